@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Rigid transforms. `T_a_b` takes points of frame b to frame a; frames cancel in a product."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from wildshape.errors import BadInputError
+from wildshape.geometry.rotation import rotation_angle
+
+_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class SE3:
+    """A batch of rigid transforms `x -> R x + t`.
+
+    Attributes:
+        rotation: `(..., 3, 3)`, proper rotations.
+        translation: `(..., 3)`, metres.
+    """
+
+    rotation: Float[Tensor, "*batch 3 3"]
+    translation: Float[Tensor, "*batch 3"]
+
+    @classmethod
+    def identity(cls, *batch: int, dtype: torch.dtype = torch.float64) -> Self:
+        """Transforms that change nothing, of the given batch shape."""
+        eye = torch.eye(3, dtype=dtype).expand(*batch, 3, 3)
+        return cls(eye, torch.zeros(*batch, 3, dtype=dtype))
+
+    @classmethod
+    def from_matrix(cls, matrix: Float[Tensor, "*batch rows 4"] | np.ndarray) -> Self:
+        """From 3x4 or 4x4 matrices, row-major, metres; kept in float64.
+
+        Raises:
+            BadInputError: a matrix is not finite or its left 3x3 block is no rotation.
+        """
+        m = torch.as_tensor(matrix, dtype=torch.float64)
+        rotation, translation = m[..., :3, :3], m[..., :3, 3]
+        if not bool(torch.isfinite(m).all()):
+            raise BadInputError("a pose holds NaN or infinite numbers.")
+        residual = rotation @ rotation.mT - torch.eye(3, dtype=torch.float64)
+        determinant = torch.linalg.det(rotation)
+        wrong = (residual.abs().amax((-2, -1)) > _TOLERANCE) | ((determinant - 1).abs() > 0.01)
+        if bool(wrong.any()):
+            bad = float(determinant[wrong].reshape(-1)[0])
+            raise BadInputError(f"a pose is no rotation (determinant {bad:.4f}, should be 1).")
+        return cls(rotation, translation)
+
+    @property
+    def matrix(self) -> Float[Tensor, "*batch 4 4"]:
+        """As 4x4 matrices, row-major."""
+        top = torch.cat((self.rotation, self.translation[..., None]), dim=-1)
+        bottom = top.new_tensor((0.0, 0.0, 0.0, 1.0)).expand(*top.shape[:-2], 1, 4)
+        return torch.cat((top, bottom), dim=-2)
+
+    def __array__(self, dtype: np.dtype | None = None, copy: bool | None = None) -> np.ndarray:
+        """`np.asarray(T)` is the 4x4 matrix."""
+        return np.asarray(self.matrix.detach().cpu().numpy(), dtype=dtype)
+
+    def __len__(self) -> int:
+        return len(self.translation)
+
+    def __getitem__(self, index: int | slice | Tensor) -> Self:
+        return type(self)(self.rotation[index], self.translation[index])
+
+    def inverse(self) -> Self:
+        """`T_b_a` of `T_a_b`."""
+        inverse = self.rotation.mT
+        return type(self)(inverse, -(inverse @ self.translation[..., None])[..., 0])
+
+    def __matmul__(self, other: "SE3") -> Self:
+        """Composition: `T_a_c = T_a_b @ T_b_c`, broadcast over the batch."""
+        rotation = self.rotation @ other.rotation
+        translation = (self.rotation @ other.translation[..., None])[..., 0] + self.translation
+        return type(self)(rotation, translation)
+
+    def apply(self, points: Float[Tensor, "*batch n 3"]) -> Float[Tensor, "*batch n 3"]:
+        """Carry points `(..., n, 3)` of frame b to frame a."""
+        return points @ self.rotation.mT + self.translation[..., None, :]
+
+    def apply_numpy(self, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+        """`apply` for one array of points, computed in float64, returned in the array's type."""
+        moved = self.apply(torch.as_tensor(points, dtype=torch.float64))
+        return moved.numpy().astype(points.dtype)
+
+    def angle(self) -> Float[Tensor, "*batch"]:
+        """Rotation angle in radians."""
+        return rotation_angle(self.rotation)
+
+    def to(self, dtype: torch.dtype) -> Self:
+        """The same transforms in another floating type."""
+        return type(self)(self.rotation.to(dtype), self.translation.to(dtype))
+
+
+def stack(transforms: list[SE3]) -> SE3:
+    """One batch of several transforms."""
+    return SE3(
+        torch.stack([t.rotation for t in transforms]),
+        torch.stack([t.translation for t in transforms]),
+    )

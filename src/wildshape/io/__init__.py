@@ -1,0 +1,3 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Files: scans by suffix, track folders, the packed store."""

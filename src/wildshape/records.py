@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is handed between the parts: frozen records, metres, frames in the names.
+
+Points are numpy float32 `(n, 3)`; poses are `SE3` over float64 tensors on the CPU.
+"""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from wildshape.geometry.se3 import SE3
+
+Points = Float[np.ndarray, "n 3"]
+SensorKind = Literal["lidar", "camera"]
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """Pinhole camera, pixels: `u = fx x / z + cx`, `v = fy y / z + cy`."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """How a scan was taken.
+
+    Attributes:
+        kind: `lidar` (x forward, y left, z up) or `camera` (x right, y down, z forward).
+        resolution_deg: angular steps (azimuth, elevation) of a LiDAR, degrees, if known.
+        intrinsics: of a camera, if known.
+    """
+
+    kind: SensorKind = "lidar"
+    resolution_deg: tuple[float, float] | None = None
+    intrinsics: Intrinsics | None = None
+
+
+@dataclass(frozen=True)
+class Track:
+    """The scans of one rigid object in time order: the method's only supervision.
+
+    Attributes:
+        name: folder name, unique in its data set.
+        scans: one `(n_i, 3)` float32 array a scan, metres, in its own sensor frame.
+        scan_names: file stems, one a scan.
+        sensor: how the scans were taken.
+        category: for example `car`; empty if unknown.
+        source: where it comes from, in words.
+        T_sensor_object: truth, one pose a scan, for evaluation only.
+        shape: truth, `(g, 3)` float32 surface points in the object frame, for evaluation only.
+    """
+
+    name: str
+    scans: tuple[Points, ...]
+    scan_names: tuple[str, ...]
+    sensor: Sensor = field(default_factory=Sensor)
+    category: str = ""
+    source: str = ""
+    T_sensor_object: SE3 | None = None
+    shape: Points | None = None
+
+    @property
+    def middle(self) -> int:
+        """Index of the middle scan, the reference of registration and fusion (METHOD 7, 8)."""
+        return len(self.scans) // 2
+
+
+@dataclass(frozen=True)
+class Box:
+    """An oriented box in the sensor frame.
+
+    Attributes:
+        center: `(3,)` metres.
+        size: `(3,)` full lengths along the box's own x (forward), y (left), z (up), metres.
+        quaternion_wxyz: `(4,)` rotation from box to sensor frame.
+    """
+
+    center: tuple[float, float, float]
+    size: tuple[float, float, float]
+    quaternion_wxyz: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Completion:
+    """One scan completed; everything in that scan's sensor frame, metres.
+
+    Attributes:
+        points: `(m, 3)` float32, the complete shape.
+        pose: `T_sensor_canonical`.
+        box: tight around `points`, its axes those of the canonical frame.
+        confidence: 0 to 1.
+        branch: the pose branch that spoke.
+        cost: its label-free cost, metres (METHOD 6).
+        refined: whether the pose was refined against the scan.
+        warning: empty, or one sentence (for example a size outside the training range).
+        seconds: time spent on this scan.
+    """
+
+    points: Points
+    pose: SE3
+    box: Box
+    confidence: float
+    branch: int
+    cost: float
+    refined: bool = False
+    warning: str = ""
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class Registration:
+    """Source registered to target.
+
+    Attributes:
+        T_target_source: takes the source scan's points to the target scan's sensor frame.
+        inlier_ratio: share of moved source points within 0.2 m (or 5 % of the object's extent
+            where that is less) of a target point.
+        confidence: 0 to 1, the smaller of the two completions'.
+    """
+
+    T_target_source: SE3
+    inlier_ratio: float
+    confidence: float
