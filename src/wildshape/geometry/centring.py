@@ -1,0 +1,35 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where a scan's own frame has its origin, found without any label (METHOD 2)."""
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from wildshape.geometry.spherical import Spherical, from_spherical, to_spherical, wrap_angle
+
+
+def _middle(values: Float[Tensor, "n"]) -> Float[Tensor, ""]:
+    return (values.amin() + values.amax()) / 2
+
+
+def frustum_centre(points: Float[Tensor, "n 3"]) -> Float[Tensor, "3"]:
+    """Middle of the bounding frustum in (azimuth, pitch, range), turned back to Cartesian.
+
+    Azimuths are taken relative to that of the mean direction, so an object across the +-pi seam
+    is not torn apart.
+    """
+    polar = to_spherical(points)
+    forward = torch.atan2(polar.azimuth.sin().mean(), polar.azimuth.cos().mean())
+    azimuth = forward + _middle(wrap_angle(polar.azimuth - forward))
+    return from_spherical(Spherical(azimuth, _middle(polar.pitch), _middle(polar.range)))
+
+
+def box_centre(points: Float[Tensor, "n 3"]) -> Float[Tensor, "3"]:
+    """Middle of the axis-aligned bounding box."""
+    return (points.amin(0) + points.amax(0)) / 2
+
+
+def scan_centre(points: Float[Tensor, "n 3"], sensor_kind: str) -> Float[Tensor, "3"]:
+    """`frustum_centre` for a LiDAR scan, `box_centre` for a depth camera's."""
+    return frustum_centre(points) if sensor_kind == "lidar" else box_centre(points)

@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Multi-view consistency with hindsight (paper eq. 5, METHOD 6)."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from wildshape.geometry.visibility import PolarBins, Projection
+from wildshape.losses.hindsight import Scores, score_hypotheses
+from wildshape.losses.observation import observation_term, projection_term
+
+
+@dataclass(frozen=True)
+class LossConfig:
+    """Weights of the loss; the defaults are the paper's for LiDAR.
+
+    Attributes:
+        beta: weight of the projection term.
+        projection: how the sensor's image is binned.
+        template: weight of the pull of every canonical shape to the batch's mean shape, at the
+            first step (beyond the paper; see docs/decisions.md).
+        template_end: the same at the last step; geometric in between.
+    """
+
+    beta: float = 0.05
+    projection: Projection = PolarBins()
+    template: float = 0.0
+    template_end: float = 0.0
+
+
+class LossTerms(NamedTuple):
+    """The loss and its parts.
+
+    Attributes:
+        total: scalar with a graph: mean over tracks of the sum over views (eq. 5).
+        observation: mean first term, metres.
+        projection: mean second term, metres.
+        winner: branch that won, a scan each.
+    """
+
+    total: Float[Tensor, ""]
+    observation: Float[Tensor, ""]
+    projection: Float[Tensor, ""]
+    winner: Int[Tensor, "B"]
+
+
+def multiview_loss(
+    scans: Float[Tensor, "B N 3"],
+    centres: Float[Tensor, "B 3"],
+    shapes: Float[Tensor, "I P 3"],
+    rotation: Float[Tensor, "B K 3 3"],
+    translation: Float[Tensor, "B K 3"],
+    config: LossConfig,
+) -> LossTerms:
+    """The shape of each track's reference scan, posed by every scan's own pose, explains it.
+
+    Args:
+        scans: centred scans, the views of a track next to each other: B = I x V.
+        centres: of the scans in their sensor frames.
+        shapes: canonical shape of the reference scan of each track.
+        rotation: of every scan's pose hypotheses.
+        translation: of the same.
+        config: weights.
+    """
+    views = len(scans) // len(shapes)
+    shape = shapes.repeat_interleave(views, dim=0)
+    with torch.no_grad():
+        posed = shape[:, None] @ rotation.mT + translation[:, :, None]
+        scores = score_hypotheses(scans, centres, posed, config.projection)
+        winner = scores.cost(config.beta).argmin(-1)
+    observation, projection = _winner_terms(scans, shape, rotation, translation, scores, winner)
+    total = (observation + config.beta * projection).mean() * views
+    return LossTerms(total, observation.mean().detach(), projection.mean().detach(), winner)
+
+
+def _winner_terms(
+    scans: Tensor,
+    shape: Tensor,
+    rotation: Tensor,
+    translation: Tensor,
+    scores: Scores,
+    winner: Tensor,
+) -> tuple[Tensor, Tensor]:
+    """Both terms of the winning hypothesis of each scan, differentiable (winner takes all)."""
+    rows = torch.arange(len(scans), device=scans.device)
+    posed = shape @ rotation[rows, winner].mT + translation[rows, winner][:, None]
+    observation = observation_term(scans, posed, scores.to_shape[rows, winner])
+    seen = scores.visible[rows, winner]
+    projection = projection_term(posed, scans, scores.to_scan[rows, winner], seen)
+    return observation, projection

@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The two decoders (METHOD 3): canonical shape, and K hypotheses of the pose."""
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+from torch.nn.functional import relu
+
+from wildshape.geometry.rotation import (
+    random_rotation,
+    rotation_from_6d,
+    rotation_to_6d,
+    rotation_z,
+)
+
+
+class ShapeDecoder(nn.Module):
+    """Code to `(m, 3)` canonical points, a 3-layer MLP.
+
+    Args:
+        code: length of the code.
+        widths: of the two hidden layers.
+        points: m; even if `mirror`.
+        mirror: decode m / 2 points and reflect them in the canonical plane y = 0.
+    """
+
+    def __init__(self, code: int, widths: tuple[int, int], points: int, mirror: bool) -> None:
+        super().__init__()
+        self.mirror = mirror
+        self.layer1 = nn.Linear(code, widths[0])
+        self.layer2 = nn.Linear(widths[0], widths[1])
+        self.layer3 = nn.Linear(widths[1], 3 * (points // 2 if mirror else points))
+        self._start_as_ball()
+
+    @torch.no_grad()
+    def _start_as_ball(self) -> None:
+        """Start from a ball of half the unit radius, so that every point has work to do."""
+        count = self.layer3.out_features // 3
+        direction = nn.functional.normalize(torch.randn(count, 3), dim=-1)
+        radius = torch.rand(count, 1) ** (1 / 3)
+        self.layer3.bias.copy_((0.5 * direction * radius).flatten())
+
+    def forward(self, code: Float[Tensor, "B z"]) -> Float[Tensor, "B P 3"]:
+        """Canonical points, in units of the network's scale."""
+        points = self.layer3(relu(self.layer2(relu(self.layer1(code))))).unflatten(-1, (-1, 3))
+        if not self.mirror:
+            return points
+        reflected = points * points.new_tensor((1.0, -1.0, 1.0))
+        return torch.cat((points, reflected), dim=1)
+
+
+class PoseDecoder(nn.Module):
+    """Code to K rotations and translations, one 3-layer MLP a branch, all in one product.
+
+    Args:
+        code: length of the code.
+        widths: of the two hidden layers of a branch.
+        branches: K.
+        spread: where the branches start: `yaw`, turned evenly about z, or `sphere`, drawn from
+            SO(3).
+    """
+
+    def __init__(self, code: int, widths: tuple[int, int], branches: int, spread: str) -> None:
+        super().__init__()
+        a, b = widths
+        self.branches = branches
+        self.layer1 = nn.Linear(code, branches * a)
+        self.weight2 = nn.Parameter(torch.randn(branches, a, b) * (2 / a) ** 0.5)
+        self.bias2 = nn.Parameter(torch.zeros(branches, 1, b))
+        self.weight3 = nn.Parameter(torch.randn(branches, b, 9) * 0.3 / b**0.5)
+        self.bias3 = nn.Parameter(torch.zeros(branches, 1, 9))
+        self._start_spread(spread)
+
+    @torch.no_grad()
+    def _start_spread(self, spread: str) -> None:
+        turns = torch.arange(self.branches) * (2 * torch.pi / self.branches)
+        generator = torch.Generator().manual_seed(0)
+        start = rotation_z(turns) if spread == "yaw" else random_rotation(self.branches, generator)
+        self.bias3[:, 0, :6] = rotation_to_6d(start)
+
+    def forward(
+        self, code: Float[Tensor, "B z"]
+    ) -> tuple[Float[Tensor, "B K 3 3"], Float[Tensor, "B K 3"]]:
+        """Rotation and translation of `T_sensor_canonical`, in the scan's centred frame."""
+        hidden = relu(self.layer1(code)).unflatten(-1, (self.branches, -1)).transpose(0, 1)
+        hidden = relu(torch.baddbmm(self.bias2, hidden, self.weight2))
+        out = torch.baddbmm(self.bias3, hidden, self.weight3).transpose(0, 1).float()
+        return rotation_from_6d(out[..., :6]), out[..., 6:]
