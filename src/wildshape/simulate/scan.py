@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""One turn of a spinning LiDAR over one object: the rays, and what comes back."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wildshape.simulate.raycast import Hits, Scene
+from wildshape.simulate.sensor import SpinningLidar
+from wildshape.simulate.solid import Solid
+
+_RIM_M = 0.3
+
+
+@dataclass(frozen=True)
+class Returns:
+    """How pulses are lost and blurred.
+
+    Attributes:
+        noise_m: sigma of the range noise, metres.
+        dropout: share of pulses lost at random.
+        glass: share of pulses on glass that do come back.
+        ground: whether ground returns within 0.3 m of the object's box are left in.
+    """
+
+    noise_m: float
+    dropout: float
+    glass: float
+    ground: bool
+
+
+def window(T_object_sensor: np.ndarray, half: np.ndarray) -> tuple[float, ...]:
+    """Azimuth and elevation range of an object's box in the sensor's image, degrees.
+
+    Args:
+        T_object_sensor: `(4, 4)`.
+        half: `(3,)` half lengths of the box around the object's origin, metres.
+
+    Returns:
+        Azimuth from, to (to >= from, no seam between), elevation from, to.
+    """
+    edges = (_EDGES * half - T_object_sensor[:3, 3]) @ T_object_sensor[:3, :3]
+    middle = -T_object_sensor[:3, 3] @ T_object_sensor[:3, :3]
+    toward = np.arctan2(middle[1], middle[0])
+    azimuth = np.arctan2(edges[:, 1], edges[:, 0]) - toward
+    azimuth = np.degrees((azimuth + np.pi) % (2 * np.pi) - np.pi)
+    elevation = np.degrees(np.arctan2(edges[:, 2], np.hypot(edges[:, 0], edges[:, 1])))
+    away = np.degrees(toward)
+    return (
+        away + azimuth.min(), away + azimuth.max(),
+        float(elevation.min()) - 0.05, float(elevation.max()) + 0.05,
+    )  # fmt: skip
+
+
+def rays(
+    sensor: SpinningLidar, bounds: tuple[float, ...], phase_deg: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The sensor's own pulses within a window.
+
+    Args:
+        sensor: its beam table and azimuth step.
+        bounds: as from `window`, degrees.
+        phase_deg: azimuth of the turn's first firing, degrees.
+
+    Returns:
+        `(n, 3)` float64 unit directions in the sensor frame and `(n,)` ring numbers.
+    """
+    table = np.asarray(sensor.elevation_deg)
+    ring = np.flatnonzero((table >= bounds[2]) & (table <= bounds[3]))
+    step = sensor.azimuth_step_deg
+    first = np.ceil((bounds[0] - phase_deg) / step) - 1
+    columns = np.arange(int((bounds[1] - bounds[0]) / step) + 3)
+    azimuth = phase_deg + step * (first + columns) + sensor.ring_phase_deg[ring, None]
+    phi = np.radians(azimuth)
+    theta = np.radians(table[ring])[:, None]
+    flat = np.broadcast_to(np.cos(theta), phi.shape)
+    up = np.broadcast_to(np.sin(theta), phi.shape)
+    directions = np.stack((flat * np.cos(phi), flat * np.sin(phi), up), -1).reshape(-1, 3)
+    return directions, np.repeat(ring, len(columns))
+
+
+def scan(
+    scene: Scene,
+    target: Solid,
+    sensor: SpinningLidar,
+    T_object_sensor: np.ndarray,
+    returns: Returns,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """One scan of the object, `(n, 3)` float32, metres, sensor frame.
+
+    Args:
+        scene: the target as solid 0, anything after it only blocks the view.
+        target: the object, its box centre at the origin of its frame.
+        sensor: what scans.
+        T_object_sensor: `(4, 4)` where it stands.
+        returns: how pulses are lost.
+        rng: the only source of chance.
+    """  # fmt: skip
+    half = target.bounds[1]
+    grown = half + ((_RIM_M, _RIM_M, 0.0) if returns.ground else 0.0)
+    phase = float(rng.uniform(0, sensor.azimuth_step_deg))
+    directions, _ = rays(sensor, window(T_object_sensor, grown), phase)
+    toward = directions @ T_object_sensor[:3, :3].T
+    origin = T_object_sensor[:3, 3]
+    hits = scene.cast(np.broadcast_to(origin, toward.shape), toward)
+    kept = _returned(hits, target, sensor, returns, rng)
+    distance = hits.distance.astype(np.float64)
+    if returns.ground:
+        below = _ground(hits, toward, origin, half)
+        lost = rng.random(len(below)) < returns.dropout
+        distance = np.where(below > 0, below, distance)
+        kept = np.where(below > 0, ~lost, kept)
+    reach = distance[kept]
+    reach = reach + returns.noise_m * rng.standard_normal(len(reach))
+    return (directions[kept] * reach[:, None]).astype(np.float32)
+
+
+def _returned(
+    hits: Hits, target: Solid, sensor: SpinningLidar, returns: Returns, rng: np.random.Generator
+) -> np.ndarray:
+    """`(n,)` bool: pulses on the target that come back strong enough to be told."""
+    chance = np.full(len(hits.face), 1 - returns.dropout)
+    chance *= np.clip(hits.cosine / 0.12, 0.0, 1.0)
+    glass = target.glass[np.maximum(hits.face, 0)] & (hits.solid == 0)
+    chance *= np.where(glass, returns.glass, 1.0)
+    on_target = (hits.solid == 0) & (hits.distance < sensor.max_range_m)
+    return on_target & (rng.random(len(chance)) < chance)
+
+
+def _ground(hits: Hits, toward: np.ndarray, origin: np.ndarray, half: np.ndarray) -> np.ndarray:
+    """`(n,)` range of the ground where a pulse meets it first, near the object; else 0."""
+    down = np.minimum(toward[:, 2], -1e-9)
+    reach = (-half[2] - origin[2]) / down
+    at = origin[:2] + reach[:, None] * toward[:, :2]
+    near = (np.abs(at) <= half[:2] + _RIM_M).all(1)
+    return np.where(near & (reach < hits.distance), reach, 0.0)
+
+
+def _box_edges(steps: int = 9) -> np.ndarray:
+    """`(12 steps, 3)` points along the edges of the cube from -1 to 1."""
+    t = np.linspace(-1, 1, steps)
+    corners = np.array([(a, b) for a in (-1, 1) for b in (-1, 1)], float)
+    edges = [
+        np.insert(np.repeat(corners, steps, 0), axis, np.tile(t, 4), axis=1) for axis in range(3)
+    ]
+    return np.concatenate(edges)
+
+
+_EDGES = _box_edges()

@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The complete shape: points spread evenly over the surface that can be seen from outside."""
+
+import numpy as np
+
+from wildshape.errors import BadInputError
+from wildshape.simulate.raycast import Scene
+from wildshape.simulate.solid import Solid
+
+_ROUNDS = 24
+
+
+def visible_surface(
+    solid: Solid, scene: Scene, count: int, lowest_deg: float, rng: np.random.Generator
+) -> np.ndarray:
+    """`(count, 3)` float32 points on the outer visible surface, uniform by area.
+
+    Points are drawn uniformly by area over all triangles; one counts as visible if it is the
+    first hit from far away in at least one of 24 random directions. What is inside a closed
+    body, or under a car, is therefore not in it.
+
+    Args:
+        solid: the object.
+        scene: of the object alone.
+        count: points returned.
+        lowest_deg: lowest elevation of a viewer: about -5 for objects that stand on the road
+            (a LiDAR never sees a car from below), -90 for objects seen from everywhere.
+        rng: the only source of chance.
+
+    Raises:
+        BadInputError: nearly nothing of the surface can be seen from outside.
+    """
+    found, have = [], 0
+    for _ in range(12):
+        points = _on_surface(solid, int(1.3 * (count - have)) + 64, rng)
+        seen = points[_seen(points, solid, scene, lowest_deg, rng)]
+        found.append(seen)
+        have += len(seen)
+        if have >= count:
+            return np.concatenate(found)[:count].astype(np.float32)
+    raise BadInputError(
+        f"the mesh {solid.kind or 'given'} shows {have} of {count} surface points to the outside, "
+        "expected nearly all: check that it holds one object and no empty triangles."
+    )
+
+
+def _on_surface(solid: Solid, count: int, rng: np.random.Generator) -> np.ndarray:
+    """`(count, 3)` points, uniform by area (stratified along the triangle list)."""
+    a, b, c = (solid.vertices[solid.faces[:, i]] for i in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    cumulative = np.cumsum(area)
+    at = (np.arange(count) + rng.random(count)) / count * cumulative[-1]
+    face = np.minimum(np.searchsorted(cumulative, at), len(area) - 1)
+    u, v = rng.random((2, count, 1))
+    fold = u + v > 1
+    u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
+    points = a[face] + u * (b[face] - a[face]) + v * (c[face] - a[face])
+    return rng.permutation(points)
+
+
+def _seen(
+    points: np.ndarray, solid: Solid, scene: Scene, lowest_deg: float, rng: np.random.Generator
+) -> np.ndarray:
+    """`(n,)` bool: the first thing met from far away in one of `_ROUNDS` directions."""
+    low, high = solid.bounds
+    far = 2 * float(np.linalg.norm(high - low))
+    seen = np.zeros(len(points), bool)
+    for _ in range(_ROUNDS):
+        left = np.flatnonzero(~seen)
+        if len(left) == 0:
+            break
+        toward = _directions(len(left), lowest_deg, rng)
+        reach = np.full(len(left), far * (1 - 2e-4))
+        hidden = scene.blocked(points[left] + far * toward, -toward, reach)
+        seen[left[~hidden]] = True
+    return seen
+
+
+def _directions(count: int, lowest_deg: float, rng: np.random.Generator) -> np.ndarray:
+    """`(count, 3)` unit vectors, uniform over the sphere above an elevation."""
+    z = rng.uniform(np.sin(np.radians(lowest_deg)), 1.0, count)
+    azimuth = rng.uniform(0, 2 * np.pi, count)
+    flat = np.sqrt(1 - z * z)
+    return np.stack((flat * np.cos(azimuth), flat * np.sin(azimuth), z), -1)
