@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Every failure of a file or of a library that reads it becomes one sentence."""
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from wildshape.errors import BadInputError
+
+MAX_POINTS = 100_000_000
+"""More points in one scan of one object are taken for a damaged header."""
+
+
+@contextmanager
+def reading(path: Path, expected: str) -> Iterator[None]:
+    """Turn whatever goes wrong inside into a `BadInputError` naming `path` and `expected`.
+
+    Warnings of the libraries are dropped: what matters in a damaged file is an error.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except BadInputError:
+        raise
+    except FileNotFoundError as error:
+        raise BadInputError(f"{path}: no such file; check the path.") from error
+    except OSError as error:
+        reason = error.strerror or first_line(error)
+        raise BadInputError(f"{path}: cannot be read as {expected} ({reason}).") from error
+    except Exception as error:
+        raise BadInputError(
+            f"{path}: expected {expected}, found a damaged or foreign file "
+            f"({type(error).__name__}: {first_line(error)}); write or copy it again."
+        ) from error
+
+
+def first_line(error: BaseException, limit: int = 160) -> str:
+    """The start of an error's message, on one line."""
+    text = " ".join(str(error).split())
+    return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def check_promise(path: Path, what: str, promised: int, least: int, present: int) -> None:
+    """Refuse a header that promises more than its file can hold, before anything is allocated.
+
+    Args:
+        path: named in the error.
+        what: the name of the counted things, for example `points`.
+        promised: how many of them the header promises.
+        least: bytes that the promise needs at least.
+        present: bytes that the file holds after its header.
+
+    Raises:
+        BadInputError: the promise is negative, absurd, or does not fit into the file.
+    """
+    if promised < 0:
+        raise BadInputError(f"{path}: the header promises {promised} {what}; write the file again.")
+    if least > present:
+        raise BadInputError(
+            f"{path}: the header promises {promised} {what} (at least {least} bytes), but only "
+            f"{present} bytes follow it; the file is truncated or its header is wrong: copy or "
+            "write it again."
+        )
+    if promised > MAX_POINTS:
+        raise BadInputError(
+            f"{path}: {promised} {what} is more than one scan of one object can hold "
+            f"({MAX_POINTS}); cut the objects out of the scan first."
+        )
