@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Outliers of accumulated clouds, and thinning to an even density (METHOD 8)."""
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+
+def statistical_inliers(
+    points: Float[np.ndarray, "n 3"], neighbours: int = 20, ratio: float = 2.0
+) -> Bool[np.ndarray, "n"]:
+    """Points whose mean distance to their nearest neighbours is not unusual for this cloud.
+
+    Kept where that mean is at most (average over the cloud) + `ratio` x (its standard deviation).
+
+    Args:
+        points: metres, any frame.
+        neighbours: how many, the point itself not counted; fewer where the cloud is smaller.
+        ratio: in standard deviations.
+    """
+    from scipy.spatial import KDTree
+
+    k = min(neighbours, len(points) - 1)
+    if k < 1:
+        return np.ones(len(points), dtype=bool)
+    distances, _ = KDTree(points).query(points, k=k + 1)
+    means = distances[:, 1:].mean(axis=1)
+    return means <= means.mean() + ratio * means.std()
+
+
+def radius_inliers(
+    points: Float[np.ndarray, "n 3"], radius: float, neighbours: int
+) -> Bool[np.ndarray, "n"]:
+    """Points with at least `neighbours` others within `radius` metres."""
+    from scipy.spatial import KDTree
+
+    if len(points) == 0:
+        return np.ones(0, dtype=bool)
+    counts = KDTree(points).query_ball_point(points, radius, return_length=True)
+    return np.asarray(counts) - 1 >= neighbours
+
+
+def voxel_thin(points: Float[np.ndarray, "n 3"], size: float) -> Float[np.ndarray, "m 3"]:
+    """The mean of the points in each occupied cube of edge `size` metres, in a fixed order."""
+    if len(points) == 0:
+        return points
+    cells = np.floor(points / size).astype(np.int64)
+    _, index = np.unique(cells, axis=0, return_inverse=True)
+    index = index.reshape(-1)
+    counts = np.bincount(index)
+    sums = [np.bincount(index, weights=points[:, axis]) for axis in range(3)]
+    return (np.stack(sums, axis=1) / counts[:, None]).astype(points.dtype)
