@@ -1,0 +1,242 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Track folders: scans/ and, if known, poses.txt, shape.ply, track.json (DESIGN, Track folder)."""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from jaxtyping import Float32
+from numpy import ndarray
+
+from wildshape.errors import BadInputError
+from wildshape.geometry.se3 import SE3
+from wildshape.io.atomic import write_json
+from wildshape.io.guard import reading
+from wildshape.io.points import METRES, Unit, is_scan_file, read_points, read_scan, write_ply
+from wildshape.io.poses import read_poses, write_poses
+from wildshape.records import Intrinsics, Sensor, Track
+
+__all__ = [
+    "NoUsableScanError",
+    "TrackFile",
+    "read_poses",
+    "read_track",
+    "read_track_file",
+    "track_of_files",
+    "write_poses",
+    "write_track",
+]
+
+Skipped = tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class TrackFile:
+    """A track as read.
+
+    Attributes:
+        track: the usable scans, with their truth if there is any.
+        skipped: file name and reason of each scan that could not be used.
+        dropped_nonfinite: file name and number of the points that were NaN or infinite.
+    """
+
+    track: Track
+    skipped: Skipped = ()
+    dropped_nonfinite: tuple[tuple[str, int], ...] = ()
+
+
+class NoUsableScanError(BadInputError):
+    """A track all of whose scans were refused; `skipped` says why."""
+
+    def __init__(self, folder: Path, skipped: Skipped):
+        self.skipped = skipped
+        reason = skipped[0][1] if skipped else "the folder is empty"
+        super().__init__(f"{folder}: none of {len(skipped)} scans can be used; the first: {reason}")
+
+
+def read_track(folder: Path | str, unit: Unit = "m") -> Track:
+    """The track in a folder; scans that cannot be used are left out (see `read_track_file`)."""
+    return read_track_file(folder, unit).track
+
+
+def read_track_file(folder: Path | str, unit: Unit = "m") -> TrackFile:
+    """The track in a folder with the list of the scans that had to be skipped.
+
+    Args:
+        folder: holds scans/, and perhaps poses.txt, shape.ply, track.json.
+        unit: of scans, shape and the poses' translations; the "unit" of track.json goes before
+            the default `m`. Everything returned is in metres.
+
+    Raises:
+        BadInputError: no scans, none of them usable, or damaged poses, shape or track.json.
+    """
+    folder = Path(folder)
+    files = scan_files(folder / "scans")
+    info = _read_info(folder / "track.json")
+    unit = info["unit"] if unit == "m" else unit
+    kept, skipped, dropped = _read_scans(files, folder, unit)
+    poses = _read_truth(folder / "poses.txt", len(files), [files.index(f) for f in kept], unit)
+    track = Track(
+        name=folder.resolve().name,
+        scans=tuple(kept.values()),
+        scan_names=_stems(list(kept)),
+        sensor=info["sensor"],
+        category=info["category"],
+        source=info["source"],
+        T_sensor_object=poses,
+        shape=_read_shape(folder / "shape.ply", unit),
+    )
+    return TrackFile(track, skipped, dropped)
+
+
+def track_of_files(files: list[Path], name: str, unit: Unit = "m") -> TrackFile:
+    """Scan files of a plain folder as one track, in the order given.
+
+    Raises:
+        NoUsableScanError: none of them can be used.
+    """
+    kept, skipped, dropped = _read_scans(files, files[0].parent, unit)
+    track = Track(name, tuple(kept.values()), _stems(list(kept)))
+    return TrackFile(track, skipped, dropped)
+
+
+def scan_files(folder: Path) -> list[Path]:
+    """The scan files of a folder, sorted by name: in time order.
+
+    Raises:
+        BadInputError: there is no such folder or no scan in it.
+    """
+    if not folder.is_dir():
+        raise BadInputError(f"{folder}: no such folder; a track keeps its scans in scans/.")
+    files = sorted((f for f in folder.iterdir() if is_scan_file(f)), key=lambda f: f.name)
+    if not files:
+        raise BadInputError(f"{folder}: holds no scan (.ply .pcd .bin .npy .npz .xyz .las ...).")
+    return files
+
+
+def _read_scans(
+    files: list[Path], folder: Path, unit: Unit
+) -> tuple[dict[Path, Float32[ndarray, "n 3"]], Skipped, tuple[tuple[str, int], ...]]:
+    kept, skipped, dropped = {}, [], []
+    for file in files:
+        try:
+            scan = read_scan(file, unit)
+        except BadInputError as error:
+            skipped.append((file.name, str(error)))
+            continue
+        kept[file] = scan.points
+        if scan.dropped_nonfinite:
+            dropped.append((file.name, scan.dropped_nonfinite))
+    if not kept:
+        raise NoUsableScanError(folder, tuple(skipped))
+    return kept, tuple(skipped), tuple(dropped)
+
+
+def _stems(files: list[Path]) -> tuple[str, ...]:
+    """Names of scans: the stems, or the whole file names where two stems are equal."""
+    stems = tuple(file.stem for file in files)
+    return stems if len(set(stems)) == len(stems) else tuple(file.name for file in files)
+
+
+def _read_truth(path: Path, count: int, kept: list[int], unit: Unit) -> SE3 | None:
+    """Truth poses of the scans that were kept."""
+    if not path.exists():
+        return None
+    poses = read_poses(path, count)[torch.tensor(kept)]
+    return SE3(poses.rotation, poses.translation * METRES[unit])
+
+
+def _read_shape(path: Path, unit: Unit) -> Float32[ndarray, "n 3"] | None:
+    return read_points(path, unit) if path.exists() else None
+
+
+def _read_info(path: Path) -> dict[str, Any]:
+    """track.json with its gaps filled."""
+    raw: Any = {}
+    if path.exists():
+        with reading(path, "JSON with the keys of a track"):
+            raw = json.loads(path.read_text("utf-8"))
+            if not isinstance(raw, dict):
+                raise BadInputError(f"{path}: expected a JSON object, found {type(raw).__name__}.")
+            return _parse_info(raw, path)
+    return _parse_info(raw, path)
+
+
+def _parse_info(raw: dict[str, Any], path: Path) -> dict[str, Any]:
+    unit = raw.get("unit", "m")
+    if unit not in METRES:
+        raise BadInputError(f"{path}: unit {unit!r} is unknown; use one of {', '.join(METRES)}.")
+    return {
+        "unit": unit,
+        "sensor": sensor_from_json(raw, path),
+        "category": str(raw.get("category") or ""),
+        "source": str(raw.get("source") or ""),
+    }
+
+
+def sensor_from_json(raw: dict[str, Any], path: Path) -> Sensor:
+    """The sensor described by the keys sensor, resolution_deg and intrinsics.
+
+    Raises:
+        BadInputError: a value makes no sense.
+    """
+    kind = raw.get("sensor", "camera" if raw.get("intrinsics") else "lidar")
+    if kind not in ("lidar", "camera"):
+        raise BadInputError(f"{path}: sensor {kind!r} is unknown; use 'lidar' or 'camera'.")
+    try:
+        steps, intrinsics = raw.get("resolution_deg"), raw.get("intrinsics")
+        azimuth, elevation = steps or (0.0, 0.0)
+        return Sensor(
+            kind=kind,
+            resolution_deg=(float(azimuth), float(elevation)) if steps else None,
+            intrinsics=_parse_intrinsics(intrinsics) if intrinsics else None,
+        )
+    except (TypeError, ValueError, KeyError) as error:
+        raise BadInputError(
+            f"{path}: expected resolution_deg [azimuth, elevation] or intrinsics "
+            f"{{fx, fy, cx, cy, width, height}}, found {type(error).__name__}: {error}."
+        ) from error
+
+
+def _parse_intrinsics(raw: dict[str, Any]) -> Intrinsics:
+    numbers = {key: float(raw[key]) for key in ("fx", "fy", "cx", "cy")}
+    return Intrinsics(**numbers, width=int(raw["width"]), height=int(raw["height"]))
+
+
+def sensor_to_json(sensor: Sensor) -> dict[str, Any]:
+    """The keys of track.json that describe a sensor; unknown ones are left out."""
+    data: dict[str, Any] = {"sensor": sensor.kind}
+    if sensor.resolution_deg is not None:
+        data["resolution_deg"] = list(sensor.resolution_deg)
+    if sensor.intrinsics is not None:
+        data["intrinsics"] = asdict(sensor.intrinsics)
+    return data
+
+
+def write_track(folder: Path | str, track: Track) -> None:
+    """Write a track folder in metres; scans are numbered files if their names are no file names.
+
+    Raises:
+        BadInputError: the folder has scans already.
+    """
+    folder = Path(folder)
+    if (folder / "scans").exists():
+        raise BadInputError(f"{folder}: holds a track already; choose another folder or remove it.")
+    for name, points in zip(_file_names(track), track.scans):
+        write_ply(folder / "scans" / f"{name}.ply", points)
+    if track.T_sensor_object is not None:
+        write_poses(folder / "poses.txt", track.T_sensor_object)
+    if track.shape is not None:
+        write_ply(folder / "shape.ply", track.shape)
+    info = {"category": track.category, "source": track.source, "unit": "m"}
+    write_json(folder / "track.json", sensor_to_json(track.sensor) | info)
+
+
+def _file_names(track: Track) -> list[str]:
+    """Names that sort in time order: the scans' own if they do, else their numbers."""
+    names = list(track.scan_names)
+    usable = names == sorted(set(names)) and all(Path(n).name == n and n for n in names)
+    return names if usable else [f"{i:06d}" for i in range(len(names))]
