@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Objects to look at, chosen by their error and never by hand."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from wildshape.evaluation.cases import Case, prepare
+from wildshape.evaluation.method import Completer, Method, Registrar
+from wildshape.evaluation.protocol import complete_scans
+from wildshape.evaluation.results import MethodScores, Results
+from wildshape.records import Points, Track
+
+
+@dataclass(frozen=True)
+class Example:
+    """One object as seen, as it is and as it was made; clouds in the object's true frame, metres.
+
+    Attributes:
+        label: `best`, `median` or `worst`.
+        track: name.
+        cd: mean over the track's scans, metres.
+        scan: `(n, 3)`, the middle scan.
+        truth: `(g, 3)`.
+        completed: `(m, 3)`, from the middle scan alone.
+        fused: `(f, 3)`, all scans moved by the method; None if it does not register.
+    """
+
+    label: str
+    track: str
+    cd: float
+    scan: Points
+    truth: Points
+    completed: Points
+    fused: Points | None
+
+
+def pick(scores: MethodScores) -> dict[str, tuple[str, float]]:
+    """`best`, `median` and `worst` track by its mean CD: their names and that mean."""
+    sums: dict[str, list[float]] = {}
+    for row in scores.completions:
+        sums.setdefault(row.track, []).append(row.error.cd)
+    means = sorted((float(np.mean(values)), name) for name, values in sums.items())
+    if not means:
+        return {}
+    chosen = {"best": means[0], "median": means[len(means) // 2], "worst": means[-1]}
+    return {label: (name, cd) for label, (cd, name) in chosen.items()}
+
+
+def gather(
+    tracks: Iterable[Track],
+    results: Results,
+    name: str,
+    method: Method,
+    *,
+    max_scans: int | None = None,
+) -> list[Example]:
+    """The three objects of a run, completed and fused once more for drawing.
+
+    Args:
+        tracks: those of the run.
+        results: of the run.
+        name: the method's row; it must complete single scans.
+        method: the same as in the run.
+        max_scans: the same as in the run.
+    """
+    chosen = pick(results[name])
+    if not isinstance(method, Completer):
+        return []
+    wanted = {track for track, _ in chosen.values()}
+    cases = {
+        track.name: prepare(track, results.rotate, results.seed, max_scans)
+        for track in tracks
+        if track.name in wanted
+    }
+    made = (_example(label, cd, cases[t], method) for label, (t, cd) in chosen.items())
+    return [example for example in made if example is not None]
+
+
+def _example(label: str, cd: float, case: Case, method: Completer) -> Example | None:
+    completed = complete_scans(method, case)[case.middle]
+    if completed is None or case.truth is None or case.T_sensor_object is None:
+        return None
+    T_object_middle = case.T_sensor_object[case.middle].inverse()
+    fused = _fuse(method, case) if isinstance(method, Registrar) else None
+    return Example(
+        label=label,
+        track=case.name,
+        cd=cd,
+        scan=T_object_middle.apply_numpy(case.scans[case.middle]),
+        truth=case.truth.shape,
+        completed=T_object_middle.apply_numpy(completed),
+        fused=None if fused is None else T_object_middle.apply_numpy(fused),
+    )
+
+
+def _fuse(method: Registrar, case: Case) -> Points:
+    T_middle_scan = method.register_track(case.inputs(), case.sensor)
+    moved = [T_middle_scan[i].apply_numpy(scan) for i, scan in enumerate(case.scans)]
+    return np.concatenate(moved)

@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of an evaluation: clouds from one fixed viewpoint, and how the errors spread."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Float
+
+from wildshape.evaluation.examples import Example
+from wildshape.evaluation.metrics import ACCURATE_DEG
+from wildshape.evaluation.results import MethodScores, Results
+from wildshape.records import Points
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# From the front left and above, in the object's frame: orthographic, so sizes compare.
+_AZIMUTH_DEG, _ELEVATION_DEG = 40.0, 22.0
+_PANELS = ("one scan", "truth", "completed", "fused")
+_MAX_DRAWN = 6000
+
+
+def project(points: Points) -> Float[np.ndarray, "n 3"]:
+    """Right, up and towards the viewer, metres, from the fixed viewpoint."""
+    azimuth, elevation = math.radians(_AZIMUTH_DEG), math.radians(_ELEVATION_DEG)
+    towards = np.asarray(
+        (
+            math.cos(elevation) * math.cos(azimuth),
+            math.cos(elevation) * math.sin(azimuth),
+            math.sin(elevation),
+        )
+    )
+    right = np.asarray((-math.sin(azimuth), math.cos(azimuth), 0.0))
+    return points @ np.stack((right, np.cross(towards, right), towards), axis=1)
+
+
+def draw_examples(examples: Sequence[Example]) -> Figure:
+    """A row an object: the scan, the truth, the completion and the fused track."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(3.2 * len(_PANELS), 2.5 * len(examples)), layout="constrained")
+    axes = figure.subplots(len(examples), len(_PANELS), squeeze=False)
+    for row, example in zip(axes, examples, strict=True):
+        _draw_example(row, example)
+    for ax, title in zip(axes[0], _PANELS, strict=True):
+        ax.set_title(title)
+    return figure
+
+
+def _draw_example(row: Sequence[Axes], example: Example) -> None:
+    clouds = (example.scan, example.truth, example.completed, example.fused)
+    low, high = project(example.truth).min(0)[:2], project(example.truth).max(0)[:2]
+    heights = (float(example.truth[:, 2].min()), float(example.truth[:, 2].max()))
+    margin = 0.12 * float((high - low).max())
+    for ax, cloud in zip(row, clouds, strict=True):
+        ax.set_aspect("equal")
+        ax.set_xlim(low[0] - margin, high[0] + margin)
+        ax.set_ylim(low[1] - margin, high[1] + margin)
+        ax.set_xticks([])
+        ax.set_yticks([])
+        if cloud is None:
+            ax.text(0.5, 0.5, "does not register", ha="center", transform=ax.transAxes)
+        else:
+            _draw_cloud(ax, cloud, heights)
+            ax.set_xlabel(f"{len(cloud)} points", fontsize=8)
+    row[0].set_ylabel(f"{example.label}\nCD {example.cd:.3f} m", fontsize=9)
+    row[1].text(0.02, 0.97, example.track, va="top", fontsize=6, transform=row[1].transAxes)
+
+
+def _draw_cloud(ax: Axes, cloud: Points, heights: tuple[float, float]) -> None:
+    step = -(-len(cloud) // _MAX_DRAWN)
+    seen = project(cloud[::step])
+    order = np.argsort(seen[:, 2])
+    height = cloud[::step, 2][order]
+    x, y = seen[order, 0], seen[order, 1]
+    low, high = heights
+    ax.scatter(x, y, c=height, s=1.6, cmap="viridis", vmin=low, vmax=high, linewidths=0)
+
+
+def draw_errors(results: Results) -> Figure:
+    """Share of scans below an error: rotation with the 30 degree bar, and CD."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 3.8), layout="constrained")
+    rotation, cd = figure.subplots(1, 2)
+    for i, scores in enumerate(results.methods):
+        _draw_shares(rotation, [r.rotation_deg for r in scores.registrations], scores, i)
+        _draw_shares(cd, [r.error.cd for r in scores.completions], scores, i)
+    rotation.axvline(ACCURATE_DEG, color="0.6", linestyle=":", linewidth=1)
+    rotation.set_xscale("log")
+    rotation.set_xlim(0.1, 180)
+    ticks = (0.1, 0.3, 1, 3, 10, 30, 180)
+    rotation.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    rotation.minorticks_off()
+    rotation.set_xlabel("rotation error, degrees")
+    cd.set_xlim(left=0)
+    cd.set_xlabel("Chamfer distance, m")
+    for ax in (rotation, cd):
+        _finish(ax)
+    return figure
+
+
+def _draw_shares(ax: Axes, errors: list[float], scores: MethodScores, colour: int) -> None:
+    if not errors:
+        return
+    shares = 100 * np.arange(len(errors) + 1) / len(errors)
+    x = np.concatenate(([0.0], np.sort(errors)))
+    ax.step(x, shares, where="post", label=scores.name, color=f"C{colour}")
+
+
+def _finish(ax: Axes) -> None:
+    ax.set_ylim(0, 102)
+    ax.set_ylabel("scans below it, %")
+    ax.grid(alpha=0.3)
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(fontsize=8, frameon=False, loc="best")
+
+
+def write_figures(folder: Path, results: Results, examples: Sequence[Example]) -> list[Path]:
+    """Write `errors.png` and, where there are examples, `examples.png`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    drawn = {"errors.png": draw_errors(results)}
+    if examples:
+        drawn["examples.png"] = draw_examples(examples)
+    for name, figure in drawn.items():
+        figure.savefig(folder / name, dpi=130)
+    return [folder / name for name in drawn]

@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What evaluation asks of a method. Methods offer any of these and do not import this file.
+
+None of them is handed anything but points and the kind of sensor (METHOD 8).
+"""
+
+from collections.abc import Sequence
+from typing import Protocol, runtime_checkable
+
+from wildshape.geometry.se3 import SE3
+from wildshape.records import Points, Sensor
+
+
+@runtime_checkable
+class Completer(Protocol):
+    """Completes one scan on its own."""
+
+    def complete(self, points: Points, sensor: Sensor) -> Points:
+        """The complete shape `(m, 3)` in the frame of `points` `(n, 3)`, metres."""
+        ...
+
+
+@runtime_checkable
+class BatchCompleter(Completer, Protocol):
+    """Completes several scans, each on its own, faster together."""
+
+    def complete_many(self, scans: list[Points], sensor: Sensor) -> Sequence[Points]:
+        """`complete` of each scan, in order."""
+        ...
+
+
+@runtime_checkable
+class TrackCompleter(Protocol):
+    """Completes an object from all scans of its track together."""
+
+    def complete_track(self, scans: list[Points], sensor: Sensor) -> Points:
+        """The shape `(m, 3)` in the frame of the middle scan, `scans[len(scans) // 2]`."""
+        ...
+
+
+@runtime_checkable
+class Registrar(Protocol):
+    """Finds how the object moved."""
+
+    def register_track(self, scans: list[Points], sensor: Sensor) -> SE3:
+        """`T_middle_scan`, one a scan: takes each scan to the frame of the middle scan."""
+        ...
+
+
+Method = Completer | TrackCompleter | Registrar

@@ -1,0 +1,193 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The evaluation protocol of METHOD 8: methods see points and the sensor, never the truth."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+
+from wildshape.errors import BadInputError
+from wildshape.evaluation.cases import Case, Truth, prepare
+from wildshape.evaluation.method import (
+    BatchCompleter,
+    Completer,
+    Method,
+    Registrar,
+    TrackCompleter,
+)
+from wildshape.evaluation.metrics import completion_error, distance_floor, registration_error
+from wildshape.evaluation.results import (
+    CompletionScore,
+    MethodScores,
+    RegistrationScore,
+    Results,
+)
+from wildshape.evaluation.turning import Rotate
+from wildshape.geometry.se3 import SE3
+from wildshape.records import Points, Track
+
+Progress = Callable[[int, str], None]
+REFUSED = "refused by the method"
+NOT_FINITE = "prediction empty or not finite"
+
+
+@dataclass
+class _Ledger:
+    """What one row of the table is made of, while it grows."""
+
+    completions: list[CompletionScore] = field(default_factory=list)
+    registrations: list[RegistrationScore] = field(default_factory=list)
+    skipped: Counter[str] = field(default_factory=Counter)
+
+    def close(self, name: str) -> MethodScores:
+        return MethodScores(
+            name, tuple(self.completions), tuple(self.registrations), dict(self.skipped)
+        )
+
+
+def run(
+    methods: Mapping[str, Method],
+    tracks: Iterable[Track],
+    rotate: Rotate = "none",
+    seed: int = 0,
+    progress: Progress | None = None,
+    *,
+    max_scans: int | None = None,
+) -> Results:
+    """Every method on every track.
+
+    A method that completes both from one scan and from a whole track gets two rows, the second
+    named `<name>, whole track`.
+
+    Args:
+        methods: by the name of their row.
+        tracks: read once, one held at a time.
+        rotate: input protocol, see `turn_track`.
+        seed: of the rotations.
+        progress: called after each track with the number done and its name.
+        max_scans: tracks with more scans are subsampled evenly.
+    """
+    ledgers: dict[str, _Ledger] = {name: _Ledger() for name in methods}
+    for done, track in enumerate(tracks, start=1):
+        case = prepare(track, rotate, seed, max_scans)
+        for name, method in methods.items():
+            _evaluate(name, method, case, ledgers)
+        if progress is not None:
+            progress(done, track.name)
+    rows = tuple(ledger.close(name) for name, ledger in ledgers.items())
+    return Results(rotate=rotate, seed=seed, methods=rows)
+
+
+def whole_track_name(name: str, method: Method) -> str:
+    """Under which row a method's completions of whole tracks stand."""
+    alone = isinstance(method, Completer)
+    return f"{name}, whole track" if alone else name
+
+
+def _evaluate(name: str, method: Method, case: Case, ledgers: dict[str, _Ledger]) -> None:
+    ledger = ledgers[name]
+    ledger.skipped.update(case.skipped)
+    if not case.scans:
+        return
+    if isinstance(method, Completer):
+        _score_scans(method, case, ledger)
+    if isinstance(method, TrackCompleter):
+        _score_whole(method, case, ledgers.setdefault(whole_track_name(name, method), _Ledger()))
+    if isinstance(method, Registrar):
+        _score_registration(method, case, ledger)
+
+
+def _score_scans(method: Completer, case: Case, ledger: _Ledger) -> None:
+    if case.truth is None or case.T_sensor_object is None:
+        ledger.skipped["completion: no true shape"] += len(case.scans)
+        return
+    for i, predicted in enumerate(complete_scans(method, case)):
+        _score_completion(predicted, case, case.truth, case.T_sensor_object, i, ledger)
+
+
+def complete_scans(method: Completer, case: Case) -> Sequence[Points | None]:
+    """One cloud a scan in that scan's frame; None where the method refused it."""
+    if isinstance(method, BatchCompleter):
+        # One scan's refusal must not cost the others theirs: then each goes alone.
+        with suppress(BadInputError):
+            return method.complete_many(case.inputs(), case.sensor)
+    return [_complete(method, scan, case) for scan in case.inputs()]
+
+
+def _complete(method: Completer, scan: Points, case: Case) -> Points | None:
+    try:
+        return method.complete(scan, case.sensor)
+    except BadInputError:
+        return None
+
+
+def _score_whole(method: TrackCompleter, case: Case, ledger: _Ledger) -> None:
+    if case.truth is None or case.T_sensor_object is None:
+        ledger.skipped["completion: no true shape"] += 1
+        return
+    try:
+        predicted = method.complete_track(case.inputs(), case.sensor)
+    except BadInputError:
+        predicted = None
+    _score_completion(predicted, case, case.truth, case.T_sensor_object, case.middle, ledger)
+
+
+def _score_completion(
+    predicted: Points | None,
+    case: Case,
+    truth: Truth,
+    T_sensor_object: SE3,
+    i: int,
+    ledger: _Ledger,
+) -> None:
+    if predicted is None:
+        ledger.skipped[f"completion: {REFUSED}"] += 1
+        return
+    if len(predicted) == 0 or not np.isfinite(predicted).all():
+        ledger.skipped[f"completion: {NOT_FINITE}"] += 1
+        return
+    local = T_sensor_object[i].inverse().apply_numpy(np.asarray(predicted, dtype=np.float32))
+    partial = None if truth.partial is None else completion_error(local, truth.partial)
+    floor = distance_floor(truth.area, len(local)) + distance_floor(truth.area, len(truth.shape))
+    ledger.completions.append(
+        CompletionScore(
+            track=case.name,
+            scan=case.scan_names[i],
+            error=completion_error(local, truth.shape),
+            error_partial=partial,
+            truth=truth.kind,
+            points=len(local),
+            truth_points=len(truth.shape),
+            cd_floor=floor,
+        )
+    )
+
+
+def _score_registration(method: Registrar, case: Case, ledger: _Ledger) -> None:
+    others = [i for i in range(len(case.scans)) if i != case.middle]
+    if case.T_sensor_object is None or not others:
+        reason = "no true poses" if others else "a track of one scan"
+        ledger.skipped[f"registration: {reason}"] += len(case.scans)
+        return
+    try:
+        T_middle_scan = method.register_track(case.inputs(), case.sensor)
+    except BadInputError:
+        ledger.skipped[f"registration: {REFUSED}"] += len(others)
+        return
+    # The middle scan against itself is no test and is not counted.
+    index = torch.tensor(others)
+    error = registration_error(
+        T_middle_scan.to(torch.float64)[index],
+        case.T_sensor_object[index],
+        case.T_sensor_object[case.middle],
+    )
+    columns = (error.rotation_deg, error.rotation_sym_deg, error.translation_m)
+    for i, values in zip(others, torch.stack(columns, dim=1).tolist(), strict=True):
+        if not np.isfinite(values).all():
+            ledger.skipped[f"registration: {NOT_FINITE}"] += 1
+            continue
+        ledger.registrations.append(RegistrationScore(case.name, case.scan_names[i], *values))
