@@ -1,15 +1,29 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Nearest neighbours: the one door. Backends lie beside it (`nearest_torch`, ...)."""
+"""Nearest neighbours: the one door. Backends lie beside it and promise the same results.
+
+`native` (compiled C) on the CPU, `triton` on CUDA, `torch` wherever those are absent, and
+`reference` for types other than float32. `WILDSHAPE_NEAREST=torch|native` forces one on the CPU.
+"""
+
+import os
+from importlib.util import find_spec
+from typing import Literal, get_args
 
 import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
-from wildshape.ops.nearest_torch import nearest_reference
+from wildshape.errors import BadInputError
+from wildshape.ops.library import library
+from wildshape.ops.nearest_native import NativeDistance, nearest_native
+from wildshape.ops.nearest_torch import nearest_blocked, nearest_reference
 from wildshape.ops.neighbours import Neighbours
 
-__all__ = ["Neighbours", "nearest", "nearest_both", "nearest_distance"]
+__all__ = ["Backend", "Neighbours", "backend", "nearest", "nearest_both", "nearest_distance"]
+
+Backend = Literal["native", "triton", "torch", "reference"]
+_VARIABLE = "WILDSHAPE_NEAREST"
 
 
 def nearest(
@@ -21,15 +35,30 @@ def nearest(
     """The nearest target of each query, ties to the smallest index; no gradient.
 
     Args:
-        query: `(B, N, 3)` points.
-        target: `(B, M, 3)` points in the same frame and unit.
-        query_sizes: points in use a row, the rest is padding; all if None.
+        query: `(B, N, 3)` finite points.
+        target: `(B, M, 3)` finite points in the same frame, unit, type and device.
+        query_sizes: `(B,)` points in use a row, the rest is padding; all if None.
         target_sizes: the same for the targets.
 
     Returns:
         Squared distances (inf where a row has no target, 0 for padding) and indices.
+
+    Raises:
+        BadInputError: WILDSHAPE_NEAREST names no backend, or one that is not built.
     """
-    return nearest_reference(query.detach(), target.detach(), query_sizes, target_sizes)
+    query, target = query.detach(), target.detach()
+    arguments = (query, target, query_sizes, target_sizes)
+    match _backend_for(query, target):
+        case "native":
+            return nearest_native(*arguments)
+        case "triton":
+            from wildshape.ops.nearest_triton import nearest_triton
+
+            return nearest_triton(*arguments)
+        case "torch":
+            return nearest_blocked(*arguments)
+        case _:
+            return nearest_reference(*arguments)
 
 
 def nearest_both(
@@ -38,7 +67,7 @@ def nearest_both(
     a_sizes: Int64[Tensor, "B"] | None = None,
     b_sizes: Int64[Tensor, "B"] | None = None,
 ) -> tuple[Neighbours, Neighbours]:
-    """`nearest` from a to b and from b to a in one call."""
+    """`nearest` from a to b and from b to a."""
     return nearest(a, b, a_sizes, b_sizes), nearest(b, a, b_sizes, a_sizes)
 
 
@@ -54,7 +83,8 @@ def nearest_distance(
     Args:
         query: `(B, N, 3)` points.
         target: `(B, M, 3)` points.
-        neighbours: of `nearest(query, target, ...)`, searched here if None.
+        neighbours: what `nearest(query, target, ...)` gave for these very points; searched here
+            if None.
 
     Returns:
         `(B, N)` distances; inf where a row has no target, 0 for padding; both without gradient.
@@ -62,8 +92,32 @@ def nearest_distance(
     found = nearest(query, target) if neighbours is None else neighbours
     if target.shape[1] == 0:
         return found.distance_squared
+    if _backend_for(query, target) == "native":
+        return NativeDistance.apply(query, target, found.distance_squared, found.index)  # pyright: ignore[reportReturnType]
     chosen = target.gather(1, found.index[..., None].expand(-1, -1, 3))
-    d2 = (query - chosen).square().sum(-1)
-    known = found.distance_squared.isfinite() & (found.distance_squared > 0)
-    safe = torch.where(known, d2, 1.0).clamp_min(torch.finfo(d2.dtype).tiny)
-    return torch.where(known, safe.sqrt(), found.distance_squared)
+    apart = found.distance_squared.isfinite() & (found.distance_squared > 0)
+    squared = torch.where(apart, (query - chosen).square().sum(-1), 1.0)
+    distance = squared.clamp_min(torch.finfo(squared.dtype).tiny).sqrt()
+    return torch.where(apart, distance, found.distance_squared)
+
+
+def backend(device: torch.device | str = "cpu") -> Backend:
+    """Which implementation answers for float32 points on this device."""
+    if torch.device(device).type == "cuda":
+        return "triton" if find_spec("triton") else "torch"
+    if torch.device(device).type != "cpu":
+        return "torch"
+    forced = os.environ.get(_VARIABLE, "")
+    if forced and forced not in get_args(Backend):
+        raise BadInputError(f"{_VARIABLE}={forced} is none of torch, native, reference.")
+    if forced == "native" and library() is None:
+        raise BadInputError(f"{_VARIABLE}=native, but the native library was not built.")
+    if forced in ("torch", "reference", "native"):
+        return forced
+    return "native" if library() else "torch"
+
+
+def _backend_for(query: Tensor, target: Tensor) -> Backend:
+    if query.dtype != torch.float32 or target.dtype != torch.float32:
+        return "reference"
+    return backend(query.device)

@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every nearest-neighbour backend returns."""
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from jaxtyping import Float, Int64
 from torch import Tensor
 
 
-class Neighbours(NamedTuple):
+@dataclass(frozen=True)
+class Neighbours:
     """The nearest target of each query; constants for autograd.
 
     Attributes:

@@ -2,10 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nearest-in-bin visibility (METHOD 5): the one door. Backends lie beside it."""
 
+from importlib.util import find_spec
+
 import torch
 from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
+from wildshape.ops.library import library
+from wildshape.ops.zbuffer_native import visible_native
 from wildshape.ops.zbuffer_torch import visible_reference
 
 
@@ -16,10 +20,18 @@ def visible(
 
     Args:
         bins: `(B, N)` bin of each point in its row's image; outside [0, n_bins): never visible.
-        depth: `(B, N)` distance from the sensor, compared as float32; ties to the smallest index.
+        depth: `(B, N)` distance from the sensor, compared as float32; ties to the smallest
+            index, NaN counts as infinitely far.
         n_bins: bins of one image.
 
     Returns:
         `(B, N)`: exactly one True for each occupied bin; no gradient.
     """
-    return visible_reference(bins, depth.detach().to(torch.float32), n_bins)
+    depth = depth.detach().to(torch.float32)
+    if bins.device.type == "cuda" and find_spec("triton"):
+        from wildshape.ops.zbuffer_triton import visible_triton
+
+        return visible_triton(bins, depth, n_bins)
+    if bins.device.type == "cpu" and library():
+        return visible_native(bins, depth, n_bins)
+    return visible_reference(bins, depth, n_bins)

@@ -29,7 +29,8 @@ def visible_reference(
 
 def pack(depth: Float32[Tensor, "B N"]) -> Int64[Tensor, "B N"]:
     """(depth, index in the row) as one int64 that sorts as the pair does."""
-    bits = (depth + 0.0).contiguous().view(torch.int32)  # + 0.0 makes one zero of -0 and 0
+    depth = depth.nan_to_num(nan=torch.inf, posinf=torch.inf, neginf=-torch.inf) + 0.0  # no -0
+    bits = depth.contiguous().view(torch.int32)
     ordered = bits ^ ((bits >> 31) & 0x7FFFFFFF)
     index = torch.arange(depth.shape[1], device=depth.device)
     return (ordered.to(torch.int64) << 32) | index

@@ -1,0 +1,38 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The compiled C kernels, if the build made them for this machine; else None, silently."""
+
+import ctypes
+from functools import cache
+from pathlib import Path
+
+_ABI = 1
+_PATH = Path(__file__).parent / "native" / "libwildshape_ops.so"
+
+_P, _I64, _INT = ctypes.c_void_p, ctypes.c_int64, ctypes.c_int
+_SIGNATURES = {
+    "wildshape_abi": ([], _INT),
+    "wildshape_level": ([], _INT),
+    "wildshape_nearest": (
+        [_P, _I64, _P, _P, _I64, _P, _I64, _I64, _I64, _P, _P, _INT, _INT],
+        _INT,
+    ),
+    "wildshape_nearest_gradient": (
+        [_P, _I64, _P, _I64, _P, _P, _P, _I64, _I64, _I64, _P, _P, _INT],
+        None,
+    ),
+    "wildshape_visible": ([_P, _P, _I64, _I64, _I64, _P, _INT], _INT),
+}
+
+
+@cache
+def library() -> ctypes.CDLL | None:
+    """The kernels, or None where they are absent, do not load or are of another version."""
+    try:
+        loaded = ctypes.CDLL(str(_PATH))
+        for name, (arguments, result) in _SIGNATURES.items():
+            function = getattr(loaded, name)
+            function.argtypes, function.restype = arguments, result
+    except (OSError, AttributeError):
+        return None
+    return loaded if loaded.wildshape_abi() == _ABI else None
