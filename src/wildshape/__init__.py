@@ -1,3 +1,37 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
 """Complete 3D shapes and 6-DoF poses of objects from one partial scan, without labels."""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from wildshape.errors import BadInputError
+    from wildshape.inference.predictor import Predictor, load
+    from wildshape.records import Box, Completion, Registration, Sensor, Track
+
+__version__ = "0.1.0"
+__all__ = [
+    "BadInputError",
+    "Box",
+    "Completion",
+    "Predictor",
+    "Registration",
+    "Sensor",
+    "Track",
+    "load",
+]
+
+_HOME = {
+    "BadInputError": "wildshape.errors",
+    "Predictor": "wildshape.inference.predictor",
+    "load": "wildshape.inference.predictor",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import on first use, so that `import wildshape` costs nothing."""
+    if name not in __all__:
+        raise AttributeError(f"module 'wildshape' has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module(_HOME.get(name, "wildshape.records")), name)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Multi-view consistency with hindsight (paper eq. 5, METHOD 6)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import torch
@@ -27,7 +27,7 @@ class LossConfig:
     """
 
     beta: float = 0.05
-    projection: Projection = PolarBins()
+    projection: Projection = field(default_factory=PolarBins)
     template: float = 0.0
     template_end: float = 0.0
 

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The two terms that tie a posed shape to a scan (paper eq. 2 and 3, METHOD 4 and 5)."""
 
-import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """PCN's encoder (METHOD 3, Yuan et al. 2018): two max-pooled shared MLPs."""
 
-import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn.functional import relu

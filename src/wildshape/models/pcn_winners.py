@@ -63,12 +63,12 @@ class _GatherDot(torch.autograd.Function):
     """`z[b, c] = u[row[b, c]] . W[c]`: the last layer at the winning rows alone."""
 
     @staticmethod
-    def forward(ctx, u: Tensor, weight: Tensor, row: Tensor) -> Tensor:  # noqa: ANN001
+    def forward(ctx, u: Tensor, weight: Tensor, row: Tensor) -> Tensor:
         ctx.save_for_backward(u, weight, row)
         return torch.stack([(u.index_select(0, at) * weight).sum(1) for at in row])
 
     @staticmethod
-    def backward(ctx, grad: Tensor):  # noqa: ANN001, ANN205
+    def backward(ctx, grad: Tensor):
         u, weight, row = ctx.saved_tensors
         grad_u, grad_weight = torch.zeros_like(u), torch.zeros_like(weight)
         for at, g in zip(row, grad[..., None]):

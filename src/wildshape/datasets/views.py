@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""V scans of each of I tracks, as one batch (METHOD 2 and 6). The trainer's only reader."""
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from wildshape.errors import BadInputError
+from wildshape.geometry.centring import scan_centre
+from wildshape.geometry.rotation import random_rotation, random_yaw
+from wildshape.io.store import Store
+from wildshape.records import SensorKind
+
+
+@dataclass(frozen=True)
+class ViewConfig:
+    """How a batch is drawn; the defaults are the paper's for LiDAR.
+
+    Attributes:
+        tracks: I, tracks a batch.
+        views: V, scans of each.
+        points: n, each scan resampled with replacement to this many.
+        window: the V scans lie within this many consecutive frames of the track.
+        turn: each scan turned about the sensor by its own random rotation before training:
+            `none` (the paper), `yaw` or `so3`.
+        sensor: decides the centring: `lidar` the frustum's middle, `camera` the box's.
+        min_points: scans with fewer are never drawn.
+    """
+
+    tracks: int = 8
+    views: int = 4
+    points: int = 1024
+    window: int = 20
+    turn: Literal["none", "yaw", "so3"] = "none"
+    sensor: SensorKind = "lidar"
+    min_points: int = 100
+
+
+class Batch(NamedTuple):
+    """Centred scans, the views of a track next to each other.
+
+    Attributes:
+        scans: B = I x V clouds of n points, metres, about their own centres.
+        centres: the centres in the (turned) sensor frames.
+        reference: row of the reference scan of each track.
+    """
+
+    scans: Float[Tensor, "B N 3"]
+    centres: Float[Tensor, "B 3"]
+    reference: Tensor
+
+
+class ViewSampler:
+    """Draws batches from a store; a batch depends on its seeds alone, not on those before it."""
+
+    def __init__(self, store: Store, tracks: np.ndarray, config: ViewConfig) -> None:
+        """Sample from the given track indices of the store.
+
+        Raises:
+            BadInputError: no track has a scan with enough points.
+        """
+        self.store, self.config = store, config
+        starts, sizes = store.track_starts, store.scan_sizes
+        usable = [
+            starts[t] + np.flatnonzero(sizes[starts[t] : starts[t + 1]] >= config.min_points)
+            for t in tracks
+        ]
+        self.scans_of = [scans for scans in usable if len(scans) > 0]
+        if not self.scans_of:
+            raise BadInputError(
+                f"{store.path}: no track has a scan of {config.min_points} points or more;"
+                " nothing to train on."
+            )
+        self._centres: dict[int, Tensor] = {}
+
+    def draw(self, *seed: int) -> Batch:
+        """The batch of these seeds, for example (run seed, step, process)."""
+        rng = np.random.default_rng(seed)
+        config = self.config
+        chosen = rng.integers(len(self.scans_of), size=config.tracks)
+        rows = np.concatenate([self._window(self.scans_of[t], rng) for t in chosen])
+        scans = torch.stack([self._resampled(int(s), rng) for s in rows])
+        centres = torch.stack([self._centre(int(s)) for s in rows])
+        first = np.arange(config.tracks) * config.views
+        reference = torch.from_numpy(first + rng.integers(config.views, size=config.tracks))
+        return _turned(scans, centres, reference, config.turn, int(rng.integers(2**62)))
+
+    def extent_range(self, scans: int = 500) -> tuple[float, float]:
+        """Smallest and largest bounding-box diagonal, metres, over a seeded sample of scans."""
+        rng = np.random.default_rng(0)
+        rows = rng.choice(np.concatenate(self.scans_of), size=scans)
+        clouds = (self.store.scan_points(int(row)) for row in rows)
+        extents = [float(np.linalg.norm(np.ptp(cloud, axis=0))) for cloud in clouds]
+        return min(extents), max(extents)
+
+    def _window(self, scans: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """V scans within `window` frames of each other, distinct where there are enough."""
+        config = self.config
+        start = rng.integers(max(1, len(scans) - config.window + 1))
+        near = scans[start : start + config.window]
+        return rng.choice(near, size=config.views, replace=len(near) < config.views)
+
+    def _resampled(self, scan: int, rng: np.random.Generator) -> Tensor:
+        points = self.store.scan_points(scan)
+        picked = points[rng.integers(len(points), size=self.config.points)]
+        return torch.from_numpy(picked) - self._centre(scan)
+
+    def _centre(self, scan: int) -> Tensor:
+        """The label-free centre of a scan, found once."""
+        if scan not in self._centres:
+            points = torch.from_numpy(np.ascontiguousarray(self.store.scan_points(scan)))
+            self._centres[scan] = scan_centre(points, self.config.sensor)
+        return self._centres[scan]
+
+
+def _turned(scans: Tensor, centres: Tensor, reference: Tensor, turn: str, seed: int) -> Batch:
+    """Each scan turned about its sensor by its own random rotation."""
+    if turn == "none":
+        return Batch(scans, centres, reference)
+    generator = torch.Generator().manual_seed(seed)
+    draw = random_yaw if turn == "yaw" else random_rotation
+    rotation = draw(len(scans), generator)
+    turned = (rotation @ centres[..., None])[..., 0]
+    return Batch(scans @ rotation.mT, turned, reference)

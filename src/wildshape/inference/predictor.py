@@ -1,0 +1,178 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Complete, register and fuse with a trained network (METHOD 7)."""
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from wildshape.geometry.box import fit_box
+from wildshape.geometry.rotation import quaternion_from_rotation
+from wildshape.geometry.se3 import SE3, stack
+from wildshape.inference.prepare import as_points, extent, network_input
+from wildshape.losses.hindsight import score_hypotheses
+from wildshape.models.checkpoint import ModelSettings, load_checkpoint
+from wildshape.models.shapepose import Poses, ShapePoseNet
+from wildshape.ops.nearest import nearest
+from wildshape.records import Box, Completion, Points, Registration, Sensor
+
+SHIPPED = Path(__file__).parent.parent / "weights" / "default.safetensors"
+_BATCH, _INLIER_M, _INLIER_SHARE = 32, 0.2, 0.05
+
+
+def load(model: str | Path | None = None, device: str = "cpu") -> "Predictor":
+    """A predictor from a checkpoint; the weights shipped in the package by default.
+
+    Raises:
+        BadInputError: the checkpoint cannot be used; the sentence says why.
+    """
+    network, settings = load_checkpoint(Path(model) if model is not None else SHIPPED)
+    return Predictor(network.to(device), settings)
+
+
+class Predictor:
+    """A trained network and what it needs to know of its training. Sensor frames in and out."""
+
+    def __init__(self, network: ShapePoseNet, settings: ModelSettings) -> None:
+        self.network, self.settings = network, settings
+        self.device = next(network.parameters()).device
+
+    def complete(self, points: object, sensor: Sensor | None = None) -> Completion:
+        """The complete shape of the object of one scan.
+
+        Args:
+            points: `(n, 3)` array or tensor, sensor frame, metres.
+            sensor: how it was taken; by default as the scans trained on.
+
+        Raises:
+            BadInputError: not `(n, 3)`, or fewer than 16 finite points.
+        """
+        return next(self.complete_many([points], sensor))
+
+    @torch.inference_mode()
+    def complete_many(
+        self, scans: Sequence[object], sensor: Sensor | None = None
+    ) -> Iterator[Completion]:
+        """`complete` for many scans, in batches; each is completed on its own."""
+        for start in range(0, len(scans), _BATCH):
+            began = time.perf_counter()
+            names = range(start, len(scans))
+            batch = [as_points(s, f"scan {i}") for i, s in zip(names, scans[start:][:_BATCH])]
+            done = self._complete_batch(batch, sensor)
+            seconds = (time.perf_counter() - began) / len(batch)
+            yield from (replace(item, seconds=seconds) for item in done)
+
+    def register(self, source: object, target: object) -> Registration:
+        """`T_target_source = T_target_can inv(T_source_can)` (METHOD 7)."""
+        pair = (as_points(source, "source"), as_points(target, "target"))
+        done_source, done_target = self.complete_many(pair)
+        T_target_source = done_target.pose @ done_source.pose.inverse()
+        ratio = inlier_ratio(T_target_source, *pair)
+        confidence = min(done_source.confidence, done_target.confidence)
+        return Registration(T_target_source, ratio, confidence)
+
+    def register_track(self, scans: Sequence[object], sensor: Sensor | None = None) -> SE3:
+        """`T_middle_scan`: every scan to the frame of the track's middle scan."""
+        return to_middle(self.poses(scans, sensor))
+
+    def poses(self, scans: Sequence[object], sensor: Sensor | None = None) -> SE3:
+        """`T_sensor_canonical` of each scan."""
+        return stack([done.pose for done in self.complete_many(scans, sensor)])
+
+    def fuse(self, scans: Sequence[object], sensor: Sensor | None = None) -> Points:
+        """All points of a track's scans in the middle scan's sensor frame, metres."""
+        clouds = [as_points(scan, f"scan {i}") for i, scan in enumerate(scans)]
+        T_middle_scan = self.register_track(clouds, sensor)
+        return fuse_scans(clouds, T_middle_scan)
+
+    def _complete_batch(self, scans: list[Points], sensor: Sensor | None) -> list[Completion]:
+        settings = self.settings
+        inputs, centres = network_input(scans, settings.input_points, settings.sensor)
+        inputs, centres = inputs.to(self.device), centres.to(self.device)
+        code = self.network.encode(inputs)
+        shapes, poses = self.network.canonical(code), self.network.poses(code)
+        cost, branch = self._choose(inputs, centres, shapes, poses)
+        chosen = poses.choose(branch)
+        T_sensor_can = SE3(chosen.rotation[:, 0], chosen.translation[:, 0] + centres)
+        shapes, T_sensor_can = shapes.cpu(), SE3(*(t.cpu() for t in _parts(T_sensor_can)))
+        warnings = [self._warning(scan, sensor) for scan in scans]
+        return [
+            self._completion(shapes[i], T_sensor_can[i], int(branch[i]), float(cost[i]), warning)
+            for i, warning in enumerate(warnings)
+        ]
+
+    def _choose(
+        self, inputs: Tensor, centres: Tensor, shapes: Tensor, poses: Poses
+    ) -> tuple[Tensor, Tensor]:
+        """Cost and index of the branch with the lowest label-free cost (METHOD 3)."""
+        posed = poses.apply(shapes)
+        scores = score_hypotheses(inputs, centres, posed, self.settings.projection)
+        cost, branch = scores.cost(self.settings.beta).min(-1)
+        return cost, branch
+
+    def _completion(
+        self, shape: Tensor, T_sensor_can: SE3, branch: int, cost: float, warning: str
+    ) -> Completion:
+        points = T_sensor_can.apply(shape).numpy()
+        confidence = 0.0 if warning else self.confidence(cost)
+        pose = T_sensor_can.to(torch.float64)
+        return Completion(
+            points, pose, box_of(shape, T_sensor_can), confidence, branch, cost, warning=warning
+        )
+
+    def confidence(self, cost: float) -> float:
+        """0 to 1, falling with the label-free cost; 1/2 at the held-out 90th percentile."""
+        return 1.0 / (1.0 + (cost / self.settings.cost_m[1]) ** 2)
+
+    def _warning(self, scan: Points, sensor: Sensor | None) -> str:
+        """One sentence where the model was not made for such a scan, else nothing."""
+        if sensor is not None and sensor.kind != self.settings.sensor:
+            return (
+                f"a {sensor.kind} scan, but the model was trained on {self.settings.sensor} scans"
+            )
+        low, high = self.settings.extent_m
+        size = extent(scan)
+        if size < low / 2 or size > 1.5 * high:
+            return (
+                f"extent {size:.3g} m lies outside the {low:.3g} to {high:.3g} m trained on;"
+                " check the unit, or train on such objects"
+            )
+        return ""
+
+
+def _parts(transform: SE3) -> tuple[Tensor, Tensor]:
+    return transform.rotation, transform.translation
+
+
+def box_of(shape: Tensor, T_sensor_canonical: SE3) -> Box:
+    """The box fitted to the canonical shape, carried to the sensor frame."""
+    fitted = fit_box(shape)
+    centre = T_sensor_canonical.apply(fitted.centre[None])[0]
+    quaternion = quaternion_from_rotation(T_sensor_canonical.rotation @ fitted.rotation)
+    as_tuple = lambda values: tuple(round(float(v), 6) for v in values)  # noqa: E731
+    return Box(as_tuple(centre), as_tuple(fitted.size), as_tuple(quaternion))
+
+
+def to_middle(T_sensor_canonical: SE3) -> SE3:
+    """`T_middle_scan = T_middle_can inv(T_scan_can)` of every scan of a track."""
+    middle = T_sensor_canonical[len(T_sensor_canonical) // 2]
+    return middle @ T_sensor_canonical.inverse()
+
+
+def fuse_scans(scans: Sequence[Points], T_middle_scan: SE3) -> Points:
+    """The scans' points, moved and joined."""
+    moved = [T_middle_scan[i].apply_numpy(scan) for i, scan in enumerate(scans)]
+    return np.concatenate(moved).astype(np.float32)
+
+
+def inlier_ratio(T_target_source: SE3, source: Points, target: Points) -> float:
+    """Share of moved source points near a target point (`Registration.inlier_ratio`)."""
+    reach = min(_INLIER_M, _INLIER_SHARE * extent(target))
+    moved = torch.from_numpy(T_target_source.apply_numpy(source))
+    found = nearest(moved[None], torch.from_numpy(np.ascontiguousarray(target))[None])
+    return float((found.distance_squared <= reach * reach).float().mean())

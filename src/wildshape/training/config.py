@@ -1,0 +1,53 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""An experiment is a value: frozen dataclasses, saved with every result."""
+
+from dataclasses import dataclass, field
+
+from wildshape.datasets.views import ViewConfig
+from wildshape.losses.multiview import LossConfig
+from wildshape.models.shapepose import NetworkConfig
+
+
+@dataclass(frozen=True)
+class OptimConfig:
+    """Adam and its schedule; the defaults are the paper's for LiDAR (METHOD 6).
+
+    Attributes:
+        steps: gradient steps.
+        lr: learning rate at the first step.
+        decay: factor of the learning rate every `decay_every` steps.
+        decay_every: see `decay`; 0 falls along a half cosine to a hundredth instead.
+        warmup: steps over which the learning rate rises from zero.
+        average: decay of the running mean of the weights that is kept; 0 keeps the last.
+        clip: largest norm of the gradient; 0 is none.
+    """
+
+    steps: int = 400_000
+    lr: float = 1e-4
+    decay: float = 0.7
+    decay_every: int = 100_000
+    warmup: int = 0
+    average: float = 0.0
+    clip: float = 0.0
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Everything that decides a training run except its data and its seed.
+
+    Attributes:
+        name: of the preset it comes from.
+        network: sizes.
+        loss: weights of the terms.
+        views: how batches are drawn.
+        optim: optimiser and schedule.
+        validate_every: steps between validations and checkpoints.
+    """
+
+    name: str
+    network: NetworkConfig = field(default_factory=NetworkConfig)
+    loss: LossConfig = field(default_factory=LossConfig)
+    views: ViewConfig = field(default_factory=ViewConfig)
+    optim: OptimConfig = field(default_factory=OptimConfig)
+    validate_every: int = 1000

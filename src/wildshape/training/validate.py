@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Held-out figures without any truth: both loss terms, and cycle consistency over a track."""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from wildshape.datasets.views import Batch, ViewSampler
+from wildshape.geometry.centring import scan_centre
+from wildshape.geometry.se3 import SE3
+from wildshape.losses.hindsight import score_hypotheses
+from wildshape.losses.multiview import LossConfig, multiview_loss
+from wildshape.models.shapepose import Poses, ShapePoseNet
+
+_SEED = 20_200_823
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Label-free figures on held-out tracks.
+
+    Attributes:
+        observation: first term under multi-view consistency, metres.
+        projection: second term, metres.
+        cost_median: median label-free cost of a scan under its own shape, metres.
+        cost_p90: its 90th percentile.
+        cycle_deg: median angle, degrees, between the pose of scan b and the pose predicted for
+            scan a after it was registered to b: a registered scan must be posed as its target.
+    """
+
+    observation: float
+    projection: float
+    cost_median: float
+    cost_p90: float
+    cycle_deg: float
+
+
+@torch.no_grad()
+def validate(
+    network: ShapePoseNet, sampler: ViewSampler, config: LossConfig, batches: int, device: str
+) -> Validation:
+    """The figures over a fixed set of batches of held-out tracks."""
+    rows = [
+        _figures(network, sampler, config, Batch(*(t.to(device) for t in batch)))
+        for batch in (sampler.draw(_SEED, index) for index in range(batches))
+    ]
+    observation, projection, cost, cycle = (torch.cat(part) for part in zip(*rows))
+    return Validation(
+        float(observation.mean()),
+        float(projection.mean()),
+        float(cost.median()),
+        float(cost.quantile(0.9)),
+        float(torch.rad2deg(cycle).median()),
+    )
+
+
+def _figures(
+    network: ShapePoseNet, sampler: ViewSampler, config: LossConfig, batch: Batch
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    code = network.encode(batch.scans)
+    poses, shapes = network.poses(code), network.canonical(code)
+    reference = shapes[batch.reference]
+    terms = multiview_loss(
+        batch.scans, batch.centres, reference, poses.rotation, poses.translation, config
+    )
+    own = score_hypotheses(batch.scans, batch.centres, poses.apply(shapes), config.projection)
+    cost, branch = own.cost(config.beta).min(-1)
+    cycle = _cycle_angle(network, sampler, config, batch, poses.choose(branch))
+    return terms.observation[None], terms.projection[None], cost, cycle
+
+
+def _cycle_angle(
+    network: ShapePoseNet, sampler: ViewSampler, config: LossConfig, batch: Batch, poses: Poses
+) -> Tensor:
+    """Scan a of each track registered to its neighbour b, posed again, against b's pose."""
+    views = sampler.config.views
+    T_centred_can = SE3(poses.rotation[:, 0], poses.translation[:, 0])
+    T_sensor_can = SE3(T_centred_can.rotation, T_centred_can.translation + batch.centres)
+    target = torch.arange(len(batch.scans), device=batch.scans.device)
+    target = target // views * views + (target + 1) % views
+    T_b_a = T_sensor_can[target] @ T_sensor_can.inverse()
+    moved = T_b_a.apply(batch.scans + batch.centres[:, None])
+    centres = torch.stack([scan_centre(scan, sampler.config.sensor) for scan in moved])
+    centred = moved - centres[:, None]
+    code = network.encode(centred)
+    again, shapes = network.poses(code), network.canonical(code)
+    scores = score_hypotheses(centred, centres, again.apply(shapes), config.projection)
+    chosen = again.choose(scores.cost(config.beta).argmin(-1))
+    return SE3(poses.rotation[target, 0].mT @ chosen.rotation[:, 0], centres).angle()
