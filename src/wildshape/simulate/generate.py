@@ -2,51 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulated tracks as records: the same for the same seed, however many workers make them."""
 
+import os
 from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Literal
 
-import numpy as np
+import torch
 
 from wildshape.geometry.se3 import SE3
-from wildshape.records import Sensor, Track
-from wildshape.simulate.drive import RawTrack, lidar_track
-from wildshape.simulate.scan import Returns
-from wildshape.simulate.sensor import SENSORS, SpinningLidar
-from wildshape.simulate.vehicle import random_vehicle
+from wildshape.records import Intrinsics, Sensor, Track
+from wildshape.simulate.config import SimulationConfig
+from wildshape.simulate.drive import RawTrack
+from wildshape.simulate.job import Job
+from wildshape.simulate.meshes import mesh_files
+from wildshape.simulate.sensor import DepthCamera, SpinningLidar
+from wildshape.simulate.worker import in_parallel
 
-SensorName = Literal["hdl64", "hdl32", "os1-128", "depth-camera"]
-Category = Literal["car", "airplane", "chair"]
+__all__ = ["SimulationConfig", "simulate_tracks"]
 
-
-@dataclass(frozen=True)
-class SimulationConfig:
-    """What to simulate.
-
-    Attributes:
-        tracks: how many objects.
-        scans: usable scans a track; None: 24 for a LiDAR, 5 for the depth camera.
-        sensor: what scans.
-        category: of our procedural shapes; airplanes and chairs are for the depth camera.
-        meshes: folder of the user's meshes instead.
-        occlusion: probability that something stands in the way for part of a track.
-        ground: leave ground returns within 0.3 m of the object in.
-        dropout: share of pulses lost at random.
-        noise_m: sigma of the range noise, metres; None: the sensor's own.
-        shape_points: points of the complete truth shape.
-    """
-
-    tracks: int = 100
-    scans: int | None = None
-    sensor: SensorName = "hdl64"
-    category: Category = "car"
-    meshes: Path | None = None
-    occlusion: float = 0.3
-    ground: bool = False
-    dropout: float = 0.03
-    noise_m: float | None = None
-    shape_points: int = 8192
+_WORTH_A_WORKER = 16
 
 
 def simulate_tracks(
@@ -54,32 +26,47 @@ def simulate_tracks(
 ) -> Iterator[Track]:
     """Yield `config.tracks` tracks with truth, in order.
 
-    Track i depends on (seed, i) alone.
+    Track i depends on (config, seed, i) alone: neither on the other tracks nor on `workers`.
+    The truth frame of an object has its origin at the centre of its bounding box, x forward,
+    y left, z up; poses are T_sensor_object, the shape is in the object frame, metres (depth
+    camera: box diagonals).
+
+    Args:
+        config: what to simulate.
+        seed: at least 0.
+        workers: processes; None: one a core where there are enough tracks; 1: none beside this.
+
+    Raises:
+        BadInputError: a mesh that cannot be used.
+        MissingExtraError: embreex is not installed.
     """
-    for index in range(config.tracks):
-        yield _record(_raw(config, seed, index), config, index)
-
-
-def _raw(config: SimulationConfig, seed: int, index: int) -> RawTrack:
-    rng = np.random.default_rng([seed, index])
-    sensor = SENSORS[config.sensor]
-    assert isinstance(sensor, SpinningLidar)
-    target = random_vehicle(rng).centred()
-    noise = sensor.noise_m if config.noise_m is None else config.noise_m
-    returns = Returns(noise, config.dropout, float(rng.uniform(0.05, 0.5)), config.ground)
-    return lidar_track(target, sensor, config.scans or 24, returns, config.shape_points, rng)
+    meshes = mesh_files(config.meshes) if config.meshes else ()
+    job = Job(config, seed, meshes)
+    cores = os.cpu_count() or 1
+    count = min(cores, config.tracks // _WORTH_A_WORKER) if workers is None else workers
+    if count > 1:
+        raw = in_parallel(job, count)
+    else:
+        raw = (job.track(index) for index in range(config.tracks))
+    for index, made in enumerate(raw):
+        yield _record(made, config, index)
 
 
 def _record(raw: RawTrack, config: SimulationConfig, index: int) -> Track:
-    sensor = SENSORS[config.sensor]
-    assert isinstance(sensor, SpinningLidar)
     return Track(
         name=f"{index:06d}",
         scans=tuple(raw.scans),
         scan_names=tuple(f"{i:06d}" for i in range(len(raw.scans))),
-        sensor=Sensor("lidar", sensor.resolution_deg),
+        sensor=_sensor(config.device),
         category=config.category,
         source=f"simulated {config.sensor} {raw.kind}",
-        T_sensor_object=SE3.from_matrix(raw.T_sensor_object),
+        T_sensor_object=SE3.from_matrix(torch.as_tensor(raw.T_object_sensor)).inverse(),
         shape=raw.shape,
     )
+
+
+def _sensor(device: SpinningLidar | DepthCamera) -> Sensor:
+    if isinstance(device, SpinningLidar):
+        return Sensor("lidar", resolution_deg=device.resolution_deg)
+    f, c = device.focal_px, device.center_px
+    return Sensor("camera", intrinsics=Intrinsics(f, f, c, c, device.size, device.size))

@@ -87,7 +87,7 @@ def scan(
     T_object_sensor: np.ndarray,
     returns: Returns,
     rng: np.random.Generator,
-) -> np.ndarray:
+) -> tuple[np.ndarray, int]:
     """One scan of the object, `(n, 3)` float32, metres, sensor frame.
 
     Args:
@@ -97,16 +97,20 @@ def scan(
         T_object_sensor: `(4, 4)` where it stands.
         returns: how pulses are lost.
         rng: the only source of chance.
+
+    Returns:
+        The points, and how many of them lie on the object (the others on the ground).
     """  # fmt: skip
     half = target.bounds[1]
     grown = half + ((_RIM_M, _RIM_M, 0.0) if returns.ground else 0.0)
     phase = float(rng.uniform(0, sensor.azimuth_step_deg))
     directions, _ = rays(sensor, window(T_object_sensor, grown), phase)
-    toward = directions @ T_object_sensor[:3, :3].T
+    toward = np.einsum("ij,nj->ni", T_object_sensor[:3, :3], directions)
     origin = T_object_sensor[:3, 3]
     hits = scene.cast(np.broadcast_to(origin, toward.shape), toward)
     kept = _returned(hits, target, sensor, returns, rng)
     distance = hits.distance.astype(np.float64)
+    on_target = int(kept.sum())
     if returns.ground:
         below = _ground(hits, toward, origin, half)
         lost = rng.random(len(below)) < returns.dropout
@@ -114,7 +118,7 @@ def scan(
         kept = np.where(below > 0, ~lost, kept)
     reach = distance[kept]
     reach = reach + returns.noise_m * rng.standard_normal(len(reach))
-    return (directions[kept] * reach[:, None]).astype(np.float32)
+    return (directions[kept] * reach[:, None]).astype(np.float32), on_target
 
 
 def _returned(
@@ -123,7 +127,7 @@ def _returned(
     """`(n,)` bool: pulses on the target that come back strong enough to be told."""
     chance = np.full(len(hits.face), 1 - returns.dropout)
     chance *= np.clip(hits.cosine / 0.12, 0.0, 1.0)
-    glass = target.glass[np.maximum(hits.face, 0)] & (hits.solid == 0)
+    glass = target.glass[np.where(hits.solid == 0, hits.face, 0)]
     chance *= np.where(glass, returns.glass, 1.0)
     on_target = (hits.solid == 0) & (hits.distance < sensor.max_range_m)
     return on_target & (rng.random(len(chance)) < chance)

@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What to simulate, in one frozen record."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from wildshape.errors import BadInputError
+from wildshape.simulate.sensor import SENSORS, DepthCamera, SpinningLidar
+
+SensorName = Literal["hdl64", "hdl32", "os1-128", "depth-camera"]
+Category = Literal["car", "airplane", "chair"]
+
+
+@dataclass(frozen=True)
+class SimulationConfig:
+    """What to simulate.
+
+    Attributes:
+        tracks: how many objects.
+        scans: usable scans a track; None: 24 for a LiDAR, 5 for the depth camera.
+        vary_scans: draw each track's number of scans from half to 5/3 of `scans` (12-40 of 24).
+        sensor: what scans.
+        category: of our procedural shapes; airplanes and chairs are for the depth camera.
+        meshes: folder of the user's meshes instead (x forward, z up, metres); track i shows the
+            mesh i of the sorted list, again from the first after the last.
+        occlusion: probability that something stands in the way in a LiDAR track.
+        ground: leave ground returns within 0.3 m of the object in (LiDAR).
+        dropout: share of pulses or pixels lost at random; None: 0.03 LiDAR, 0 camera.
+        noise_m: sigma of the range noise, metres; None: the sensor's own (camera: 0).
+        shape_points: points of the complete truth shape.
+    """
+
+    tracks: int = 100
+    scans: int | None = None
+    vary_scans: bool = False
+    sensor: SensorName = "hdl64"
+    category: Category = "car"
+    meshes: Path | None = None
+    occlusion: float = 0.3
+    ground: bool = False
+    dropout: float | None = None
+    noise_m: float | None = None
+    shape_points: int = 8192
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be simulated.
+
+        Raises:
+            BadInputError: a count, probability, sensor or category is out of range.
+        """
+        if self.sensor not in SENSORS:
+            raise BadInputError(f"sensor is {self.sensor!r}, expected one of {', '.join(SENSORS)}.")
+        if self.category not in ("car", "airplane", "chair"):
+            raise BadInputError(f"category is {self.category!r}, expected car, airplane or chair.")
+        self._check_numbers()
+        if self.is_lidar and self.category != "car" and self.meshes is None:
+            raise BadInputError(
+                f"category {self.category} with sensor {self.sensor}: our {self.category}s are of "
+                "unit size, expected a car; use --sensor depth-camera."
+            )
+
+    def _check_numbers(self) -> None:
+        counts = {"tracks": self.tracks, "shape_points": self.shape_points, "scans": self.scans}
+        for name, count in counts.items():
+            if count is not None and count < 1:
+                raise BadInputError(f"{name} is {count}, expected at least 1.")
+        for name, share in {"occlusion": self.occlusion, "dropout": self.loss}.items():
+            if not 0 <= share < 1:
+                raise BadInputError(f"{name} is {share}, expected 0 to below 1.")
+        if not self.noise >= 0:
+            raise BadInputError(f"noise_m is {self.noise}, expected 0 or more metres.")
+
+    @property
+    def is_lidar(self) -> bool:
+        """Whether the sensor is a spinning LiDAR."""
+        return isinstance(SENSORS[self.sensor], SpinningLidar)
+
+    @property
+    def device(self) -> SpinningLidar | DepthCamera:
+        """The sensor itself."""
+        return SENSORS[self.sensor]
+
+    @property
+    def usual_scans(self) -> int:
+        """Scans a track where nothing else is asked for."""
+        return self.scans or (24 if self.is_lidar else 5)
+
+    @property
+    def loss(self) -> float:
+        """Share of pulses or pixels lost at random."""
+        return (0.03 if self.is_lidar else 0.0) if self.dropout is None else self.dropout
+
+    @property
+    def noise(self) -> float:
+        """Sigma of the range noise, metres."""
+        return self.device.noise_m if self.noise_m is None else self.noise_m
