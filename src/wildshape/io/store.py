@@ -1,0 +1,221 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The packed store: tracks in few large files, memory-mapped (DESIGN, Packed store)."""
+
+import hashlib
+import json
+from bisect import bisect_right
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import Float32, Int64
+
+from wildshape.errors import BadInputError
+from wildshape.geometry.se3 import SE3
+from wildshape.io.store_format import (
+    INDEX,
+    INDEX_JSON,
+    INDEX_TENSORS,
+    WRITING_JSON,
+    FileRecord,
+    map_tensors,
+    read_manifest,
+)
+from wildshape.io.store_writer import StoreWriter
+from wildshape.io.tracks import sensor_from_json
+from wildshape.records import Sensor, Track
+
+__all__ = ["Store", "StoreWriter", "is_store", "open_store"]
+
+
+def is_store(path: Path | str) -> bool:
+    """Whether a packed store, finished or half-written, lies at `path`."""
+    return any((Path(path) / name).is_file() for name in (INDEX_JSON, WRITING_JSON))
+
+
+def open_store(path: Path | str) -> "Store":
+    """Open a finished packed store for reading; costs milliseconds however large it is.
+
+    Raises:
+        BadInputError: no store, half-written, of another version, or damaged.
+    """
+    return Store(Path(path))
+
+
+class Store:
+    """A packed store opened for reading; safe in several processes, pickled by its path.
+
+    Attributes:
+        path: its folder.
+        track_starts: `(T + 1,)` first scan of each track.
+        scan_sizes: `(S,)` points of each scan.
+        fingerprint: short hash of the contents (not of the provenance).
+        provenance: how it was made.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Map the index; the shards follow when touched.
+
+        Raises:
+            BadInputError: see `open_store`.
+        """
+        self.path = path
+        manifest = read_manifest(path)
+        self._files = [_file_record(f, path) for f in (manifest["index"], *manifest["shards"])]
+        for record in self._files:
+            _check_size(path, record)
+        self._index = map_tensors(path / INDEX_TENSORS)
+        _check_index(self._index, len(self._files) - 1, path)
+        self.track_starts: Int64[np.ndarray, "tracks+1"] = self._index["track_starts"]
+        self.scan_sizes: Int64[np.ndarray, "scans"] = self._index["scan_sizes"]
+        self.fingerprint: str = manifest["fingerprint"]
+        self.provenance: dict[str, Any] = manifest["provenance"]
+        self._shard_starts: list[int] = self._index["shard_starts"].tolist()
+        self._shards: dict[int, Float32[np.ndarray, "n 3"]] = {}
+        self._sensors: dict[int, Sensor] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return open_store, (self.path,)
+
+    def __len__(self) -> int:
+        return len(self.track_starts) - 1
+
+    def __iter__(self) -> Iterator[Track]:
+        return (self.track(i) for i in range(len(self)))
+
+    @property
+    def scan_count(self) -> int:
+        """Number of scans of all tracks."""
+        return len(self.scan_sizes)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The tracks' names."""
+        return tuple(self._text("track_names", i) for i in range(len(self)))
+
+    def track(self, index: int) -> Track:
+        """A track; its scans and shape are views of the mapped files, float32, metres.
+
+        Raises:
+            IndexError: there is no such track.
+        """
+        index = _inside(index, len(self), "track")
+        scans = range(int(self.track_starts[index]), int(self.track_starts[index + 1]))
+        return Track(
+            name=self._text("track_names", index),
+            scans=tuple(self.scan_points(s) for s in scans),
+            scan_names=tuple(self._text("scan_names", s) for s in scans),
+            sensor=self.sensor_of(index),
+            category=self._text("categories", index),
+            source=self._text("sources", index),
+            T_sensor_object=self.poses_of(index),
+            shape=self.shape_of(index),
+        )
+
+    def scan_points(self, scan: int) -> Float32[np.ndarray, "n 3"]:
+        """Points of scan number `scan` of the whole store: a view, metres, its sensor's frame.
+
+        Raises:
+            IndexError: there is no such scan.
+        """
+        scan = _inside(scan, len(self.scan_sizes), "scan")
+        return self._rows(int(self._index["scan_starts"][scan]), int(self.scan_sizes[scan]))
+
+    def shape_of(self, track: int) -> Float32[np.ndarray, "n 3"] | None:
+        """Truth: surface points in the object frame, a view, metres; None if unknown."""
+        start = int(self._index["shape_starts"][track])
+        return None if start < 0 else self._rows(start, int(self._index["shape_sizes"][track]))
+
+    def poses_of(self, track: int) -> SE3 | None:
+        """Truth: `T_sensor_object`, one a scan; None if unknown."""
+        start = int(self._index["pose_starts"][track])
+        if start < 0:
+            return None
+        count = int(self.track_starts[track + 1] - self.track_starts[track])
+        rows = torch.from_numpy(self._index["poses"][start : start + count].copy())
+        return SE3(rows[:, :, :3], rows[:, :, 3])
+
+    def sensor_of(self, track: int) -> Sensor:
+        """How a track was taken."""
+        number = int(self._index["sensors"][track])
+        if number not in self._sensors:
+            raw = json.loads(self._text("sensors", track))
+            self._sensors[number] = sensor_from_json(raw, self.path)
+        return self._sensors[number]
+
+    def verify(self) -> None:
+        """Read everything and compare the checksums.
+
+        Raises:
+            BadInputError: a file differs from what was written.
+        """
+        for record in self._files:
+            with (self.path / record.file).open("rb") as file:
+                found = hashlib.file_digest(file, "sha256").hexdigest()
+            if found != record.sha256:
+                raise BadInputError(
+                    f"{self.path / record.file}: the checksum is wrong (expected "
+                    f"{record.sha256[:12]}, found {found[:12]}); copy or convert the store again."
+                )
+
+    def _rows(self, start: int, count: int) -> Float32[np.ndarray, "n 3"]:
+        last = len(self._shard_starts) - 2
+        shard = min(bisect_right(self._shard_starts, start) - 1, last)
+        first = start - self._shard_starts[shard]
+        return self._shard(shard)[first : first + count]
+
+    def _shard(self, number: int) -> Float32[np.ndarray, "n 3"]:
+        if number not in self._shards:
+            path = self.path / self._files[number + 1].file
+            points = map_tensors(path).get("points")
+            rows = self._shard_starts[number + 1] - self._shard_starts[number]
+            if points is None or points.shape != (rows, 3) or points.dtype != np.float32:
+                raise BadInputError(f"{path}: does not hold the {rows} points of the index.")
+            self._shards[number] = points
+        return self._shards[number]
+
+    def _text(self, column: str, row: int) -> str:
+        number = int(self._index[column][row])
+        start, end = self._index["text_starts"][number : number + 2].tolist()
+        return self._index["text_bytes"][start:end].tobytes().decode()
+
+
+def _inside(index: int, count: int, what: str) -> int:
+    if not -count <= index < count:
+        raise IndexError(f"{what} {index} of {count}")
+    return index % count
+
+
+def _file_record(raw: dict[str, Any], path: Path) -> FileRecord:
+    try:
+        return FileRecord(**raw)
+    except TypeError as error:
+        raise BadInputError(f"{path / INDEX_JSON}: damaged; convert the data again.") from error
+
+
+def _check_size(path: Path, record: FileRecord) -> None:
+    file = path / record.file
+    found = file.stat().st_size if file.is_file() else 0
+    if found != record.bytes:
+        raise BadInputError(
+            f"{file}: expected {record.bytes} bytes, found {found}; copy the whole store again."
+        )
+
+
+def _check_index(index: dict[str, np.ndarray], shards: int, path: Path) -> None:
+    wrong = [n for n, kind in INDEX.items() if n not in index or index[n].dtype != kind]
+    if wrong:
+        raise BadInputError(f"{path / INDEX_TENSORS}: lacks {', '.join(wrong)}; convert again.")
+    tracks, scans = len(index["track_starts"]) - 1, len(index["scan_sizes"])
+    lengths = {
+        **dict.fromkeys(("track_names", "categories", "sources", "sensors"), tracks),
+        **dict.fromkeys(("shape_starts", "shape_sizes", "pose_starts"), tracks),
+        **dict.fromkeys(("scan_starts", "scan_names"), scans),
+        "shard_starts": shards + 1,
+    }
+    if any(len(index[n]) != k for n, k in lengths.items()) or index["track_starts"][-1] != scans:
+        raise BadInputError(f"{path / INDEX_TENSORS}: its parts do not fit; convert again.")
