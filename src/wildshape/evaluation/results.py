@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What an evaluation found: one record a scan, their summaries, and `metrics.json`."""
 
-import json
 import os
 import platform
 from collections.abc import Mapping, Sequence
@@ -14,6 +13,7 @@ import numpy as np
 
 from wildshape.evaluation.metrics import ACCURATE_DEG, CompletionError
 from wildshape.evaluation.turning import Rotate
+from wildshape.io.atomic import write_json
 
 FORMAT = 1
 Figures = dict[str, float | None]
@@ -247,17 +247,13 @@ def write_metrics(
         runs: at least one, of one input protocol, one a seed.
         provenance: data, models, commands, commit: whatever says how the figures came about.
     """
-    return _write(folder / "metrics.json", as_json(runs, provenance or {}))
+    path = folder / "metrics.json"
+    write_json(path, as_json(runs, provenance or {}))
+    return path
 
 
 def write_scores(folder: Path, runs: Sequence[Results]) -> Path:
     """Write `scores.json`, every scan's record behind the figures, atomically."""
-    return _write(folder / "scores.json", {"runs": [asdict(run) for run in runs]})
-
-
-def _write(path: Path, content: Mapping[str, object]) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_suffix(".partial")
-    draft.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    draft.replace(path)
+    path = folder / "scores.json"
+    write_json(path, {"runs": [asdict(run) for run in runs]})
     return path

@@ -8,6 +8,7 @@ from pathlib import Path
 from wildshape.evaluation.paper import LIDAR_ROWS, VIEW_ROWS, PaperRow
 from wildshape.evaluation.results import Results, Summary, summarise
 from wildshape.evaluation.turning import Rotate
+from wildshape.io.atomic import write_text
 
 _ROTATE: dict[Rotate, str] = {
     "none": "scans as recorded",
@@ -59,10 +60,9 @@ def paper_markdown(rows: Sequence[PaperRow] = LIDAR_ROWS) -> str:
 
 def write_table(folder: Path, runs: Sequence[Results], *, views: bool = False) -> Path:
     """Write `table.md`: ours, then the paper's LiDAR rows (or those of its depth views)."""
-    folder.mkdir(parents=True, exist_ok=True)
     path = folder / "table.md"
     paper = paper_markdown(VIEW_ROWS if views else LIDAR_ROWS)
-    path.write_text(f"{markdown(runs)}\n{paper}", encoding="utf-8")
+    write_text(path, f"{markdown(runs)}\n{paper}")
     return path
 
 
@@ -98,6 +98,8 @@ def _notes(summaries: Sequence[Summary]) -> str:
     if truths:
         lines.append(f"Truth: {', '.join(truths)}, {counts} points (median).")
         lines.append("CD floor: 0.5 sqrt(area / count), both sides; compare CD at like counts.")
+    if "mirrored" in truths:
+        lines.append("Mirrored truth is made of the scans; clouds of them can be under the floor.")
     lines += [
         f"Left out, {summary.name}: {count} x {reason}."
         for summary in summaries
