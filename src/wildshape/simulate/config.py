@@ -27,7 +27,7 @@ class SimulationConfig:
             mesh i of the sorted list, again from the first after the last.
         occlusion: probability that something stands in the way in a LiDAR track.
         ground: leave ground returns within 0.3 m of the object in (LiDAR).
-        dropout: share of pulses or pixels lost at random; None: 0.03 LiDAR, 0 camera.
+        dropout: share of pulses or pixels lost at random; None: 0.05 LiDAR, 0 camera.
         noise_m: sigma of the range noise, metres; None: the sensor's own (camera: 0).
         shape_points: points of the complete truth shape.
     """
@@ -90,7 +90,7 @@ class SimulationConfig:
     @property
     def loss(self) -> float:
         """Share of pulses or pixels lost at random."""
-        return (0.03 if self.is_lidar else 0.0) if self.dropout is None else self.dropout
+        return (0.05 if self.is_lidar else 0.0) if self.dropout is None else self.dropout
 
     @property
     def noise(self) -> float:

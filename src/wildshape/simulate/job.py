@@ -43,7 +43,7 @@ class Job:
         scans = config.usual_scans
         if config.vary_scans:
             scans = int(rng.integers(max(scans // 2, 1), scans * 5 // 3 + 1))
-        glass = float(rng.uniform(0.05, 0.4))
+        glass = float(rng.uniform(0.02, 0.3))
         returns = Returns(config.noise, config.loss, glass, config.ground)
         if isinstance(config.device, DepthCamera):
             return camera_track(target, config.device, scans, returns, config.shape_points, rng)

@@ -125,7 +125,7 @@ def _returned(
     hits: Hits, target: Solid, sensor: SpinningLidar, returns: Returns, rng: np.random.Generator
 ) -> np.ndarray:
     """`(n,)` bool: pulses on the target that come back strong enough to be told."""
-    chance = np.full(len(hits.face), 1 - returns.dropout)
+    chance = np.full(len(hits.face), 1.0 - returns.dropout)
     chance *= np.clip(hits.cosine / 0.12, 0.0, 1.0)
     glass = target.glass[np.where(hits.solid == 0, hits.face, 0)]
     chance *= np.where(glass, returns.glass, 1.0)

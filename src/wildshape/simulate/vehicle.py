@@ -60,6 +60,7 @@ class _Body:
     wheel_radius: float
     bed: tuple[float, float]
     corner: float
+    panel: bool
 
     @property
     def glass_x(self) -> np.ndarray:
@@ -91,9 +92,10 @@ def _draw(kind: str, rng: np.random.Generator) -> _Body:
     nose = hood * rng.uniform(0.78, 0.92)
     tail = trunk * rng.uniform(0.86, 0.97)
     cowl, roof0, roof1, deck = (r[name] * length for name in ("cowl", "roof0", "roof1", "deck"))
+    bow = float(rng.uniform(0.96, 0.995))  # the roof falls backward
     arc = height * rng.uniform(0.965, 0.985)
     top = np.array((
-        (0.0, nose * 0.86), (0.10, nose), (cowl, hood), (roof0, arc), (roof1, arc * 0.995),
+        (0.0, nose * 0.86), (0.10, nose), (cowl, hood), (roof0, arc), (roof1, arc * bow),
         (deck, trunk), (length - 0.06, tail), (length, tail * 0.86),
     ))  # fmt: skip
     if kind == "truck":
@@ -107,7 +109,7 @@ def _draw(kind: str, rng: np.random.Generator) -> _Body:
         kind, length, r["width"], height, top, belt, float(rng.uniform(0.18, 0.26)),
         r["tumble"], (front, rear), radius,
         (deck + 0.05, length - 0.08) if kind == "pickup" else (9e9, 9e9),
-        float(rng.uniform(0.10, 0.24)),
+        float(rng.uniform(0.10, 0.24)), kind == "truck" or (kind == "van" and rng.random() < 0.4),
     )  # fmt: skip
 
 
@@ -115,13 +117,13 @@ def _stations(body: _Body) -> np.ndarray:
     """Where cross-sections stand: profile knots, wheel wells, rounded ends, door pillars."""
     end = body.top[-1, 0]
     reach = body.wheel_radius + 0.05
-    wells = [x + reach * np.cos(np.linspace(np.pi, 0, 9)) for x in body.wheel_x]
+    wells = [x + reach * np.cos(np.linspace(np.pi, 0, 7)) for x in body.wheel_x]
     _, roof0, roof1, _ = body.glass_x
     pillar = (roof0 + roof1) / 2 + np.array((-0.06, 0.06))
     bed = [np.asarray(body.bed) + d for d in (-0.03, 0.0)] if body.bed[0] < end else []
     x = np.concatenate((
         body.top[:, 0], *wells, pillar, *bed,
-        (0.04, 0.2, 0.4, end - 0.2, end - 0.4, end - 0.03), np.linspace(0, end, 9),
+        (0.04, 0.2, 0.4, end - 0.2, end - 0.4, end - 0.03), np.linspace(0, end, 6),
     ))  # fmt: skip
     x = np.unique(np.round(x[(x >= 0) & (x <= end)], 3))
     return x[np.concatenate(((True,), np.diff(x) > 0.008))]
@@ -148,19 +150,25 @@ def _shell(body: _Body) -> Solid:
     """The body's skin: 24 points around each section, bottom middle first, leftwards up."""
     x = _stations(body)
     top = np.interp(x, body.top[:, 0], body.top[:, 1])
+    _, roof0, roof1, _ = body.glass_x
+    along = np.clip((x - roof0) / (roof1 - roof0), 0, 1)
+    top = top + 0.1 * along * (1 - along)  # the roof is arched
     wide, well = _half_width(body, x), _well(body, x)
     belt = np.maximum(np.minimum(body.belt, top - 0.07), well + 0.06)
     rise = np.maximum(top - belt, 0.0)
     lean = body.tumble * np.maximum(top - body.belt, 0.0)
     shoulder = wide - 0.05 - lean
     inner = np.where((x > body.bed[0]) & (x < body.bed[1]), 0.45, 0.0)
-    low = np.maximum(body.floor, well)
+    end = body.top[-1, 0]
+    lift = np.clip(1 - x / 0.4, 0, 1) ** 2 + np.clip(1 - (end - x) / 0.4, 0, 1) ** 2
+    floor = body.floor + 0.08 * lift  # bumpers end higher than the sills
+    low = np.maximum(floor, well)
     third = (belt - low) / 3
     bulge = 0.02
     pane0, pane1 = belt + 0.12 * rise, belt + 0.86 * rise
     lines = (
-        (0 * x, body.floor + 0 * x),
-        (wide - 0.30, body.floor + 0 * x),
+        (0 * x, floor),
+        (wide - 0.30, floor),
         (wide - 0.28, low),
         (wide - 0.03, low),
         (wide - 0.5 * bulge, low + third),
@@ -183,10 +191,10 @@ def _panes(body: _Body, x: np.ndarray) -> np.ndarray:
     cowl, roof0, roof1, deck = body.glass_x
     middle = (x[1:] + x[:-1]) / 2
     pillar = np.abs(middle - (roof0 + roof1) / 2) < 0.07
-    closed = (middle > (roof0 + roof1) / 2) if body.kind == "truck" else np.zeros_like(pillar)
+    closed = (middle > (roof0 + roof1) / 2) & body.panel
     side = (middle > cowl + 0.25 * (roof0 - cowl)) & (middle < deck - 0.25 * (deck - roof1))
     screen = (middle > cowl) & (middle < roof0)
-    rear = (middle > roof1) & (middle < deck) & (body.kind != "truck")
+    rear = (middle > roof1) & (middle < deck) & (not body.panel)
     panes = np.zeros((len(middle), 24), bool)
     panes[:, [7, 16]] = (side & ~pillar & ~closed)[:, None]
     panes[:, 9:15] |= (screen | rear)[:, None]

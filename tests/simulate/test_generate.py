@@ -1,0 +1,147 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whole tracks: truth fits the scans, and a seed makes the same bytes with any workers."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from wildshape.errors import BadInputError
+from wildshape.records import Track
+from wildshape.simulate.config import SensorName
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+from wildshape.simulate.solid import box
+
+
+def _bytes(track: Track) -> bytes:
+    assert track.T_sensor_object is not None
+    assert track.shape is not None
+    arrays = (*track.scans, np.asarray(track.T_sensor_object), track.shape)
+    return b"".join(np.ascontiguousarray(a).tobytes() for a in arrays) + track.source.encode()
+
+
+def _tracks(config: SimulationConfig, seed: int = 0, workers: int = 1) -> list[Track]:
+    return list(simulate_tracks(config, seed, workers))
+
+
+@pytest.mark.parametrize("sensor", ["hdl64", "hdl32", "os1-128", "depth-camera"])
+def test_points_carried_back_lie_on_the_truth_shape(sensor: SensorName) -> None:
+    lidar = sensor != "depth-camera"
+    config = SimulationConfig(tracks=2, sensor=sensor, scans=6 if lidar else 3)
+    for track in _tracks(config):
+        assert track.shape is not None
+        assert track.T_sensor_object is not None
+        assert track.shape.shape == (8192, 3)
+        assert track.shape.dtype == np.float32
+        tree = KDTree(track.shape)
+        spacing = 0.12 if lidar else 0.03
+        for i, scan in enumerate(track.scans):
+            assert len(scan) >= 100
+            assert scan.dtype == np.float32
+            off, _ = tree.query(track.T_sensor_object[i].inverse().apply_numpy(scan))
+            assert np.quantile(off, 0.99) < spacing + (0.06 if lidar else 0.0)
+            assert np.median(off) < 0.5 * spacing
+
+
+def test_a_lidar_shape_is_centred_and_upright() -> None:
+    for track in _tracks(SimulationConfig(tracks=3, scans=4)):
+        assert track.shape is not None
+        low, high = track.shape.min(0), track.shape.max(0)
+        assert np.abs(low + high)[:2].max() < 0.1
+        assert high[0] - low[0] > high[1] - low[1] > 1.5
+
+
+def test_the_same_seed_makes_the_same_bytes_with_any_workers() -> None:
+    config = SimulationConfig(tracks=5, scans=5, occlusion=0.5, ground=True)
+    alone = [_bytes(t) for t in _tracks(config, seed=3)]
+    assert alone == [_bytes(t) for t in _tracks(config, seed=3, workers=2)]
+    fewer = [
+        _bytes(t)
+        for t in _tracks(SimulationConfig(tracks=2, scans=5, occlusion=0.5, ground=True), 3)
+    ]
+    assert alone[:2] == fewer
+    assert len(set(alone)) == 5
+    assert alone[0] != _bytes(_tracks(config, seed=4)[0])
+
+
+def test_occluders_reduce_points() -> None:
+    def points(occlusion: float) -> list[int]:
+        config = SimulationConfig(tracks=12, scans=4, occlusion=occlusion, shape_points=64)
+        return [sum(len(s) for s in t.scans) for t in _tracks(config, seed=1)]
+
+    free, occluded = points(0.0), points(0.999)
+    fewer = sum(b < 0.97 * a for a, b in zip(free, occluded))
+    assert fewer >= 3
+
+
+def test_as_many_scans_as_asked_for_and_never_under_100_points() -> None:
+    for track in _tracks(SimulationConfig(tracks=4, sensor="hdl32", occlusion=0.9)):
+        assert len(track.scans) == len(track.scan_names) == 24
+        assert min(len(s) for s in track.scans) >= 100
+        assert track.sensor.resolution_deg == (0.1667, 1.3335)
+        assert track.source.startswith("simulated hdl32 ")
+    varied = [len(t.scans) for t in _tracks(SimulationConfig(tracks=8, vary_scans=True))]
+    assert len(set(varied)) > 2
+    assert all(12 <= n <= 40 for n in varied)
+
+
+def test_the_depth_camera_is_dpcs() -> None:
+    (track,) = _tracks(SimulationConfig(tracks=1, sensor="depth-camera", category="airplane"))
+    assert len(track.scans) == 5
+    camera = track.sensor.intrinsics
+    assert camera is not None
+    assert (camera.fx, camera.cx, camera.width) == (240.0, 64.0, 128)
+    assert track.sensor.kind == "camera"
+
+
+def test_a_users_meshes(tmp_path: Path) -> None:
+    import trimesh
+
+    (tmp_path / "deep").mkdir()
+    for name, length in (("b.ply", 2.0), ("deep/a.stl", 2.4)):
+        brick = box((-length, -0.9, 0.0), (length, 0.9, 1.5))
+        trimesh.Trimesh(brick.vertices, brick.faces).export(tmp_path / name)
+    config = SimulationConfig(tracks=3, scans=3, meshes=tmp_path)
+    assert [t.source.split()[-1] for t in _tracks(config)] == ["b", "a", "b"]
+
+
+@pytest.mark.parametrize(
+    ("size", "message"), [(4000.0, "millimetres"), (0.1, "unit scale")], ids=["mm", "unit"]
+)
+def test_meshes_not_in_metres_are_refused(tmp_path: Path, size: float, message: str) -> None:
+    import trimesh
+
+    trimesh.creation.box((size, size / 2, size / 2)).export(tmp_path / "odd.ply")
+    with pytest.raises(BadInputError, match=rf"odd\.ply.*{message}"):
+        _tracks(SimulationConfig(tracks=1, meshes=tmp_path))
+    assert _tracks(SimulationConfig(tracks=1, meshes=tmp_path, sensor="depth-camera"))
+
+
+def test_a_worker_hands_on_what_it_refused(tmp_path: Path) -> None:
+    (tmp_path / "broken.ply").write_bytes(b"ply\nnonsense")
+    with pytest.raises(BadInputError, match=r"broken\.ply"):
+        _tracks(SimulationConfig(tracks=2, meshes=tmp_path), workers=2)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"tracks": 0}, "tracks is 0"),
+        ({"scans": 0}, "scans is 0"),
+        ({"occlusion": 1.5}, "occlusion is 1.5"),
+        ({"noise_m": -1.0}, "noise_m"),
+        ({"sensor": "kinect"}, "expected one of hdl64"),
+        ({"category": "chair"}, "depth-camera"),
+    ],
+)
+def test_bad_settings_are_refused_in_one_sentence(wrong: dict, message: str) -> None:
+    with pytest.raises(BadInputError, match=message):
+        SimulationConfig(**wrong)
+
+
+def test_missing_and_empty_mesh_folders(tmp_path: Path) -> None:
+    for folder, message in ((tmp_path / "none", "no folder"), (tmp_path, "holds no mesh")):
+        with pytest.raises(BadInputError, match=message):
+            _tracks(SimulationConfig(tracks=1, meshes=folder))

@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Depth views: exact back-projection, the stated intrinsics, the object within the image."""
+
+import numpy as np
+import pytest
+
+from wildshape.simulate.raycast import Scene
+from wildshape.simulate.sensor import DEPTH_CAMERA
+from wildshape.simulate.solid import box
+from wildshape.simulate.unit_shapes import airplane
+from wildshape.simulate.view import back_project, depth_image, random_pose, view
+
+
+def test_back_projection_is_exact_on_a_plane() -> None:
+    plane = box((-5.0, -5.0, 2.0), (5.0, 5.0, 3.0))
+    depth = depth_image(Scene([plane]), DEPTH_CAMERA, np.eye(4))
+    np.testing.assert_allclose(depth, 2.0, atol=1e-5)
+    points = back_project(depth, DEPTH_CAMERA).astype(np.float64)
+    assert len(points) == 128 * 128
+    u = 240.0 * points[:, 0] / points[:, 2] + 64.0
+    v = 240.0 * points[:, 1] / points[:, 2] + 64.0
+    row, column = np.divmod(np.arange(128 * 128), 128)
+    np.testing.assert_allclose(u, column + 0.5, atol=1e-4)
+    np.testing.assert_allclose(v, row + 0.5, atol=1e-4)
+
+
+def test_a_unit_sphere_of_directions_fits_and_fills_the_image() -> None:
+    """A sphere of diameter 1 at distance 2 reaches 0.484 of the half width 0.5."""
+    edge = 0.5 / np.sqrt(2.0**2 - 0.5**2) * DEPTH_CAMERA.focal_px
+    assert 0.9 * 64 < edge < 64
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_views_look_upright_at_the_object(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    T = random_pose(DEPTH_CAMERA, rng)
+    np.testing.assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0)
+    np.testing.assert_allclose(T[:3, 3] + 2.0 * T[:3, 2], 0.0, atol=1e-12)
+    assert T[2, 1] < 0  # the image's down is the world's down
+    solid = airplane(rng)
+    points, T_object_camera = view(Scene([solid]), DEPTH_CAMERA, 0.0, 0.0, rng)
+    on_object = points @ T_object_camera[:3, :3].T + T_object_camera[:3, 3]
+    assert (np.abs(on_object) <= solid.bounds[1] + 1e-4).all()
+    assert len(points) > 300
