@@ -1,0 +1,130 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a report holds, as frozen records; `page.write_report` draws them.
+
+All clouds and the box of one object are in ONE frame, a sensor's, metres: they are drawn with one
+camera, so a shift between two panels is a shift in metres.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wildshape.records import Box, Points, SensorKind
+
+# Okabe & Ito 2008: told apart by colour-blind readers, on white and on black.
+ORANGE, BLUE, GREEN, PINK, SKY, GREY = (
+    "#d55e00",
+    "#0072b2",
+    "#009e73",
+    "#cc79a7",
+    "#56b4e9",
+    "#8a8f98",
+)
+SERIES_COLORS = (BLUE, ORANGE, GREEN, PINK, SKY, GREY)
+LABEL_COLORS = {
+    "input scan": ORANGE,
+    "completed": BLUE,
+    "fused by us": GREEN,
+    "ICP fused": PINK,
+    "truth": GREY,
+}
+
+Numbers = Sequence[float | int] | np.ndarray
+Cell = str | int | float | None
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of cells; `None` is drawn as a dash, a float with three digits.
+
+    Attributes:
+        emphasis: indices of the rows drawn bold (our own method).
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    caption: str = ""
+    emphasis: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One diagram; a series is (name, xs, ys), values that are not finite are gaps."""
+
+    title: str
+    x_label: str
+    y_label: str
+    series: tuple[tuple[str, Numbers, Numbers], ...]
+    log_y: bool = False
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """One panel's points.
+
+    Attributes:
+        label: the panel's title: `input scan`, `truth`, `fused by us`, `completed`, `ICP fused`.
+        points: `(n, 3)` metres, in the frame of the object's other clouds.
+        color: `#rrggbb`; empty takes the label's own.
+        size: dot size in CSS pixels.
+    """
+
+    label: str
+    points: Points
+    color: str = ""
+    size: float = 2.0
+
+    @property
+    def paint(self) -> str:
+        """The colour to draw with."""
+        return self.color or LABEL_COLORS.get(self.label, SKY)
+
+
+@dataclass(frozen=True)
+class ReportObject:
+    """One object: a row of linked panels.
+
+    Attributes:
+        clouds: one a panel, at most eight (a browser keeps about sixteen 3D contexts alive).
+        box: oriented box in the clouds' frame, drawn in each panel.
+        facts: (label, value) pairs under the name.
+        sensor: tells which way is up; the sensor stands at the origin.
+    """
+
+    name: str
+    subtitle: str = ""
+    clouds: tuple[Cloud, ...] = ()
+    box: Box | None = None
+    facts: tuple[tuple[str, str], ...] = ()
+    sensor: SensorKind = "lidar"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A finished picture, embedded as it is."""
+
+    title: str
+    png: bytes
+
+
+@dataclass(frozen=True)
+class Report:
+    """A whole page.
+
+    Attributes:
+        cost: (label, value) tiles: time, steps, points.
+        provenance: name -> anything; shown folded at the end.
+    """
+
+    title: str
+    summary: str = ""
+    cost: tuple[tuple[str, str], ...] = ()
+    tables: tuple[Table, ...] = ()
+    curves: tuple[Curve, ...] = ()
+    objects: tuple[ReportObject, ...] = ()
+    notes: tuple[str, ...] = ()
+    provenance: dict = field(default_factory=dict)
+    figures: tuple[Figure, ...] = ()

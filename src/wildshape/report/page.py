@@ -1,0 +1,236 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The report as one HTML file that needs no network: plotly's script and all data are inside.
+
+The page carries a Content-Security-Policy that forbids every load from outside, so the browser
+itself keeps the promise.
+"""
+
+import base64
+import json
+import math
+import os
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+
+import numpy as np
+
+from wildshape.io.atomic import write_text
+from wildshape.report.content import SERIES_COLORS, Cell, Cloud, Curve, Numbers, Report, Table
+from wildshape.report.picture import still
+from wildshape.report.scene import AXES, Scene, scene_of
+
+_MAX_CURVE_POINTS = 2000
+_DASH = "\N{EN DASH}"
+_NUMERIC = f"0123456789-+±{_DASH}"
+_STEPS = 65534  # int16 from -32767 to 32767 across the scene
+
+
+def write_report(report: Report, path: Path) -> None:
+    """Write the page; the file appears under its name only when it is whole.
+
+    Args:
+        report: what to show; every part may be empty.
+        path: the `.html` file; an existing one is replaced.
+    """
+    write_text(path, render(report))
+
+
+def render(report: Report) -> str:
+    """The page's text."""
+    from plotly.offline import get_plotlyjs
+
+    template = files("wildshape.report") / "template"
+    scenes = [scene_of(shown) for shown in report.objects]
+    return Template((template / "page.html").read_text(encoding="utf-8")).substitute(
+        title=escape(report.title),
+        summary=_paragraphs(report.summary),
+        style=(template / "page.css").read_text(encoding="utf-8"),
+        stills=_stills(report, scenes),
+        objects_hidden="" if report.objects else "hidden",
+        cost=_cost(report),
+        tables="".join(_table(table) for table in report.tables),
+        curves=_curves(report.curves),
+        figures=_figures(report),
+        notes=_notes(report.notes),
+        provenance=_provenance(report.provenance),
+        data=_json(_data(report, scenes)),
+        plotly=get_plotlyjs(),
+        script=(template / "page.js").read_text(encoding="utf-8"),
+    )
+
+
+def quantise(points: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[str, list[float]]:
+    """Points as base64 of little-endian int16, and the metres of one step along each axis.
+
+    `x = (q + 32767) step + low`; the error is at most half a step, that is 0.1 mm for 10 m.
+    """
+    step = (high - low) / _STEPS
+    q = np.rint((points - low) / step) - 32767
+    packed = np.clip(q, -32767, 32767).astype("<i2").tobytes()
+    return base64.b64encode(packed).decode("ascii"), step.tolist()
+
+
+def _data(report: Report, scenes: list[Scene]) -> dict:
+    objects = [
+        {
+            "name": shown.name,
+            "subtitle": shown.subtitle,
+            "facts": shown.facts,
+            "axes": AXES[shown.sensor],
+            **_scene(scene),
+        }
+        for shown, scene in zip(report.objects, scenes, strict=True)
+    ]
+    return {"objects": objects, "curves": [_curve(curve) for curve in report.curves]}
+
+
+def _scene(scene: Scene) -> dict:
+    return {
+        "middle": scene.middle.tolist(),
+        "extent": scene.extent,
+        "low": scene.low.tolist(),
+        "high": scene.high.tolist(),
+        "box": scene.box.round(4).tolist(),
+        "arrow": None if scene.arrow is None else scene.arrow.round(4).tolist(),
+        "distance": round(scene.distance, 2),
+        "clouds": [_cloud(cloud, scene) for cloud in scene.clouds],
+    }
+
+
+def _cloud(cloud: Cloud, scene: Scene) -> dict:
+    packed, step = quantise(cloud.points, scene.low, scene.high)
+    return {
+        "label": cloud.label,
+        "color": cloud.paint,
+        "size": cloud.size,
+        "count": len(cloud.points),
+        "step": step,
+        "points": packed,
+    }
+
+
+def _curve(curve: Curve) -> dict:
+    series = [
+        {
+            "name": name,
+            "x": _column(xs),
+            "y": _column(ys),
+            "color": SERIES_COLORS[i % len(SERIES_COLORS)],
+        }
+        for i, (name, xs, ys) in enumerate(curve.series)
+    ]
+    labels = {"title": curve.title, "x_label": curve.x_label, "y_label": curve.y_label}
+    return {**labels, "log_y": curve.log_y, "series": series}
+
+
+def _column(values: Numbers) -> list[float | None]:
+    stride = max(1, math.ceil(len(values) / _MAX_CURVE_POINTS))
+    thinned = (float(value) for value in values[::stride])
+    return [float(f"{value:.6g}") if math.isfinite(value) else None for value in thinned]
+
+
+def _json(data: dict) -> str:
+    """JSON that cannot end its script element, whatever a name holds."""
+    return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def _paragraphs(text: str) -> str:
+    parts = (part.strip() for part in text.split("\n\n"))
+    return "".join(f"<p>{escape(part)}</p>" for part in parts if part)
+
+
+def _section(title: str, body: str) -> str:
+    return f"<section><h2>{title}</h2>{body}</section>" if body else ""
+
+
+def _cost(report: Report) -> str:
+    tiles = "".join(
+        f"<div><dt>{escape(label)}</dt><dd>{escape(value)}</dd></div>"
+        for label, value in report.cost
+    )
+    return _section("Cost", f'<dl class="tiles">{tiles}</dl>' if tiles else "")
+
+
+def _table(table: Table) -> str:
+    right = [_numeric([row[i] for row in table.rows]) for i in range(len(table.columns))]
+    head = _cells("th scope=col", "th", table.columns, right)
+    rows = "".join(
+        f"<tr{' class=ours' if i in table.emphasis else ''}>{_cells('td', 'td', row, right)}</tr>"
+        for i, row in enumerate(table.rows)
+    )
+    caption = f"<p class=caption>{escape(table.caption)}</p>" if table.caption else ""
+    grid = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+    return _section(escape(table.title), f"<div class=scroll>{grid}</div>{caption}")
+
+
+def _numeric(cells: list[Cell]) -> bool:
+    """Whether a column holds numbers, some perhaps written as `82.1 ± 1.3` or `–`."""
+    return all(not isinstance(cell, str) or cell[:1] in _NUMERIC for cell in cells)
+
+
+def _cells(start: str, end: str, cells: tuple[Cell, ...], right: list[bool]) -> str:
+    return "".join(
+        f"<{start}{' class=number' if number else ''}>{escape(_text(cell))}</{end}>"
+        for cell, number in zip(cells, right, strict=True)
+    )
+
+
+def _text(cell: Cell) -> str:
+    if cell is None or (isinstance(cell, float) and not math.isfinite(cell)):
+        return _DASH
+    return format(cell, ".3g") if isinstance(cell, float) else str(cell)
+
+
+def _curves(curves: tuple[Curve, ...]) -> str:
+    panels = "".join(
+        f'<figure><figcaption>{escape(curve.title)}</figcaption><div id="curve{i}" class=curve>'
+        "</div></figure>"
+        for i, curve in enumerate(curves)
+    )
+    return _section("Training", f"<div class=grid>{panels}</div>" if panels else "")
+
+
+def _figures(report: Report) -> str:
+    images = "".join(
+        f'<figure><figcaption>{escape(figure.title)}</figcaption><img alt="{escape(figure.title)}"'
+        f' src="{_png(figure.png)}"></figure>'
+        for figure in report.figures
+    )
+    return _section("Figures", f"<div class=grid>{images}</div>" if images else "")
+
+
+def _stills(report: Report, scenes: list[Scene]) -> str:
+    """One picture an object, shown on paper and where a browser has no WebGL."""
+    return "".join(
+        f"<figure><figcaption>{escape(shown.name)} <small>{escape(shown.subtitle)}</small>"
+        f'</figcaption><img alt="{escape(shown.name)}" src="{_png(still(scene))}"></figure>'
+        for shown, scene in zip(report.objects, scenes, strict=True)
+        if scene.clouds
+    )
+
+
+def _png(png: bytes) -> str:
+    return f"data:image/png;base64,{base64.b64encode(png).decode('ascii')}"
+
+
+def _notes(notes: tuple[str, ...]) -> str:
+    items = "".join(f"<li>{escape(note)}</li>" for note in notes)
+    return _section("Notes", f"<ul>{items}</ul>" if items else "")
+
+
+def _provenance(provenance: dict) -> str:
+    rows = "".join(
+        f"<dt>{escape(str(name))}</dt><dd>{escape(_readable(value))}</dd>"
+        for name, value in provenance.items()
+    )
+    folded = f"<details><summary>Where this comes from</summary><dl>{rows}</dl></details>"
+    return f"<section class=provenance>{folded}</section>" if rows else ""
+
+
+def _readable(value: object) -> str:
+    if isinstance(value, dict | list | tuple):
+        return json.dumps(value, indent=1, default=str)
+    return os.fspath(value) if isinstance(value, os.PathLike) else str(value)
