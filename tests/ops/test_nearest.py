@@ -220,6 +220,14 @@ def test_gradient_through_expanded_and_strided_inputs(forced, monkeypatch):
     torch.testing.assert_close(shapes.grad, exact_shapes.grad.float(), rtol=1e-4, atol=1e-5)
 
 
+def test_half_types_are_searched_in_float32():
+    query, target = (x.bfloat16().requires_grad_() for x in clouds(2, 9, 20))
+    agrees(nearest(query, target), query.detach().float(), target.detach().float())
+    nearest_distance(query, target).sum().backward()
+    assert query.grad is not None
+    assert query.grad.dtype == torch.bfloat16
+
+
 def test_no_targets_at_all():
     query = torch.zeros(2, 3, 3, requires_grad=True)
     assert nearest_distance(query, torch.zeros(2, 0, 3)).isinf().all()

@@ -46,7 +46,7 @@ def nearest(
     Raises:
         BadInputError: WILDSHAPE_NEAREST names no backend, or one that is not built.
     """
-    query, target = query.detach(), target.detach()
+    query, target = _at_least_float32(query.detach()), _at_least_float32(target.detach())
     arguments = (query, target, query_sizes, target_sizes)
     match _backend_for(query, target):
         case "native":
@@ -89,6 +89,7 @@ def nearest_distance(
     Returns:
         `(B, N)` distances; inf where a row has no target, 0 for padding; both without gradient.
     """
+    query, target = _at_least_float32(query), _at_least_float32(target)
     found = nearest(query, target) if neighbours is None else neighbours
     if target.shape[1] == 0:
         return found.distance_squared
@@ -115,6 +116,11 @@ def backend(device: torch.device | str = "cpu") -> Backend:
     if forced in ("torch", "reference", "native"):
         return forced
     return "native" if library() else "torch"
+
+
+def _at_least_float32(points: Tensor) -> Tensor:
+    """Half types are searched in float32: distances in them would tie or overflow."""
+    return points.float() if points.dtype in (torch.float16, torch.bfloat16) else points
 
 
 def _backend_for(query: Tensor, target: Tensor) -> Backend:
