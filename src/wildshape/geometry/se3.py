@@ -3,7 +3,6 @@
 """Rigid transforms. `T_a_b` takes points of frame b to frame a; frames cancel in a product."""
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 import torch
@@ -29,22 +28,22 @@ class SE3:
     translation: Float[Tensor, "*batch 3"]
 
     @classmethod
-    def identity(cls, *batch: int, dtype: torch.dtype = torch.float64) -> Self:
+    def identity(cls, *batch: int, dtype: torch.dtype = torch.float64) -> "SE3":
         """Transforms that change nothing, of the given batch shape."""
         eye = torch.eye(3, dtype=dtype).expand(*batch, 3, 3)
         return cls(eye, torch.zeros(*batch, 3, dtype=dtype))
 
     @classmethod
-    def from_matrix(cls, matrix: Float[Tensor, "*batch rows 4"] | np.ndarray) -> Self:
+    def from_matrix(cls, matrix: Float[Tensor, "*batch rows 4"] | np.ndarray) -> "SE3":
         """From 3x4 or 4x4 matrices, row-major, metres; kept in float64.
 
         Raises:
-            BadInputError: a matrix is not finite or its left 3x3 block is no rotation.
+            BadInputError: a matrix is of another shape, not finite, its left 3x3 block is no
+                rotation, or its last row is not 0 0 0 1 (as when it is column-major).
         """
         m = torch.as_tensor(matrix, dtype=torch.float64)
+        _check_layout(m)
         rotation, translation = m[..., :3, :3], m[..., :3, 3]
-        if not bool(torch.isfinite(m).all()):
-            raise BadInputError("a pose holds NaN or infinite numbers.")
         residual = rotation @ rotation.mT - torch.eye(3, dtype=torch.float64)
         determinant = torch.linalg.det(rotation)
         wrong = (residual.abs().amax((-2, -1)) > _TOLERANCE) | ((determinant - 1).abs() > 0.01)
@@ -67,15 +66,15 @@ class SE3:
     def __len__(self) -> int:
         return len(self.translation)
 
-    def __getitem__(self, index: int | slice | Tensor) -> Self:
+    def __getitem__(self, index: int | slice | Tensor) -> "SE3":
         return type(self)(self.rotation[index], self.translation[index])
 
-    def inverse(self) -> Self:
+    def inverse(self) -> "SE3":
         """`T_b_a` of `T_a_b`."""
         inverse = self.rotation.mT
         return type(self)(inverse, -(inverse @ self.translation[..., None])[..., 0])
 
-    def __matmul__(self, other: "SE3") -> Self:
+    def __matmul__(self, other: "SE3") -> "SE3":
         """Composition: `T_a_c = T_a_b @ T_b_c`, broadcast over the batch."""
         rotation = self.rotation @ other.rotation
         translation = (self.rotation @ other.translation[..., None])[..., 0] + self.translation
@@ -94,9 +93,19 @@ class SE3:
         """Rotation angle in radians."""
         return rotation_angle(self.rotation)
 
-    def to(self, dtype: torch.dtype) -> Self:
+    def to(self, dtype: torch.dtype) -> "SE3":
         """The same transforms in another floating type."""
         return type(self)(self.rotation.to(dtype), self.translation.to(dtype))
+
+
+def _check_layout(m: Tensor) -> None:
+    if m.ndim < 2 or m.shape[-2:] not in ((3, 4), (4, 4)):
+        raise BadInputError(f"a pose is of shape {tuple(m.shape)}, expected 3x4 or 4x4.")
+    if not bool(torch.isfinite(m).all()):
+        raise BadInputError("a pose holds NaN or infinite numbers.")
+    last = m[..., 3:, :]
+    if bool(((last - last.new_tensor((0.0, 0.0, 0.0, 1.0))).abs() > _TOLERANCE).any()):
+        raise BadInputError("the last row of a pose is not 0 0 0 1; give it row-major.")
 
 
 def stack(transforms: list[SE3]) -> SE3:

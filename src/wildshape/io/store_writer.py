@@ -8,7 +8,7 @@ import os
 from array import array
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float32
@@ -79,7 +79,7 @@ class StoreWriter:
         self._shards: list[FileRecord] = []
         self._shard: _Shard | None = None
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "StoreWriter":
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:

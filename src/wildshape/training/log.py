@@ -5,7 +5,7 @@
 import json
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 
 class RunLog:
@@ -31,7 +31,7 @@ class RunLog:
                 if isinstance(value, int | float):
                     self._board.add_scalar(name, value, step)
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "RunLog":
         return self
 
     def __exit__(
