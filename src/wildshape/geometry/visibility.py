@@ -5,6 +5,7 @@
 Three ways to bin. Each gives `(bin, depth, count)`; `wildshape.ops.zbuffer.visible` does the rest.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -62,7 +63,7 @@ def polar_bins(points: Float[Tensor, "B N 3"], bins: PolarBins) -> Bins:
     """Bins over the whole sphere, in the sensor's own axes (paper eq. 4)."""
     polar = to_spherical(points)
     columns = round(2 * torch.pi / bins.d_azimuth)
-    rows = round(torch.pi / bins.d_pitch) + 1
+    rows = 2 * math.ceil(torch.pi / 2 / bins.d_pitch) + 1  # so that no two heights share a row
     u = torch.floor(polar.azimuth / bins.d_azimuth).long() % columns
     v = torch.floor(polar.pitch / bins.d_pitch).long() % rows
     return Bins(u * rows + v, polar.range, columns * rows)
