@@ -1,0 +1,31 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""One thread a test process, the same examples on every run, and a few simulated cars."""
+
+import pytest
+import torch
+from hypothesis import settings
+
+from wildshape.io.store import StoreWriter, open_store
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+
+settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=40)
+settings.load_profile("repeatable")
+torch.set_num_threads(1)
+
+
+@pytest.fixture(scope="session")
+def cars():
+    """Eight simulated drive-bys, 12 scans each."""
+    config = SimulationConfig(tracks=8, scans=12, occlusion=0.0, shape_points=1024)
+    return list(simulate_tracks(config, seed=1, workers=1))
+
+
+@pytest.fixture(scope="session")
+def car_store(cars, tmp_path_factory):
+    """The same cars as a packed store."""
+    path = tmp_path_factory.mktemp("cars") / "store"
+    with StoreWriter(path, {}) as writer:
+        for track in cars:
+            writer.add(track)
+    return open_store(path)
