@@ -7,7 +7,6 @@ Three ways to bin. Each gives `(bin, depth, count)`; `wildshape.ops.zbuffer.visi
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import torch
 from jaxtyping import Float, Int
@@ -19,7 +18,8 @@ _WINDOW = 256
 _BEHIND = 1e-3
 
 
-class Bins(NamedTuple):
+@dataclass(frozen=True)
+class Bins:
     """Bin of each point (-1: not in the image), its depth, and how many bins there are."""
 
     index: Int[Tensor, "B N"]
