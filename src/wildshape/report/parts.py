@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from wildshape.geometry.se3 import SE3
 from wildshape.records import Box, Points, Track
@@ -75,7 +76,7 @@ def track_object(
     )
 
 
-def fuse(scans: Sequence[Points], T_middle_scan: SE3) -> Points:
+def fuse(scans: Sequence[Points], T_middle_scan: SE3) -> Float[np.ndarray, "f 3"]:
     """All scans moved to the middle scan's frame (METHOD 7)."""
     return np.concatenate([T_middle_scan[i].apply_numpy(scan) for i, scan in enumerate(scans)])
 

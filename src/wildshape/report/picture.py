@@ -138,8 +138,8 @@ def _panel(figure: Any, place: tuple[int, int, int], scene: Scene) -> Any:
     axes = figure.add_subplot(*place, projection="3d", computed_zorder=False)
     low, high = _tight(scene)
     middle, half = (low + high) / 2, (high - low) / 2
-    axes.set(xlim=_around(middle[0], half[0]), ylim=_around(middle[1], half[1]))
-    axes.set(zlim=_around(middle[2], half[2]))
+    (left, near, foot), (right, far, top) = low, high
+    axes.set(xlim=(left, right), ylim=(near, far), zlim=(foot, top))
     axes.set_box_aspect(tuple(half / half.max()), zoom=1.75)
     axes.set_axis_off()
     axes.patch.set_alpha(0)
@@ -155,10 +155,6 @@ def _tight(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     middle, half = (low + high) / 2, np.maximum((high - low) / 2, 1e-3)
     half[:2] = half[:2].max()
     return middle - half, middle + half
-
-
-def _around(middle: float, half: float) -> tuple[float, float]:
-    return float(middle - half), float(middle + half)
 
 
 def _thinned(cloud: Cloud) -> Cloud:

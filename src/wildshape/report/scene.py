@@ -76,7 +76,7 @@ def upright(points: np.ndarray, sensor: SensorKind) -> np.ndarray:
     return np.stack((x, z, -y), axis=-1)
 
 
-def thin(points: Points, count: int = MAX_POINTS) -> Points:
+def thin(points: Points, count: int = MAX_POINTS) -> Float[np.ndarray, "m 3"]:
     """At most `count` points, drawn without replacement, the same ones every time."""
     if len(points) <= count:
         return points

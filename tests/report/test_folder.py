@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from wildshape.errors import BadInputError
+from wildshape.geometry.rotation import rotation_z
+from wildshape.geometry.se3 import SE3
+from wildshape.io.points import write_ply
+from wildshape.io.poses import write_poses
+from wildshape.io.tracks import write_track
+from wildshape.records import Track
+from wildshape.report.folder import report_from_folder
+from wildshape.report.page import render
+
+NAMES = ("000000", "000001", "000002")
+
+
+def _track() -> Track:
+    """Three full views of one cloud of points, and the poses that explain them."""
+    rng = np.random.default_rng(0)
+    shape = (rng.uniform(-1, 1, (200, 3)) * (2, 0.9, 0.7)).astype(np.float32)
+    yaw = torch.tensor([0.0, 0.5, 1.0], dtype=torch.float64)
+    place = torch.tensor([[10.0, 2, 0], [11, 3, 0], [12, 4, 0]], dtype=torch.float64)
+    T_sensor_object = SE3(rotation_z(yaw), place)
+    scans = tuple(T_sensor_object[i].apply_numpy(shape) for i in range(3))
+    return Track("0007", scans, NAMES, T_sensor_object=T_sensor_object, shape=shape)
+
+
+def _completed(folder: Path, track: Track, objects: object) -> None:
+    assert track.T_sensor_object is not None
+    for name, scan in zip(NAMES, track.scans, strict=True):
+        write_ply(folder / "completed" / f"{name}.ply", scan)
+    write_poses(folder / "poses.txt", track.T_sensor_object)
+    (folder / "objects.json").write_text(json.dumps(objects), encoding="utf-8")
+
+
+def _entry(name: str) -> dict:
+    box = {"center": [11, 3, 0], "size": [4, 1.8, 1.4], "quaternion_wxyz": [1, 0, 0, 0]}
+    return {"scan": name, "box": box, "confidence": 0.75, "refined": True, "seconds": 0.02}
+
+
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_track_is_fused_in_its_middle_scan_s_frame(tmp_path: Path, wrapped: bool) -> None:
+    track = _track()
+    write_track(tmp_path / "data" / "0007", track)
+    entries = [_entry(name) for name in NAMES]
+    objects = {"scans": entries} if wrapped else entries
+    _completed(tmp_path / "out" / "0007", track, objects)
+    shown = report_from_folder(tmp_path / "out", tmp_path / "data").objects[0]
+    clouds = {cloud.label: cloud.points for cloud in shown.clouds}
+    assert list(clouds) == ["input scan", "truth", "fused by us", "completed"]
+    for points in (clouds["truth"], clouds["fused by us"][:200], clouds["fused by us"][-200:]):
+        np.testing.assert_allclose(points, track.scans[1], atol=1e-4)
+    np.testing.assert_array_equal(clouds["completed"], track.scans[1])
+    assert shown.box is not None
+    assert shown.box.size == (4, 1.8, 1.4)
+    assert ("confidence", "0.75") in shown.facts
+
+
+def test_without_the_scans_only_the_completed_shape_is_shown(tmp_path: Path) -> None:
+    _completed(tmp_path / "0007", _track(), {})
+    shown = report_from_folder(tmp_path).objects[0]
+    assert [cloud.label for cloud in shown.clouds] == ["completed"]
+    assert "not found" in shown.subtitle
+
+
+def test_metrics_and_log_become_table_and_curves(tmp_path: Path) -> None:
+    figures = {"cd": 0.312, "acc30": 0.82, "std": {"acc30": 0.013}, "scans_counted": {"pose": 42}}
+    metrics = {
+        "rotate": "yaw",
+        "seeds": [0, 1],
+        "methods": {"identity": {"cd": None, "acc30": 0.31}, "wildshape": figures},
+        "provenance": {"commit": "abc"},
+    }
+    (tmp_path / "evaluation").mkdir()
+    (tmp_path / "evaluation" / "metrics.json").write_text(json.dumps(metrics), encoding="utf-8")
+    lines = [
+        {"step": i, "loss": 1 / i, "observation": 0.1, "template": 0.0, "branch_shares": [0.5, 0.5]}
+        for i in (1, 2)
+    ]
+    lines.append({"step": 2, "validation/cycle_deg": 4.0})
+    (tmp_path / "run").mkdir()
+    log = "".join(json.dumps(line) + "\n" for line in lines) + '{"step": 3, "lo'
+    (tmp_path / "run" / "log.jsonl").write_text(log, encoding="utf-8")
+
+    report = report_from_folder(tmp_path)
+    table = report.tables[0]
+    row = dict(zip(table.columns, table.rows[1], strict=True))
+    assert table.emphasis == (1,)
+    assert (row["method"], row["CD, m"], row["scans"]) == ("wildshape", "0.312", 42)
+    assert row["acc ≤ 30°, %"] == "82.0 ± 1.3"
+    assert row["rotation, °"] is None
+    series = {c.title: [name for name, _, _ in c.series] for c in report.curves}
+    assert series["Loss"] == ["loss", "observation"]
+    assert series["Cycle consistency on held-out tracks"] == ["cycle"]
+    assert report.provenance == {"commit": "abc"}
+    assert "Each scan turned by its own random yaw" in render(report)
+
+
+@pytest.mark.parametrize("content", [None, "{"], ids=["empty", "broken"])
+def test_folder_without_anything_to_report_is_refused(tmp_path: Path, content: str | None) -> None:
+    if content is not None:
+        (tmp_path / "metrics.json").write_text(content, encoding="utf-8")
+    with pytest.raises(BadInputError, match=tmp_path.name):
+        report_from_folder(tmp_path)
+
+
+def test_missing_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match="no such folder"):
+        report_from_folder(tmp_path / "absent")
