@@ -5,7 +5,7 @@
 None of them is handed anything but points and the kind of sensor (METHOD 8).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Protocol, runtime_checkable
 
 from wildshape.geometry.se3 import SE3
@@ -25,7 +25,7 @@ class Completer(Protocol):
 class BatchCompleter(Completer, Protocol):
     """Completes several scans, each on its own, faster together."""
 
-    def complete_many(self, scans: list[Points], sensor: Sensor) -> Sequence[Points]:
+    def complete_many(self, scans: list[Points], sensor: Sensor) -> Iterable[Points]:
         """`complete` of each scan, in order."""
         ...
 

@@ -114,7 +114,7 @@ def complete_scans(method: Completer, case: Case) -> Sequence[Points | None]:
     if isinstance(method, BatchCompleter):
         # One scan's refusal must not cost the others theirs: then each goes alone.
         with suppress(BadInputError):
-            return method.complete_many(case.inputs(), case.sensor)
+            return list(method.complete_many(case.inputs(), case.sensor))
     return [_complete(method, scan, case) for scan in case.inputs()]
 
 

@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A drive written here in KITTI's own layout, with known points."""
+
+import math
+
+import numpy as np
+import pytest
+from tests.cars import poses_of
+
+from wildshape.datasets.kitti_raw import KittiRaw
+from wildshape.errors import BadInputError
+
+SIZE = (4.0, 1.8, 1.5)  # l w h
+
+
+def pose_xml(tx, ty, tz, rz):
+    fields = {"tx": tx, "ty": ty, "tz": tz, "rx": 0, "ry": 0, "rz": rz}
+    return "<item>" + "".join(f"<{k}>{v}</{k}>" for k, v in fields.items()) + "</item>"
+
+
+def tracklet_xml(category, first_frame, poses):
+    length, width, height = SIZE
+    return (
+        f"<item><objectType>{category}</objectType><h>{height}</h><w>{width}</w><l>{length}</l>"
+        f"<first_frame>{first_frame}</first_frame><poses><count>{len(poses)}</count>"
+        f"<item_version>2</item_version>{''.join(pose_xml(*p) for p in poses)}</poses></item>"
+    )
+
+
+def write_drive(folder, tracklets, clouds, scans="velodyne_points/data"):
+    folder.mkdir(parents=True, exist_ok=True)
+    body = "".join(tracklet_xml(*tracklet) for tracklet in tracklets)
+    (folder / "tracklet_labels.xml").write_text(
+        '<?xml version="1.0" encoding="UTF-8" standalone="yes" ?><!DOCTYPE boost_serialization>'
+        f"<boost_serialization><tracklets><count>{len(tracklets)}</count>{body}</tracklets>"
+        "</boost_serialization>"
+    )
+    (folder / scans).mkdir(parents=True, exist_ok=True)
+    for frame, cloud in clouds.items():
+        rows = np.concatenate((cloud, np.zeros((len(cloud), 1))), axis=1)
+        rows.astype("<f4").tofile(folder / scans / f"{frame:010d}.bin")
+    return folder
+
+
+def in_velo(points, pose):
+    """By hand: turn about z, then from the box's floor centre."""
+    x, y, z, yaw = pose
+    c, s = math.cos(yaw), math.sin(yaw)
+    p = np.atleast_2d(points)
+    turned = np.stack((c * p[:, 0] - s * p[:, 1], s * p[:, 0] + c * p[:, 1], p[:, 2]), axis=1)
+    return turned + np.array((x, y, z))
+
+
+POSES = [(10.0 - i, 4.0, -1.7, 0.5) for i in range(6)]
+
+
+@pytest.fixture
+def drive(tmp_path):
+    rng = np.random.default_rng(0)
+    clouds = {}
+    for i, pose in enumerate(POSES):
+        # z from the box's floor: 120 points above the strip, 30 in it, and the world around.
+        on_car = rng.uniform((-2, -0.9, 0.25), (2, 0.9, 1.5), size=(120, 3))
+        ground = rng.uniform((-2, -0.9, 0.0), (2, 0.9, 0.19), size=(30, 3))
+        world = np.array([[2.3, 0, 1], [0, 1.2, 1], [0, 0, 1.8], [-30, 0, 1], [60, 70, 2]])
+        clouds[3 + i] = in_velo(np.concatenate((on_car, ground, world)), pose)
+    clouds[5] = clouds[5][:90]
+    del clouds[7]
+    tracklets = [
+        ("Car", 3, POSES),
+        ("Pedestrian", 3, POSES),
+        ("Van", 3, [(40.0, -9.0, -1.7, 0.0)] * 2),
+    ]
+    root = tmp_path / "kitti"
+    return write_drive(root / "2011_09_26" / "2011_09_26_drive_0099_sync", tracklets, clouds)
+
+
+def test_a_vehicle_becomes_a_track(drive):
+    source = KittiRaw(drive)
+    (track,) = source.tracks()
+    assert track.name == "2011_09_26_drive_0099_sync_0000"
+    assert track.category == "car"
+    assert track.scan_names == tuple(f"{frame:010d}" for frame in (3, 4, 6, 8))
+    assert [len(scan) for scan in track.scans] == [120] * 4
+    assert all(scan.dtype == np.float32 for scan in track.scans)
+    assert source.rejected == {
+        "object: category Pedestrian": 1,
+        "scan: fewer than 100 points on the object": 3,
+        "scan: the frame has no velodyne file": 1,
+        "object: fewer than 1 scans left": 1,
+    }
+
+
+def test_truth_has_its_origin_at_the_boxs_centre(drive):
+    (track,) = KittiRaw(drive).tracks()
+    poses = poses_of(track)
+    for i, frame in enumerate((3, 4, 6, 8)):
+        x, y, z, yaw = POSES[frame - 3]
+        assert poses.translation[i].tolist() == pytest.approx([x, y, z + SIZE[2] / 2])
+        # One metre ahead of, left of and above the centre.
+        for axis in range(3):
+            ahead = in_velo(np.eye(3)[axis] + [0, 0, SIZE[2] / 2], (x, y, z, yaw))
+            assert poses[i].apply_numpy(np.eye(3)[axis : axis + 1]) == pytest.approx(ahead)
+        local = poses[i].inverse().apply_numpy(track.scans[i])
+        assert (np.abs(local) <= np.array(SIZE) / 2 + 1e-4).all()
+
+
+def test_ground_margin_and_every(drive):
+    (kept,) = KittiRaw(drive, keep_ground=True).tracks()
+    assert len(kept.scans[0]) == 150
+    # 0.35 m reaches the points 0.3 m beside, before and above the box.
+    (wide,) = KittiRaw(drive, margin=0.35).tracks()
+    assert len(wide.scans[0]) == 123
+    (second,) = KittiRaw(drive, every=2, min_points=50).tracks()
+    assert second.scan_names == ("0000000003", "0000000005")
+    assert list(KittiRaw(drive, min_scans=9).tracks()) == []
+
+
+@pytest.mark.parametrize("level", [0, 1, 2])
+def test_root_may_be_a_drive_a_date_or_the_folder_above(drive, level):
+    root = (drive, *drive.parents)[level]
+    assert [track.name for track in KittiRaw(root).tracks()] == [f"{drive.name}_0000"]
+
+
+def test_cut_scans_stand_in_where_full_ones_are_missing(drive):
+    (full,) = KittiRaw(drive).tracks()
+    cut = {7: in_velo(np.random.default_rng(1).uniform(0.3, 0.8, (110, 3)), POSES[4])}
+    cut[3] = np.zeros((1, 3))
+    write_drive(drive, [("Car", 3, POSES)], cut, "velodyne_objects_xyz0")
+    (track,) = KittiRaw(drive).tracks()
+    assert track.scan_names[3] == "0000000007"
+    assert np.array_equal(track.scans[0], full.scans[0])
+
+
+def test_a_drive_without_labels_among_others_is_counted(drive):
+    (drive.parent / "2011_09_26_drive_0100_sync" / "velodyne_points" / "data").mkdir(parents=True)
+    source = KittiRaw(drive.parent)
+    assert len(list(source.tracks())) == 1
+    assert source.rejected["drive without tracklet_labels.xml"] == 1
+
+
+def refused(root, match):
+    with pytest.raises(BadInputError, match=match):
+        list(KittiRaw(root).tracks())
+
+
+def test_missing_and_corrupt_files_are_named(drive):
+    refused(drive / "nowhere", "nowhere: no such folder")
+    labels = drive / "tracklet_labels.xml"
+    good = labels.read_text()
+    labels.write_text(good[:400])
+    refused(drive, r"tracklet_labels\.xml: not valid XML")
+    labels.write_text(good.replace("<tx>10.0</tx>", "<tx>nan</tx>", 1))
+    refused(drive, r"tracklet_labels\.xml: tracklet 0: <tx> is 'nan'")
+    labels.write_text("<a/>")
+    refused(drive, r"tracklet_labels\.xml: holds no tracklets")
+    labels.unlink()
+    refused(drive, r"tracklet_labels\.xml: no such file")
+    refused(drive.parent, "found 1 KITTI raw drives and none with")
+    labels.write_text(good)
+    scan = drive / "velodyne_points" / "data" / "0000000004.bin"
+    scan.write_bytes(scan.read_bytes()[:-5])
+    refused(drive, r"0000000004\.bin: \d+ bytes, expected a multiple of 16")
+
+
+def test_a_drive_without_scans_is_refused(tmp_path):
+    drive = write_drive(tmp_path / "2011_09_26_drive_0001_sync", [("Car", 0, POSES)], {})
+    refused(drive, r"velodyne_points.data: no \.bin scans")

@@ -1,0 +1,49 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Track folders and the packed store as sources."""
+
+import numpy as np
+import pytest
+from tests.cars import drive_by
+
+from wildshape.datasets.folder import Folder
+from wildshape.datasets.kitti_raw import KittiRaw
+from wildshape.datasets.packed import Packed
+from wildshape.datasets.source import Source
+from wildshape.errors import BadInputError
+from wildshape.io.store import StoreWriter
+from wildshape.io.tracks import write_track
+
+
+def test_folder_yields_tracks_in_order_and_counts_bad_scans(tmp_path):
+    for name in ("b", "a"):
+        write_track(tmp_path / name, drive_by(name, scans=3, points=50))
+    (tmp_path / "a" / "scans" / "000001.ply").write_bytes(b"ply\nbroken")
+    (tmp_path / "c" / "scans").mkdir(parents=True)
+    (tmp_path / "c" / "scans" / "0.npy").write_bytes(b"")
+    source = Folder(tmp_path)
+    tracks = list(source.tracks())
+    assert [track.name for track in tracks] == ["a", "b"]
+    assert tracks[0].scan_names == ("000000", "000002")
+    assert source.rejected == {"scan: cannot be used": 2, "track: no scan left": 1}
+    assert [track.name for track in Folder(tmp_path / "b").tracks()] == ["b"]
+
+
+def test_folder_without_tracks_is_refused(tmp_path):
+    with pytest.raises(BadInputError, match="no track folder"):
+        list(Folder(tmp_path).tracks())
+
+
+def test_packed_gives_back_what_was_written(tmp_path):
+    written = [drive_by(name, scans=2, points=50, seed=i) for i, name in enumerate("ab")]
+    store = StoreWriter(tmp_path / "store", {"source": "test"})
+    for track in written:
+        store.add(track)
+    store.close()
+    for track, read in zip(written, Packed(tmp_path / "store").tracks(), strict=True):
+        assert read.name == track.name
+        assert np.array_equal(read.scans[1], track.scans[1])
+
+
+def test_readers_are_sources(tmp_path):
+    assert all(isinstance(kind(tmp_path), Source) for kind in (Folder, Packed, KittiRaw))

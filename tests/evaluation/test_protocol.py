@@ -1,0 +1,212 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from tests.cars import drive_by, known, poses_of
+
+from wildshape.baselines.identity import Identity, OneScan
+from wildshape.baselines.local_icp import LocalIcp
+from wildshape.errors import BadInputError
+from wildshape.evaluation.protocol import run
+from wildshape.evaluation.results import figures_of
+from wildshape.evaluation.turning import turn_track
+from wildshape.geometry.rotation import random_rotation
+from wildshape.geometry.se3 import SE3
+from wildshape.records import Sensor
+
+
+class Recorder:
+    """Looks at its input, keeps what it answered, and answers something that depends on it."""
+
+    def __init__(self):
+        self.answers = []
+
+    def complete(self, points, sensor):
+        answer = (points[:50] * 1.01).copy()
+        self.answers.append(answer.tobytes())
+        points[:] = np.nan  # A method may spoil what it was given.
+        return answer
+
+    def register_track(self, scans, sensor):
+        T = LocalIcp().register_track(scans, sensor)
+        self.answers.append(T.matrix.numpy().tobytes())
+        return T
+
+    def complete_track(self, scans, sensor):
+        answer = LocalIcp().complete_track(scans, sensor)
+        self.answers.append(answer.tobytes())
+        return answer
+
+
+def corrupted(track):
+    """The same scans with other poses and another shape."""
+    generator = torch.Generator().manual_seed(9)
+    rotation = random_rotation(len(track.scans), generator).double()
+    u, _, vt = torch.linalg.svd(rotation)
+    rng = np.random.default_rng(9)
+    return replace(
+        track,
+        T_sensor_object=SE3(u @ vt, 9 * torch.randn(len(track.scans), 3).double()),
+        shape=rng.normal(size=(77, 3)).astype(np.float32),
+    )
+
+
+@pytest.mark.parametrize("rotate", ["none", "yaw", "so3"])
+def test_truth_never_reaches_the_method(rotate):
+    """Guard: other poses, other shape or no truth at all change no bit of any prediction."""
+    track = drive_by(scans=5, points=120)
+    answers, cds = [], []
+    bare = replace(track, T_sensor_object=None, shape=None)
+    for given in (track, corrupted(track), bare):
+        method = Recorder()
+        results = run({"method": method}, [given], rotate, seed=4)
+        answers.append(method.answers)
+        cds.append(figures_of(results["method"])["cd"])
+    assert len(answers[0]) == 5 + 1 + 1
+    assert answers[1] == answers[0]
+    assert cds[1] != cds[0]
+    # Nothing can be scored without truth, so nothing is asked.
+    assert cds[2] is None
+
+
+def test_turning_moves_scans_and_truth_alike():
+    track = drive_by(scans=6)
+    for rotate in ("yaw", "so3"):
+        turned = turn_track(track, rotate, seed=1)
+        before = poses_of(track).inverse()
+        after = poses_of(turned).inverse()
+        for i, (a, b) in enumerate(zip(track.scans, turned.scans)):
+            assert not np.allclose(a, b, atol=0.1)
+            # About the sensor's origin: the ranges stay.
+            assert np.linalg.norm(a, axis=1) == pytest.approx(np.linalg.norm(b, axis=1), rel=1e-5)
+            assert before[i].apply_numpy(a) == pytest.approx(after[i].apply_numpy(b), abs=1e-4)
+    assert turn_track(track, "none", seed=1) is track
+
+
+def test_yaw_turns_about_the_sensors_vertical():
+    track = drive_by(scans=3)
+    lidar = turn_track(track, "yaw", seed=0)
+    camera = turn_track(replace(track, sensor=Sensor(kind="camera")), "yaw", seed=0)
+    for a, b, c in zip(track.scans, lidar.scans, camera.scans):
+        assert b[:, 2] == pytest.approx(a[:, 2], abs=1e-5)
+        assert c[:, 1] == pytest.approx(a[:, 1], abs=1e-5)
+        assert not np.allclose(c[:, 2], a[:, 2], atol=0.1)
+
+
+def test_turns_depend_on_seed_and_name_only():
+    a, b = drive_by("a", scans=3), drive_by("b", scans=3)
+    again = turn_track(a, "so3", seed=2).scans
+    assert np.array_equal(turn_track(a, "so3", seed=2).scans[1], again[1])
+    assert not np.allclose(turn_track(a, "so3", seed=3).scans[1], again[1], atol=0.1)
+    other = turn_track(replace(b, scans=a.scans), "so3", seed=2).scans
+    assert not np.allclose(other[1], again[1], atol=0.1)
+
+
+def test_identity_is_right_on_a_straight_road_and_by_chance_under_yaw():
+    tracks = [drive_by(f"t{seed}", scans=9, points=60, seed=seed) for seed in range(20)]
+    # Only poses are looked at here: any small cloud will do for a shape.
+    tracks = [replace(t, shape=t.scans[0]) for t in tracks]
+    recorded = known(figures_of(run({"identity": Identity()}, tracks)["identity"]))
+    assert recorded["acc30"] == 1
+    assert recorded["rot_median_deg"] < 1e-5
+    turned = known(figures_of(run({"identity": Identity()}, tracks, "yaw", seed=0)["identity"]))
+    # 60 of 360 degrees: 16.7 %, three standard deviations of 160 draws either side.
+    assert turned["acc30"] == pytest.approx(1 / 6, abs=0.09)
+    assert turned["acc30_sym"] == pytest.approx(1 / 3, abs=0.12)
+
+
+def test_local_icp_row_beats_identity_by_cd_where_the_track_is_easy():
+    tracks = [drive_by(f"t{seed}", step=0.5, seed=seed) for seed in range(2)]
+    methods = {"identity": Identity(), "icp": LocalIcp(), "scan": OneScan()}
+    results = run(methods, tracks)
+    figures = {name: known(figures_of(results[name])) for name in methods}
+    assert figures["icp"]["rot_median_deg"] < 5
+    assert figures["icp"]["trans_median_m"] < figures["identity"]["trans_median_m"]
+    assert "acc30" not in figures["scan"]
+    assert figures["scan"]["points"] < figures["icp"]["points"]
+    assert len(results["scan"].completions) == 2 * 11
+    assert len(results["icp"].completions) == 2
+    # Every scan but the middle one.
+    assert len(results["icp"].registrations) == 2 * 10
+
+
+class Oracle:
+    """Knows the truth of a test's track."""
+
+    def __init__(self, track):
+        self.track = track
+
+    def complete(self, points, sensor):
+        i = next(i for i, s in enumerate(self.track.scans) if np.array_equal(s, points))
+        return self.track.T_sensor_object[i].apply_numpy(self.track.shape)
+
+    def register_track(self, scans, sensor):
+        poses = self.track.T_sensor_object
+        return poses[self.track.middle] @ poses.inverse()
+
+    def complete_track(self, scans, sensor):
+        return self.complete(scans[len(scans) // 2], sensor)
+
+
+def test_a_perfect_method_has_no_error_and_two_rows():
+    track = drive_by(scans=4)
+    results = run({"oracle": Oracle(track)}, [track])
+    assert [scores.name for scores in results.methods] == ["oracle", "oracle, whole track"]
+    figures = known(figures_of(results["oracle"]))
+    assert figures["cd"] < 1e-5
+    assert figures["acc30"] == 1
+    assert figures["trans_median_m"] < 1e-9
+    assert known(figures_of(results["oracle, whole track"]))["cd"] < 1e-5
+
+
+class Picky(OneScan):
+    """Refuses, or answers nonsense, by the number of points."""
+
+    def complete(self, points, sensor):
+        if len(points) == 30:
+            raise BadInputError("thirty points are too few.")
+        return points[:0] if len(points) == 40 else points
+
+    def complete_many(self, scans, sensor):
+        return (self.complete(scan, sensor) for scan in scans)
+
+
+def test_what_is_left_out_is_counted_with_its_reason():
+    track = drive_by(scans=8, points=100)
+    scans = list(track.scans)
+    scans[0] = scans[0][:15]
+    scans[1] = np.repeat(scans[1][:1], 50, axis=0)
+    scans[2] = np.concatenate((scans[2][:10], np.full((50, 3), np.nan, np.float32)))
+    scans[3], scans[4] = scans[3][:30], scans[4][:40]
+    track = replace(track, scans=tuple(scans))
+    results = run({"picky": Picky()}, [track, replace(track, name="bare", T_sensor_object=None)])
+    assert results["picky"].skipped == {
+        "fewer than 16 finite points": 4,
+        "all points equal": 2,
+        "completion: refused by the method": 1,
+        "completion: prediction empty or not finite": 1,
+        "completion: no true shape": 5,
+    }
+    assert [row.scan for row in results["picky"].completions] == ["000005", "000006", "000007"]
+
+
+def test_truth_is_accumulated_where_no_shape_is_given():
+    track = replace(drive_by(scans=7), shape=None)
+    row = run({"scan": OneScan()}, [track], max_scans=3)["scan"]
+    assert [score.scan for score in row.completions] == ["000000", "000003", "000006"]
+    score = row.completions[0]
+    assert score.truth == "mirrored"
+    assert score.error_partial is not None
+    # The far side is not in the scan: more is missing of the mirrored truth.
+    assert score.error.coverage > score.error_partial.coverage
+    assert run({"scan": OneScan()}, [drive_by(scans=2)])["scan"].completions[0].truth == "shape"
+
+
+def test_progress_and_seed_are_told():
+    told = []
+    tracks = [drive_by(name, scans=2, points=30) for name in ("a", "b")]
+    run({"scan": OneScan()}, iter(tracks), progress=lambda done, name: told.append((done, name)))
+    assert told == [(1, "a"), (2, "b")]
