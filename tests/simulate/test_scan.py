@@ -100,8 +100,8 @@ def test_dropout_dark_glass_and_occluders_take_points_away() -> None:
         return scan(scene, car, HDL64, T, returns, np.random.default_rng(0))[1]
 
     full = count(alone, _CLEAN)
-    assert count(alone, Returns(0, 0.2, 1, ground=False)) == pytest.approx(0.8 * full, rel=0.05)
-    assert count(alone, Returns(0, 0, 0.05, ground=False)) < 0.95 * full
+    assert count(alone, Returns(0.0, 0.2, 1.0, ground=False)) == pytest.approx(0.8 * full, rel=0.05)
+    assert count(alone, Returns(0.0, 0.0, 0.05, ground=False)) < 0.95 * full
     pole = box((3.8, 1.6, -2.0), (4.2, 2.0, 2.0))
     assert 0 < count(Scene([car, pole]), _CLEAN) < 0.9 * full
 
@@ -109,7 +109,7 @@ def test_dropout_dark_glass_and_occluders_take_points_away() -> None:
 def test_ground_option_adds_a_low_rim_only() -> None:
     car = _car()
     T = _pose(6, 4, 2.5, car)
-    with_ground = Returns(0, 0, 1, ground=True)
+    with_ground = Returns(0.0, 0.0, 1.0, ground=True)
     points, on_car = scan(Scene([car]), car, HDL64, T, with_ground, np.random.default_rng(0))
     assert len(points) > on_car > 100
     on_object = points @ T[:3, :3].T + T[:3, 3]

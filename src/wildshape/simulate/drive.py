@@ -60,8 +60,8 @@ class Passing:
 def lidar_track(target: Solid, wanted: Passing, rng: np.random.Generator) -> RawTrack:
     """Drive past an object, again if need be, until enough usable scans are together.
 
-    The truth shape is what can be seen from above 5 degrees below the horizon: a LiDAR on a
-    road sees no car's underside.
+    The truth shape is what can be seen from a point's own height or higher: a LiDAR on a road
+    sees every wall down to the ground, but no car's underside.
 
     Args:
         target: the object, box centre at the origin of its frame, metres.
@@ -72,7 +72,7 @@ def lidar_track(target: Solid, wanted: Passing, rng: np.random.Generator) -> Raw
         BadInputError: no drive-by shows enough of the object.
     """
     alone = Scene([target])
-    shape = visible_surface(target, alone, wanted.shape_points, -5.0, rng)
+    shape = visible_surface(target, alone, wanted.shape_points, 0.0, rng)
     height = wanted.sensor.height_m + rng.normal(0.0, 0.03)
     for attempt in range(_ATTEMPTS):
         far = max(_FAR_M * 0.96**attempt, 2 * _NEAR_M)

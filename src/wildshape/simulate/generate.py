@@ -5,6 +5,7 @@
 import os
 from collections.abc import Iterator
 
+import numpy as np
 import torch
 
 from wildshape.geometry.se3 import SE3
@@ -53,6 +54,8 @@ def simulate_tracks(
 
 
 def _record(raw: RawTrack, config: SimulationConfig, index: int) -> Track:
+    rotation = np.ascontiguousarray(raw.T_object_sensor[:, :3, :3])
+    translation = np.ascontiguousarray(raw.T_object_sensor[:, :3, 3])
     return Track(
         name=f"{index:06d}",
         scans=tuple(raw.scans),
@@ -60,7 +63,7 @@ def _record(raw: RawTrack, config: SimulationConfig, index: int) -> Track:
         sensor=_sensor(config.device),
         category=config.category,
         source=f"simulated {config.sensor} {raw.kind}",
-        T_sensor_object=SE3.from_matrix(torch.as_tensor(raw.T_object_sensor)).inverse(),
+        T_sensor_object=SE3(torch.from_numpy(rotation), torch.from_numpy(translation)).inverse(),
         shape=raw.shape,
     )
 

@@ -60,7 +60,8 @@ def read_mesh(path: Path, metres: bool) -> Solid:
             f"LiDAR: {_advice(extent)}."
         )
     no_glass, one_part = np.zeros(len(faces), bool), np.zeros(len(faces), np.int64)
-    return Solid(vertices, faces, no_glass, one_part, path.stem).centred(None if metres else 1.0)
+    solid = Solid(vertices, faces, no_glass, one_part, path.stem, closed=False)
+    return solid.centred(None if metres else 1.0)
 
 
 def _used(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

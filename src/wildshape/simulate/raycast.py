@@ -55,14 +55,17 @@ class Scene:
         o = np.ascontiguousarray(origins, np.float32)
         d = np.ascontiguousarray(directions, np.float32)
         raw = self._scene.run(o, d, query="INTERSECT", output=1)
-        hit = raw["primID"] != -1
-        normal = raw["Ng"]
-        dot = np.einsum("ij,ij->i", normal, d)
-        length = np.sqrt(np.einsum("ij,ij->i", normal, normal))
-        cosine = np.where(hit, np.abs(dot) / np.maximum(length, 1e-20), 0.0)
-        distance = np.where(hit, raw["tfar"], np.float32(np.inf))
         face = raw["primID"].astype(np.int64)
-        return Hits(distance, face, np.where(hit, raw["geomID"], -1).astype(np.int64), cosine)
+        hit = np.flatnonzero(face >= 0)
+        normal = raw["Ng"][hit]
+        dot = np.abs(np.einsum("ij,ij->i", normal, d[hit]))
+        cosine = np.zeros(len(d), np.float32)
+        cosine[hit] = dot / np.maximum(np.linalg.norm(normal, axis=1), 1e-20)
+        distance = np.full(len(d), np.inf, np.float32)
+        distance[hit] = raw["tfar"][hit]
+        solid = np.full(len(d), -1, np.int64)
+        solid[hit] = raw["geomID"][hit]
+        return Hits(distance, face, solid, cosine)
 
     def blocked(self, origins: np.ndarray, directions: np.ndarray, reach: np.ndarray) -> np.ndarray:
         """Whether anything lies within `reach (n,)` metres along each ray, `(n,)` bool."""

@@ -71,12 +71,17 @@ def rays(
     step = sensor.azimuth_step_deg
     first = np.ceil((bounds[0] - phase_deg) / step) - 1
     columns = np.arange(int((bounds[1] - bounds[0]) / step) + 3)
-    azimuth = phase_deg + step * (first + columns) + sensor.ring_phase_deg[ring, None]
-    phi = np.radians(azimuth)
-    theta = np.radians(table[ring])[:, None]
-    flat = np.broadcast_to(np.cos(theta), phi.shape)
-    up = np.broadcast_to(np.sin(theta), phi.shape)
-    directions = np.stack((flat * np.cos(phi), flat * np.sin(phi), up), -1).reshape(-1, 3)
+    column = np.radians(phase_deg + step * (first + columns))
+    own = np.radians(sensor.ring_phase_deg[ring])
+    theta = np.radians(table[ring])
+    # cos and sin of (own + column), each ring's cos(theta) already in the first factor
+    cos_own, sin_own = np.cos(theta) * np.cos(own), np.cos(theta) * np.sin(own)
+    cos, sin = np.cos(column), np.sin(column)
+    directions = np.empty((len(ring), len(column), 3))
+    directions[..., 0] = np.outer(cos_own, cos) - np.outer(sin_own, sin)
+    directions[..., 1] = np.outer(sin_own, cos) + np.outer(cos_own, sin)
+    directions[..., 2] = np.sin(theta)[:, None]
+    directions = directions.reshape(-1, 3)
     return directions, np.repeat(ring, len(columns))
 
 
@@ -125,12 +130,12 @@ def _returned(
     hits: Hits, target: Solid, sensor: SpinningLidar, returns: Returns, rng: np.random.Generator
 ) -> np.ndarray:
     """`(n,)` bool: pulses on the target that come back strong enough to be told."""
-    chance = np.full(len(hits.face), 1.0 - returns.dropout)
-    chance *= np.clip(hits.cosine / 0.12, 0.0, 1.0)
-    glass = target.glass[np.where(hits.solid == 0, hits.face, 0)]
-    chance *= np.where(glass, returns.glass, 1.0)
-    on_target = (hits.solid == 0) & (hits.distance < sensor.max_range_m)
-    return on_target & (rng.random(len(chance)) < chance)
+    hit = np.flatnonzero((hits.solid == 0) & (hits.distance < sensor.max_range_m))
+    chance = (1.0 - returns.dropout) * np.minimum(hits.cosine[hit] / 0.12, 1.0)
+    chance[target.glass[hits.face[hit]]] *= returns.glass
+    kept = np.zeros(len(hits.face), bool)
+    kept[hit] = rng.random(len(hit)) < chance
+    return kept
 
 
 def _ground(hits: Hits, toward: np.ndarray, origin: np.ndarray, half: np.ndarray) -> np.ndarray:

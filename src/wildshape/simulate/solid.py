@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Closed triangle surfaces, and the few ways of making them: loft, box, cylinder, ellipsoid."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -17,6 +18,7 @@ class Solid:
         glass: `(f,)` bool, faces that return few pulses.
         parts: `(f,)` int64, which closed part a face belongs to.
         kind: what it is, for example `sedan`.
+        closed: whether every part is watertight with its faces outward.
     """
 
     vertices: np.ndarray
@@ -24,8 +26,9 @@ class Solid:
     glass: np.ndarray
     parts: np.ndarray
     kind: str = ""
+    closed: bool = True
 
-    @property
+    @cached_property
     def bounds(self) -> np.ndarray:
         """`(2, 3)` smallest and largest corner."""
         return np.stack((self.vertices.min(0), self.vertices.max(0)))
@@ -35,7 +38,7 @@ class Solid:
         c, s = np.cos(yaw), np.sin(yaw)
         turn = np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
         vertices = (self.vertices @ turn.T) * scale + offset
-        return Solid(vertices, self.faces, self.glass, self.parts, self.kind)
+        return replace(self, vertices=vertices)
 
     def centred(self, diagonal: float | None = None) -> "Solid":
         """Bounding-box centre at the origin; optionally scaled to a box diagonal."""
@@ -117,6 +120,4 @@ def ellipsoid(middle: tuple[float, float, float], half: tuple[float, float, floa
     bar = cylinder(
         np.array((-1.0, 0.0, 0.0)), np.array((1.0, 0.0, 0.0)), (0.35, 0.86, 1.0, 0.86, 0.35), 8
     )
-    return bar.moved(np.zeros(3)).__class__(
-        bar.vertices * np.asarray(half) + np.asarray(middle), bar.faces, bar.glass, bar.parts
-    )
+    return replace(bar, vertices=bar.vertices * np.asarray(half) + np.asarray(middle))

@@ -24,8 +24,9 @@ def visible_surface(
         solid: the object.
         scene: of the object alone.
         count: points returned.
-        lowest_deg: lowest elevation of a viewer: about -5 for objects that stand on the road
-            (a LiDAR never sees a car from below), -90 for objects seen from everywhere.
+        lowest_deg: lowest elevation from which it is looked at: 0 for objects that stand on the
+            road (a LiDAR, higher than a car's floor, never looks up at it), -90 for objects seen
+            from everywhere.
         rng: the only source of chance.
 
     Raises:
@@ -33,8 +34,8 @@ def visible_surface(
     """
     found, have = [], 0
     for _ in range(12):
-        points = _on_surface(solid, int(1.3 * (count - have)) + 64, rng)
-        seen = points[_seen(points, solid, scene, lowest_deg, rng)]
+        points, normals = _on_surface(solid, int(1.3 * (count - have)) + 64, rng)
+        seen = points[_seen(points, normals, solid, scene, lowest_deg, rng)]
         found.append(seen)
         have += len(seen)
         if have >= count:
@@ -45,37 +46,45 @@ def visible_surface(
     )
 
 
-def _on_surface(solid: Solid, count: int, rng: np.random.Generator) -> np.ndarray:
-    """`(count, 3)` points, uniform by area (stratified along the triangle list)."""
+def _on_surface(
+    solid: Solid, count: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """`(count, 3)` points, uniform by area (stratified along the triangle list), and normals."""
     a, b, c = (solid.vertices[solid.faces[:, i]] for i in range(3))
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    cumulative = np.cumsum(area)
-    at = (np.arange(count) + rng.random(count)) / count * cumulative[-1]
-    face = np.minimum(np.searchsorted(cumulative, at), len(area) - 1)
+    normal = np.cross(b - a, c - a)
+    cumulative = np.cumsum(np.linalg.norm(normal, axis=1))
+    at = rng.permutation(np.arange(count) + rng.random(count)) / count * cumulative[-1]
+    face = np.minimum(np.searchsorted(cumulative, at), len(normal) - 1)
     u, v = rng.random((2, count, 1))
     fold = u + v > 1
     u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
-    points = a[face] + u * (b[face] - a[face]) + v * (c[face] - a[face])
-    return rng.permutation(points)
+    return a[face] + u * (b - a)[face] + v * (c - a)[face], normal[face]
 
 
 def _seen(
-    points: np.ndarray, solid: Solid, scene: Scene, lowest_deg: float, rng: np.random.Generator
+    points: np.ndarray,
+    normals: np.ndarray,
+    solid: Solid,
+    scene: Scene,
+    lowest_deg: float,
+    rng: np.random.Generator,
 ) -> np.ndarray:
     """`(n,)` bool: the first thing met from far away in one of `_ROUNDS` directions."""
     low, high = solid.bounds
     far = 2 * float(np.linalg.norm(high - low))
+    # The side from which a point is looked at first, where most are seen at once: that of its
+    # face, if faces are known to look outward, else that of the point.
+    side = normals if solid.closed else points - (low + high) / 2
     seen = np.zeros(len(points), bool)
-    middle = (low + high) / 2
     for turn in range(_ROUNDS):
         left = np.flatnonzero(~seen)
-        if len(left) == 0:
-            break
         toward = _directions(len(left), lowest_deg, rng)
-        if turn % 2 == 0:  # from the point's own side first: most are seen at once
-            outward = points[left, :2] - middle[:2]
-            inward = np.einsum("ij,ij->i", outward, toward[:, :2]) < 0
-            toward[inward, :2] *= -1
+        if solid.closed or turn % 2 == 0:
+            away = np.einsum("ij,ij->i", side[left, :2], toward[:, :2]) < 0
+            toward[away, :2] *= -1
+        if solid.closed:  # from behind, a closed body hides its own face
+            faces_us = np.einsum("ij,ij->i", side[left], toward) > 0
+            left, toward = left[faces_us], toward[faces_us]
         reach = np.full(len(left), far * (1 - 2e-4))
         hidden = scene.blocked(points[left] + far * toward, -toward, reach)
         seen[left[~hidden]] = True

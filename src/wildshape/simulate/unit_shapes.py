@@ -166,8 +166,8 @@ def _legs(x: float, y: float, top: float, rng: np.random.Generator) -> list[Soli
         star = 2 * np.pi * np.arange(5) / 5 + rng.uniform(0, 1)
         arms = [(0.3 * np.cos(a), 0.3 * np.sin(a), 0.03) for a in star]
         return [
-            _bar((0, 0, 0.05), (0, 0, top), 0.03, 12),
-            *[_bar((0, 0, 0.07), arm, 0.02, 6) for arm in arms],
+            _bar((0.0, 0.0, 0.05), (0.0, 0.0, top), 0.03, 12),
+            *[_bar((0.0, 0.0, 0.07), arm, 0.02, 6) for arm in arms],
         ]
     return [box((-x, s * y - 0.02, 0.0), (x, s * y + 0.02, top)) for s in (-1, 1)]
 

@@ -90,13 +90,15 @@ def _draw(kind: str, rng: np.random.Generator) -> _Body:
     length, height = r["length"], r["height"]
     hood, belt, trunk = (r[name] * height for name in ("hood", "belt", "trunk"))
     nose = hood * rng.uniform(0.78, 0.92)
+    slope = float(rng.uniform(0.68, 0.86))  # of the bonnet's front edge
     tail = trunk * rng.uniform(0.86, 0.97)
     cowl, roof0, roof1, deck = (r[name] * length for name in ("cowl", "roof0", "roof1", "deck"))
     bow = float(rng.uniform(0.96, 0.995))  # the roof falls backward
     arc = height * rng.uniform(0.965, 0.985)
     top = np.array((
-        (0.0, nose * 0.86), (0.10, nose), (cowl, hood), (roof0, arc), (roof1, arc * bow),
-        (deck, trunk), (length - 0.06, tail), (length, tail * 0.86),
+        (0.0, nose * slope), (min(0.16, 0.6 * cowl), nose), (cowl, hood),
+        (roof0, arc), (roof1, arc * bow), (deck, trunk),
+        (length - 0.06, tail), (length, tail * 0.86),
     ))  # fmt: skip
     if kind == "truck":
         top[6:, 0] = deck + 0.05, deck + 0.1
@@ -105,11 +107,13 @@ def _draw(kind: str, rng: np.random.Generator) -> _Body:
     rear = length - float(rng.uniform(0.16, 0.24)) * length
     if kind == "truck":
         front = float(rng.uniform(0.12, 0.16)) * length
+    corner = float(rng.uniform(0.15, 0.38) if kind != "truck" else rng.uniform(0.05, 0.15))
+    panel = kind == "truck" or (kind == "van" and rng.random() < 0.4)
     return _Body(
         kind, length, r["width"], height, top, belt, float(rng.uniform(0.18, 0.26)),
         r["tumble"], (front, rear), radius,
         (deck + 0.05, length - 0.08) if kind == "pickup" else (9e9, 9e9),
-        float(rng.uniform(0.10, 0.24)), kind == "truck" or (kind == "van" and rng.random() < 0.4),
+        corner, panel,
     )  # fmt: skip
 
 
@@ -132,8 +136,8 @@ def _stations(body: _Body) -> np.ndarray:
 def _half_width(body: _Body, x: np.ndarray) -> np.ndarray:
     """Half width at the widest height: rounded in plan at both bumpers."""
     end = body.top[-1, 0]
-    front = np.clip(1 - x / 0.6, 0, 1)
-    back = np.clip(1 - (end - x) / 0.5, 0, 1)
+    front = np.clip(1 - x / 0.8, 0, 1)
+    back = np.clip(1 - (end - x) / 0.6, 0, 1)
     return body.width / 2 - body.corner * (front**2.2 + 0.8 * back**2.2)
 
 
