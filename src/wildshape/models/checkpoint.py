@@ -76,14 +76,14 @@ def load_checkpoint(path: Path) -> tuple[ShapePoseNet, ModelSettings]:
             weights = {name: file.get_tensor(name).float() for name in file.keys()}  # noqa: SIM118
     except (SafetensorError, OSError, ValueError) as error:
         raise BadInputError(f"{path}: not a readable safetensors file ({error}).") from error
-    settings = _settings(path, metadata)
-    network = ShapePoseNet(settings.network)
+    network, settings = _described(path, metadata)
     _check_weights(path, network, weights)
     network.load_state_dict(weights)
     return network.eval(), settings
 
 
-def _settings(path: Path, metadata: dict[str, str]) -> ModelSettings:
+def _described(path: Path, metadata: dict[str, str]) -> tuple[ShapePoseNet, ModelSettings]:
+    """The network, its weights not yet loaded, and the settings of the metadata."""
     found = f"{metadata.get('format', 'no format')} version {metadata.get('version', 'none')}"
     if found != f"{FORMAT} version {VERSION}":
         raise BadInputError(
@@ -91,8 +91,9 @@ def _settings(path: Path, metadata: dict[str, str]) -> ModelSettings:
             " give --model a file written by wildshape train."
         )
     try:
-        return settings_from_dict(json.loads(metadata["settings"]))
-    except (KeyError, TypeError, ValueError) as error:
+        settings = settings_from_dict(json.loads(metadata["settings"]))
+        return ShapePoseNet(settings.network), settings
+    except (KeyError, TypeError, ValueError, AttributeError, RuntimeError) as error:
         raise BadInputError(f"{path}: its settings are damaged ({error!r}).") from error
 
 
