@@ -48,11 +48,13 @@ class Batch(NamedTuple):
         scans: B = I x V clouds of n points, metres, about their own centres.
         centres: the centres in the (turned) sensor frames.
         reference: row of the reference scan of each track.
+        turn: rotation by which each scan was turned about its sensor.
     """
 
     scans: Float[Tensor, "B N 3"]
     centres: Float[Tensor, "B 3"]
     reference: Tensor
+    turn: Float[Tensor, "B 3 3"]
 
 
 class ViewSampler:
@@ -121,9 +123,9 @@ class ViewSampler:
 def _turned(scans: Tensor, centres: Tensor, reference: Tensor, turn: str, seed: int) -> Batch:
     """Each scan turned about its sensor by its own random rotation."""
     if turn == "none":
-        return Batch(scans, centres, reference)
+        return Batch(scans, centres, reference, torch.eye(3).repeat(len(scans), 1, 1))
     generator = torch.Generator().manual_seed(seed)
     draw = random_yaw if turn == "yaw" else random_rotation
     rotation = draw(len(scans), generator)
     turned = (rotation @ centres[..., None])[..., 0]
-    return Batch(scans @ rotation.mT, turned, reference)
+    return Batch(scans @ rotation.mT, turned, reference, rotation)

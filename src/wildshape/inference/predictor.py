@@ -109,11 +109,15 @@ class Predictor:
     def _choose(
         self, inputs: Tensor, centres: Tensor, shapes: Tensor, poses: Poses
     ) -> tuple[Tensor, Tensor]:
-        """Cost and index of the branch with the lowest label-free cost (METHOD 3)."""
+        """Cost and index of the branch with the lowest label-free cost (METHOD 3).
+
+        A selector's belief counts too, `settings.belief` metres a nat.
+        """
         posed = poses.apply(shapes)
         scores = score_hypotheses(inputs, centres, posed, self.settings.projection)
-        cost, branch = scores.cost(self.settings.beta).min(-1)
-        return cost, branch
+        cost = scores.cost(self.settings.beta)
+        branch = (cost - self.settings.belief * poses.log_belief).argmin(-1)
+        return cost.gather(1, branch[:, None])[:, 0], branch
 
     def _completion(
         self, shape: Tensor, T_sensor_can: SE3, branch: int, cost: float, warning: str

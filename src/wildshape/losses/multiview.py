@@ -24,12 +24,18 @@ class LossConfig:
         template: weight of the pull of every canonical shape to the batch's mean shape, at the
             first step (beyond the paper; see docs/decisions.md).
         template_end: the same at the last step; geometric in between.
+        belief: weight of the cross-entropy that teaches the selector the winner; also the metres
+            of cost that a nat of belief is worth when a branch is chosen.
+        steady: an object does not turn around within a window of neighbouring scans: a branch
+            more than 90 degrees from the reference scan's pose, as recorded, cannot win.
     """
 
     beta: float = 0.05
     projection: Projection = field(default_factory=PolarBins)
     template: float = 0.0
     template_end: float = 0.0
+    belief: float = 0.0
+    steady: bool = False
 
 
 class LossTerms(NamedTuple):
@@ -55,6 +61,7 @@ def multiview_loss(
     rotation: Float[Tensor, "B K 3 3"],
     translation: Float[Tensor, "B K 3"],
     config: LossConfig,
+    handicap: Float[Tensor, "B K"] | None = None,
 ) -> LossTerms:
     """The shape of each track's reference scan, posed by every scan's own pose, explains it.
 
@@ -65,13 +72,15 @@ def multiview_loss(
         rotation: of every scan's pose hypotheses.
         translation: of the same.
         config: weights.
+        handicap: metres added to a branch's cost when the winner is chosen.
     """
     views = len(scans) // len(shapes)
     shape = shapes.repeat_interleave(views, dim=0)
     with torch.no_grad():
         posed = shape[:, None] @ rotation.mT + translation[:, :, None]
         scores = score_hypotheses(scans, centres, posed, config.projection)
-        winner = scores.cost(config.beta).argmin(-1)
+        cost = scores.cost(config.beta)
+        winner = (cost if handicap is None else cost + handicap).argmin(-1)
     observation, projection = _winner_terms(scans, shape, rotation, translation, scores, winner)
     total = (observation + config.beta * projection).mean() * views
     return LossTerms(total, observation.mean().detach(), projection.mean().detach(), winner)

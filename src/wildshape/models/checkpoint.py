@@ -31,6 +31,7 @@ class ModelSettings:
         input_points: n, points a scan is resampled to.
         projection: binning of the projection term.
         beta: its weight in the label-free cost.
+        belief: metres of cost that a nat of the selector's belief is worth.
         extent_m: smallest and largest extent of the scans trained on, metres.
         cost_m: median and 90th percentile of the label-free cost on held-out scans, metres.
         provenance: command, commit, data, hardware, seed, steps.
@@ -42,6 +43,7 @@ class ModelSettings:
     input_points: int
     projection: Projection
     beta: float
+    belief: float = 0.0
     extent_m: tuple[float, float] = (0.0, float("inf"))
     cost_m: tuple[float, float] = (0.1, 0.2)
     provenance: dict[str, Any] = field(default_factory=dict)

@@ -23,23 +23,31 @@ class ShapeDecoder(nn.Module):
         widths: of the two hidden layers.
         points: m; even if `mirror`.
         mirror: decode m / 2 points and reflect them in the canonical plane y = 0.
+        start: half lengths of the ellipsoid that the points fill before training.
     """
 
-    def __init__(self, code: int, widths: tuple[int, int], points: int, mirror: bool) -> None:
+    def __init__(
+        self,
+        code: int,
+        widths: tuple[int, int],
+        points: int,
+        mirror: bool,
+        start: tuple[float, float, float],
+    ) -> None:
         super().__init__()
         self.mirror = mirror
         self.layer1 = nn.Linear(code, widths[0])
         self.layer2 = nn.Linear(widths[0], widths[1])
         self.layer3 = nn.Linear(widths[1], 3 * (points // 2 if mirror else points))
-        self._start_as_ball()
+        self._start_as_ellipsoid(start)
 
     @torch.no_grad()
-    def _start_as_ball(self) -> None:
-        """Start from a ball of half the unit radius, so that every point has work to do."""
+    def _start_as_ellipsoid(self, half: tuple[float, float, float]) -> None:
+        """Points spread over a volume from the start, so that every one has work to do."""
         count = self.layer3.out_features // 3
         direction = nn.functional.normalize(torch.randn(count, 3), dim=-1)
         radius = torch.rand(count, 1) ** (1 / 3)
-        self.layer3.bias.copy_((0.5 * direction * radius).flatten())
+        self.layer3.bias.copy_((torch.tensor(half) * direction * radius).flatten())
 
     def forward(self, code: Float[Tensor, "B z"]) -> Float[Tensor, "B P 3"]:
         """Canonical points, in units of the network's scale."""
@@ -59,17 +67,21 @@ class PoseDecoder(nn.Module):
         branches: K.
         spread: where the branches start: `yaw`, turned evenly about z, or `sphere`, drawn from
             SO(3).
+        selector: also give each branch a logit, the network's own belief in it.
     """
 
-    def __init__(self, code: int, widths: tuple[int, int], branches: int, spread: str) -> None:
+    def __init__(
+        self, code: int, widths: tuple[int, int], branches: int, spread: str, selector: bool
+    ) -> None:
         super().__init__()
         a, b = widths
         self.branches = branches
         self.layer1 = nn.Linear(code, branches * a)
         self.weight2 = nn.Parameter(torch.randn(branches, a, b) * (2 / a) ** 0.5)
         self.bias2 = nn.Parameter(torch.zeros(branches, 1, b))
-        self.weight3 = nn.Parameter(torch.randn(branches, b, 9) * 0.3 / b**0.5)
-        self.bias3 = nn.Parameter(torch.zeros(branches, 1, 9))
+        out = 10 if selector else 9
+        self.weight3 = nn.Parameter(torch.randn(branches, b, out) * 0.3 / b**0.5)
+        self.bias3 = nn.Parameter(torch.zeros(branches, 1, out))
         self._start_spread(spread)
 
     @torch.no_grad()
@@ -81,9 +93,13 @@ class PoseDecoder(nn.Module):
 
     def forward(
         self, code: Float[Tensor, "B z"]
-    ) -> tuple[Float[Tensor, "B K 3 3"], Float[Tensor, "B K 3"]]:
-        """Rotation and translation of `T_sensor_canonical`, in the scan's centred frame."""
+    ) -> tuple[Float[Tensor, "B K 3 3"], Float[Tensor, "B K 3"], Float[Tensor, "B K"]]:
+        """Rotation and translation of `T_sensor_canonical`, in the scan's centred frame; logits.
+
+        Without a selector the logits are zero: every branch is as likely as the next.
+        """
         hidden = relu(self.layer1(code)).unflatten(-1, (self.branches, -1)).transpose(0, 1)
         hidden = relu(torch.baddbmm(self.bias2, hidden, self.weight2))
         out = torch.baddbmm(self.bias3, hidden, self.weight3).transpose(0, 1).float()
-        return rotation_from_6d(out[..., :6]), out[..., 6:]
+        logits = out[..., 9] if out.shape[-1] > 9 else torch.zeros_like(out[..., 0])
+        return rotation_from_6d(out[..., :6]), out[..., 6:9], logits

@@ -25,7 +25,11 @@ class NetworkConfig:
         points: m, canonical points.
         branches: K, pose hypotheses.
         spread: where the branches start, about z (`yaw`) or over all rotations (`sphere`).
+        selector: the pose decoder also says which branch it believes in (beyond the paper, which
+            asks the label-free cost alone).
         mirror: the canonical shape is symmetric in its plane y = 0 (beyond the paper).
+        start: half lengths, in network units, of the ellipsoid of points the shape starts from.
+            Longer along x than along y, it puts a mirror plane along the object, not across.
         scale: metres of one network unit, about half an object's length; 1 in the paper.
     """
 
@@ -35,7 +39,9 @@ class NetworkConfig:
     points: int = 2048
     branches: int = 4
     spread: Literal["yaw", "sphere"] = "yaw"
+    selector: bool = False
     mirror: bool = False
+    start: tuple[float, float, float] = (0.5, 0.5, 0.5)
     scale: float = 1.0
 
 
@@ -45,10 +51,12 @@ class Poses(NamedTuple):
     Attributes:
         rotation: proper rotations.
         translation: metres.
+        log_belief: logarithm of the network's belief in each.
     """
 
     rotation: Float[Tensor, "B K 3 3"]
     translation: Float[Tensor, "B K 3"]
+    log_belief: Float[Tensor, "B K"]
 
     def apply(self, canonical: Float[Tensor, "B P 3"]) -> Float[Tensor, "B K P 3"]:
         """The canonical shape under every hypothesis."""
@@ -57,7 +65,7 @@ class Poses(NamedTuple):
     def choose(self, branch: Tensor) -> "Poses":
         """One hypothesis a scan, `(B,)` indices, K = 1."""
         rows = torch.arange(len(branch), device=branch.device)
-        return Poses(self.rotation[rows, branch][:, None], self.translation[rows, branch][:, None])
+        return Poses(*(part[rows, branch][:, None] for part in self))
 
 
 class ShapePoseNet(nn.Module):
@@ -68,8 +76,8 @@ class ShapePoseNet(nn.Module):
         self.config = config
         code = config.encoder[-1]
         self.encoder = PCNEncoder(config.encoder)
-        self.shape = ShapeDecoder(code, config.decoder, config.points, config.mirror)
-        self.pose = PoseDecoder(code, config.pose, config.branches, config.spread)
+        self.shape = ShapeDecoder(code, config.decoder, config.points, config.mirror, config.start)
+        self.pose = PoseDecoder(code, config.pose, config.branches, config.spread, config.selector)
 
     def encode(self, scans: Float[Tensor, "B N 3"]) -> Float[Tensor, "B z"]:
         """Code of centred scans; training on a CPU runs through the winning points only."""
@@ -84,12 +92,17 @@ class ShapePoseNet(nn.Module):
 
     def poses(self, code: Float[Tensor, "B z"]) -> Poses:
         """`T_sensor_canonical` of every branch, in the centred frame, metres."""
-        rotation, translation = self.pose(code)
-        return Poses(rotation, translation * self.config.scale)
+        rotation, translation, logits = self.pose(code)
+        return Poses(rotation, translation * self.config.scale, logits.log_softmax(-1))
 
     def forward(
         self, scans: Float[Tensor, "B N 3"]
-    ) -> tuple[Float[Tensor, "B P 3"], Float[Tensor, "B K 3 3"], Float[Tensor, "B K 3"]]:
-        """Canonical shape, rotations and translations: pure, for export."""
+    ) -> tuple[
+        Float[Tensor, "B P 3"],
+        Float[Tensor, "B K 3 3"],
+        Float[Tensor, "B K 3"],
+        Float[Tensor, "B K"],
+    ]:
+        """Canonical shape, rotations, translations and log-beliefs: pure, for export."""
         code = self.encoder(scans / self.config.scale)
         return self.canonical(code), *self.poses(code)

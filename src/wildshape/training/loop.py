@@ -101,14 +101,27 @@ def split_tracks(count: int) -> tuple[np.ndarray, np.ndarray]:
     return (order[held:], order[:held]) if held else (order, order)
 
 
-def fit(run: Run, progress: Progress | None = None) -> Path:
-    """Train to the last step, validating and saving on the way; returns the checkpoint's path."""
+def fit(
+    run: Run, progress: Progress | None = None, stopped: Callable[[], bool] = lambda: False
+) -> Path:
+    """Train to the last step, validating and saving on the way; returns the checkpoint's path.
+
+    Args:
+        run: set up.
+        progress: called every 25 steps with the step and the means since the last call.
+        stopped: asked after every step.
+
+    Raises:
+        StopRequested: `stopped` said so; the state is saved.
+    """
     objective = run.processes.wrap(WeaklySupervised(run.state.network, run.recipe.loss))
     meter = Meter(run.recipe.network.branches)
     with RunLog(run.folder, run.state.step) if run.processes.leads else _Silent() as log:
         while run.state.step < run.recipe.optim.steps:
             meter.add(_step(run, objective))
             step = run.state.step
+            if step < run.recipe.optim.steps and stopped():
+                _save_and_stop(run)
             if step % _LOG_EVERY == 0 or step == run.recipe.optim.steps:
                 values = meter.read(step)
                 log.write(step, values)
@@ -119,6 +132,12 @@ def fit(run: Run, progress: Progress | None = None) -> Path:
         log.write(run.state.step, checkpoint(run))
     run.processes.leave()
     return run.folder / MODEL
+
+
+def _save_and_stop(run: Run) -> None:
+    if run.processes.leads:
+        save_state(run.folder, run.state, run.identity)
+    raise StopRequested
 
 
 def _report(run: Run, progress: Progress, values: dict[str, Any]) -> None:
@@ -178,6 +197,7 @@ def model_settings(run: Run, found: Validation) -> ModelSettings:
         input_points=recipe.views.points,
         projection=recipe.loss.projection,
         beta=recipe.loss.beta,
+        belief=recipe.loss.belief,
         extent_m=run.sampler.extent_range(),
         cost_m=(found.cost_median, found.cost_p90),
         provenance={**run.provenance, "steps": run.state.step, "seed": run.seed},

@@ -4,12 +4,15 @@
 
 from typing import NamedTuple
 
+import torch
 from torch import Tensor, nn
 
 from wildshape.datasets.views import Batch
+from wildshape.losses.hindsight import score_hypotheses
 from wildshape.losses.multiview import LossConfig, multiview_loss
+from wildshape.losses.steady import turning_handicap
 from wildshape.losses.template import template_deviation
-from wildshape.models.shapepose import ShapePoseNet
+from wildshape.models.shapepose import Poses, ShapePoseNet
 
 
 class Objective(NamedTuple):
@@ -35,10 +38,36 @@ class WeaklySupervised(nn.Module):
         poses = self.network.poses(code)
         shapes = self.network.canonical(code[batch.reference])
         terms = multiview_loss(
-            batch.scans, batch.centres, shapes, poses.rotation, poses.translation, self.config
+            batch.scans,
+            batch.centres,
+            shapes,
+            poses.rotation,
+            poses.translation,
+            self.config,
+            self._handicap(batch, shapes, poses),
         )
         deviation = template_deviation(shapes)
-        loss = terms.total + template * deviation if template > 0 else terms.total
+        loss = terms.total
+        if template > 0:
+            loss = loss + template * deviation
+        if self.config.belief > 0:
+            belief = poses.log_belief.gather(1, terms.winner[:, None]).mean()
+            loss = loss - self.config.belief * belief
         return Objective(
             loss, terms.observation, terms.projection, deviation.detach(), terms.winner
         )
+
+    @torch.no_grad()
+    def _handicap(self, batch: Batch, shapes: Tensor, poses: Poses) -> Tensor | None:
+        """What keeps branches from winning besides their cost: belief, and turning around."""
+        config = self.config
+        if not config.steady:
+            return None
+        at = batch.reference
+        own = Poses(*(part[at] for part in poses))
+        scores = score_hypotheses(
+            batch.scans[at], batch.centres[at], own.apply(shapes), config.projection
+        )
+        branch = (scores.cost(config.beta) - config.belief * own.log_belief).argmin(-1)
+        anchor = batch.turn[at].mT @ own.choose(branch).rotation[:, 0]
+        return turning_handicap(poses.rotation, batch.turn, anchor)

@@ -45,10 +45,12 @@ def small() -> Recipe:
             pose=(256, 128),
             points=1024,
             branches=4,
+            selector=True,
             mirror=True,
+            start=(1.0, 0.45, 0.35),
             scale=2.0,
         ),
-        loss=LossConfig(beta=0.25, projection=FacingBins(0.2), template=0.3, template_end=0.01),
+        loss=LossConfig(beta=0.25, projection=FacingBins(0.2), belief=0.05, steady=True),
         views=ViewConfig(points=512, window=40, turn="yaw"),
         optim=OptimConfig(
             steps=12_000, lr=1e-3, decay_every=0, warmup=100, average=0.998, clip=5.0
@@ -61,8 +63,10 @@ def default() -> Recipe:
     """For a long run: the paper's network with what `small` adds."""
     return Recipe(
         name="default",
-        network=NetworkConfig(points=2048, branches=4, mirror=True, scale=2.0),
-        loss=LossConfig(beta=0.25, projection=FacingBins(0.2), template=0.3, template_end=0.01),
+        network=NetworkConfig(
+            points=2048, branches=4, selector=True, mirror=True, start=(1.0, 0.45, 0.35), scale=2.0
+        ),
+        loss=LossConfig(beta=0.25, projection=FacingBins(0.2), belief=0.05, steady=True),
         views=ViewConfig(points=1024, window=40, turn="yaw"),
         optim=OptimConfig(
             steps=200_000, lr=5e-4, decay_every=0, warmup=1000, average=0.9995, clip=5.0
@@ -79,10 +83,12 @@ def tiny() -> Recipe:
             decoder=(256, 256),
             pose=(128, 64),
             points=512,
+            selector=True,
             mirror=True,
+            start=(1.0, 0.45, 0.35),
             scale=2.0,
         ),
-        loss=LossConfig(beta=0.25, projection=FacingBins(0.3), template=0.3, template_end=0.01),
+        loss=LossConfig(beta=0.25, projection=FacingBins(0.3), belief=0.05, steady=True),
         views=ViewConfig(points=256, window=40, turn="yaw"),
         optim=OptimConfig(steps=500, lr=2e-3, decay_every=0, warmup=20, average=0.99, clip=5.0),
         validate_every=100,

@@ -66,7 +66,9 @@ def _figures(
         batch.scans, batch.centres, reference, poses.rotation, poses.translation, config
     )
     own = score_hypotheses(batch.scans, batch.centres, poses.apply(shapes), config.projection)
-    cost, branch = own.cost(config.beta).min(-1)
+    cost = own.cost(config.beta)
+    branch = (cost - config.belief * poses.log_belief).argmin(-1)
+    cost = cost.gather(1, branch[:, None])[:, 0]
     cycle = _cycle_angle(network, sampler, config, batch, poses.choose(branch))
     return terms.observation[None], terms.projection[None], cost, cycle
 
@@ -87,5 +89,6 @@ def _cycle_angle(
     code = network.encode(centred)
     again, shapes = network.poses(code), network.canonical(code)
     scores = score_hypotheses(centred, centres, again.apply(shapes), config.projection)
-    chosen = again.choose(scores.cost(config.beta).argmin(-1))
+    believed = scores.cost(config.beta) - config.belief * again.log_belief
+    chosen = again.choose(believed.argmin(-1))
     return SE3(poses.rotation[target, 0].mT @ chosen.rotation[:, 0], centres).angle()
