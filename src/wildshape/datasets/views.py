@@ -78,7 +78,7 @@ class ViewSampler:
                 f"{store.path}: no track has a scan of {config.min_points} points or more;"
                 " nothing to train on."
             )
-        self._centres: dict[int, Tensor] = {}
+        self._centres = np.full((len(sizes), 3), np.nan, dtype=np.float32)
 
     def draw(self, *seed: int) -> Batch:
         """The batch of these seeds, for example (run seed, step, process)."""
@@ -105,6 +105,7 @@ class ViewSampler:
         config = self.config
         start = rng.integers(max(1, len(scans) - config.window + 1))
         near = scans[start : start + config.window]
+        near = near[near < near[0] + config.window]  # scans too sparse to be used leave gaps
         return rng.choice(near, size=config.views, replace=len(near) < config.views)
 
     def _resampled(self, scan: int, rng: np.random.Generator) -> Tensor:
@@ -114,10 +115,11 @@ class ViewSampler:
 
     def _centre(self, scan: int) -> Tensor:
         """The label-free centre of a scan, found once."""
-        if scan not in self._centres:
+        centre = self._centres[scan]
+        if np.isnan(centre[0]):
             points = torch.from_numpy(np.ascontiguousarray(self.store.scan_points(scan)))
-            self._centres[scan] = scan_centre(points, self.config.sensor)
-        return self._centres[scan]
+            centre[:] = scan_centre(points, self.config.sensor).numpy()
+        return torch.from_numpy(centre)
 
 
 def _turned(scans: Tensor, centres: Tensor, reference: Tensor, turn: str, seed: int) -> Batch:
