@@ -103,9 +103,10 @@ class ViewSampler:
     def _window(self, scans: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """V scans within `window` frames of each other, distinct where there are enough."""
         config = self.config
-        start = rng.integers(max(1, len(scans) - config.window + 1))
-        near = scans[start : start + config.window]
-        near = near[near < near[0] + config.window]  # scans too sparse to be used leave gaps
+        # In frames, not in usable scans: those too sparse to be used leave gaps.
+        last = np.searchsorted(scans, scans[-1] - config.window, side="right")
+        near = scans[rng.integers(last + 1) :]
+        near = near[near < near[0] + config.window]
         return rng.choice(near, size=config.views, replace=len(near) < config.views)
 
     def _resampled(self, scan: int, rng: np.random.Generator) -> Tensor:
