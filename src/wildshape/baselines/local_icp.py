@@ -28,11 +28,11 @@ class LocalIcp:
 
     Attributes:
         distance: correspondences further apart are ignored, metres (the paper's 0.175).
-        iterations: at most, a pair.
+        iterations: at most, a pair (30: Open3D's default, which the paper used).
     """
 
     distance: float = 0.175
-    iterations: int = 50
+    iterations: int = 30
 
     def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:  # noqa: ARG002
         """`T_middle_scan`, one a scan."""
