@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -44,14 +45,14 @@ def _entry(name: str) -> dict:
     return {"scan": name, "box": box, "confidence": 0.75, "refined": True, "seconds": 0.02}
 
 
-@pytest.mark.parametrize("wrapped", [False, True])
-def test_track_is_fused_in_its_middle_scan_s_frame(tmp_path: Path, wrapped: bool) -> None:
+@pytest.mark.parametrize("moved", [False, True])
+def test_track_is_fused_in_its_middle_scan_s_frame(tmp_path: Path, moved: bool) -> None:
     track = _track()
     write_track(tmp_path / "data" / "0007", track)
-    entries = [_entry(name) for name in NAMES]
-    objects = {"scans": entries} if wrapped else entries
+    place = tmp_path / ("gone" if moved else "data")
+    objects = {"input": str(place), "scans": [_entry(name) for name in NAMES]}
     _completed(tmp_path / "out" / "0007", track, objects)
-    shown = report_from_folder(tmp_path / "out", tmp_path / "data").objects[0]
+    shown = report_from_folder(tmp_path / "out", tmp_path / "data" if moved else None).objects[0]
     clouds = {cloud.label: cloud.points for cloud in shown.clouds}
     assert list(clouds) == ["input scan", "truth", "fused by us", "completed"]
     for points in (clouds["truth"], clouds["fused by us"][:200], clouds["fused by us"][-200:]):
@@ -63,10 +64,26 @@ def test_track_is_fused_in_its_middle_scan_s_frame(tmp_path: Path, wrapped: bool
 
 
 def test_without_the_scans_only_the_completed_shape_is_shown(tmp_path: Path) -> None:
-    _completed(tmp_path / "0007", _track(), {})
+    objects = {"input": str(tmp_path / "gone"), "scans": [_entry("000001")]}
+    _completed(tmp_path / "0007", _track(), objects)
     shown = report_from_folder(tmp_path).objects[0]
     assert [cloud.label for cloud in shown.clouds] == ["completed"]
-    assert "not found" in shown.subtitle
+    assert "cannot be read" in shown.subtitle
+    assert ("time", "20 ms") in shown.facts
+
+
+def test_registered_only_and_in_millimetres(tmp_path: Path) -> None:
+    track = _track()
+    scans = tmp_path / "data" / "0007" / "scans"
+    for name, scan in zip(NAMES, track.scans, strict=True):
+        write_ply(scans / f"{name}.ply", scan * 1000)
+    out = tmp_path / "out"
+    _completed(out / "0007", track, {"input": str(tmp_path / "data")})
+    shutil.rmtree(out / "0007" / "completed")
+    (out / "wildshape.json").write_text('{"settings": {"unit": "mm"}}', encoding="utf-8")
+    shown = report_from_folder(out).objects[0]
+    assert [cloud.label for cloud in shown.clouds] == ["input scan", "fused by us"]
+    np.testing.assert_allclose(shown.clouds[1].points[:200], track.scans[1], atol=1e-3)
 
 
 def test_metrics_and_log_become_table_and_curves(tmp_path: Path) -> None:
@@ -98,11 +115,11 @@ def test_metrics_and_log_become_table_and_curves(tmp_path: Path) -> None:
     series = {c.title: [name for name, _, _ in c.series] for c in report.curves}
     assert series["Loss"] == ["loss", "observation"]
     assert series["Cycle consistency on held-out tracks"] == ["cycle"]
-    assert report.provenance == {"commit": "abc"}
+    assert report.provenance == {"evaluation/metrics.json": {"commit": "abc"}}
     assert "Each scan turned by its own random yaw" in render(report)
 
 
-@pytest.mark.parametrize("content", [None, "{"], ids=["empty", "broken"])
+@pytest.mark.parametrize("content", [None, "{", "[]"], ids=["empty", "broken", "a list"])
 def test_folder_without_anything_to_report_is_refused(tmp_path: Path, content: str | None) -> None:
     if content is not None:
         (tmp_path / "metrics.json").write_text(content, encoding="utf-8")

@@ -188,7 +188,7 @@
   function look(name) {
     [view.azimuth, view.elevation] = presets[name](data.objects[current]);
     const { clientWidth: w, clientHeight: h } = panels[0].plot; // the field of view is vertical
-    view.distance = 1.42 * Math.max(1, (1.2 * h) / w);
+    view.distance = 1.5 * Math.max(1, (1.2 * h) / w);
   }
 
   function select(index) {
