@@ -58,10 +58,10 @@ def test_rays_of_the_window_miss_nothing(yaw: float) -> None:
     car = _car()
     T = _pose(5, -3, yaw, car)
     scene = Scene([car])
-    few, _ = rays(HDL64, window(T, car.bounds[1]), 0.05)
-    every, _ = rays(HDL64, (-180.0, 179.9, -90.0, 90.0), 0.05)
+    few = rays(HDL64, window(T, car.bounds[1]), 0.05, T[:3, :3])
+    every = rays(HDL64, (-180.0, 179.9, -90.0, 90.0), 0.05, T[:3, :3])
     hits = [
-        np.isfinite(scene.cast(np.tile(T[:3, 3], (len(d), 1)), d @ T[:3, :3].T).distance).sum()
+        np.isfinite(scene.cast(np.tile(T[:3, 3], (len(d), 1)), d).distance).sum()
         for d in (few, every)
     ]
     assert abs(int(hits[0]) - int(hits[1])) <= 4

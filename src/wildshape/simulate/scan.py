@@ -54,17 +54,18 @@ def window(T_object_sensor: np.ndarray, half: np.ndarray) -> tuple[float, ...]:
 
 
 def rays(
-    sensor: SpinningLidar, bounds: tuple[float, ...], phase_deg: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """The sensor's own pulses within a window.
+    sensor: SpinningLidar, bounds: tuple[float, ...], phase_deg: float, R: np.ndarray
+) -> np.ndarray:
+    """The sensor's own pulses within a window, ring by ring from the top.
 
     Args:
         sensor: its beam table and azimuth step.
         bounds: as from `window`, degrees.
         phase_deg: azimuth of the turn's first firing, degrees.
+        R: `(3, 3)` rotation from the sensor frame to that of the answer.
 
     Returns:
-        `(n, 3)` float64 unit directions in the sensor frame and `(n,)` ring numbers.
+        `(n, 3)` float32 unit directions, turned by R.
     """
     table = np.asarray(sensor.elevation_deg)
     ring = np.flatnonzero((table >= bounds[2]) & (table <= bounds[3]))
@@ -74,15 +75,17 @@ def rays(
     column = np.radians(phase_deg + step * (first + columns))
     own = np.radians(sensor.ring_phase_deg[ring])
     theta = np.radians(table[ring])
-    # cos and sin of (own + column), each ring's cos(theta) already in the first factor
+    # R (cos t cos p, cos t sin p, sin t) with p = own + column, by the addition theorem, so
+    # that sines are taken per ring and per column and not per pulse.
     cos_own, sin_own = np.cos(theta) * np.cos(own), np.cos(theta) * np.sin(own)
-    cos, sin = np.cos(column), np.sin(column)
-    directions = np.empty((len(ring), len(column), 3))
-    directions[..., 0] = np.outer(cos_own, cos) - np.outer(sin_own, sin)
-    directions[..., 1] = np.outer(sin_own, cos) + np.outer(cos_own, sin)
-    directions[..., 2] = np.sin(theta)[:, None]
-    directions = directions.reshape(-1, 3)
-    return directions, np.repeat(ring, len(columns))
+    cos, sin = np.cos(column).astype(np.float32), np.sin(column).astype(np.float32)
+    directions = np.empty((len(ring), len(column), 3), np.float32)
+    for k, (rx, ry, rz) in enumerate(R):
+        of_cos = (rx * cos_own + ry * sin_own).astype(np.float32)[:, None]
+        of_sin = (ry * cos_own - rx * sin_own).astype(np.float32)[:, None]
+        up = (rz * np.sin(theta)).astype(np.float32)[:, None]
+        directions[..., k] = of_cos * cos + of_sin * sin + up
+    return directions.reshape(-1, 3)
 
 
 def scan(
@@ -109,8 +112,7 @@ def scan(
     half = target.bounds[1]
     grown = half + ((_RIM_M, _RIM_M, 0.0) if returns.ground else 0.0)
     phase = float(rng.uniform(0, sensor.azimuth_step_deg))
-    directions, _ = rays(sensor, window(T_object_sensor, grown), phase)
-    toward = np.einsum("ij,nj->ni", T_object_sensor[:3, :3], directions)
+    toward = rays(sensor, window(T_object_sensor, grown), phase, T_object_sensor[:3, :3])
     origin = T_object_sensor[:3, 3]
     hits = scene.cast(np.broadcast_to(origin, toward.shape), toward)
     kept = _returned(hits, target, sensor, returns, rng)
@@ -123,7 +125,8 @@ def scan(
         kept = np.where(below > 0, ~lost, kept)
     reach = distance[kept]
     reach = reach + returns.noise_m * rng.standard_normal(len(reach))
-    return (directions[kept] * reach[:, None]).astype(np.float32), on_target
+    on_ray = toward[kept] * reach[:, None]
+    return np.einsum("ji,nj->ni", T_object_sensor[:3, :3], on_ray).astype(np.float32), on_target
 
 
 def _returned(

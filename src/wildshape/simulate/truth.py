@@ -8,7 +8,7 @@ from wildshape.errors import BadInputError
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.solid import Solid
 
-_ROUNDS = 16
+_ROUNDS = 12
 
 
 def visible_surface(
@@ -17,7 +17,7 @@ def visible_surface(
     """`(count, 3)` float32 points on the outer visible surface, uniform by area.
 
     Points are drawn uniformly by area over all triangles; one counts as visible if it is the
-    first hit from far away in at least one of 16 random directions. What is inside a closed
+    first hit from far away in at least one of 12 random directions. What is inside a closed
     body, or under a car, is therefore not in it.
 
     Args:
@@ -34,7 +34,7 @@ def visible_surface(
     """
     found, have = [], 0
     for _ in range(12):
-        points, normals = _on_surface(solid, int(1.3 * (count - have)) + 64, rng)
+        points, normals = _on_surface(solid, int(1.5 * (count - have)) + 64, rng)
         seen = points[_seen(points, normals, solid, scene, lowest_deg, rng)]
         found.append(seen)
         have += len(seen)
@@ -76,9 +76,10 @@ def _seen(
     # face, if faces are known to look outward, else that of the point.
     side = normals if solid.closed else points - (low + high) / 2
     seen = np.zeros(len(points), bool)
+    pool = _directions(2048, lowest_deg, rng)
     for turn in range(_ROUNDS):
         left = np.flatnonzero(~seen)
-        toward = _directions(len(left), lowest_deg, rng)
+        toward = pool[rng.integers(0, len(pool), len(left))]
         if solid.closed or turn % 2 == 0:
             away = np.einsum("ij,ij->i", side[left, :2], toward[:, :2]) < 0
             toward[away, :2] *= -1
