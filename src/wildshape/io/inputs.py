@@ -18,6 +18,7 @@ from wildshape.io.tracks import (
 )
 from wildshape.records import Track
 
+_NO_SCANS = ("poses.txt", "shape.ply")  # truth beside scans, not scans
 _CURE = (
     "pass a scan file, a TRACK folder (with scans/), a DATASET folder of such tracks, a folder of "
     "scan files, or a packed store"
@@ -139,7 +140,7 @@ def _folder(path: Path, unit: Unit) -> TrackSource:
     if folders:
         names = tuple(folder.name for folder in folders)
         return TrackSource(path, names, lambda index: read_track_file(folders[index], unit))
-    files = [entry for entry in entries if is_scan_file(entry)]
+    files = [f for f in entries if is_scan_file(f) and f.name not in _NO_SCANS]
     if not files:
         found = f"{len(entries)} other entries" if entries else "an empty folder"
         raise BadInputError(f"{path}: found no scans ({found}); {_CURE}.")

@@ -11,10 +11,9 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float
 
 from wildshape.errors import BadInputError
-from wildshape.io.atomic import atomic_write
 from wildshape.io.guard import check_promise
 
 _NAMES = {  # numpy's name: the PLY names
@@ -279,32 +278,3 @@ def _check_end(end: int, body: bytes, path: Path) -> None:
             f"{path}: the PLY header promises {end} bytes or more, {len(body)} follow it: "
             "truncated; copy it again."
         )
-
-
-def write_ply(
-    path: Path | str,
-    points: Float[np.ndarray, "n 3"],
-    colors: UInt8[np.ndarray, "n 3"] | None = None,
-) -> None:
-    """Write points as binary little-endian PLY, float32 x y z (and uchar colours).
-
-    Args:
-        path: the file; written atomically, its folder is made if needed.
-        points: `(n, 3)`, metres.
-        colors: `(n, 3)` 0 to 255.
-    """
-    fields = [(axis, "<f4") for axis in _AXES]
-    lines = [f"property float {axis}" for axis in _AXES]
-    if colors is not None:
-        fields += [(name, "u1") for name in ("red", "green", "blue")]
-        lines += [f"property uchar {name}" for name in ("red", "green", "blue")]
-    rows = np.empty(len(points), np.dtype(fields))
-    for i, axis in enumerate(_AXES):
-        rows[axis] = points[:, i]
-    if colors is not None:
-        for i, name in enumerate(("red", "green", "blue")):
-            rows[name] = colors[:, i]
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}", *lines]
-    with atomic_write(path) as file:
-        file.write(("\n".join([*header, "end_header"]) + "\n").encode())
-        file.write(rows.tobytes())

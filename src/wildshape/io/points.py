@@ -15,7 +15,8 @@ from wildshape.io.arrays import read_kitti_bin, read_npy, read_npz
 from wildshape.io.guard import reading
 from wildshape.io.las import read_las
 from wildshape.io.pcd import read_pcd
-from wildshape.io.ply import read_ply, write_ply
+from wildshape.io.ply import read_ply
+from wildshape.io.ply_writer import write_ply
 from wildshape.io.text import read_text
 
 __all__ = [

@@ -50,6 +50,7 @@ INDEX: dict[str, str] = {
 """Tensors of `index.safetensors` and their types; T tracks, S scans, K shards."""
 
 _TYPES = {"F32": "float32", "F64": "float64", "I64": "int64", "I32": "int32", "U8": "uint8"}
+_KEYS = {"fingerprint", "tracks", "scans", "points", "index", "shards", "provenance"}
 _LONGEST_HEADER = 1 << 20
 
 
@@ -112,4 +113,7 @@ def read_manifest(path: Path) -> dict[str, Any]:
                 f"{manifest}: expected {FORMAT} version {VERSION}, found {found[0]} version "
                 f"{found[1]}; convert the data again with this version of Wildshape."
             )
+        missing = _KEYS - data.keys()
+        if missing:
+            raise BadInputError(f"{manifest}: lacks {', '.join(sorted(missing))}; convert again.")
         return data

@@ -3,6 +3,7 @@
 """Track folders: scans/ and, if known, poses.txt, shape.ply, track.json (DESIGN, Track folder)."""
 
 import json
+import shutil
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,8 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.se3 import SE3
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import reading
-from wildshape.io.points import METRES, Unit, is_scan_file, read_points, read_scan, write_ply
+from wildshape.io.ply_writer import ply_bytes, write_ply
+from wildshape.io.points import METRES, Unit, is_scan_file, read_points, read_scan
 from wildshape.io.poses import read_poses, write_poses
 from wildshape.records import Intrinsics, Sensor, Track
 
@@ -225,14 +227,23 @@ def write_track(folder: Path | str, track: Track) -> None:
     folder = Path(folder)
     if (folder / "scans").exists():
         raise BadInputError(f"{folder}: holds a track already; choose another folder or remove it.")
-    for name, points in zip(_file_names(track), track.scans):
-        write_ply(folder / "scans" / f"{name}.ply", points)
     if track.T_sensor_object is not None:
         write_poses(folder / "poses.txt", track.T_sensor_object)
     if track.shape is not None:
         write_ply(folder / "shape.ply", track.shape)
     info = {"category": track.category, "source": track.source, "unit": "m"}
     write_json(folder / "track.json", sensor_to_json(track.sensor) | info)
+    _write_scans(folder, track)
+
+
+def _write_scans(folder: Path, track: Track) -> None:
+    """All scans or none: they are written aside, and scans/ makes the folder a track, so last."""
+    aside = folder / ".scans.part"
+    shutil.rmtree(aside, ignore_errors=True)  # of a writer that was killed
+    aside.mkdir()
+    for name, points in zip(_file_names(track), track.scans):
+        (aside / f"{name}.ply").write_bytes(ply_bytes(points))
+    aside.replace(folder / "scans")
 
 
 def _file_names(track: Track) -> list[str]:
