@@ -19,6 +19,7 @@ from wildshape.simulate.view import view
 MIN_POINTS = 100
 _ATTEMPTS = 60
 _NEAR_M, _FAR_M = 4.0, 30.0
+_WHOLE_PASS = 2 / 3
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ def lidar_track(target: Solid, wanted: Passing, rng: np.random.Generator) -> Raw
     height = wanted.sensor.height_m + rng.normal(0.0, 0.03)
     for attempt in range(_ATTEMPTS):
         far = max(_FAR_M * 0.96**attempt, 2 * _NEAR_M)
-        drive = drive_by(height, float(target.bounds[1, 2]), _NEAR_M, far, rng)
+        drive = drive_by(height, target.bounds[1], _NEAR_M, far, rng)
         usable = _drive(target, alone, wanted, drive.T_object_sensor, rng)
         if usable is not None:
             clouds, poses = usable
@@ -91,11 +92,17 @@ def lidar_track(target: Solid, wanted: Passing, rng: np.random.Generator) -> Raw
 def _drive(
     target: Solid, alone: Scene, wanted: Passing, poses: np.ndarray, rng: np.random.Generator
 ) -> tuple[list[np.ndarray], np.ndarray] | None:
-    """The first usable scans from a random place of the drive on; None if they are too few."""
-    spare = len(poses) - wanted.scans
-    if spare < 0:
+    """Usable scans of a random stretch of the drive; None if they are too few.
+
+    Two tracks in three are spread over as much of the pass as there is, every k-th scan; the
+    third is every scan of a short stretch, as a sensor that loses its object early leaves it.
+    """
+    longest = len(poses) // wanted.scans
+    if longest == 0:
         return None
-    poses = poses[int(rng.integers(0, spare + 1)) :]
+    stride = longest if rng.random() < _WHOLE_PASS else 1
+    spare = len(poses) - stride * wanted.scans
+    poses = poses[int(rng.integers(0, spare + 1)) :: stride]
     scene = alone
     if wanted.occluded:
         in_the_way = occluders(target, poses[: wanted.scans, :3, 3], rng)
