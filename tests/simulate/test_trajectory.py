@@ -6,10 +6,12 @@ import numpy as np
 
 from wildshape.simulate.trajectory import drive_by
 
+_HALF = np.array((2.2, 0.9, 0.75))
+
 
 def _drives(count: int = 200) -> list:
     rng = np.random.default_rng(0)
-    return [drive_by(1.73, 0.75, 4.0, 30.0, rng) for _ in range(count)]
+    return [drive_by(1.73, _HALF, 4.0, 30.0, rng) for _ in range(count)]
 
 
 def test_ranges_steps_and_height() -> None:
@@ -21,6 +23,7 @@ def test_ranges_steps_and_height() -> None:
         assert ground_range.min() >= 4.0 - 1e-9
         assert ground_range.max() <= 30.0 + 1e-9
         np.testing.assert_allclose(T[:, 2, 3], 1.73 - 0.75, atol=0.08)
+        assert (np.abs(T[:, :2, 3]) - _HALF[:2]).max(1).min() > 0.8
         step = np.linalg.norm(np.diff(T[:, :2, 3], axis=0), axis=1)
         assert np.median(step) >= 0.29
         assert np.median(step) <= 1.21

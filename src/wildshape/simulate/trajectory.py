@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _RATE_HZ = 10.0
+_CLEARANCE_M = 0.8
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class Drive:
 
 
 def drive_by(
-    height: float, half_height: float, near: float, far: float, rng: np.random.Generator
+    height: float, half: np.ndarray, near: float, far: float, rng: np.random.Generator
 ) -> Drive:
     """A random pass of a sensor along a parked object.
 
@@ -36,7 +37,8 @@ def drive_by(
 
     Args:
         height: of the sensor above the road, metres.
-        half_height: of the object, metres: its centre is that high above the road.
+        half: `(3,)` half lengths of the object's box, metres: its centre is half[2] above the
+            road, and the sensor's way keeps 0.8 m clear of it.
         near: smallest range of the object's centre, metres.
         far: largest range, metres.
         rng: the only source of chance.
@@ -49,16 +51,17 @@ def drive_by(
     s = np.arange(-45.0, 45.0, speed / _RATE_HZ) + rng.uniform(0, speed / _RATE_HZ)
     path = _path(kind, s, rng)
     place = _beside(path, kind, rng)
-    distance = np.hypot(path[:, 0] - place[0], path[:, 1] - place[1])
-    clear = distance.min() > 2.4
-    keep = (distance >= near) & (distance <= far) & clear
-    T_world_sensor = _sensor_poses(path[keep], height, rng)
     yaw = place[2]
     turn = np.array(((np.cos(yaw), -np.sin(yaw), 0), (np.sin(yaw), np.cos(yaw), 0), (0, 0, 1)))
     T_object_world = np.eye(4)
     T_object_world[:3, :3] = turn.T
-    T_object_world[:3, 3] = -turn.T @ (place[0], place[1], half_height)
-    return Drive(kind, T_object_world @ T_world_sensor, speed)
+    T_object_world[:3, 3] = -turn.T @ (place[0], place[1], half[2])
+    T_object_sensor = T_object_world @ _sensor_poses(path, height, rng)
+    at = T_object_sensor[:, :2, 3]
+    clear = bool((np.abs(at) - half[:2]).max(1).min() > _CLEARANCE_M)
+    distance = np.linalg.norm(at, axis=1)
+    keep = (distance >= near) & (distance <= far) & clear
+    return Drive(kind, T_object_sensor[keep], speed)
 
 
 def _path(kind: str, s: np.ndarray, rng: np.random.Generator) -> np.ndarray:
