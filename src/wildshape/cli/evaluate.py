@@ -1,0 +1,233 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`wildshape evaluate`: models and baselines beside each other, by METHOD 8."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from tyro.conf import arg
+
+from wildshape.cli.options import AsJson, Data, Device, OutFolder, Overwrite, Unit
+from wildshape.errors import BadInputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from wildshape.cli.reading import Reading
+    from wildshape.evaluation.method import Method
+    from wildshape.evaluation.results import Results
+    from wildshape.inference.predictor import Predictor
+
+EXAMPLE = "wildshape evaluate test.store --out evaluation --rotate yaw --model runs/cars"
+FILES = ("metrics.json", "scores.json", "table.md", "errors.png", "examples.png")
+OURS = "wildshape"
+
+Models = Annotated[
+    tuple[Path, ...],
+    arg(metavar="M", help="checkpoints or folders of runs; else the shipped weights"),
+]
+Baselines = Annotated[
+    str, arg(metavar="NAMES", help="of identity, one-scan, local-icp, with commas; or none")
+]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Measure shapes and registration against truth, for models and baselines.
+
+    Writes DIR/metrics.json, table.md, scores.json and figures, and prints the table. Truth is the
+    track's shape, or what its scans accumulate to under their true poses.
+
+    Attributes:
+        rotate: turn each scan about the sensor: not at all, in yaw, or freely.
+        seeds: how many seeds of these turns.
+        max_scans: take this many scans of a longer track, evenly.
+        as_seeds: the models are training seeds of one method: one row with mean and deviation,
+            and a second for the one whose label-free validation cost is lowest.
+    """
+
+    data: Data
+    out: OutFolder
+    model: Models = ()
+    baselines: Baselines = "identity,local-icp"
+    rotate: Literal["none", "yaw", "so3"] = "none"
+    seeds: Annotated[int, arg(metavar="N")] = 1
+    max_scans: Annotated[int | None, arg(metavar="N")] = None
+    as_seeds: bool = False
+    unit: Unit = "m"
+    device: Device = "auto"
+    overwrite: Overwrite = False
+    json: AsJson = False
+
+
+def run(settings: Settings) -> None:
+    """Evaluate and write.
+
+    Raises:
+        BadInputError: data, models or settings that cannot be used; nothing with truth.
+    """
+    from wildshape.cli.output import begin
+    from wildshape.cli.reading import Reading
+    from wildshape.cli.terminal import answer, say_skipped
+
+    if settings.seeds < 1:
+        raise BadInputError(f"--seeds {settings.seeds}: expected 1 or more.")
+    reading = Reading(settings.data, settings.unit)
+    baselines = choose_baselines(settings.baselines)
+    models = load_models(settings.model, settings.device)
+    output = begin(
+        settings.out, "evaluate", _identity(settings), FILES, overwrite=settings.overwrite
+    )
+    pooled = settings.as_seeds and len(models) > 1
+    evaluated = _pooled(models) if pooled else [_rows(models)] * _useful_seeds(settings)
+    runs = [
+        evaluate_once(reading, {**baselines, **rows}, settings.rotate, seed, settings.max_scans)
+        for seed, rows in enumerate(evaluated)
+    ]
+    if pooled:
+        runs = _with_selected(runs, models)
+    _check(runs, settings.data)
+    table = write(reading, runs, next(iter(evaluated[0].items()), None), output.record, settings)
+    output.finish(skipped=reading.skipped)
+    say_skipped(reading.skipped)
+    answer(table, _json(settings.out), as_json=settings.json)
+
+
+def choose_baselines(names: str) -> "dict[str, Method]":
+    """The baselines named, with commas between them; `none` is none.
+
+    Raises:
+        BadInputError: one that there is not.
+    """
+    from wildshape.baselines.identity import Identity, OneScan
+    from wildshape.baselines.local_icp import LocalIcp
+
+    known = {"identity": Identity(), "one-scan": OneScan(), "local-icp": LocalIcp()}
+    wanted = [name.strip() for name in names.split(",") if name.strip() not in ("", "none")]
+    for name in wanted:
+        if name not in known:
+            raise BadInputError(f"'{name}' is no baseline; there are {', '.join(known)}.")
+    return {name: known[name] for name in wanted}
+
+
+def load_models(models: "Sequence[Path]", device: str) -> "dict[str, Predictor]":
+    """Predictors by the name of their row; the shipped weights if none is named.
+
+    Raises:
+        BadInputError: a checkpoint that cannot be used, or two of one name.
+    """
+    from wildshape.cli.models import load_model, model_file
+    from wildshape.training.loop import MODEL
+
+    if not models:
+        return {OURS: load_model(None, device)}
+    found: dict[str, Predictor] = {}
+    for model in models:
+        file = model_file(model)
+        name = file.resolve().parent.name if file.name == MODEL else file.stem
+        if name in found:
+            raise BadInputError(f"{model}: another --model is called {name} too; rename one.")
+        found[name] = load_model(model, device)
+    return found
+
+
+def evaluate_once(
+    reading: "Reading",
+    methods: "dict[str, Method]",
+    rotate: Literal["none", "yaw", "so3"],
+    seed: int,
+    max_scans: int | None,
+) -> "Results":
+    """The protocol under one seed, with progress."""
+    from wildshape.cli.terminal import progress
+    from wildshape.evaluation.protocol import run as run_protocol
+
+    with progress(f"evaluating, seed {seed}", len(reading.source)) as bar:
+        tracks = (track for _, track in reading.tracks())
+        return run_protocol(methods, tracks, rotate, seed, bar.at, max_scans=max_scans)
+
+
+def write(
+    reading: "Reading",
+    runs: "list[Results]",
+    drawn: "tuple[str, Method] | None",
+    record: dict[str, Any],
+    settings: Settings,
+) -> str:
+    """Write metrics, scores, table and figures; returns the table."""
+    from wildshape.evaluation.examples import gather
+    from wildshape.evaluation.figures import write_figures
+    from wildshape.evaluation.results import write_metrics, write_scores
+    from wildshape.evaluation.tables import markdown, write_table
+
+    made = {**record["provenance"], "settings": record["settings"]}
+    examples = []
+    if drawn is not None:
+        tracks = (track for _, track in reading.tracks())
+        examples = gather(tracks, runs[0], *drawn, max_scans=settings.max_scans)
+    write_figures(settings.out, runs[0], examples)
+    write_scores(settings.out, runs)
+    write_table(settings.out, runs, views=_views(reading))
+    write_metrics(settings.out, runs, made)
+    return markdown(runs)
+
+
+def _useful_seeds(settings: Settings) -> int:
+    from wildshape.cli.terminal import say
+
+    if settings.rotate == "none" and settings.seeds > 1:
+        say("--rotate none leaves nothing to chance: one seed is enough")
+        return 1
+    return settings.seeds
+
+
+def _rows(models: "dict[str, Predictor]") -> "dict[str, Method]":
+    from wildshape.inference.method import Learned
+
+    return {name: Learned(predictor) for name, predictor in models.items()}
+
+
+def _pooled(models: "dict[str, Predictor]") -> "list[dict[str, Method]]":
+    """Each model under our one name, in a run of its own."""
+    return [{OURS: method} for method in _rows(models).values()]
+
+
+def _with_selected(runs: "list[Results]", models: "dict[str, Predictor]") -> "list[Results]":
+    """The run of the model with the lowest label-free cost gets a second row for it."""
+    costs = [predictor.settings.cost_m[0] for predictor in models.values()]
+    best = costs.index(min(costs))
+    name = f"{OURS}, seed selected without labels ({list(models)[best]})"
+    chosen = replace(runs[best][OURS], name=name)
+    return [
+        replace(run, methods=(*run.methods, chosen)) if i == best else run
+        for i, run in enumerate(runs)
+    ]
+
+
+def _check(runs: "list[Results]", data: Path) -> None:
+    scored = any(m.completions or m.registrations for run in runs for m in run.methods)
+    if not scored:
+        raise BadInputError(
+            f"{data}: no track has true poses (poses.txt) to measure against; complete it instead."
+        )
+
+
+def _views(reading: "Reading") -> bool:
+    first = next((track for _, track in reading.tracks()), None)
+    return first is not None and first.sensor.kind == "camera"
+
+
+def _identity(settings: Settings) -> dict[str, Any]:
+    from wildshape.cli.models import fingerprint
+
+    names = ("baselines", "rotate", "seeds", "max_scans", "as_seeds", "unit")
+    models = [fingerprint(model) for model in settings.model] or [fingerprint(None)]
+    chosen = {name: getattr(settings, name) for name in names}
+    return {**chosen, "data": str(settings.data.resolve()), "models": models}
+
+
+def _json(out: Path) -> dict[str, Any]:
+    import json
+
+    return json.loads((out / "metrics.json").read_text("utf-8"))

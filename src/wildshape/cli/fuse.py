@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`wildshape fuse`: all scans of a track as one cloud."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, arg
+
+from wildshape.cli.options import AsJson, Device, Model, Overwrite, Unit
+from wildshape.errors import BadInputError
+
+if TYPE_CHECKING:
+    from wildshape.records import Points
+
+EXAMPLE = "wildshape fuse track --out fused.ply"
+_SUFFIXES = (".ply", ".npy", ".xyz", ".txt")
+
+TrackFolder = Annotated[Path, Positional, arg(metavar="TRACK", help="a TRACK folder")]
+OutFile = Annotated[Path, arg(metavar="FILE", help="cloud to write: .ply .npy .xyz .txt")]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Join all scans of a track into one cloud, in the middle scan's sensor frame, metres."""
+
+    track: TrackFolder
+    out: OutFile
+    model: Model = None
+    unit: Unit = "m"
+    device: Device = "auto"
+    overwrite: Overwrite = False
+    json: AsJson = False
+
+
+def run(settings: Settings) -> None:
+    """Fuse one track.
+
+    Raises:
+        BadInputError: input, model or output cannot be used.
+    """
+    from wildshape.cli.models import load_model
+    from wildshape.cli.output import refuse_file
+    from wildshape.cli.reading import Reading
+    from wildshape.cli.terminal import answer, say_skipped
+
+    if settings.out.suffix.lower() not in _SUFFIXES:
+        raise BadInputError(f"{settings.out}: give --out one of {', '.join(_SUFFIXES)}.")
+    refuse_file(settings.out, overwrite=settings.overwrite)
+    reading = Reading(settings.track, settings.unit)
+    track = reading.single("fuse")
+    fused = load_model(settings.model, settings.device).fuse(track.scans, track.sensor)
+    write_cloud(settings.out, fused)
+    say_skipped(reading.skipped)
+    middle = track.scan_names[track.middle]
+    text = (
+        f"fused {len(track.scans)} scans, {len(fused)} points, in the frame of scan {middle};"
+        f" see {settings.out}"
+    )
+    data = {"out": str(settings.out), "points": len(fused), "scans": len(track.scans)}
+    answer(text, {**data, "middle_scan": middle}, as_json=settings.json)
+
+
+def write_cloud(path: Path, points: "Points") -> None:
+    """Write points atomically, in the format of the suffix."""
+    import numpy as np
+
+    from wildshape.io.atomic import atomic_write
+    from wildshape.io.points import write_ply
+
+    if path.suffix.lower() == ".ply":
+        write_ply(path, points)
+        return
+    with atomic_write(path) as file:
+        if path.suffix.lower() == ".npy":
+            np.save(file, points)
+        else:
+            np.savetxt(file, points, fmt="%.6f")

@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The command line's door: it imports a command, and with it torch, only when one is named."""
+
+import errno
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from types import ModuleType
+
+from wildshape.cli.interrupt import Terminated, terminable
+from wildshape.errors import BadInputError, MissingExtraError
+
+COMMANDS = {
+    "demo": "the whole way on simulated scans, or on yours, in five minutes on a CPU",
+    "simulate": "make tracks of scans, with their truth, by ray casting",
+    "convert": "turn a published data set, or your own folders, into tracks",
+    "train": "learn completion and pose from tracks, without labels",
+    "complete": "complete the object of each scan: shape, pose, box, confidence",
+    "register": "align two scans of an object, or all scans of its track",
+    "fuse": "join all scans of a track into one cloud",
+    "evaluate": "measure models and baselines against known shapes and poses",
+    "report": "draw what other commands wrote as one HTML page",
+}
+_HELP = ("-h", "--help")
+_BAD_INPUT, _FAILED, _INTERRUPTED, _TERMINATED = 2, 1, 130, 143
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Run one command.
+
+    Raises:
+        SystemExit: 2 after bad input or usage, 130 after Ctrl-C, 143 after SIGTERM, 1 where the
+            disk is full; always with one sentence on stderr.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    if not arguments or arguments[0] in _HELP:
+        print(overview())
+        return
+    if arguments[0] == "--version":
+        from wildshape import __version__
+
+        print(__version__)
+        return
+    if arguments[0] not in COMMANDS:
+        _leave(f"'{arguments[0]}' is no command; there are {', '.join(COMMANDS)}.", _BAD_INPUT)
+    module = import_module(f"wildshape.cli.{arguments[0]}")
+    with terminable():
+        _guarded(module, arguments[0], arguments[1:])
+
+
+def overview() -> str:
+    """The help of `wildshape` itself."""
+    width = max(map(len, COMMANDS))
+    lines = [f"  {name:{width}}  {purpose}" for name, purpose in COMMANDS.items()]
+    return "\n".join(
+        (
+            "usage: wildshape COMMAND [...]",
+            "",
+            "Complete 3D shapes and poses of objects from partial scans, learned without labels.",
+            "",
+            *lines,
+            "",
+            "`wildshape COMMAND --help` explains one; `wildshape --version` tells which this is.",
+            "",
+            "example:",
+            "  wildshape complete scan.ply --out completed",
+        )
+    )
+
+
+def _guarded(module: ModuleType, command: str, arguments: list[str]) -> None:
+    """Run a command; what a user can cure becomes one sentence and an exit code."""
+    try:
+        module.run(_parse(module, command, arguments))
+    except (BadInputError, MissingExtraError) as error:
+        _leave(str(error), _BAD_INPUT)
+    except Terminated as stopped:
+        _leave(str(stopped) or _stopped(), _TERMINATED)
+    except KeyboardInterrupt as stopped:
+        _leave(str(stopped) or _stopped(), _INTERRUPTED)
+    except BrokenPipeError:
+        sys.stderr.close()  # the reader of our output has gone; nothing is left to say
+        raise SystemExit(_FAILED) from None
+    except OSError as error:
+        _leave(_system_sentence(error), _FAILED if error.errno in _NO_ROOM else _BAD_INPUT)
+
+
+def _parse(module: ModuleType, command: str, arguments: list[str]) -> object:
+    import tyro
+
+    try:
+        return tyro.cli(
+            module.Settings,
+            prog=f"wildshape {command}",
+            args=arguments,
+            config=(tyro.conf.FlagCreatePairsOff,),
+        )
+    except SystemExit as leaving:
+        if leaving.code in (0, None):
+            print(f"\nexample:\n  {module.EXAMPLE}")
+        raise
+
+
+def _stopped() -> str:
+    return "stopped; what is finished stays, and the same command goes on from there."
+
+
+def _system_sentence(error: OSError) -> str:
+    place = f"{error.filename}: " if error.filename else ""
+    reason = (error.strerror or str(error)).lower()
+    return f"{place}{reason}; what is finished stays valid, and the same command goes on from it."
+
+
+def _leave(sentence: str, code: int) -> None:
+    print(f"wildshape: {' '.join(sentence.split())}", file=sys.stderr, flush=True)
+    raise SystemExit(code)

@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""An output folder and its `wildshape.json`: which command made it, and whether it is finished.
+
+An existing output is refused; a half-finished one of the same command and settings is gone on
+with; two are never mixed; `--overwrite` removes what the earlier command wrote and nothing else.
+"""
+
+import json
+import shlex
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from wildshape.cli.terminal import say
+from wildshape.errors import BadInputError
+from wildshape.io.atomic import write_json
+from wildshape.io.provenance import provenance
+
+MARKER = "wildshape.json"
+
+
+@dataclass(frozen=True)
+class Output:
+    """A folder being written.
+
+    Attributes:
+        path: the folder.
+        record: what `wildshape.json` holds.
+        resumed: whether finished work of an earlier, interrupted run lies in it.
+    """
+
+    path: Path
+    record: dict[str, Any]
+    resumed: bool = False
+
+    def finish(self, **more: object) -> None:
+        """Say that everything is there."""
+        write_json(self.path / MARKER, {**self.record, **more, "status": "finished"})
+
+
+def begin(
+    path: Path,
+    command: str,
+    settings: dict[str, Any],
+    files: Sequence[str],
+    *,
+    overwrite: bool = False,
+) -> Output:
+    """Start, or go on with, the output of a command.
+
+    Args:
+        path: the folder.
+        command: for example `complete`.
+        settings: JSON values; whatever changes the content of the output.
+        files: patterns of the files that the command may write below `path`.
+        overwrite: remove an earlier output first.
+
+    Raises:
+        BadInputError: something else is there, or a finished output without `overwrite`.
+    """
+    settings = json.loads(json.dumps(settings, default=str))
+    resumed = False
+    if path.exists() and not path.is_dir():
+        raise BadInputError(f"{path}: is a file; --out names a folder to write.")
+    if path.is_dir() and any(path.iterdir()):
+        resumed = _existing(path, command, settings, overwrite=overwrite)
+    record = {
+        "command": command,
+        "status": "running",
+        "settings": settings,
+        "files": list(files),
+        "provenance": provenance(command_line()),
+    }
+    write_json(path / MARKER, record)
+    return Output(path, record, resumed)
+
+
+def command_line() -> str:
+    """As a user would type it again."""
+    return shlex.join(["wildshape", *sys.argv[1:]])
+
+
+def refuse_file(path: Path, *, overwrite: bool) -> None:
+    """Refuse to write over a file.
+
+    Raises:
+        BadInputError: it exists, and `overwrite` was not given; or it is a folder.
+    """
+    if path.is_dir():
+        raise BadInputError(f"{path}: is a folder; --out names a file to write.")
+    if path.exists() and not overwrite:
+        raise BadInputError(f"{path}: exists; pass --overwrite to replace it.")
+
+
+def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: bool) -> bool:
+    """Whether the output there is to be gone on with; with `overwrite` it is removed."""
+    record = _read(path)
+    if overwrite:
+        _remove(path, record.get("files", []))
+        return False
+    same = record.get("command") == command and record.get("settings") == settings
+    if record.get("status") == "finished":
+        raise BadInputError(
+            f"{path}: holds the output of an earlier `{record.get('command')}`; pass --overwrite"
+            " to replace it, or choose another --out."
+        )
+    if not same:
+        raise BadInputError(
+            f"{path}: holds the unfinished output of `{record.get('command')}` with other"
+            " settings; repeat it as it was, pass --overwrite, or choose another --out."
+        )
+    say(f"going on with the unfinished output in {path}")
+    return True
+
+
+def _read(path: Path) -> dict[str, Any]:
+    marker = path / MARKER
+    if not marker.is_file():
+        raise BadInputError(
+            f"{path}: is not empty and was not written by this command; choose another --out."
+        )
+    try:
+        record = json.loads(marker.read_text("utf-8"))
+    except ValueError as error:
+        raise BadInputError(f"{marker}: damaged; choose another --out.") from error
+    return record if isinstance(record, dict) else {}
+
+
+def _remove(path: Path, patterns: Sequence[str]) -> None:
+    """Remove our files and the folders that are empty then."""
+    (path / MARKER).unlink()
+    for file in [file for pattern in patterns for file in path.glob(pattern)]:
+        if file.is_file():
+            file.unlink()
+    folders = sorted((f for f in path.rglob("*") if f.is_dir()), reverse=True)
+    for folder in folders:
+        if not any(folder.iterdir()):
+            folder.rmdir()

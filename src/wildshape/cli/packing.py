@@ -1,0 +1,117 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Tracks written as a packed store or as track folders, by `simulate`, `convert` and `train`."""
+
+import json
+import shutil
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from wildshape.cli.options import Layout
+from wildshape.cli.output import begin, command_line
+from wildshape.cli.results import file_name
+from wildshape.cli.terminal import say
+from wildshape.errors import BadInputError
+from wildshape.io.provenance import provenance
+from wildshape.io.store import StoreWriter
+from wildshape.io.store_format import INDEX_JSON, WRITING_JSON
+from wildshape.io.tracks import write_track
+from wildshape.records import Track
+
+FILES = ("*/scans/*.ply", "*/poses.txt", "*/shape.ply", "*/track.json")
+_UNFINISHED = ".unfinished"
+
+
+@dataclass
+class Written:
+    """How much was written."""
+
+    tracks: int = 0
+    scans: int = 0
+    points: int = 0
+
+    def count(self, track: Track) -> None:
+        """Add a track."""
+        self.tracks += 1
+        self.scans += len(track.scans)
+        self.points += sum(len(scan) for scan in track.scans)
+
+
+def write_tracks(
+    tracks: Iterable[Track],
+    out: Path,
+    layout: Layout,
+    *,
+    command: str,
+    settings: dict[str, Any],
+    overwrite: bool = False,
+    at: Callable[[int], None] = lambda _: None,
+) -> Written:
+    """Write tracks as they come.
+
+    Args:
+        tracks: in order; made again from the first where an earlier run was interrupted.
+        out: the store or the DATASET folder.
+        layout: which of the two.
+        command: that writes.
+        settings: JSON values; all that decides the tracks.
+        overwrite: replace an earlier output.
+        at: called with the number of tracks written.
+
+    Raises:
+        BadInputError: something is at `out` already, or no track came.
+    """
+    write = _packed if layout == "packed" else _folders
+    settings = json.loads(json.dumps(settings, default=str))
+    written = Written()
+    for track in write(tracks, out, command, settings, overwrite):
+        written.count(track)
+        at(written.tracks)
+    if not written.tracks:
+        raise BadInputError(f"{out}: no track came out of the source; check it and its options.")
+    return written
+
+
+def _packed(
+    tracks: Iterable[Track], out: Path, command: str, settings: dict[str, Any], overwrite: bool
+) -> Iterator[Track]:
+    """Into a packed store, which cannot be gone on with: a half-written one is begun again."""
+    made = {**provenance(command_line()), "made_by": command, "settings": settings}
+    again = _half_written(out, made)
+    if again:
+        say(f"beginning the half-written store {out} again")
+    with StoreWriter(out, made, overwrite=overwrite or again) as writer:
+        for track in tracks:
+            writer.add(track)
+            yield track
+
+
+def _half_written(out: Path, made: dict[str, Any]) -> bool:
+    """Whether an interrupted run of the same command and settings left a store."""
+    path = out / WRITING_JSON
+    if not path.is_file() or (out / INDEX_JSON).exists():
+        return False
+    try:
+        found = json.loads(path.read_text("utf-8")).get("provenance", {})
+    except ValueError:
+        return False
+    return all(found.get(key) == made[key] for key in ("made_by", "settings"))
+
+
+def _folders(
+    tracks: Iterable[Track], out: Path, command: str, settings: dict[str, Any], overwrite: bool
+) -> Iterator[Track]:
+    """Into track folders; each appears under its name only when it is whole."""
+    output = begin(out, command, settings, FILES, overwrite=overwrite)
+    unfinished = out / _UNFINISHED
+    shutil.rmtree(unfinished, ignore_errors=True)
+    for track in tracks:
+        folder = out / file_name(track.name)
+        if not folder.exists():
+            write_track(unfinished / track.name, track)
+            (unfinished / track.name).replace(folder)
+        yield track
+    shutil.rmtree(unfinished, ignore_errors=True)
+    output.finish()

@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`wildshape register`: two scans of one object, or all scans of a track."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from tyro.conf import Positional, arg
+
+from wildshape.cli.options import AsJson, Device, Model, Overwrite, Unit
+from wildshape.errors import BadInputError
+
+EXAMPLE = "wildshape register before.ply after.ply"
+
+Source = Annotated[
+    Path, Positional, arg(metavar="SOURCE", help="a scan; without TARGET a TRACK or DATASET")
+]
+Target = Annotated[
+    Path | None, Positional, arg(metavar="TARGET", help="the scan to whose frame SOURCE is taken")
+]
+Out = Annotated[Path | None, arg(metavar="DIR", help="folder to write, with a TRACK")]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Register SOURCE to TARGET, or every scan of a TRACK to its middle scan.
+
+    Two scans: prints T_target_source, which takes the source's points to the target's sensor
+    frame, and the share of them that then lie near the target. A TRACK: writes
+    DIR/TRACK/poses.txt (T_sensor_canonical), T_middle_scan.txt and objects.json.
+    """
+
+    source: Source
+    target: Target = None
+    out: Out = None
+    model: Model = None
+    unit: Unit = "m"
+    device: Device = "auto"
+    overwrite: Overwrite = False
+    json: AsJson = False
+
+
+def run(settings: Settings) -> None:
+    """Register a pair or tracks.
+
+    Raises:
+        BadInputError: input, model or output cannot be used.
+    """
+    if settings.target is not None and settings.out is not None:
+        raise BadInputError(
+            "register SOURCE TARGET prints its result; leave --out away, or name one TRACK alone."
+        )
+    if settings.target is not None:
+        _pair(settings, settings.target)
+    elif settings.out is not None:
+        _tracks(settings, settings.out)
+    else:
+        raise BadInputError("register needs SOURCE and TARGET scans, or a TRACK and --out DIR.")
+
+
+def _tracks(settings: Settings, out: Path) -> None:
+    from wildshape.cli.results import Work, perform
+
+    work = Work(
+        command="register",
+        input=settings.source,
+        out=out,
+        model=settings.model,
+        unit=settings.unit,
+        device=settings.device,
+    )
+    perform(work, overwrite=settings.overwrite, as_json=settings.json)
+
+
+def _pair(settings: Settings, target: Path) -> None:
+    from wildshape.cli.models import load_model
+    from wildshape.cli.terminal import answer
+
+    scans = [_scan(path, settings) for path in (settings.source, target)]
+    found = load_model(settings.model, settings.device).register(*scans)
+    matrix = found.T_target_source.matrix.tolist()
+    lines = [" ".join(f"{value:12.6f}" for value in row) for row in matrix]
+    shares = f"inlier ratio {found.inlier_ratio:.3f}, confidence {found.confidence:.3f}"
+    data = {
+        "T_target_source": matrix,
+        "inlier_ratio": found.inlier_ratio,
+        "confidence": found.confidence,
+    }
+    answer("\n".join(("T_target_source", *lines, shares)), data, as_json=settings.json)
+
+
+def _scan(path: Path, settings: Settings) -> Any:
+    from wildshape.cli.reading import Reading
+
+    track = Reading(path, settings.unit).single("a pair")
+    if len(track.scans) != 1:
+        raise BadInputError(
+            f"{path}: holds {len(track.scans)} scans, but a pair takes two files of one scan each;"
+            " for a whole track name it alone with --out DIR."
+        )
+    return track.scans[0]

@@ -1,0 +1,241 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What `complete` and `register` write of a track (DESIGN, Commands).
+
+`objects.json` is written last: a track folder that has it is finished.
+"""
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from wildshape.cli.models import fingerprint, load_model
+from wildshape.cli.options import Device, Unit
+from wildshape.cli.output import Output, begin
+from wildshape.cli.reading import Reading
+from wildshape.cli.terminal import answer, duration, progress, say, say_skipped
+from wildshape.errors import BadInputError
+from wildshape.geometry.se3 import stack
+from wildshape.inference.predictor import Predictor, to_middle
+from wildshape.io.atomic import write_json
+from wildshape.io.points import write_ply
+from wildshape.io.tracks import write_poses
+from wildshape.records import Completion, Track
+
+OBJECTS, POSES, COMPLETED, MIDDLE = "objects.json", "poses.txt", "completed", "T_middle_scan.txt"
+FILES = (f"*/{COMPLETED}/*.ply", f"*/{POSES}", f"*/{MIDDLE}", f"*/{OBJECTS}")
+
+
+@dataclass(frozen=True)
+class Work:
+    """One command's order.
+
+    Attributes:
+        command: `complete` writes clouds; `register` the scans' poses to the middle scan instead.
+        input: what to read.
+        out: folder to write.
+        model: checkpoint, None for the shipped one.
+        unit: of the files.
+        device: `auto`, `cpu` or `cuda`.
+    """
+
+    command: Literal["complete", "register"]
+    input: Path
+    out: Path
+    model: Path | None
+    unit: Unit
+    device: Device
+
+    def identity(self) -> dict[str, Any]:
+        """What decides the output's content."""
+        source = str(self.input.resolve())
+        return {"input": source, "unit": self.unit, "model": fingerprint(self.model)}
+
+
+@dataclass
+class Tally:
+    """What was done.
+
+    Attributes:
+        tracks: written now.
+        kept: finished by an earlier, interrupted run.
+        scans: written now.
+        skipped: what could not be used, with the reason.
+        flagged: scans that carry a warning; `example` is the first of them.
+    """
+
+    tracks: int = 0
+    kept: int = 0
+    scans: int = 0
+    skipped: list[tuple[str, str]] = field(default_factory=list)
+    flagged: int = 0
+    example: str = ""
+
+    def add(self, track: Track, scans: list[Completion]) -> None:
+        """Count a track."""
+        self.tracks += 1
+        self.scans += len(scans)
+        for name, done in zip(track.scan_names, scans):
+            if done.warning:
+                self.flagged += 1
+                self.example = self.example or f"{track.name}/{name}: {done.warning}"
+
+    @property
+    def warning(self) -> str:
+        """A sentence on the scans that the model was not made for, or nothing."""
+        if not self.flagged:
+            return ""
+        return f"{self.flagged} scans are flagged with confidence 0, for example {self.example}"
+
+
+def perform(work: Work, *, overwrite: bool, as_json: bool) -> None:
+    """Do the work, say what was skipped, and answer.
+
+    Raises:
+        BadInputError: input, model or output cannot be used.
+    """
+    began = time.monotonic()
+    reading = Reading(work.input, work.unit)
+    predictor = load_model(work.model, work.device)
+    output = begin(work.out, work.command, work.identity(), FILES, overwrite=overwrite)
+    tally = write_results(reading, predictor, output, registers=work.command == "register")
+    output.finish(skipped=tally.skipped)
+    _conclude(work, tally, reading, time.monotonic() - began, as_json)
+
+
+def _conclude(work: Work, tally: Tally, reading: Reading, seconds: float, as_json: bool) -> None:
+    if reading.dropped:
+        say(reading.dropped)
+    say_skipped(tally.skipped)
+    if tally.warning:
+        say(tally.warning)
+    done = "completed" if work.command == "complete" else "registered"
+    before = f", {tally.kept} tracks had been finished before" if tally.kept else ""
+    text = (
+        f"{done} {tally.scans} scans of {tally.tracks} tracks in {duration(seconds)}{before};"
+        f" see {work.out}"
+    )
+    data = {
+        "out": str(work.out),
+        "tracks": tally.tracks,
+        "tracks_finished_before": tally.kept,
+        "scans": tally.scans,
+        "skipped": [{"what": what, "reason": reason} for what, reason in tally.skipped],
+        "seconds": round(seconds, 3),
+    }
+    answer(text, data, as_json=as_json)
+
+
+def write_results(
+    reading: Reading, predictor: Predictor, output: Output, *, registers: bool = False
+) -> Tally:
+    """Complete every scan of every track and write the results, track after track.
+
+    Args:
+        reading: the tracks.
+        predictor: does the work.
+        output: the folder, begun.
+        registers: write `T_middle_scan` instead of the completed shapes.
+
+    Raises:
+        BadInputError: nothing can be used, or a name cannot be that of a file.
+    """
+    names = reading.source.names
+    earlier: list[tuple[str, str]] = []
+    tally = Tally()
+
+    def done(name: str) -> bool:
+        path = output.path / file_name(name) / OBJECTS
+        if not path.is_file():
+            return False
+        found = json.loads(path.read_text("utf-8"))["skipped"]
+        earlier.extend((f"{name}/{scan['scan']}", scan["reason"]) for scan in found)
+        tally.kept += 1
+        return True
+
+    with progress("completing", len(names)) as bar:
+        for index, track in reading.tracks(done):
+            at = lambda text, index=index: bar.at(index, text)  # noqa: E731
+            folder = output.path / file_name(track.name)
+            scans = complete_track(track, predictor, folder, at, registers=registers)
+            write_json(folder / OBJECTS, _objects(track, scans, reading, predictor))
+            tally.add(track, scans)
+            bar.at(index + 1, track.name)
+    tally.skipped = [*earlier, *reading.skipped]
+    return tally
+
+
+def complete_track(
+    track: Track,
+    predictor: Predictor,
+    folder: Path,
+    at: Callable[[str], None] = lambda _: None,
+    *,
+    registers: bool = False,
+) -> list[Completion]:
+    """Complete the scans of a track, writing each into its folder; all but `objects.json`."""
+    found: list[Completion] = []
+    for done in predictor.complete_many(track.scans, track.sensor):
+        name = file_name(track.scan_names[len(found)])
+        if not registers:
+            write_ply(folder / COMPLETED / f"{name}.ply", done.points)
+        found.append(done)
+        at(f"{track.name}, scan {len(found)} of {len(track.scans)}")
+    poses = stack([done.pose for done in found])
+    write_poses(folder / POSES, poses)
+    if registers:
+        write_poses(folder / MIDDLE, to_middle(poses))
+    return found
+
+
+def file_name(name: str) -> str:
+    """The name itself.
+
+    Raises:
+        BadInputError: it is no plain file name.
+    """
+    if not name or Path(name).name != name or name.startswith("."):
+        raise BadInputError(f"'{name}': a track or scan of this name cannot become a file; rename.")
+    return name
+
+
+def _objects(
+    track: Track, scans: list[Completion], reading: Reading, predictor: Predictor
+) -> dict[str, Any]:
+    prefix = f"{track.name}/"
+    skipped = {
+        what.removeprefix(prefix): reason
+        for what, reason in reading.skipped
+        if what.startswith(prefix)
+    }
+    return {
+        "format": 1,
+        "track": track.name,
+        "input": str(reading.source.path.resolve()),
+        "together": False,
+        "model": _model(predictor),
+        "scans": [describe(name, done) for name, done in zip(track.scan_names, scans)],
+        "skipped": [{"scan": scan, "reason": reason} for scan, reason in skipped.items()],
+    }
+
+
+def _model(predictor: Predictor) -> dict[str, Any]:
+    made = predictor.settings.provenance
+    return {key: made.get(key) for key in ("command", "code", "time_utc", "steps", "seed")}
+
+
+def describe(name: str, done: Completion) -> dict[str, Any]:
+    """A completed scan without its points; metres, the scan's sensor frame."""
+    return {
+        "scan": name,
+        "box": asdict(done.box),
+        "confidence": done.confidence,
+        "refined": done.refined,
+        "seconds": done.seconds,
+        "branch": done.branch,
+        "cost_m": done.cost,
+        "warning": done.warning,
+    }

@@ -1,0 +1,238 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`wildshape train`: learn from tracks; also under torchrun, where rank 0 alone talks."""
+
+import os
+import time
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from tyro.conf import arg
+
+from wildshape.cli.options import AsJson, Data, Device, Overwrite, Unit
+from wildshape.errors import BadInputError
+
+if TYPE_CHECKING:
+    from wildshape.io.store import Store
+    from wildshape.training.config import Recipe
+    from wildshape.training.loop import Run
+
+EXAMPLE = "wildshape train cars.store --out runs/cars --preset small"
+
+OutRun = Annotated[Path, arg(metavar="RUN", help="folder of the run")]
+_PACKED = "data.store"
+_FILES = (
+    "*.safetensors",
+    "run.json",
+    "log.jsonl",
+    "tensorboard/*",
+    f"{_PACKED}/*",
+)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Train a model on tracks, without labels; RUN/model.safetensors is the result.
+
+    Ctrl-C and SIGTERM save the state; `--resume` then goes on to the same weights as a run that
+    was never stopped. Under `torchrun --nproc-per-node N` the processes train together.
+
+    Attributes:
+        preset: sizes, losses and schedule.
+        steps: gradient steps instead of the preset's; the schedule is stretched to them.
+        seed: of weights and batches.
+        resume: go on with RUN; a finished one is left as it is.
+    """
+
+    data: Data
+    out: OutRun
+    preset: Literal["paper-lidar", "paper-views", "default", "small", "tiny"] = "default"
+    steps: Annotated[int | None, arg(metavar="N")] = None
+    seed: Annotated[int, arg(metavar="S")] = 0
+    resume: bool = False
+    device: Device = "auto"
+    unit: Unit = "m"
+    overwrite: Overwrite = False
+    json: AsJson = False
+
+
+def run(settings: Settings) -> None:
+    """Train, or go on training.
+
+    Raises:
+        BadInputError: data or settings that cannot be used, an existing run without `--resume`.
+        KeyboardInterrupt: stopped by a signal, the state saved.
+    """
+    from wildshape.cli.models import choose_device
+    from wildshape.cli.output import command_line
+    from wildshape.io.provenance import provenance
+    from wildshape.training.loop import setup
+
+    if settings.seed < 0:
+        raise BadInputError(f"--seed {settings.seed}: expected 0 or more.")
+    device = choose_device(settings.device)
+    _check_folder(settings)
+    store = open_data(settings)
+    recipe = recipe_for(store, settings.preset, settings.steps)
+    made = {**provenance(command_line()), "data": str(settings.data)}
+    prepared = setup(
+        recipe,
+        store,
+        settings.out,
+        seed=settings.seed,
+        device=device,
+        resume=settings.resume,
+        provenance=made,
+    )
+    began, first = time.monotonic(), prepared.state.step
+    if first >= recipe.optim.steps:
+        _conclude(settings, prepared, 0.0, f"{settings.out} was finished already")
+        return
+    model = fit_with_progress(prepared, resume=f"{command_line()}{_flag(settings)}")
+    text = f"trained {prepared.state.step - first} steps"
+    _conclude(settings, prepared, time.monotonic() - began, text)
+    assert model.is_file() or not prepared.processes.leads
+
+
+def fit_with_progress(run: "Run", *, resume: str = "") -> Path:
+    """`fit` with a bar; a signal stops it between two steps and saves the state.
+
+    Args:
+        run: set up.
+        resume: the command that goes on after a stop, for the message.
+
+    Raises:
+        KeyboardInterrupt: stopped by a signal; its text says how to go on.
+    """
+    from wildshape.cli.interrupt import stop_flag
+    from wildshape.cli.terminal import progress
+    from wildshape.training.loop import StopRequested, fit
+
+    total, first = run.recipe.optim.steps, run.state.step
+    silent = not run.processes.leads
+    with stop_flag() as stopped, progress("training", total, silent=silent, start=first) as bar:
+        try:
+            return fit(run, lambda step, values: bar.at(step, _line(values)), stopped)
+        except StopRequested:
+            raise stopped.error(
+                f"stopped after step {run.state.step} of {total}, the state is saved; go on with"
+                f" `{resume}`."
+            ) from None
+
+
+def open_data(settings: Settings) -> "Store":
+    """The packed store to train on; track folders are packed once into the run's folder.
+
+    Raises:
+        BadInputError: no tracks there; or track folders under torchrun.
+    """
+    from wildshape.cli.packing import write_tracks
+    from wildshape.cli.reading import Reading
+    from wildshape.cli.terminal import progress, say_skipped
+    from wildshape.io.store import is_store, open_store
+
+    if is_store(settings.data):
+        return open_store(settings.data)
+    if int(os.environ.get("WORLD_SIZE", "1")) > 1:
+        raise BadInputError(
+            f"{settings.data}: several processes need a packed store; make one first by"
+            f" `wildshape convert folder {settings.data} OUT`."
+        )
+    packed = settings.out / _PACKED
+    if settings.resume and (packed / "index.json").is_file():
+        return open_store(packed)
+    reading = Reading(settings.data, settings.unit)
+    with progress("packing tracks", len(reading.source)) as bar:
+        write_tracks(
+            (track for _, track in reading.tracks()),
+            packed,
+            "packed",
+            command="train",
+            settings={"input": str(settings.data.resolve()), "unit": settings.unit},
+            overwrite=True,
+            at=bar.at,
+        )
+    say_skipped(reading.skipped)
+    return open_store(packed)
+
+
+def recipe_for(store: "Store", preset: str, steps: int | None) -> "Recipe":
+    """The preset, for the kind of sensor in the store, with another number of steps if asked.
+
+    Raises:
+        BadInputError: a preset of the paper that was made for the other kind of sensor; no steps.
+    """
+    from wildshape.training.recipes import PRESETS
+
+    recipe = PRESETS[preset]()
+    kind = store.sensor_of(0).kind
+    if kind != recipe.views.sensor:
+        if preset.startswith("paper-"):
+            raise BadInputError(
+                f"{store.path}: holds {kind} scans, but preset {preset} is for"
+                f" {recipe.views.sensor} scans; choose another preset."
+            )
+        recipe = replace(recipe, views=replace(recipe.views, sensor=kind))
+    if steps is None:
+        return recipe
+    if steps < 1:
+        raise BadInputError(f"--steps {steps}: expected 1 or more.")
+    return replace(recipe, optim=replace(recipe.optim, steps=steps))
+
+
+def _check_folder(settings: Settings) -> None:
+    """The marker of the run; processes that do not lead leave the folder alone."""
+    from wildshape.cli.output import MARKER, begin
+
+    if int(os.environ.get("RANK", "0")) > 0:
+        return
+    if settings.resume and (settings.out / MARKER).is_file():
+        return
+    began = settings.out.is_dir() and any(settings.out.iterdir())
+    if began and not settings.overwrite:
+        raise BadInputError(
+            f"{settings.out}: a run is there already; pass --resume to go on with it, --overwrite"
+            " to replace it, or choose another --out."
+        )
+    identity = {name: str(getattr(settings, name)) for name in ("data", "preset", "steps", "seed")}
+    begin(settings.out, "train", identity, _FILES, overwrite=settings.overwrite)
+
+
+def _flag(settings: Settings) -> str:
+    return "" if settings.resume else " --resume"
+
+
+def _line(values: dict[str, Any]) -> str:
+    shares = "/".join(f"{100 * share:.0f}" for share in values["branch_shares"])
+    return (
+        f"loss {values['loss']:.4f} (observation {values['observation']:.4f},"
+        f" projection {values['projection']:.4f}), branches {shares} %,"
+        f" {values['steps_per_second']:.1f} steps/s"
+    )
+
+
+def _conclude(settings: Settings, run: "Run", seconds: float, text: str) -> None:
+    if not run.processes.leads:
+        return
+    import json
+
+    from wildshape.cli.output import MARKER
+    from wildshape.cli.terminal import answer, duration
+    from wildshape.io.atomic import write_json
+    from wildshape.models.checkpoint import load_checkpoint
+    from wildshape.training.loop import MODEL
+
+    marker = settings.out / MARKER
+    write_json(marker, {**json.loads(marker.read_text("utf-8")), "status": "finished"})
+    model = settings.out / MODEL
+    _, saved = load_checkpoint(model)
+    spent = f" in {duration(seconds)}" if seconds else ""
+    data = {
+        "model": str(model),
+        "steps": run.state.step,
+        "seconds": round(seconds, 3),
+        "metrics": saved.metrics,
+        "recipe": asdict(run.recipe),
+    }
+    answer(f"{text}{spent}; the model is {model}", data, as_json=settings.json)

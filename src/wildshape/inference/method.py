@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A predictor as evaluation wants a method: clouds and poses, nothing else."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from wildshape.geometry.se3 import SE3
+from wildshape.inference.predictor import Predictor
+from wildshape.records import Points, Sensor
+
+
+@dataclass(frozen=True)
+class Learned:
+    """Our row in a table.
+
+    Attributes:
+        predictor: does the work; each scan is completed on its own.
+    """
+
+    predictor: Predictor
+
+    def complete(self, points: Points, sensor: Sensor) -> Points:
+        """The complete shape `(m, 3)` in the frame of `points` `(n, 3)`, metres.
+
+        Raises:
+            BadInputError: fewer than 16 finite points.
+        """
+        return self.predictor.complete(points, sensor).points
+
+    def complete_many(self, scans: list[Points], sensor: Sensor) -> list[Points]:
+        """`complete` of each scan, in order; in batches.
+
+        Raises:
+            BadInputError: one of them has fewer than 16 finite points.
+        """
+        return [done.points for done in self.predictor.complete_many(scans, sensor)]
+
+    def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:
+        """`T_middle_scan`, one a scan: takes each scan to the frame of the middle scan.
+
+        Raises:
+            BadInputError: a scan has fewer than 16 finite points.
+        """
+        return self.predictor.register_track(scans, sensor)
