@@ -54,10 +54,13 @@ def load_state(folder: Path, state: TrainState, identity: dict[str, str]) -> Non
     try:
         tensors = load_file(path)
         with safe_open(path, framework="pt") as file:
-            metadata = file.metadata()
-    except (SafetensorError, OSError) as error:
-        raise BadInputError(f"{path}: cannot be resumed from ({error}).") from error
-    _check_identity(path, json.loads(metadata["identity"]), identity)
+            metadata = file.metadata() or {}
+        step, found = int(metadata["step"]), dict(json.loads(metadata["identity"]))
+    except (SafetensorError, OSError, KeyError, TypeError, ValueError) as error:
+        raise BadInputError(
+            f"{path}: cannot be resumed from ({error!r}); choose a new --out."
+        ) from error
+    _check_identity(path, found, identity)
     for name, network in (("network.", state.network), ("mean.", state.mean)):
         network.load_state_dict(_under(tensors, name))
     described = state.optimiser.state_dict()
@@ -66,7 +69,7 @@ def load_state(folder: Path, state: TrainState, identity: dict[str, str]) -> Non
         if moments:
             described["state"][index] = moments
     state.optimiser.load_state_dict(described)
-    state.step = int(metadata["step"])
+    state.step = step
 
 
 def _under(tensors: dict[str, torch.Tensor], prefix: str) -> dict[str, torch.Tensor]:
