@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from wildshape.geometry.se3 import SE3
 
-Points = Float[np.ndarray, "n 3"]
+Points = Float[np.ndarray, "_ 3"]
 SensorKind = Literal["lidar", "camera"]
 
 
