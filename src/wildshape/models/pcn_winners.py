@@ -53,9 +53,13 @@ def _winning_rows(
 
 
 def _argmax_rows(values: Float[Tensor, "n c"]) -> Int[Tensor, "c"]:
-    """First row of each column's maximum: `amax` and a comparison, as torch's argmax is slow."""
+    """First row of each column's maximum: `amax` and a comparison, as torch's argmax is slow.
+
+    The last row where the maximum is NaN: weights that are no longer finite give a loss that is
+    not, and the trainer says so.
+    """
     order = torch.arange(len(values), 0, -1, dtype=torch.int32, device=values.device)
-    first = (values == values.amax(0)).int().mul_(order[:, None]).amax(0)
+    first = (values == values.amax(0)).int().mul_(order[:, None]).amax(0).clamp_min_(1)
     return (len(values) - first).long()
 
 
