@@ -113,21 +113,25 @@ def fit(
 
     Raises:
         StopRequested: `stopped` said so; the state is saved.
+        BadInputError: the loss is not finite; the last checkpoint stays.
     """
     objective = run.processes.wrap(WeaklySupervised(run.state.network, run.recipe.loss))
     meter = Meter(run.recipe.network.branches)
     with RunLog(run.folder, run.state.step) if run.processes.leads else _Silent() as log:
         while run.state.step < run.recipe.optim.steps:
             meter.add(_step(run, objective))
-            step = run.state.step
-            if step < run.recipe.optim.steps and stopped():
-                _save_and_stop(run)
-            if step % _LOG_EVERY == 0 or step == run.recipe.optim.steps:
+            step, steps = run.state.step, run.recipe.optim.steps
+            due = step < steps and step % run.recipe.validate_every == 0
+            stop = step < steps and stopped()
+            # Whatever is saved below, its loss is read before and refused if not finite.
+            if due or stop or step % _LOG_EVERY == 0 or step == steps:
                 values = meter.read(step)
                 log.write(step, values)
                 if progress is not None:
                     _report(run, progress, values)
-            if step % run.recipe.validate_every == 0 and step < run.recipe.optim.steps:
+            if stop:
+                _save_and_stop(run)
+            if due:
                 log.write(step, checkpoint(run))
         log.write(run.state.step, checkpoint(run))
     run.processes.leave()
@@ -176,12 +180,17 @@ def _average(state: TrainState, decay: float) -> None:
 
 
 def checkpoint(run: Run) -> dict[str, Any]:
-    """Validate the mean weights and write model and state; returns the figures."""
+    """Validate the mean weights and write model and state; returns the figures.
+
+    Raises:
+        BadInputError: the weights are no longer finite; the last checkpoint stays.
+    """
     if not run.processes.leads:
         run.processes.wait()
         return {}
     device = run.processes.device.type
     found = validate(run.state.mean, run.held_out, run.recipe.loss, _VALIDATION_BATCHES, device)
+    _refuse_not_finite(found.observation, run.state.step)
     save_checkpoint(run.folder / MODEL, run.state.mean, model_settings(run, found))
     save_state(run.folder, run.state, run.identity)
     run.processes.wait()
@@ -230,11 +239,7 @@ class Meter:
             BadInputError: the loss is not finite.
         """
         loss, observation, projection, template = (float(s) / self.count for s in self.sums)
-        if not np.isfinite(loss):
-            raise BadInputError(
-                f"training stopped before step {step}: the loss is not finite; resume from the"
-                " last checkpoint with a smaller learning rate, or check the data's units."
-            )
+        _refuse_not_finite(loss, step)
         assert self.shares is not None
         shares = (self.shares / self.shares.sum()).tolist()
         rate = self.count / (time.perf_counter() - self.started)
@@ -260,6 +265,14 @@ class _Silent:
 
     def __exit__(self, *error: object) -> None:
         pass
+
+
+def _refuse_not_finite(loss: float, step: int) -> None:
+    if not np.isfinite(loss):
+        raise BadInputError(
+            f"training stopped before step {step}: the loss is not finite; resume from the"
+            " last checkpoint with a smaller learning rate, or check the data's units."
+        )
 
 
 def _short_hash(text: str) -> str:
