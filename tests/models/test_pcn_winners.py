@@ -81,3 +81,10 @@ def test_training_and_inference_give_the_same_code():
     with torch.no_grad():
         dense = net(points)
     torch.testing.assert_close(encode_winners(net, points).detach(), dense, atol=1e-5, rtol=1e-5)
+
+
+def test_weights_that_are_not_finite_give_a_code_that_is_not():
+    net = encoder(5)
+    with torch.no_grad():
+        net.point1.bias.fill_(torch.nan)
+    assert encode_winners(net, clouds(11, 2, 20, 3)).isnan().all()

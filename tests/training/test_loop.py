@@ -1,0 +1,188 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Repeatable, resumable, and it stops before it spoils anything."""
+
+import json
+import math
+from dataclasses import replace
+
+import pytest
+import torch
+from safetensors import safe_open
+from safetensors.torch import load_file, save_file
+from tests.training.worker import SMALLEST
+
+from wildshape.errors import BadInputError
+from wildshape.models.checkpoint import load_checkpoint
+from wildshape.training.loop import StopRequested, fit, setup, split_tracks
+from wildshape.training.state import STATE
+
+
+class KilledError(Exception):
+    """Stands for SIGKILL: nothing is saved on the way out."""
+
+
+def stop_at(step, error):
+    def progress(now, values):
+        if now >= step:
+            raise error
+
+    return progress
+
+
+def trained(store, folder, *, seed=3, recipe=SMALLEST, resume=False, progress=None):
+    run = setup(recipe, store, folder, seed=seed, resume=resume)
+    fit(run, progress)
+    return run
+
+
+@pytest.fixture(scope="module")
+def undisturbed(car_store, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("undisturbed")
+    trained(car_store, folder)
+    return folder
+
+
+def log(folder):
+    return [json.loads(line) for line in (folder / "log.jsonl").read_text().splitlines()]
+
+
+def assert_same_run(folder, twin):
+    for name in ("model.safetensors", STATE):
+        found, expected = load_file(folder / name), load_file(twin / name)
+        assert set(found) == set(expected)
+        for key, tensor in expected.items():
+            assert torch.equal(found[key], tensor), key
+    assert sorted({e["step"] for e in log(folder)}) == sorted({e["step"] for e in log(twin)})
+
+
+def test_the_same_seed_gives_the_same_weights(car_store, undisturbed, tmp_path):
+    trained(car_store, tmp_path)
+    assert_same_run(tmp_path, undisturbed)
+
+
+def test_another_seed_gives_other_weights(car_store, undisturbed, tmp_path):
+    trained(car_store, tmp_path, seed=4)
+    found = load_file(tmp_path / "model.safetensors")
+    expected = load_file(undisturbed / "model.safetensors")
+    assert any(not torch.equal(found[k], expected[k]) for k in expected)
+
+
+@pytest.mark.parametrize("step", [25, 50])
+def test_stopped_and_resumed_is_the_undisturbed_run(car_store, undisturbed, tmp_path, step):
+    with pytest.raises(StopRequested):
+        trained(car_store, tmp_path, progress=stop_at(step, StopRequested()))
+    with safe_open(tmp_path / STATE, framework="pt") as file:
+        assert file.metadata()["step"] == str(step)
+    trained(car_store, tmp_path, resume=True)
+    assert_same_run(tmp_path, undisturbed)
+
+
+def test_killed_and_resumed_is_the_undisturbed_run(car_store, undisturbed, tmp_path):
+    """Killed at step 50, after the checkpoint of step 30: the 20 steps in between are redone."""
+    with pytest.raises(KilledError):
+        trained(car_store, tmp_path, progress=stop_at(50, KilledError()))
+    with safe_open(tmp_path / STATE, framework="pt") as file:
+        assert file.metadata()["step"] == "30"
+    trained(car_store, tmp_path, resume=True)
+    assert_same_run(tmp_path, undisturbed)
+
+
+def test_killed_before_the_first_checkpoint_starts_anew(car_store, undisturbed, tmp_path):
+    with pytest.raises(KilledError):
+        trained(car_store, tmp_path, progress=stop_at(25, KilledError()))
+    assert not (tmp_path / STATE).exists()
+    trained(car_store, tmp_path, resume=True)
+    assert_same_run(tmp_path, undisturbed)
+
+
+def test_resuming_a_finished_run_changes_nothing(car_store, undisturbed, tmp_path):
+    trained(car_store, tmp_path)
+    run = trained(car_store, tmp_path, resume=True)
+    assert run.state.step == SMALLEST.optim.steps
+    for name in ("model.safetensors", STATE):
+        found, expected = load_file(tmp_path / name), load_file(undisturbed / name)
+        assert all(torch.equal(found[k], expected[k]) for k in expected)
+
+
+def test_resume_refuses_another_seed_or_other_settings(car_store, undisturbed):
+    with pytest.raises(BadInputError, match=r"another seed; resume with the same settings"):
+        setup(SMALLEST, car_store, undisturbed, seed=4, resume=True)
+    other = replace(SMALLEST, loss=replace(SMALLEST.loss, beta=0.3))
+    with pytest.raises(BadInputError, match="another settings and seed"):
+        setup(other, car_store, undisturbed, seed=4, resume=True)
+
+
+@pytest.mark.parametrize("content", ["foreign", "garbage", "truncated"])
+def test_resume_refuses_what_is_no_state(car_store, undisturbed, tmp_path, content):
+    path = tmp_path / STATE
+    if content == "foreign":
+        save_file({"weight": torch.zeros(2)}, path)
+    else:
+        whole = (undisturbed / STATE).read_bytes()
+        path.write_bytes(b"no state" if content == "garbage" else whole[: len(whole) // 2])
+    with pytest.raises(BadInputError, match=r"state\.safetensors: cannot be resumed from"):
+        setup(SMALLEST, car_store, tmp_path, seed=3, resume=True)
+
+
+def test_the_checkpoint_says_what_it_is(undisturbed):
+    _, settings = load_checkpoint(undisturbed / "model.safetensors")
+    assert settings.network == SMALLEST.network
+    assert (settings.input_points, settings.beta) == (48, SMALLEST.loss.beta)
+    assert (settings.provenance["steps"], settings.provenance["seed"]) == (75, 3)
+    assert settings.provenance["recipe"]["name"] == "smallest"
+    assert 0 < settings.cost_m[0] <= settings.cost_m[1] < math.inf
+    assert 0.5 < settings.extent_m[0] < settings.extent_m[1] < 20
+    assert set(settings.metrics) >= {"observation", "projection", "cycle_deg"}
+    json.dumps(settings.provenance, allow_nan=False)
+
+
+def test_the_kept_weights_are_the_running_mean(car_store, tmp_path):
+    """One step: the mean lies between the start and the weights after it."""
+    recipe = replace(SMALLEST, optim=replace(SMALLEST.optim, steps=1, average=0.9))
+    run = setup(recipe, car_store, tmp_path, seed=3)
+    start = run.state.network.shape.layer3.bias.detach().clone()
+    fit(run)
+    now, mean = run.state.network.shape.layer3.bias, run.state.mean.shape.layer3.bias
+    torch.testing.assert_close(mean, torch.lerp(start, now, 0.9), atol=1e-7, rtol=0)
+    saved = load_file(tmp_path / "model.safetensors")["shape.layer3.bias"]
+    assert torch.equal(saved, mean)
+
+
+def test_without_averaging_the_last_weights_are_kept(car_store, tmp_path):
+    recipe = replace(SMALLEST, optim=replace(SMALLEST.optim, steps=3, average=0.0))
+    run = trained(car_store, tmp_path, recipe=recipe)
+    for mean, now in zip(run.state.mean.parameters(), run.state.network.parameters()):
+        assert torch.equal(mean, now)
+
+
+@pytest.mark.parametrize("every", [10, 30])
+def test_a_loss_that_is_not_finite_stops_and_spoils_no_checkpoint(car_store, tmp_path, every):
+    recipe = replace(SMALLEST, validate_every=every)
+    with pytest.raises(StopRequested):
+        trained(car_store, tmp_path, recipe=recipe, progress=stop_at(10, StopRequested()))
+    run = setup(recipe, car_store, tmp_path, seed=3, resume=True)
+    before = (tmp_path / STATE).read_bytes()
+    with torch.no_grad():
+        run.state.network.shape.layer3.bias[0] = math.inf
+    with pytest.raises(BadInputError, match=r"the loss is not finite; resume from the last"):
+        fit(run)
+    assert (tmp_path / STATE).read_bytes() == before
+
+
+def test_weights_that_are_not_finite_are_not_saved(car_store, tmp_path):
+    """The last step's loss was finite, its update was not."""
+    recipe = replace(SMALLEST, optim=replace(SMALLEST.optim, steps=1, lr=math.inf))
+    with pytest.raises(BadInputError, match="not finite"):
+        trained(car_store, tmp_path, recipe=recipe)
+    assert not (tmp_path / STATE).exists()
+    assert not (tmp_path / "model.safetensors").exists()
+
+
+def test_few_tracks_are_both_fitted_and_held_out_many_are_not():
+    fitted, held = split_tracks(8)
+    assert sorted(fitted) == sorted(held) == list(range(8))
+    fitted, held = split_tracks(100)
+    assert len(held) == 5
+    assert sorted([*fitted, *held]) == list(range(100))
+    assert list(split_tracks(100)[1]) == list(held)

@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The presets hold the paper's numbers (METHOD 3 and 6), and every one of them trains."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from wildshape.datasets.views import ViewSampler
+from wildshape.geometry.visibility import PixelBins, PolarBins
+from wildshape.models.shapepose import ShapePoseNet
+from wildshape.training.objectives import WeaklySupervised
+from wildshape.training.recipes import PRESETS, paper_lidar, paper_views
+from wildshape.training.schedule import learning_rate
+
+
+@pytest.mark.parametrize("recipe", [paper_lidar(), paper_views()])
+def test_what_both_paper_presets_share(recipe):
+    assert recipe.network.encoder == (128, 256, 512, 1024)
+    assert recipe.network.decoder == (1024, 1024)
+    assert (recipe.network.points, recipe.network.branches) == (2048, 4)
+    assert (recipe.network.mirror, recipe.network.scale) == (False, 1.0)
+    assert recipe.loss.template == 0
+    assert (recipe.views.tracks, recipe.views.views, recipe.views.window) == (8, 4, 20)
+    assert (recipe.views.turn, recipe.views.min_points) == ("none", 100)
+    assert (recipe.optim.lr, recipe.optim.decay_every) == (1e-4, 100_000)
+    assert (recipe.optim.warmup, recipe.optim.average, recipe.optim.clip) == (0, 0, 0)
+
+
+def test_lidar():
+    recipe = paper_lidar()
+    assert (recipe.loss.beta, recipe.views.points, recipe.views.sensor) == (0.05, 1024, "lidar")
+    assert isinstance(recipe.loss.projection, PolarBins)
+    assert (recipe.optim.steps, recipe.optim.decay) == (400_000, 0.7)
+
+
+def test_views():
+    recipe = paper_views()
+    assert (recipe.loss.beta, recipe.views.points, recipe.views.sensor) == (0.25, 3096, "camera")
+    assert isinstance(recipe.loss.projection, PixelBins)
+    assert (recipe.optim.steps, recipe.optim.decay) == (300_000, 0.5)
+
+
+@pytest.mark.parametrize(("recipe", "factor"), [(paper_lidar(), 0.7), (paper_views(), 0.5)])
+def test_paper_schedules(recipe, factor):
+    optim = recipe.optim
+    for step, drops in ((0, 0), (99_999, 0), (100_000, 1), (199_999, 1), (200_000, 2)):
+        assert learning_rate(step, optim) == pytest.approx(1e-4 * factor**drops)
+    last = optim.steps - 1
+    assert learning_rate(last, optim) == pytest.approx(1e-4 * factor ** (last // 100_000))
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_every_preset_is_named_and_takes_a_step(name, car_store):
+    recipe = PRESETS[name]()
+    assert recipe.name == name
+    assert recipe == PRESETS[name]()
+    torch.manual_seed(0)
+    views = replace(recipe.views, tracks=1, views=2, min_points=16)
+    network = ShapePoseNet(recipe.network)
+    batch = ViewSampler(car_store, torch.arange(8).numpy(), views).draw(0)
+    WeaklySupervised(network, recipe.loss)(batch, recipe.loss.template).loss.backward()
+    for weight, p in network.named_parameters():
+        assert p.grad is not None, weight
+        assert p.grad.isfinite().all(), weight
+        assert p.grad.abs().sum() > 0, weight
