@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files that hold nothing but an array: KITTI .bin, .npy, .npz."""
 
+import io
 import zipfile
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 from jaxtyping import Float
@@ -13,6 +13,7 @@ from wildshape.errors import BadInputError
 from wildshape.io.guard import check_promise
 
 _DEFLATE_RATIO = 1100  # deflate cannot shrink more than 1032 times
+_NPY_HEADER = 16384  # bytes; longer headers are refused
 _NAMES = ("points", "xyz", "pcd", "arr_0", "data")
 
 
@@ -64,14 +65,14 @@ def read_npz(path: Path) -> Float[np.ndarray, "n 3"]:
             path, "unpacked bytes", 0, info.file_size, _DEFLATE_RATIO * (info.compress_size + 64)
         )
         with archive.open(info) as file:
-            _check_npy_header(file, info.file_size, path)
+            _check_npy_header(io.BytesIO(file.read(_NPY_HEADER)), info.file_size, path)
         with archive.open(info) as file:
             array = np.lib.format.read_array(file, allow_pickle=False)
             file.read()  # to the end: only there the checksum is compared
         return _columns(array, path)
 
 
-def _check_npy_header(file: IO[bytes], size: int, path: Path) -> None:
+def _check_npy_header(file: io.BytesIO, size: int, path: Path) -> None:
     version = np.lib.format.read_magic(file)
     read = {
         (1, 0): np.lib.format.read_array_header_1_0,

@@ -20,6 +20,7 @@ from wildshape.io.ply_writer import write_ply
 from wildshape.io.text import read_text
 
 __all__ = [
+    "METRES",
     "SUFFIXES",
     "ScanFile",
     "Unit",

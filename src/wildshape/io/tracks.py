@@ -169,7 +169,7 @@ def _read_info(path: Path) -> dict[str, Any]:
 
 def _parse_info(raw: dict[str, Any], path: Path) -> dict[str, Any]:
     unit = raw.get("unit", "m")
-    if unit not in METRES:
+    if unit not in tuple(METRES):
         raise BadInputError(f"{path}: unit {unit!r} is unknown; use one of {', '.join(METRES)}.")
     return {
         "unit": unit,

@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""One cloud in every format, and one track."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from wildshape.geometry.rotation import random_rotation
+from wildshape.geometry.se3 import SE3
+from wildshape.io.points import write_ply
+from wildshape.records import Intrinsics, Sensor, Track
+
+_LISTS = """ply
+format {} 1.0
+comment lists before, in and after the points, of different lengths
+element grid 2
+property list uchar int index
+element vertex {}
+property uchar before
+property list uchar short tags
+property double x
+property double y
+property double z
+property float confidence
+element face 1
+property list uchar int vertex_indices
+end_header
+"""
+
+
+@pytest.fixture(scope="session")
+def cloud() -> np.ndarray:
+    """`(60, 3)` float32 points of a unit normal distribution."""
+    return np.random.default_rng(7).normal(size=(60, 3)).astype(np.float32)
+
+
+@pytest.fixture(scope="session")
+def formats(tmp_path_factory: pytest.TempPathFactory, cloud: np.ndarray) -> dict[str, Path]:
+    """The cloud in every format that can be read."""
+    folder = tmp_path_factory.mktemp("formats")
+    write_ply(folder / "plain.ply", cloud, np.zeros(cloud.shape, np.uint8))
+    for order, sign in (("binary_little_endian", "<"), ("binary_big_endian", ">")):
+        (folder / f"{order}.ply").write_bytes(_ply_with_lists(order, sign, cloud))
+    (folder / "ascii.ply").write_text(_ascii_ply_with_lists(cloud))
+    _write_pcd(folder, cloud)
+    np.save(folder / "array.npy", cloud.astype(np.float64))
+    np.savez(folder / "only.npz", cloud)
+    np.savez_compressed(folder / "named.npz", points=cloud, other=cloud[:3])
+    np.savetxt(folder / "rows.xyz", cloud)
+    np.savetxt(folder / "header.csv", cloud, delimiter=",", header="x,y,z", comments="")
+    np.hstack([cloud, cloud[:, :1]]).tofile(folder / "kitti.bin")
+    _write_las(folder, cloud)
+    return {path.name: path for path in sorted(folder.iterdir())}
+
+
+def _ply_with_lists(order: str, sign: str, cloud: np.ndarray) -> bytes:
+    body = struct.pack(sign + "BiBii", 1, 5, 2, 6, 7)
+    for i, point in enumerate(cloud):
+        tags = [1] * (i % 3)
+        body += struct.pack(f"{sign}BB{len(tags)}h3df", 9, len(tags), *tags, *point, 0.5)
+    return _LISTS.format(order, len(cloud)).encode() + body + struct.pack(sign + "B3i", 3, 0, 1, 2)
+
+
+def _ascii_ply_with_lists(cloud: np.ndarray) -> str:
+    rows = [f"9 {i % 3}{' 1' * (i % 3)} {x} {y} {z} 0.5" for i, (x, y, z) in enumerate(cloud)]
+    return _LISTS.format("ascii", len(cloud)) + "\n".join(["1 5", "2 6 7", *rows, "3 0 1 2"]) + "\n"
+
+
+def _write_pcd(folder: Path, cloud: np.ndarray) -> None:
+    from pypcd4.pypcd4 import Encoding, PointCloud
+
+    for encoding in ("ascii", "binary", "binary_compressed"):
+        points = PointCloud.from_xyzi_points(np.hstack([cloud, cloud[:, :1]]))
+        points.save(folder / f"{encoding}.pcd", Encoding(encoding))
+
+
+def _write_las(folder: Path, cloud: np.ndarray) -> None:
+    import laspy
+
+    for kind, version in ((3, "1.2"), (6, "1.4")):
+        header = laspy.LasHeader(point_format=kind, version=version)
+        header.scales = np.full(3, 1e-6)
+        data = laspy.LasData(header)
+        data.xyz = cloud.astype(np.float64)
+        data.write(str(folder / f"format{kind}.las"))
+        data.write(str(folder / f"format{kind}.laz"))
+
+
+@pytest.fixture
+def track(cloud: np.ndarray) -> Track:
+    """Three scans of different sizes with truth and a camera."""
+    generator = torch.Generator().manual_seed(3)
+    rotation = random_rotation(3, generator).double()
+    # Orthonormal to float64, unlike what was drawn in float32.
+    rotation = torch.linalg.qr(rotation)[0]
+    rotation = rotation * torch.linalg.det(rotation)[:, None, None]
+    return Track(
+        name="car-1",
+        scans=(cloud, cloud[:20], cloud[:33]),
+        scan_names=("000010", "000011", "000012"),
+        sensor=Sensor("camera", None, Intrinsics(100.5, 100.5, 64.0, 64.0, 128, 128)),
+        category="car",
+        source="a test, ünïcode",
+        T_sensor_object=SE3(rotation, torch.randn(3, 3, generator=generator).double()),
+        shape=cloud * 2,
+    )

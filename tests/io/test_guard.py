@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Damaged files of every format: a valid result or one sentence, and no memory for a lie."""
+
+import resource
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wildshape.errors import BadInputError
+from wildshape.io.points import read_points
+
+_ALLOWED_GROWTH_KIB = 200_000
+
+
+def _survives(path: Path, data: bytes) -> None:
+    path.write_bytes(data)
+    try:
+        points = read_points(path)
+    except BadInputError as error:
+        assert str(error).startswith(str(path))  # noqa: PT017
+        assert "\n" not in str(error)  # noqa: PT017
+    else:
+        assert np.isfinite(points).all()
+
+
+def _damaged(data: bytes, rng: np.random.Generator) -> bytes:
+    """Up to three bytes or words changed, most of them in the header."""
+    broken = bytearray(data)
+    words = (b"\xff\xff\xff\xff", b"\x00\x00\x00\x00", b"\xff\xff\xff\x7f", b"\x00\x00\x00\x80")
+    for _ in range(rng.integers(1, 4)):
+        at = int(rng.integers(min(len(data), 600) if rng.random() < 0.7 else len(data)))
+        if rng.random() < 0.3:
+            broken[at : at + 4] = words[rng.integers(4)]
+        else:
+            broken[at] = rng.integers(256)
+    return bytes(broken)
+
+
+def test_truncated_and_flipped_files_never_surprise(
+    formats: dict[str, Path], tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(0)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    for path in formats.values():
+        data, copy = path.read_bytes(), tmp_path / path.name
+        cuts = {*rng.integers(0, len(data), 40).tolist(), 0, 1, len(data) - 1}
+        for cut in cuts:
+            _survives(copy, data[:cut])
+        for _ in range(60):
+            _survives(copy, _damaged(data, rng))
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    assert grown < _ALLOWED_GROWTH_KIB
+
+
+@pytest.mark.parametrize("count", [61, 10**9, 10**15, 10**30, -1])
+@pytest.mark.parametrize("name", ["plain.ply", "binary_big_endian.ply", "ascii.ply"])
+def test_ply_header_that_lies_about_the_count(
+    name: str, count: int, formats: dict[str, Path], tmp_path: Path
+) -> None:
+    data = formats[name].read_bytes()
+    _refused(tmp_path / "a.ply", data.replace(b"vertex 60", b"vertex %d" % count))
+
+
+@pytest.mark.parametrize("count", [61, 10**9, 10**15, -1])
+@pytest.mark.parametrize("name", ["ascii.pcd", "binary.pcd", "binary_compressed.pcd"])
+def test_pcd_header_that_lies_about_the_count(
+    name: str, count: int, formats: dict[str, Path], tmp_path: Path
+) -> None:
+    data = formats[name].read_bytes()
+    _refused(tmp_path / "a.pcd", data.replace(b"POINTS 60", b"POINTS %d" % count))
+
+
+@pytest.mark.parametrize("count", [61, 10**9, 2**32 - 1])
+@pytest.mark.parametrize("name", ["format3.las", "format3.laz"])
+def test_las_header_that_lies_about_the_count(
+    name: str, count: int, formats: dict[str, Path], tmp_path: Path
+) -> None:
+    data = bytearray(formats[name].read_bytes())
+    data[107:111] = count.to_bytes(4, "little")
+    _refused(tmp_path / f"a{Path(name).suffix}", bytes(data))
+
+
+@pytest.mark.parametrize("count", [61, 10**9, 10**15])
+@pytest.mark.parametrize("name", ["format6.las", "format6.laz"])
+def test_las_1_4_header_that_lies_about_the_count(
+    name: str, count: int, formats: dict[str, Path], tmp_path: Path
+) -> None:
+    data = bytearray(formats[name].read_bytes())
+    data[247:255] = count.to_bytes(8, "little")
+    _refused(tmp_path / f"a{Path(name).suffix}", bytes(data))
+
+
+@pytest.mark.parametrize("shape", [b"(99, 3)", b"(1000000000000000, 3)", b"(-60, 3)"])
+def test_npy_header_that_lies_about_the_shape(
+    shape: bytes, formats: dict[str, Path], tmp_path: Path
+) -> None:
+    header, _, body = formats["array.npy"].read_bytes().partition(b"\n")
+    lie = header.rstrip().replace(b"(60, 3)", shape).ljust(len(header))
+    length = len(lie) - 10 + 1
+    lie = lie[:8] + length.to_bytes(2, "little") + lie[10:]
+    _refused(tmp_path / "a.npy", lie + b"\n" + body)
+
+
+def test_pickles_are_never_loaded(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
+    _refused(tmp_path / "a.npy", (tmp_path / "a.npy").read_bytes())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (b"property float x", b"property quad x", "type 'quad' is unknown"),
+        (b"property float x", b"property float w", "x, y and z"),
+        (b"element vertex", b"element points", "x, y and z"),
+        (b"binary_little_endian", b"zipped", "format 'zipped'"),
+        (b"end_header", b"", "makes no sense|does not end"),
+        (b"ply\n", b"PK\n", "first line 'ply'"),
+    ],
+)
+def test_ply_headers_that_make_no_sense(
+    old: bytes, new: bytes, said: str, formats: dict[str, Path], tmp_path: Path
+) -> None:
+    data = formats["plain.ply"].read_bytes().replace(old, new, 1)
+    _refused(tmp_path / "a.ply", data, said)
+
+
+def test_kitti_of_a_broken_size(tmp_path: Path) -> None:
+    _refused(tmp_path / "a.bin", bytes(16 * 20 + 4), "324 bytes")
+
+
+def _refused(path: Path, data: bytes, said: str = "header|points|file") -> None:
+    path.write_bytes(data)
+    with pytest.raises(BadInputError, match=said):
+        read_points(path)

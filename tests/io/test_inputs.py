@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wildshape.errors import BadInputError
+from wildshape.io.inputs import open_tracks
+from wildshape.io.points import write_ply
+from wildshape.io.store import StoreWriter
+from wildshape.io.tracks import NoUsableScanError, write_track
+from wildshape.records import Track
+
+
+@pytest.fixture
+def dataset(track: Track, tmp_path: Path) -> Path:
+    for name in ("b", "a"):
+        write_track(tmp_path / "data" / name, replace(track, name=name))
+    (tmp_path / "data" / "notes").mkdir()
+    (tmp_path / "data" / "README.txt").write_text("words")
+    return tmp_path / "data"
+
+
+def test_dataset(dataset: Path) -> None:
+    source = open_tracks(dataset)
+    assert source.names == ("a", "b")
+    assert len(source) == 2
+    assert [t.name for t in source] == ["a", "b"]
+    assert source[-1].name == "b"
+    assert source.skipped == ()
+    with pytest.raises(IndexError):
+        source[2]
+
+
+def test_track_folder_plain_folder_and_one_scan(dataset: Path) -> None:
+    (track,) = open_tracks(dataset / "a")
+    assert (track.name, len(track.scans), track.category) == ("a", 3, "car")
+    (track,) = open_tracks(dataset / "a" / "scans")
+    assert (track.name, len(track.scans), track.category) == ("scans", 3, "")
+    (track,) = open_tracks(dataset / "a" / "scans" / "000011.ply")
+    assert (track.name, track.scan_names, len(track.scans[0])) == ("000011", ("000011",), 20)
+
+
+def test_packed_store(track: Track, tmp_path: Path) -> None:
+    with StoreWriter(tmp_path / "store", {}) as writer:
+        writer.add(track)
+    source = open_tracks(tmp_path / "store")
+    assert source.names == ("car-1",)
+    np.testing.assert_array_equal(source[0].scans[2], track.scans[2])
+
+
+def test_tracks_are_read_when_asked_for(dataset: Path) -> None:
+    source = open_tracks(dataset)
+    for path in (dataset / "b" / "scans").iterdir():
+        path.write_text("ply, but broken later")
+    assert source[0].name == "a"
+    with pytest.raises(NoUsableScanError):
+        source[1]
+
+
+def test_bad_scans_are_counted_and_listed_once(dataset: Path) -> None:
+    (dataset / "a" / "scans" / "000011.ply").write_text("no")
+    for path in (dataset / "b" / "scans").iterdir():
+        path.write_text("no")
+    source = open_tracks(dataset)
+    for _ in range(2):
+        assert [len(track.scans) for track in source] == [2]
+    names = [name for name, _ in source.skipped]
+    assert names == ["a/000011.ply", "b/000010.ply", "b/000011.ply", "b/000012.ply"]
+
+
+def test_dropped_points_are_listed(tmp_path: Path, cloud: np.ndarray) -> None:
+    dirty = cloud.copy()
+    dirty[0] = np.inf
+    write_ply(tmp_path / "a.ply", dirty)
+    source = open_tracks(tmp_path / "a.ply")
+    assert len(source[0].scans[0]) == 59
+    assert source.dropped_nonfinite == (("a/a.ply", 1),)
+
+
+def test_a_run_without_any_usable_scan_fails(tmp_path: Path) -> None:
+    write_ply(tmp_path / "d" / "t" / "scans" / "0.ply", np.zeros((40, 3), np.float32))
+    with pytest.raises(BadInputError, match="all 40 points are equal"):
+        list(open_tracks(tmp_path / "d"))
+
+
+def test_one_bad_scan_file_raises(tmp_path: Path) -> None:
+    write_ply(tmp_path / "a.ply", np.zeros((2, 3), np.float32))
+    with pytest.raises(BadInputError, match=r"a\.ply: 2 finite points"):
+        list(open_tracks(tmp_path / "a.ply"))
+
+
+def test_truth_beside_scans_is_no_scan(tmp_path: Path, cloud: np.ndarray) -> None:
+    write_ply(tmp_path / "0.ply", cloud)
+    write_ply(tmp_path / "shape.ply", cloud)
+    (tmp_path / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
+    (track,) = open_tracks(tmp_path)
+    assert track.scan_names == ("0",)
+
+
+def test_nothing_recognisable(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match=r"no such file or folder.*pass a scan file"):
+        open_tracks(tmp_path / "missing")
+    with pytest.raises(BadInputError, match=r"an empty folder.*pass a scan file"):
+        open_tracks(tmp_path)
+    (tmp_path / "a.pdf").write_text("")
+    with pytest.raises(BadInputError, match="1 other entries"):
+        open_tracks(tmp_path)
+    with pytest.raises(BadInputError, match=r"a\.pdf: no scan file"):
+        open_tracks(tmp_path / "a.pdf")
+    (tmp_path / "t" / "scans").mkdir(parents=True)
+    with pytest.raises(BadInputError, match="holds no scan"):
+        open_tracks(tmp_path / "t")
+
+
+def test_unit(dataset: Path, tmp_path: Path, cloud: np.ndarray) -> None:
+    np.savetxt(tmp_path / "a.xyz", cloud.astype(np.float64) * 1000)
+    np.testing.assert_allclose(open_tracks(tmp_path / "a.xyz", "mm")[0].scans[0], cloud, rtol=1e-6)
+    with pytest.raises(BadInputError, match="--unit mm"):
+        open_tracks(tmp_path / "a.xyz")[0]

@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from wildshape.errors import BadInputError
+from wildshape.io.points import write_ply
+from wildshape.io.tracks import NoUsableScanError, read_track, read_track_file, write_track
+from wildshape.records import Sensor, Track
+
+
+def test_round_trip(track: Track, tmp_path: Path) -> None:
+    write_track(tmp_path / track.name, track)
+    found = read_track_file(tmp_path / track.name)
+    assert found.skipped == ()
+    assert_equal(found.track, track)
+
+
+def test_scans_alone_are_a_complete_track(tmp_path: Path, formats: dict[str, Path]) -> None:
+    scans = tmp_path / "some track" / "scans"
+    scans.mkdir(parents=True)
+    for i, path in enumerate(formats.values()):
+        (scans / f"{i:03d}{path.suffix}").write_bytes(path.read_bytes())
+    (scans / ".hidden.ply").write_text("")
+    (scans / "notes.md").write_text("")
+    track = read_track(scans.parent)
+    assert track.name == "some track"
+    assert track.scan_names == tuple(f"{i:03d}" for i in range(len(formats)))
+    assert track.sensor == Sensor()
+    assert track.T_sensor_object is None
+    assert track.shape is None
+
+
+def test_a_bad_scan_is_skipped_with_its_pose(track: Track, tmp_path: Path) -> None:
+    write_track(tmp_path / "t", track)
+    (tmp_path / "t" / "scans" / "000011.ply").write_bytes(b"ply\nbroken")
+    found = read_track_file(tmp_path / "t")
+    assert [name for name, _ in found.skipped] == ["000011.ply"]
+    assert "000011.ply" in found.skipped[0][1]
+    assert found.track.scan_names == ("000010", "000012")
+    poses, truth = found.track.T_sensor_object, track.T_sensor_object
+    assert poses is not None
+    assert truth is not None
+    assert torch.equal(poses.matrix, truth.matrix[[0, 2]])
+
+
+def test_dropped_points_are_listed(track: Track, tmp_path: Path, cloud: np.ndarray) -> None:
+    dirty = cloud.copy()
+    dirty[4:6] = np.nan
+    write_track(tmp_path / "t", replace(track, scans=(dirty, cloud, cloud)))
+    assert read_track_file(tmp_path / "t").dropped_nonfinite == (("000010.ply", 2),)
+
+
+def test_no_usable_scan_is_an_error(tmp_path: Path) -> None:
+    write_ply(tmp_path / "scans" / "a.ply", np.zeros((3, 3), np.float32))
+    with pytest.raises(NoUsableScanError, match="3 finite points") as caught:
+        read_track(tmp_path)
+    assert [name for name, _ in caught.value.skipped] == ["a.ply"]
+
+
+def test_poses_of_another_length(track: Track, tmp_path: Path) -> None:
+    write_track(tmp_path / "t", track)
+    text = (tmp_path / "t" / "poses.txt").read_text()
+    (tmp_path / "t" / "poses.txt").write_text("".join(text.splitlines(keepends=True)[:2]))
+    with pytest.raises(BadInputError, match="2 lines of poses for 3 scans"):
+        read_track(tmp_path / "t")
+
+
+@pytest.mark.parametrize("said_by", ["track.json", "argument"])
+def test_units_apply_to_everything(said_by: str, track: Track, tmp_path: Path) -> None:
+    assert track.T_sensor_object is not None
+    assert track.shape is not None
+    poses = track.T_sensor_object
+    millimetres = replace(
+        track,
+        scans=tuple(scan * 1000 for scan in track.scans),
+        shape=track.shape * 1000,
+        T_sensor_object=replace(poses, translation=poses.translation * 1000),
+    )
+    write_track(tmp_path / track.name, millimetres)
+    info = tmp_path / track.name / "track.json"
+    if said_by == "track.json":
+        info.write_text(info.read_text().replace('"unit": "m"', '"unit": "mm"'))
+        found = read_track(tmp_path / track.name)
+    else:
+        found = read_track(tmp_path / track.name, "mm")
+    for scan, truth in zip(found.scans, track.scans):
+        np.testing.assert_allclose(scan, truth, rtol=1e-6)
+    assert found.shape is not None
+    np.testing.assert_allclose(found.shape, track.shape, rtol=1e-6)
+    assert found.T_sensor_object is not None
+    torch.testing.assert_close(found.T_sensor_object.matrix, poses.matrix)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "track.json: expected JSON"),
+        ("[1]", "expected a JSON object, found list"),
+        ('{"unit": "inch"}', "unit 'inch' is unknown"),
+        ('{"unit": [1]}', "unit"),
+        ('{"sensor": "radar"}', "sensor 'radar' is unknown"),
+        ('{"resolution_deg": 0.2}', "resolution_deg"),
+        ('{"resolution_deg": ["a", 1]}', "resolution_deg"),
+        ('{"intrinsics": {"fx": 1}}', "intrinsics"),
+    ],
+)
+def test_a_damaged_track_json(text: str, said: str, track: Track, tmp_path: Path) -> None:
+    write_track(tmp_path / "t", track)
+    (tmp_path / "t" / "track.json").write_text(text)
+    with pytest.raises(BadInputError, match=said):
+        read_track(tmp_path / "t")
+
+
+def test_an_existing_track_is_not_mixed(track: Track, tmp_path: Path) -> None:
+    write_track(tmp_path / "t", track)
+    with pytest.raises(BadInputError, match="holds a track already"):
+        write_track(tmp_path / "t", track)
+
+
+def test_names_that_would_not_sort_in_time_become_numbers(track: Track, tmp_path: Path) -> None:
+    for names in (("10", "9", "8"), ("a/b", "c", "d"), ("a", "a", "b")):
+        folder = tmp_path / names[0].replace("/", "-") / names[1]
+        write_track(folder, replace(track, scan_names=names))
+        found = read_track(folder)
+        assert found.scan_names == ("000000", "000001", "000002")
+        assert [len(scan) for scan in found.scans] == [60, 20, 33]
+
+
+def assert_equal(found: Track, track: Track) -> None:
+    assert found.name == track.name
+    assert found.scan_names == track.scan_names
+    assert found.sensor == track.sensor
+    assert (found.category, found.source) == (track.category, track.source)
+    for scan, truth in zip(found.scans, track.scans, strict=True):
+        np.testing.assert_array_equal(scan, truth)
+    assert found.T_sensor_object is not None
+    assert track.T_sensor_object is not None
+    assert torch.equal(found.T_sensor_object.matrix, track.T_sensor_object.matrix)
+    assert found.shape is not None
+    assert track.shape is not None
+    np.testing.assert_array_equal(found.shape, track.shape)
