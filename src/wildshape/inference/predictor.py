@@ -54,7 +54,6 @@ class Predictor:
         """
         return next(self.complete_many([points], sensor))
 
-    @torch.inference_mode()
     def complete_many(
         self, scans: Sequence[object], sensor: Sensor | None = None
     ) -> Iterator[Completion]:
@@ -90,6 +89,7 @@ class Predictor:
         T_middle_scan = self.register_track(clouds, sensor)
         return fuse_scans(clouds, T_middle_scan)
 
+    @torch.inference_mode()
     def _complete_batch(self, scans: list[Points], sensor: Sensor | None) -> list[Completion]:
         settings = self.settings
         inputs, centres = network_input(scans, settings.input_points, settings.sensor)
@@ -158,8 +158,14 @@ def box_of(shape: Tensor, T_sensor_canonical: SE3) -> Box:
     fitted = fit_box(shape)
     centre = T_sensor_canonical.apply(fitted.centre[None])[0]
     quaternion = quaternion_from_rotation(T_sensor_canonical.rotation @ fitted.rotation)
-    as_tuple = lambda values: tuple(round(float(v), 6) for v in values)  # noqa: E731
-    return Box(as_tuple(centre), as_tuple(fitted.size), as_tuple(quaternion))
+    x, y, z = _rounded(centre)
+    length, width, height = _rounded(fitted.size)
+    qw, qx, qy, qz = _rounded(quaternion)
+    return Box((x, y, z), (length, width, height), (qw, qx, qy, qz))
+
+
+def _rounded(values: Tensor) -> list[float]:
+    return [round(value, 6) for value in values.tolist()]
 
 
 def to_middle(T_sensor_canonical: SE3) -> SE3:

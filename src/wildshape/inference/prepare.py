@@ -20,7 +20,11 @@ def as_points(scan: object, name: str = "scan") -> Points:
     Raises:
         BadInputError: not `(n, 3)`, fewer than 16 finite points, or all points equal.
     """
-    points = np.asarray(scan, dtype=np.float32)
+    try:
+        held = scan.detach().cpu() if isinstance(scan, Tensor) else scan
+        points = np.asarray(held, dtype=np.float32)
+    except (TypeError, ValueError) as error:
+        raise BadInputError(f"{name}: no array of numbers ({error}); pass (n, 3).") from error
     if points.ndim != 2 or points.shape[1] != 3:
         raise BadInputError(
             f"{name}: expected points of shape (n, 3), found {points.shape};"
@@ -41,7 +45,15 @@ def resample(points: Points, count: int) -> Points:
 
     Too many: a seeded choice without replacement; too few: all of them, over and over.
     """
-    ordered = points[np.lexsort(points.T)]
+    return _choose(_in_order(points), count)
+
+
+def _in_order(points: Points) -> Points:
+    """The same points by z, y, x: sums over them then do not depend on the file's order."""
+    return points[np.lexsort(points.T)]
+
+
+def _choose(ordered: Points, count: int) -> Points:
     if len(ordered) > count:
         return ordered[np.random.default_rng(0).choice(len(ordered), count, replace=False)]
     return ordered[np.arange(count) % len(ordered)]
@@ -51,8 +63,9 @@ def network_input(
     scans: list[Points], count: int, sensor: SensorKind
 ) -> tuple[Float[Tensor, "B N 3"], Float[Tensor, "B 3"]]:
     """Centred, resampled scans, and the centres in their sensor frames."""
-    centres = torch.stack([scan_centre(torch.from_numpy(scan), sensor) for scan in scans])
-    sampled = torch.stack([torch.from_numpy(resample(scan, count)) for scan in scans])
+    ordered = [_in_order(scan) for scan in scans]
+    centres = torch.stack([scan_centre(torch.from_numpy(scan), sensor) for scan in ordered])
+    sampled = torch.stack([torch.from_numpy(_choose(scan, count)) for scan in ordered])
     return sampled - centres[:, None], centres
 
 
