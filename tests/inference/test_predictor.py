@@ -1,0 +1,251 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What holds for any weights: frames, order, batches, warnings. Learning is tested elsewhere."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+import torch
+from tests.strategies import rotation_about
+
+from wildshape.errors import BadInputError
+from wildshape.geometry.rotation import rotation_from_quaternion
+from wildshape.geometry.se3 import SE3
+from wildshape.geometry.visibility import FacingBins
+from wildshape.inference.predictor import Predictor, inlier_ratio, load
+from wildshape.models.checkpoint import ModelSettings, save_checkpoint
+from wildshape.models.shapepose import NetworkConfig, ShapePoseNet
+from wildshape.records import Sensor
+
+CONFIG = NetworkConfig(
+    encoder=(16, 16, 32, 32), decoder=(32, 32), pose=(16, 16), points=600, mirror=True, scale=2.0
+)
+SETTINGS = ModelSettings(
+    network=CONFIG,
+    sensor="lidar",
+    input_points=128,
+    projection=FacingBins(0.3),
+    beta=0.25,
+    extent_m=(2.0, 6.0),
+    cost_m=(0.1, 0.3),
+)
+
+
+@pytest.fixture(scope="module")
+def predictor():
+    torch.manual_seed(0)
+    return Predictor(ShapePoseNet(CONFIG).eval(), SETTINGS)
+
+
+def scan(seed=0, count=200):
+    rng = np.random.default_rng(seed)
+    at = np.array([9.0 + rng.uniform(-2, 2), rng.uniform(-3, 3), -1.0])
+    return (rng.normal(size=(count, 3)) * [1.0, 0.5, 0.3] + at).astype(np.float32)
+
+
+def assert_same(a, b, atol=2e-4):
+    np.testing.assert_allclose(a.points, b.points, atol=atol)
+    torch.testing.assert_close(a.pose.matrix, b.pose.matrix, atol=atol, rtol=0)
+    np.testing.assert_allclose(a.box.center, b.box.center, atol=atol)
+    assert a.branch == b.branch
+    assert a.cost == pytest.approx(b.cost, abs=atol)
+    assert a.confidence == pytest.approx(b.confidence, abs=atol)
+
+
+def test_what_comes_out(predictor):
+    done = predictor.complete(scan())
+    assert done.points.shape == (600, 3)
+    assert done.points.dtype == np.float32
+    assert done.pose.matrix.dtype == torch.float64
+    assert not done.pose.matrix.requires_grad
+    assert 0 < done.confidence < 1
+    assert 0 <= done.branch < 4
+    assert (done.warning, done.refined) == ("", False)
+    assert done.seconds > 0
+
+
+def test_pose_carries_the_canonical_shape_to_the_sensor(predictor):
+    """Twice the same canonical shape: `inv(T_sensor_canonical)` gives it back, mirror plane y."""
+    done = predictor.complete(scan())
+    canonical = done.pose.inverse().apply_numpy(done.points)
+    left, right = np.split(canonical, 2)
+    np.testing.assert_allclose(left, right * [1, -1, 1], atol=1e-4)
+
+
+def test_order_does_not_matter(predictor):
+    points = scan()
+    shuffled = points[np.random.default_rng(1).permutation(len(points))]
+    assert_same(predictor.complete(shuffled), predictor.complete(points), atol=0)
+
+
+def test_nan_rows_do_not_matter(predictor):
+    points = scan()
+    dirty = np.concatenate((points, [[np.nan, 0, 0], [0, np.inf, 0]])).astype(np.float32)
+    assert_same(predictor.complete(dirty), predictor.complete(points))
+
+
+def test_tensors_are_welcome(predictor):
+    assert_same(predictor.complete(torch.from_numpy(scan())), predictor.complete(scan()))
+
+
+def test_many_are_completed_one_by_one(predictor):
+    """More than one batch: scan i alone gives what scan i among others gives."""
+    scans = [scan(seed, count=20 + 9 * seed) for seed in range(37)]
+    together = list(predictor.complete_many(scans))
+    assert len(together) == 37
+    for i in (0, 1, 31, 32, 36):
+        assert_same(together[i], predictor.complete(scans[i]))
+
+
+def test_repeatable(predictor):
+    first, second = predictor.complete(scan()), predictor.complete(scan())
+    np.testing.assert_array_equal(first.points, second.points)
+    assert first.cost == second.cost
+
+
+def test_the_branch_of_least_cost_speaks(predictor):
+    single = [
+        Predictor(_only_branch(predictor.network, k), _with_network(branches=1)) for k in range(4)
+    ]
+    for seed in range(5):
+        costs = [p.complete(scan(seed)).cost for p in single]
+        done = predictor.complete(scan(seed))
+        assert done.branch == int(np.argmin(costs))
+        assert done.cost == pytest.approx(min(costs), abs=1e-5)
+
+
+def _with_network(**changes):
+    return dataclasses.replace(SETTINGS, network=dataclasses.replace(CONFIG, **changes))
+
+
+def _only_branch(network, k):
+    only = ShapePoseNet(dataclasses.replace(CONFIG, branches=1)).eval()
+    weights = network.state_dict()
+    width = CONFIG.pose[0]
+    for name in ("weight2", "bias2", "weight3", "bias3"):
+        weights[f"pose.{name}"] = weights[f"pose.{name}"][k : k + 1]
+    for name in ("weight", "bias"):
+        layer = f"pose.layer1.{name}"
+        weights[layer] = weights[layer][k * width : (k + 1) * width]
+    only.load_state_dict(weights)
+    return only
+
+
+def test_box_holds_the_points_and_is_tight(predictor):
+    done = predictor.complete(scan())
+    R = rotation_from_quaternion(torch.tensor(done.box.quaternion_wxyz).double()).numpy()
+    local = (done.points - np.array(done.box.center)) @ R
+    half = np.array(done.box.size) / 2
+    outside = (np.abs(local) > half + 1e-3).any(1).mean()
+    assert outside <= 6 * 0.005
+    np.testing.assert_allclose(np.abs(np.quantile(local, 0.995, axis=0)), half, rtol=0.25)
+    # Its third axis is the canonical frame's.
+    np.testing.assert_allclose(R[:, 2], done.pose.rotation[:, 2], atol=1e-5)
+
+
+def test_registration_back_is_the_inverse(predictor):
+    a, b = scan(1), scan(2)
+    there, back = predictor.register(a, b), predictor.register(b, a)
+    product = (there.T_target_source @ back.T_target_source).matrix
+    torch.testing.assert_close(product, torch.eye(4).double(), atol=1e-4, rtol=0)
+    assert there.confidence == pytest.approx(back.confidence, abs=1e-5)
+    assert 0 <= there.inlier_ratio <= 1
+
+
+def test_registration_is_through_the_canonical_frame(predictor):
+    a, b, c = scan(1), scan(2), scan(3)
+    T_c_a = predictor.register(a, c).T_target_source
+    around = predictor.register(b, c).T_target_source @ predictor.register(a, b).T_target_source
+    torch.testing.assert_close(around.matrix, T_c_a.matrix, atol=1e-4, rtol=0)
+
+
+def test_a_scan_is_registered_to_itself_by_the_identity(predictor):
+    found = predictor.register(scan(), scan())
+    torch.testing.assert_close(
+        found.T_target_source.matrix, torch.eye(4).double(), atol=1e-5, rtol=0
+    )
+    assert found.inlier_ratio == 1
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_tracks_are_registered_to_and_fused_in_the_middle_scan(predictor, count):
+    scans = [scan(seed, count=20 + seed) for seed in range(count)]
+    T_middle_scan = predictor.register_track(scans)
+    middle = count // 2
+    assert len(T_middle_scan) == count
+    torch.testing.assert_close(
+        T_middle_scan[middle].matrix, torch.eye(4).double(), atol=1e-5, rtol=0
+    )
+    pairwise = predictor.register(scans[0], scans[middle]).T_target_source
+    torch.testing.assert_close(T_middle_scan[0].matrix, pairwise.matrix, atol=2e-4, rtol=0)
+    fused = predictor.fuse(scans)
+    assert fused.dtype == np.float32
+    parts = np.split(fused, np.cumsum([len(s) for s in scans])[:-1])
+    np.testing.assert_allclose(parts[middle], scans[middle], atol=1e-4)
+    np.testing.assert_allclose(parts[0], T_middle_scan[0].apply_numpy(scans[0]), atol=2e-4)
+
+
+@pytest.mark.parametrize("factor", [1000.0, 0.01])
+def test_a_scan_of_another_scale_is_flagged(predictor, factor):
+    done = predictor.complete(scan() * np.float32(factor))
+    assert done.confidence == 0
+    assert "extent" in done.warning
+    assert "unit" in done.warning
+    assert np.isfinite(done.points).all()
+
+
+def test_another_kind_of_sensor_is_flagged(predictor):
+    done = predictor.complete(scan(), Sensor("camera"))
+    assert done.confidence == 0
+    assert done.warning.startswith("a camera scan, but the model was trained on lidar")
+    assert predictor.complete(scan(), Sensor("lidar")).warning == ""
+
+
+def test_confidence_falls_with_the_cost(predictor):
+    values = [predictor.confidence(cost) for cost in (0.0, 0.1, 0.3, 1.0, 100.0)]
+    assert values[0] == 1
+    assert values[2] == pytest.approx(0.5)
+    assert values == sorted(values, reverse=True)
+    assert values[-1] < 1e-4
+
+
+@pytest.mark.parametrize("count", [0, 15])
+def test_too_few_points_are_refused_by_name(predictor, count):
+    with pytest.raises(BadInputError, match=f"scan 1: {count} finite points; at least 16"):
+        list(predictor.complete_many([scan(), scan(count=40)[:count]]))
+    with pytest.raises(BadInputError, match=f"source: {count} finite"):
+        predictor.register(scan()[:count], scan())
+
+
+def test_sixteen_points_are_enough(predictor):
+    assert np.isfinite(predictor.complete(scan(count=16)).points).all()
+
+
+def test_no_scans_no_completions(predictor):
+    assert list(predictor.complete_many([])) == []
+
+
+def test_load(predictor, tmp_path):
+    path = tmp_path / "model.safetensors"
+    save_checkpoint(path, predictor.network, SETTINGS)
+    assert_same(load(path).complete(scan()), predictor.complete(scan()), atol=1e-6)
+    with pytest.raises(BadInputError, match="no such checkpoint"):
+        load(tmp_path / "gone.safetensors")
+
+
+def test_inlier_ratio_by_hand():
+    """Reach is the lesser of 0.2 m and 5 % of the target's extent (here 10 m and 1 m)."""
+    line = np.linspace(0, 1, 11, dtype=np.float32)[:, None]
+    target = line * np.float32([10, 0, 0])
+    source = target + np.float32([0, 0.15, 0])
+    source[:4, 1] = 0.25
+    one = SE3.identity()
+    assert inlier_ratio(one, source, target) == pytest.approx(7 / 11)
+    small = line * np.float32([1, 0, 0])
+    near = small + np.float32([0, 0.03, 0])
+    near[:4, 1] = 0.1
+    assert inlier_ratio(one, near, small) == pytest.approx(7 / 11)
+    T = SE3(rotation_about((0.0, 0.0, 1.0), math.pi), torch.tensor([10.0, 0.0, 0.0]).double())
+    assert inlier_ratio(T, target, target) == 1

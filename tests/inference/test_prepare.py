@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+import numpy as np
+import pytest
+import torch
+
+from wildshape.errors import BadInputError
+from wildshape.geometry.centring import box_centre, frustum_centre
+from wildshape.inference.prepare import as_points, extent, network_input, resample
+
+RNG = np.random.default_rng(0)
+
+
+def scan(count=50):
+    return RNG.normal(size=(count, 3)).astype(np.float32) + np.float32([8, 1, -1])
+
+
+def test_points_that_are_not_finite_are_dropped():
+    points = scan()
+    points[[3, 7], [0, 2]] = np.nan, np.inf
+    found = as_points(points)
+    np.testing.assert_array_equal(found, np.delete(points, [3, 7], axis=0))
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        lambda p: p.astype(np.float64),
+        np.ndarray.tolist,
+        torch.tensor,
+        lambda p: torch.tensor(p).requires_grad_(),
+        np.asfortranarray,
+    ],
+)
+def test_arrays_lists_and_tensors(given):
+    points = scan()
+    found = as_points(given(points))
+    assert found.dtype == np.float32
+    np.testing.assert_array_equal(found, points)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (np.zeros((0, 3)), "0 finite points; at least 16"),
+        (np.eye(15)[:, :3], "15 finite points"),
+        (np.full((40, 3), np.nan), "0 finite points"),
+        (np.ones((40, 3)), "all 40 points are equal"),
+        (np.zeros((40, 4)), r"shape \(n, 3\), found \(40, 4\)"),
+        (np.zeros(40), r"found \(40,\)"),
+        ("scan.ply", "no array of numbers"),
+        ([[1.0, 2.0, 3.0], [1.0]], "no array of numbers"),
+        (None, "shape"),
+    ],
+)
+def test_what_is_no_scan_is_refused(given, said):
+    with pytest.raises(BadInputError, match=said) as refused:
+        as_points(given, "scan 7")
+    assert str(refused.value).startswith("scan 7: ")
+
+
+@pytest.mark.parametrize("count", [16, 50, 51, 200])
+def test_resampling_keeps_to_the_scan_and_does_not_see_its_order(count):
+    points = scan()
+    found = resample(points, count)
+    assert found.shape == (count, 3)
+    rows = {tuple(p) for p in points.tolist()}
+    taken = [tuple(p) for p in found.tolist()]
+    assert set(taken) <= rows
+    assert len(set(taken)) == min(count, len(points))
+    np.testing.assert_array_equal(resample(points[RNG.permutation(50)], count), found)
+
+
+def test_network_input_is_centred_and_the_centres_bring_it_back():
+    scans = [scan(40), scan(300)]
+    for sensor, centre_of in (("lidar", frustum_centre), ("camera", box_centre)):
+        inputs, centres = network_input(scans, 64, sensor)
+        for i, points in enumerate(scans):
+            torch.testing.assert_close(centres[i], centre_of(torch.from_numpy(points)))
+            back = (inputs[i] + centres[i]).numpy()
+            np.testing.assert_allclose(back, resample(points, 64), atol=1e-6)
+
+
+def test_extent_is_the_diagonal():
+    assert extent(np.float32([[0, 0, 0], [2, 3, 6], [1, 1, 1]])) == pytest.approx(7)
