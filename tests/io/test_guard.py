@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from wildshape.errors import BadInputError
+from wildshape.io.guard import reading
 from wildshape.io.points import read_points
 
 _ALLOWED_GROWTH_KIB = 200_000
@@ -128,6 +129,17 @@ def test_ply_headers_that_make_no_sense(
 
 def test_kitti_of_a_broken_size(tmp_path: Path) -> None:
     _refused(tmp_path / "a.bin", bytes(16 * 20 + 4), "324 bytes")
+
+
+class PanicException(BaseException):  # noqa: N818
+    """What pyo3 raises when Rust panics: no `Exception`."""
+
+
+def test_panics_are_caught_and_interrupts_are_not() -> None:
+    with pytest.raises(BadInputError, match="mid > len"), reading(Path("a.laz"), "a LAZ file"):
+        raise PanicException("mid > len")
+    with pytest.raises(KeyboardInterrupt), reading(Path("a.laz"), "a LAZ file"):
+        raise KeyboardInterrupt
 
 
 def _refused(path: Path, data: bytes, said: str = "header|points|file") -> None:

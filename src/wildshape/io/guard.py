@@ -30,7 +30,11 @@ def reading(path: Path, expected: str) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or first_line(error)
         raise BadInputError(f"{path}: cannot be read as {expected} ({reason}).") from error
-    except Exception as error:
+    except BaseException as error:
+        # Panics of libraries written in Rust (lazrs) are no `Exception`, unlike Ctrl-C they must
+        # not end the program.
+        if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
+            raise
         raise BadInputError(
             f"{path}: expected {expected}, found a damaged or foreign file "
             f"({type(error).__name__}: {first_line(error)}); write or copy it again."

@@ -39,7 +39,9 @@ def read_las(path: Path) -> Float[np.ndarray, "n 3"]:
         check_promise(path, "points", count, least, max(present, 0))
         if packed:
             record = header.vlrs.get("LasZipVlr")[0].record_data
-            _check_compressed(path, header.offset_to_point_data, count, record)
+            _check_compressed(
+                path, header.offset_to_point_data, count, header.point_format.size, record
+            )
         pieces = [np.empty((0, 3))]
         for piece in reader.chunk_iterator(min(_PIECE, max(count, 1))):
             pieces.append(np.stack([np.asarray(piece[axis]) for axis in "xyz"], -1))
@@ -68,7 +70,7 @@ def _check_header(path: Path) -> None:
     check_promise(path, "variable length records", records, 54 * records, max(points - size, 0))
 
 
-def _check_compressed(path: Path, offset: int, count: int, record: bytes) -> None:
+def _check_compressed(path: Path, offset: int, count: int, point_size: int, record: bytes) -> None:
     """Refuse a LAZ whose sizes do not fit into the file; lazrs allocates them unseen."""
     body = path.read_bytes()
     table = struct.unpack_from("<q", body, offset)[0]
@@ -80,11 +82,15 @@ def _check_compressed(path: Path, offset: int, count: int, record: bytes) -> Non
         )
     chunks = struct.unpack_from("<I", body, table + 4)[0]
     check_promise(path, "LAZ chunks", chunks, chunks, table - offset)
-    kind, *_, count_items = _LAZ_PREFIX.unpack_from(record)
+    kind, *_, number = _LAZ_PREFIX.unpack_from(record)
+    items = [_LAZ_ITEM.unpack_from(record, _LAZ_PREFIX.size + 6 * i) for i in range(number)]
+    size = sum(size for _, size, _ in items)
+    if size != point_size:
+        raise BadInputError(
+            f"{path}: LAZ items of {size} bytes make no point of {point_size}: damaged; "
+            "copy it again."
+        )
     if kind == _LAZ_LAYERED:
-        items = [
-            _LAZ_ITEM.unpack_from(record, _LAZ_PREFIX.size + 6 * i) for i in range(count_items)
-        ]
         found = _count_layered(body[offset + 8 : table], items, count)
         if found != count:
             raise _truncated(path, count, found)
