@@ -131,7 +131,7 @@ def test_kitti_of_a_broken_size(tmp_path: Path) -> None:
     _refused(tmp_path / "a.bin", bytes(16 * 20 + 4), "324 bytes")
 
 
-class PanicException(BaseException):  # noqa: N818
+class PanicException(BaseException):
     """What pyo3 raises when Rust panics: no `Exception`."""
 
 
