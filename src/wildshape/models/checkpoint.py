@@ -103,7 +103,9 @@ def settings_from_dict(values: dict[str, Any]) -> ModelSettings:
     """The inverse of what `save_checkpoint` writes into the metadata."""
     projection = dict(values.pop("projection"))
     kind = _PROJECTIONS[projection.pop("kind")]
-    network = {k: tuple(v) if isinstance(v, list) else v for k, v in values.pop("network").items()}
+    network: dict[str, Any] = {
+        k: tuple(v) if isinstance(v, list) else v for k, v in values.pop("network").items()
+    }
     for name in ("extent_m", "cost_m"):
         values[name] = tuple(values[name])
     return ModelSettings(network=NetworkConfig(**network), projection=kind(**projection), **values)

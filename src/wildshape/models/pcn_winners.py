@@ -72,7 +72,7 @@ class _GatherDot(torch.autograd.Function):
         return torch.stack([(u.index_select(0, at) * weight).sum(1) for at in row])
 
     @staticmethod
-    def backward(ctx, grad: Tensor):
+    def backward(ctx, grad: Tensor):  # pyright: ignore[reportIncompatibleMethodOverride]
         u, weight, row = ctx.saved_tensors
         grad_u, grad_weight = torch.zeros_like(u), torch.zeros_like(weight)
         for at, g in zip(row, grad[..., None]):

@@ -105,4 +105,5 @@ class ShapePoseNet(nn.Module):
     ]:
         """Canonical shape, rotations, translations and log-beliefs: pure, for export."""
         code = self.encoder(scans / self.config.scale)
-        return self.canonical(code), *self.poses(code)
+        poses = self.poses(code)
+        return self.canonical(code), poses.rotation, poses.translation, poses.log_belief
