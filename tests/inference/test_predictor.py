@@ -238,13 +238,13 @@ def test_load(predictor, tmp_path):
 def test_inlier_ratio_by_hand():
     """Reach is the lesser of 0.2 m and 5 % of the target's extent (here 10 m and 1 m)."""
     line = np.linspace(0, 1, 11, dtype=np.float32)[:, None]
-    target = line * np.float32([10, 0, 0])
-    source = target + np.float32([0, 0.15, 0])
+    target = line * np.array([10, 0, 0], np.float32)
+    source = target + np.array([0, 0.15, 0], np.float32)
     source[:4, 1] = 0.25
     one = SE3.identity()
     assert inlier_ratio(one, source, target) == pytest.approx(7 / 11)
-    small = line * np.float32([1, 0, 0])
-    near = small + np.float32([0, 0.03, 0])
+    small = line * np.array([1, 0, 0], np.float32)
+    near = small + np.array([0, 0.03, 0], np.float32)
     near[:4, 1] = 0.1
     assert inlier_ratio(one, near, small) == pytest.approx(7 / 11)
     T = SE3(rotation_about((0.0, 0.0, 1.0), math.pi), torch.tensor([10.0, 0.0, 0.0]).double())

@@ -12,7 +12,7 @@ RNG = np.random.default_rng(0)
 
 
 def scan(count=50):
-    return RNG.normal(size=(count, 3)).astype(np.float32) + np.float32([8, 1, -1])
+    return RNG.normal(size=(count, 3)).astype(np.float32) + np.array([8, 1, -1], np.float32)
 
 
 def test_points_that_are_not_finite_are_dropped():
@@ -71,15 +71,17 @@ def test_resampling_keeps_to_the_scan_and_does_not_see_its_order(count):
     np.testing.assert_array_equal(resample(points[RNG.permutation(50)], count), found)
 
 
-def test_network_input_is_centred_and_the_centres_bring_it_back():
+@pytest.mark.parametrize(
+    ("sensor", "centre_of"), [("lidar", frustum_centre), ("camera", box_centre)]
+)
+def test_network_input_is_centred_and_the_centres_bring_it_back(sensor, centre_of):
     scans = [scan(40), scan(300)]
-    for sensor, centre_of in (("lidar", frustum_centre), ("camera", box_centre)):
-        inputs, centres = network_input(scans, 64, sensor)
-        for i, points in enumerate(scans):
-            torch.testing.assert_close(centres[i], centre_of(torch.from_numpy(points)))
-            back = (inputs[i] + centres[i]).numpy()
-            np.testing.assert_allclose(back, resample(points, 64), atol=1e-6)
+    inputs, centres = network_input(scans, 64, sensor)
+    for i, points in enumerate(scans):
+        torch.testing.assert_close(centres[i], centre_of(torch.from_numpy(points)))
+        back = (inputs[i] + centres[i]).numpy()
+        np.testing.assert_allclose(back, resample(points, 64), atol=1e-6)
 
 
 def test_extent_is_the_diagonal():
-    assert extent(np.float32([[0, 0, 0], [2, 3, 6], [1, 1, 1]])) == pytest.approx(7)
+    assert extent(np.array([[0, 0, 0], [2, 3, 6], [1, 1, 1]], np.float32)) == pytest.approx(7)

@@ -118,6 +118,7 @@ def test_hidden_points_feel_no_pull_of_the_projection():
     seen = torch.zeros(1, 25, dtype=torch.bool)
     seen[0, :5] = True
     projection_term(posed, scans, torch.zeros(1, 25, dtype=torch.int64), seen).sum().backward()
+    assert posed.grad is not None
     assert (posed.grad[0, :5].abs().sum(-1) > 0).all()
     assert (posed.grad[0, 5:] == 0).all()
 
