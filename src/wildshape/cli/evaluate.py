@@ -88,7 +88,9 @@ def run(settings: Settings) -> None:
     if pooled:
         runs = _with_selected(runs, models)
     _check(runs, settings.data)
-    table = write(reading, runs, next(iter(evaluated[0].items()), None), output.record, settings)
+    made = {**output.record["provenance"], "settings": output.record["settings"]}
+    drawn = next(iter(evaluated[0].items()))
+    table = write(settings.out, reading, runs, drawn, made, settings.max_scans)
     output.finish(skipped=reading.skipped)
     say_skipped(reading.skipped)
     answer(table, _json(settings.out), as_json=settings.json)
@@ -149,27 +151,33 @@ def evaluate_once(
 
 
 def write(
+    out: Path,
     reading: "Reading",
     runs: "list[Results]",
-    drawn: "tuple[str, Method] | None",
-    record: dict[str, Any],
-    settings: Settings,
+    drawn: "tuple[str, Method]",
+    made: dict[str, Any],
+    max_scans: int | None,
 ) -> str:
-    """Write metrics, scores, table and figures; returns the table."""
+    """Write metrics, scores, table and figures; returns the table.
+
+    Args:
+        out: folder.
+        reading: the tracks of the runs.
+        runs: one a seed.
+        drawn: row and method whose best, median and worst object are drawn.
+        made: how the figures came about.
+        max_scans: as in the runs.
+    """
     from wildshape.evaluation.examples import gather
     from wildshape.evaluation.figures import write_figures
     from wildshape.evaluation.results import write_metrics, write_scores
     from wildshape.evaluation.tables import markdown, write_table
 
-    made = {**record["provenance"], "settings": record["settings"]}
-    examples = []
-    if drawn is not None:
-        tracks = (track for _, track in reading.tracks())
-        examples = gather(tracks, runs[0], *drawn, max_scans=settings.max_scans)
-    write_figures(settings.out, runs[0], examples)
-    write_scores(settings.out, runs)
-    write_table(settings.out, runs, views=_views(reading))
-    write_metrics(settings.out, runs, made)
+    tracks = (track for _, track in reading.tracks())
+    write_figures(out, runs[0], gather(tracks, runs[0], *drawn, max_scans=max_scans))
+    write_scores(out, runs)
+    write_table(out, runs, views=_views(reading))
+    write_metrics(out, runs, made)
     return markdown(runs)
 
 

@@ -78,6 +78,14 @@ def begin(
     return Output(path, record, resumed)
 
 
+def unfinished(path: Path, command: str) -> bool:
+    """Whether an interrupted run of a command left its output here."""
+    if not (path / MARKER).is_file():
+        return False
+    record = _read(path)
+    return record.get("command") == command and record.get("status") == "running"
+
+
 def command_line() -> str:
     """As a user would type it again."""
     return shlex.join(["wildshape", *sys.argv[1:]])

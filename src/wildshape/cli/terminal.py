@@ -47,8 +47,8 @@ def duration(seconds: float) -> str:
 class Bar(Protocol):
     """Progress of one long piece of work."""
 
-    def at(self, done: int, text: str = "") -> None:
-        """So much is done; `text` says what else there is to say."""
+    def at(self, done: int, text: str = "", *, total: int | None = None) -> None:
+        """So much is done; `text` says what else there is to say, `total` a new total."""
         ...
 
 
@@ -72,7 +72,7 @@ def progress(label: str, total: int, *, silent: bool = False, start: int = 0) ->
 
 
 class _Nothing:
-    def at(self, done: int, text: str = "") -> None:
+    def at(self, done: int, text: str = "", *, total: int | None = None) -> None:
         pass
 
 
@@ -83,8 +83,9 @@ class _Lines:
         self.label, self.total, self.start = label, total, start
         self.began = self.spoke = time.monotonic()
 
-    def at(self, done: int, text: str = "") -> None:
+    def at(self, done: int, text: str = "", *, total: int | None = None) -> None:
         now = time.monotonic()
+        self.total = self.total if total is None else total
         if done != self.total and now - self.spoke < _EVERY_SECONDS:
             return
         self.spoke = now
@@ -100,8 +101,8 @@ class _RichBar:
     def __init__(self, bars: Any, task: Any) -> None:
         self.bars, self.task = bars, task
 
-    def at(self, done: int, text: str = "") -> None:
-        self.bars.update(self.task, completed=done, text=text)
+    def at(self, done: int, text: str = "", *, total: int | None = None) -> None:
+        self.bars.update(self.task, completed=done, text=text, total=total)
 
 
 @contextmanager

@@ -14,6 +14,8 @@ from wildshape.cli.options import AsJson, Data, Device, Overwrite, Unit
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from wildshape.io.store import Store
     from wildshape.training.config import Recipe
     from wildshape.training.loop import Run
@@ -95,29 +97,38 @@ def run(settings: Settings) -> None:
     assert model.is_file() or not prepared.processes.leads
 
 
-def fit_with_progress(run: "Run", *, resume: str = "") -> Path:
+def fit_with_progress(
+    run: "Run", *, resume: str = "", adjust: "Callable[[Run], bool] | None" = None
+) -> Path:
     """`fit` with a bar; a signal stops it between two steps and saves the state.
 
     Args:
         run: set up.
         resume: the command that goes on after a stop, for the message.
+        adjust: called every 25 steps; may change the run's number of steps, and says whether.
 
     Raises:
         KeyboardInterrupt: stopped by a signal; its text says how to go on.
     """
     from wildshape.cli.interrupt import stop_flag
-    from wildshape.cli.terminal import progress
+    from wildshape.cli.terminal import progress, say
     from wildshape.training.loop import StopRequested, fit
 
-    total, first = run.recipe.optim.steps, run.state.step
-    silent = not run.processes.leads
-    with stop_flag() as stopped, progress("training", total, silent=silent, start=first) as bar:
+    first, silent = run.state.step, not run.processes.leads
+    planned = 0 if adjust else run.recipe.optim.steps
+    with stop_flag() as stopped, progress("training", planned, silent=silent, start=first) as bar:
+
+        def report(step: int, values: dict[str, Any]) -> None:
+            if adjust is not None and adjust(run):
+                say(f"training for {run.recipe.optim.steps} steps, which fit into the time")
+            bar.at(step, _line(values), total=run.recipe.optim.steps)
+
         try:
-            return fit(run, lambda step, values: bar.at(step, _line(values)), stopped)
+            return fit(run, report, stopped)
         except StopRequested:
             raise stopped.error(
-                f"stopped after step {run.state.step} of {total}, the state is saved; go on with"
-                f" `{resume}`."
+                f"stopped after step {run.state.step} of {run.recipe.optim.steps}, the state is"
+                f" saved; go on with `{resume}`."
             ) from None
 
 
