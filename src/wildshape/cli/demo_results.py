@@ -153,7 +153,7 @@ def draw(
             (
                 f"Trained on {data.described} without labels, for {cost.steps} steps; everything"
                 f" below is of {data.tested}, which it has never seen.",
-                "\n".join(judged),
+                *judged,
             )
         ),
         cost=(

@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+#
+#   make demo [DATA=folder]   the whole way in five minutes, ending in demo/report.html
+#   make test                 lint, types, import floors, tests
+#   make bench                our kernels and simulator beside the alternatives
+#
+# Each sets up .venv by itself and needs python >= 3.11 with venv; a C compiler makes it faster.
+# No GPU in a Linux machine? PyPI's torch may bring 2 GB of CUDA along; this takes the CPU build:
+#   make demo PIP_ARGS="--extra-index-url https://download.pytorch.org/whl/cpu"
+
+CANDIDATES := python3 python3.14 python3.13 python3.12 python3.11
+NEW_ENOUGH := import sys; sys.exit(sys.version_info < (3, 11))
+PYTHON ?= $(shell for p in $(CANDIDATES); do \
+	$$p -c '$(NEW_ENOUGH)' 2>/dev/null && { echo $$p; break; }; done)
+PIP_ARGS ?=
+DATA ?=
+OUT ?= demo
+
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install $(PIP_ARGS) -c constraints.txt
+INSTALLED := $(VENV)/.installed
+TESTED := $(VENV)/.installed-test
+BENCHED := $(VENV)/.installed-bench
+# The package is installed in place: only these make another installation necessary.
+SOURCES := pyproject.toml constraints.txt hatch_build.py $(wildcard src/wildshape/ops/native/*.[ch])
+
+.PHONY: demo test bench clean
+.DELETE_ON_ERROR:
+
+demo: $(INSTALLED)
+	$(BIN)/wildshape demo --out "$(OUT)" --overwrite $(if $(DATA),--data "$(DATA)")
+
+test: $(TESTED)
+	$(BIN)/ruff format --check --quiet .
+	$(BIN)/ruff check --quiet .
+	$(BIN)/basedpyright
+	$(BIN)/lint-imports
+	$(BIN)/python -m pytest -n 2
+
+bench: $(BENCHED)
+	@for file in benchmarks/bench_*.py; do \
+		echo "== $$file"; $(BIN)/python "$$file" || exit 1; \
+	done
+
+$(BIN)/python:
+	@test -n "$(PYTHON)" || { \
+		echo "Wildshape needs python >= 3.11, and none of $(CANDIDATES) is: install one, or name" \
+			"it: make PYTHON=/path/to/python" >&2; exit 1; }
+	@$(PYTHON) -c '$(NEW_ENOUGH)' || { \
+		echo "Wildshape needs python >= 3.11, and $(PYTHON) is older or missing." >&2; exit 1; }
+	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
+		echo "$(PYTHON) cannot make a virtual environment: its venv module is missing; install it" \
+			"(Debian and Ubuntu: python3-venv), or name another: make PYTHON=..." >&2; exit 1; }
+
+$(INSTALLED): $(SOURCES) | $(BIN)/python
+	@echo "installing into $(VENV), once; this takes a few minutes"
+	@command -v "$${CC:-cc}" >/dev/null || \
+		echo "no C compiler found: Wildshape works without its native kernels, slower" >&2
+	$(PIP) -e .
+	@touch $@
+
+$(TESTED): $(INSTALLED)
+	$(PIP) -e ".[test]"
+	@touch $@
+
+$(BENCHED): $(INSTALLED)
+	$(PIP) -e ".[bench]"
+	@touch $@
+
+clean:
+	rm -rf $(VENV) "$(OUT)"
