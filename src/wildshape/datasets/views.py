@@ -49,12 +49,19 @@ class Batch(NamedTuple):
         centres: the centres in the (turned) sensor frames.
         reference: row of the reference scan of each track.
         turn: rotation by which each scan was turned about its sensor.
+        anchor: `R_sensor_canonical` that each scan, as recorded, is held to, once headings are
+            agreed on.
     """
 
     scans: Float[Tensor, "B N 3"]
     centres: Float[Tensor, "B 3"]
     reference: Tensor
     turn: Float[Tensor, "B 3 3"]
+    anchor: Float[Tensor, "B 3 3"] | None = None
+
+    def to(self, device: torch.device | str) -> "Batch":
+        """The same batch on a device."""
+        return Batch(*(None if t is None else t.to(device, non_blocking=True) for t in self))
 
 
 class ViewSampler:
@@ -78,6 +85,7 @@ class ViewSampler:
                 f"{store.path}: no track has a scan of {config.min_points} points or more;"
                 " nothing to train on."
             )
+        self.anchors: Float[Tensor, "S 3 3"] | None = None
         self._centres = np.full((len(sizes), 3), np.nan, dtype=np.float32)
 
     def draw(self, *seed: int) -> Batch:
@@ -86,11 +94,20 @@ class ViewSampler:
         config = self.config
         chosen = rng.integers(len(self.scans_of), size=config.tracks)
         rows = np.concatenate([self._window(self.scans_of[t], rng) for t in chosen])
-        scans = torch.stack([self._resampled(int(s), rng) for s in rows])
-        centres = torch.stack([self._centre(int(s)) for s in rows])
+        scans, centres = self.gather([int(s) for s in rows], rng)
         first = np.arange(config.tracks) * config.views
         reference = torch.from_numpy(first + rng.integers(config.views, size=config.tracks))
-        return _turned(scans, centres, reference, config.turn, int(rng.integers(2**62)))
+        rotation = _turns(len(rows), config.turn, int(rng.integers(2**62)))
+        turned = (rotation @ centres[..., None])[..., 0]
+        anchor = None if self.anchors is None else self.anchors[torch.from_numpy(rows)]
+        return Batch(scans @ rotation.mT, turned, reference, rotation, anchor)
+
+    def gather(
+        self, scans: list[int], rng: np.random.Generator
+    ) -> tuple[Float[Tensor, "B n 3"], Float[Tensor, "B 3"]]:
+        """Scans of the store, centred and resampled, and their centres."""
+        clouds = torch.stack([self._resampled(scan, rng) for scan in scans])
+        return clouds, torch.stack([self._centre(scan) for scan in scans])
 
     def extent_range(self, scans: int = 500) -> tuple[float, float]:
         """Smallest and largest bounding-box diagonal, metres, over a seeded sample of scans."""
@@ -123,12 +140,9 @@ class ViewSampler:
         return torch.from_numpy(centre)
 
 
-def _turned(scans: Tensor, centres: Tensor, reference: Tensor, turn: str, seed: int) -> Batch:
-    """Each scan turned about its sensor by its own random rotation."""
-    if turn == "none":
-        return Batch(scans, centres, reference, torch.eye(3).repeat(len(scans), 1, 1))
+def _turns(count: int, turn: str, seed: int) -> Float[Tensor, "B 3 3"]:
+    """A random rotation for each scan, of the kind asked for."""
     generator = torch.Generator().manual_seed(seed)
-    draw = random_yaw if turn == "yaw" else random_rotation
-    rotation = draw(len(scans), generator)
-    turned = (rotation @ centres[..., None])[..., 0]
-    return Batch(scans @ rotation.mT, turned, reference, rotation)
+    if turn == "none":
+        return torch.eye(3).repeat(count, 1, 1)
+    return random_yaw(count, generator) if turn == "yaw" else random_rotation(count, generator)

@@ -28,6 +28,7 @@ class LossConfig:
             of cost that a nat of belief is worth when a branch is chosen.
         steady: an object does not turn around within a window of neighbouring scans: a branch
             more than 90 degrees from the reference scan's pose, as recorded, cannot win.
+        agree_at: shares of the run at which all tracks agree on which way is front.
     """
 
     beta: float = 0.05
@@ -36,6 +37,7 @@ class LossConfig:
     template_end: float = 0.0
     belief: float = 0.0
     steady: bool = False
+    agree_at: tuple[float, ...] = ()
 
 
 class LossTerms(NamedTuple):

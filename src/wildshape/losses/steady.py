@@ -19,17 +19,16 @@ _NEVER_M = 100.0
 def turning_handicap(
     rotation: Float[Tensor, "B K 3 3"],
     turn: Float[Tensor, "B 3 3"],
-    anchor: Float[Tensor, "I 3 3"],
+    anchor: Float[Tensor, "B 3 3"],
 ) -> Float[Tensor, "B K"]:
-    """Metres of handicap: none up to 90 degrees from the track's anchor, prohibitive beyond.
+    """Metres of handicap: none up to 90 degrees from the anchor, prohibitive beyond.
 
     Args:
         rotation: `R_sensor_canonical` of every branch of the turned scans.
         turn: rotation by which each scan was turned for training (`x_turned = turn x_recorded`).
-        anchor: `R_sensor_canonical` of each track's reference scan, as recorded.
+        anchor: `R_sensor_canonical` that each scan, as recorded, is held to.
     """
-    views = len(rotation) // len(anchor)
     recorded = turn.mT[:, None] @ rotation
-    relative = anchor.repeat_interleave(views, dim=0)[:, None].mT @ recorded
+    relative = anchor[:, None].mT @ recorded
     cosine = (relative.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2
     return torch.where(cosine > 0, 0.0, _NEVER_M * (1 - cosine))

@@ -15,13 +15,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from wildshape.datasets.views import Batch, ViewSampler
+from wildshape.datasets.views import ViewSampler
 from wildshape.errors import BadInputError
 from wildshape.io.store import Store
 from wildshape.models.checkpoint import ModelSettings, save_checkpoint
 from wildshape.models.shapepose import ShapePoseNet
 from wildshape.ops.allocator import keep_memory
 from wildshape.training.config import Recipe
+from wildshape.training.headings import agree_on_headings
 from wildshape.training.log import RunLog
 from wildshape.training.objectives import Objective, WeaklySupervised
 from wildshape.training.processes import Processes, join
@@ -156,8 +157,8 @@ def _report(run: Run, progress: Progress, values: dict[str, Any]) -> None:
 def _step(run: Run, objective: torch.nn.Module) -> Objective:
     """One gradient step; the batch depends on (seed, step, process) alone."""
     state, optim, step = run.state, run.recipe.optim, run.state.step
-    batch = run.sampler.draw(run.seed, step, run.processes.rank)
-    batch = Batch(*(tensor.to(run.processes.device, non_blocking=True) for tensor in batch))
+    _agree_if_due(run)
+    batch = run.sampler.draw(run.seed, step, run.processes.rank).to(run.processes.device)
     result: Objective = objective(batch, template_weight(step, optim.steps, run.recipe.loss))
     state.optimiser.zero_grad(set_to_none=True)
     result.loss.backward()
@@ -169,6 +170,15 @@ def _step(run: Run, objective: torch.nn.Module) -> Objective:
     _average(state, optim.average)
     state.step += 1
     return result
+
+
+def _agree_if_due(run: Run) -> None:
+    """At the recipe's shares of the run, let all tracks agree on which way is front."""
+    state, loss = run.state, run.recipe.loss
+    due = {int(share * run.recipe.optim.steps) for share in loss.agree_at}
+    if state.step in due:
+        state.anchors = agree_on_headings(state.mean, run.sampler, loss)
+    run.sampler.anchors = state.anchors
 
 
 @torch.no_grad()

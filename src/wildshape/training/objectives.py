@@ -63,11 +63,16 @@ class WeaklySupervised(nn.Module):
         config = self.config
         if not config.steady:
             return None
-        at = batch.reference
+        anchor = batch.anchor if batch.anchor is not None else self._anchor(batch, shapes, poses)
+        return turning_handicap(poses.rotation, batch.turn, anchor)
+
+    def _anchor(self, batch: Batch, shapes: Tensor, poses: Poses) -> Tensor:
+        """The reference scan's own pose, as recorded, for every scan of its track."""
+        config, at = self.config, batch.reference
         own = Poses(*(part[at] for part in poses))
         scores = score_hypotheses(
             batch.scans[at], batch.centres[at], own.apply(shapes), config.projection
         )
         branch = (scores.cost(config.beta) - config.belief * own.log_belief).argmin(-1)
         anchor = batch.turn[at].mT @ own.choose(branch).rotation[:, 0]
-        return turning_handicap(poses.rotation, batch.turn, anchor)
+        return anchor.repeat_interleave(len(batch.scans) // len(at), dim=0)

@@ -50,7 +50,15 @@ def small() -> Recipe:
             start=(1.0, 0.45, 0.35),
             scale=2.0,
         ),
-        loss=LossConfig(beta=0.25, projection=FacingBins(0.2), belief=0.05, steady=True),
+        loss=LossConfig(
+            beta=0.25,
+            projection=FacingBins(0.4),
+            template=3.0,
+            template_end=0.02,
+            belief=0.05,
+            steady=True,
+            agree_at=(0.1, 0.25, 0.5),
+        ),
         views=ViewConfig(points=512, window=40, turn="yaw"),
         optim=OptimConfig(
             steps=12_000, lr=1e-3, decay_every=0, warmup=100, average=0.998, clip=5.0
@@ -66,7 +74,15 @@ def default() -> Recipe:
         network=NetworkConfig(
             points=2048, branches=4, selector=True, mirror=True, start=(1.0, 0.45, 0.35), scale=2.0
         ),
-        loss=LossConfig(beta=0.25, projection=FacingBins(0.2), belief=0.05, steady=True),
+        loss=LossConfig(
+            beta=0.25,
+            projection=FacingBins(0.4),
+            template=3.0,
+            template_end=0.02,
+            belief=0.05,
+            steady=True,
+            agree_at=(0.1, 0.25, 0.5),
+        ),
         views=ViewConfig(points=1024, window=40, turn="yaw"),
         optim=OptimConfig(
             steps=200_000, lr=5e-4, decay_every=0, warmup=1000, average=0.9995, clip=5.0
@@ -88,7 +104,15 @@ def tiny() -> Recipe:
             start=(1.0, 0.45, 0.35),
             scale=2.0,
         ),
-        loss=LossConfig(beta=0.25, projection=FacingBins(0.3), belief=0.05, steady=True),
+        loss=LossConfig(
+            beta=0.25,
+            projection=FacingBins(0.4),
+            template=3.0,
+            template_end=0.02,
+            belief=0.05,
+            steady=True,
+            agree_at=(0.1, 0.25, 0.5),
+        ),
         views=ViewConfig(points=256, window=40, turn="yaw"),
         optim=OptimConfig(steps=500, lr=2e-3, decay_every=0, warmup=20, average=0.99, clip=5.0),
         validate_every=100,

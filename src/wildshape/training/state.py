@@ -22,12 +22,13 @@ STATE = "state.safetensors"
 
 @dataclass
 class TrainState:
-    """Network, its running mean, the optimiser, and how many steps are done."""
+    """Network, its running mean, the optimiser, how many steps are done, and agreed headings."""
 
     network: ShapePoseNet
     mean: ShapePoseNet
     optimiser: torch.optim.Adam
     step: int = 0
+    anchors: torch.Tensor | None = None
 
 
 def save_state(folder: Path, state: TrainState, identity: dict[str, str]) -> None:
@@ -36,6 +37,8 @@ def save_state(folder: Path, state: TrainState, identity: dict[str, str]) -> Non
     tensors |= {f"mean.{k}": v for k, v in state.mean.state_dict().items()}
     for index, moments in state.optimiser.state_dict()["state"].items():
         tensors |= {f"adam.{index}.{k}": torch.as_tensor(v) for k, v in moments.items()}
+    if state.anchors is not None:
+        tensors["anchors"] = state.anchors
     tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
     metadata = {"step": str(state.step), "identity": json.dumps(identity)}
     with atomic_write(folder / STATE) as file:

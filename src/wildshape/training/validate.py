@@ -43,7 +43,7 @@ def validate(
 ) -> Validation:
     """The figures over a fixed set of batches of held-out tracks."""
     rows = [
-        _figures(network, sampler, config, Batch(*(t.to(device) for t in batch)))
+        _figures(network, sampler, config, batch.to(device))
         for batch in (sampler.draw(_SEED, index) for index in range(batches))
     ]
     observation, projection, cost, cycle = (torch.cat(part) for part in zip(*rows))

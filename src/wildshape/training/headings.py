@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""All tracks agree on which way is front (beyond the paper), without a label.
+
+A near-symmetric object settles in either of two headings, a half turn apart, each track as chance
+has it (METHOD 12.2). Two facts that need no label decide: within a track an object does not turn
+around between neighbouring scans; across tracks, the outlines of fused scans, height over length,
+are more alike when turned the same way. Each is a problem of signs (Z2 synchronisation), solved by
+a leading eigenvector. Which of the two ways is called front stays open: nobody defines it.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from wildshape.datasets.views import ViewSampler
+from wildshape.geometry.se3 import SE3
+from wildshape.losses.hindsight import score_hypotheses
+from wildshape.losses.multiview import LossConfig
+from wildshape.models.shapepose import ShapePoseNet
+
+_BATCH, _POINTS, _REFERENCES, _NEIGHBOURS = 64, 256, 300, 5
+_BINS, _FEWEST, _TOP = 16, 20, 0.95
+_HALF_TURN = torch.diag(torch.tensor((-1.0, -1.0, 1.0)))
+
+
+@torch.no_grad()
+def agree_on_headings(
+    network: ShapePoseNet, sampler: ViewSampler, config: LossConfig
+) -> Float[Tensor, "S 3 3"]:
+    """`R_sensor_canonical` of every scan, as recorded, its heading agreed; zero for unused scans.
+
+    Args:
+        network: poses the scans.
+        sampler: of the tracks trained on.
+        config: decides which branch speaks.
+    """
+    anchors = torch.zeros(len(sampler.store.scan_sizes), 3, 3)
+    tracks, outlines = [], []
+    for scans in sampler.scans_of:
+        T_sensor_can = _steady(_poses(network, sampler, config, scans))
+        tracks.append((torch.from_numpy(scans), T_sensor_can.rotation))
+        outlines.append(outline(_fused(sampler, scans, T_sensor_can)))
+    signs = agreed_signs(torch.stack(outlines))
+    for (scans, rotation), sign in zip(tracks, signs):
+        anchors[scans] = rotation if sign > 0 else rotation @ _HALF_TURN
+    return anchors
+
+
+def outline(cloud: Float[Tensor, "n 3"]) -> Float[Tensor, "bins"]:
+    """Height over length of an object in its canonical frame, metres about the mean height.
+
+    The top of each slice along x; NaN where a slice was hardly seen.
+    """
+    low, high = cloud[:, 0].quantile(0.01), cloud[:, 0].quantile(0.99)
+    slices = ((cloud[:, 0] - low) / (high - low).clamp_min(1e-6) * _BINS).floor()
+    heights = [cloud[slices == index, 2] for index in range(_BINS)]
+    unseen = cloud.new_tensor(float("nan"))
+    tops = torch.stack([z.quantile(_TOP) if len(z) >= _FEWEST else unseen for z in heights])
+    return tops - tops.nanmean()
+
+
+def agreed_signs(outlines: Float[Tensor, "J bins"]) -> Float[Tensor, "J"]:
+    """+1 or -1 for each outline: reverse those of -1 and all look one way.
+
+    The first few hundred are compared pair by pair and agree by the leading eigenvector of how
+    much more alike each pair is as it stands than reversed; the rest follow their vote.
+    """
+    known = outlines[:_REFERENCES]
+    vote = _difference(outlines, known.flip(1)) - _difference(outlines, known)
+    among = vote[: len(known)]
+    eigenvector = torch.linalg.eigh((among + among.T) / 2).eigenvectors[:, -1]
+    signs = torch.sign(vote @ torch.sign(eigenvector))
+    return torch.where(signs == 0, torch.ones_like(signs), signs)
+
+
+def _difference(a: Float[Tensor, "I bins"], b: Float[Tensor, "J bins"]) -> Float[Tensor, "I J"]:
+    """Mean absolute difference over the slices that both have seen; 0 if there are none."""
+    return torch.nan_to_num((a[:, None] - b[None]).abs().nanmean(-1))
+
+
+def steady_signs(rotation: Float[Tensor, "V 3 3"]) -> Float[Tensor, "V"]:
+    """+1 or -1 for each pose: turn those of -1 by a half turn and no neighbours are opposed."""
+    count = len(rotation)
+    relative = rotation[:, None].mT @ rotation[None]
+    cosine = (relative.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2
+    order = torch.arange(count)
+    near = (order[:, None] - order).abs() <= _NEIGHBOURS
+    signs = torch.sign(torch.linalg.eigh(cosine * near).eigenvectors[:, -1])
+    return torch.where(signs == 0, torch.ones_like(signs), signs)
+
+
+def _poses(
+    network: ShapePoseNet, sampler: ViewSampler, config: LossConfig, scans: Sequence[int]
+) -> SE3:
+    """`T_sensor_canonical` of scans as recorded, each under its own shape."""
+    rng = np.random.default_rng(0)
+    device = next(network.parameters()).device
+    found = []
+    for start in range(0, len(scans), _BATCH):
+        inputs, centres = sampler.gather([int(s) for s in scans[start : start + _BATCH]], rng)
+        inputs, centres = inputs.to(device), centres.to(device)
+        code = network.encode(inputs)
+        poses = network.poses(code)
+        posed = poses.apply(network.canonical(code))
+        cost = score_hypotheses(inputs, centres, posed, config.projection).cost(config.beta)
+        chosen = poses.choose((cost - config.belief * poses.log_belief).argmin(-1))
+        translation = chosen.translation[:, 0] + centres
+        found.append((chosen.rotation[:, 0].cpu(), translation.cpu()))
+    rotations, translations = zip(*found)
+    return SE3(torch.cat(rotations), torch.cat(translations))
+
+
+def _steady(T_sensor_can: SE3) -> SE3:
+    """The same poses with no half turn between neighbours."""
+    turned = steady_signs(T_sensor_can.rotation) < 0
+    rotation = T_sensor_can.rotation
+    rotation = torch.where(turned[:, None, None], rotation @ _HALF_TURN, rotation)
+    return SE3(rotation, T_sensor_can.translation)
+
+
+def _fused(sampler: ViewSampler, scans: np.ndarray, T_sensor_can: SE3) -> Float[Tensor, "n 3"]:
+    """A few hundred points of each of a track's scans, in the canonical frame."""
+    rng = np.random.default_rng(0)
+    clouds = []
+    for index, scan in enumerate(scans):
+        points = sampler.store.scan_points(int(scan))
+        picked = torch.from_numpy(points[rng.integers(len(points), size=_POINTS)])
+        clouds.append(T_sensor_can[index].inverse().apply(picked))
+    return torch.cat(clouds)
