@@ -9,8 +9,6 @@ are more alike when turned the same way. Each is a problem of signs (Z2 synchron
 a leading eigenvector. Which of the two ways is called front stays open: nobody defines it.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 import torch
 from jaxtyping import Float
@@ -39,15 +37,26 @@ def agree_on_headings(
         config: decides which branch speaks.
     """
     anchors = torch.zeros(len(sampler.store.scan_sizes), 3, 3)
-    tracks, outlines = [], []
+    outlines, kept = [], []
     for scans in sampler.scans_of:
-        T_sensor_can = _steady(_poses(network, sampler, config, scans))
-        tracks.append((torch.from_numpy(scans), T_sensor_can.rotation))
-        outlines.append(outline(_fused(sampler, scans, T_sensor_can)))
+        T_sensor_can = _poses(network, sampler, config, scans)
+        steady = steady_signs(T_sensor_can.rotation)
+        T_steady_can = SE3(_turn(T_sensor_can.rotation, steady), T_sensor_can.translation)
+        anchors[torch.from_numpy(scans)] = T_steady_can.rotation
+        outlines.append(outline(_fused(sampler, scans, T_steady_can)))
+        kept.append(steady)
     signs = agreed_signs(torch.stack(outlines))
-    for (scans, rotation), sign in zip(tracks, signs):
-        anchors[scans] = rotation if sign > 0 else rotation @ _HALF_TURN
+    # Of the two ways that all may look, take the one that most scans look already.
+    way = torch.sign(sum((s * sign).sum() for s, sign in zip(kept, signs)) + 0.5)
+    for scans, sign in zip(sampler.scans_of, signs * way):
+        rows = torch.from_numpy(scans)
+        anchors[rows] = _turn(anchors[rows], sign.expand(len(rows)))
     return anchors
+
+
+def _turn(rotation: Float[Tensor, "V 3 3"], sign: Float[Tensor, "V"]) -> Float[Tensor, "V 3 3"]:
+    """Those of sign -1 turned by a half turn about the canonical z."""
+    return torch.where(sign[:, None, None] < 0, rotation @ _HALF_TURN, rotation)
 
 
 def outline(cloud: Float[Tensor, "n 3"]) -> Float[Tensor, "bins"]:
@@ -94,7 +103,7 @@ def steady_signs(rotation: Float[Tensor, "V 3 3"]) -> Float[Tensor, "V"]:
 
 
 def _poses(
-    network: ShapePoseNet, sampler: ViewSampler, config: LossConfig, scans: Sequence[int]
+    network: ShapePoseNet, sampler: ViewSampler, config: LossConfig, scans: np.ndarray
 ) -> SE3:
     """`T_sensor_canonical` of scans as recorded, each under its own shape."""
     rng = np.random.default_rng(0)
@@ -112,14 +121,6 @@ def _poses(
         found.append((chosen.rotation[:, 0].cpu(), translation.cpu()))
     rotations, translations = zip(*found)
     return SE3(torch.cat(rotations), torch.cat(translations))
-
-
-def _steady(T_sensor_can: SE3) -> SE3:
-    """The same poses with no half turn between neighbours."""
-    turned = steady_signs(T_sensor_can.rotation) < 0
-    rotation = T_sensor_can.rotation
-    rotation = torch.where(turned[:, None, None], rotation @ _HALF_TURN, rotation)
-    return SE3(rotation, T_sensor_can.translation)
 
 
 def _fused(sampler: ViewSampler, scans: np.ndarray, T_sensor_can: SE3) -> Float[Tensor, "n 3"]:

@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Make the data and train the weights that the package ships.
+
+    python experiments/default_weights.py --cad CAD_FOLDER --out runs/default --steps 20000
+
+CAD_FOLDER holds `manifest.csv` (columns category, file, split) and the meshes it names; vehicles of
+split `train` are used, besides our own procedural ones. Without --cad only the latter.
+"""
+
+import csv
+import shutil
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import tyro
+
+from wildshape.io.provenance import provenance
+from wildshape.io.store import open_store
+from wildshape.io.store_writer import StoreWriter
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+from wildshape.training.loop import fit, setup
+from wildshape.training.recipes import PRESETS
+
+_VEHICLES = ("car", "truck", "bus")
+_SENSORS = ("hdl64", "hdl64", "hdl32", "os1-128")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to make the shipped weights.
+
+    Attributes:
+        out: folder of the run.
+        cad: folder of CAD meshes with a manifest.
+        tracks: simulated tracks, an eighth for each pair of sensor and source.
+        steps: gradient steps.
+        preset: of `wildshape train`.
+        seed: of data and training.
+        resume: go on with a run that was stopped.
+    """
+
+    out: Path
+    cad: Path | None = None
+    tracks: int = 1600
+    steps: int = 20_000
+    preset: str = "small"
+    seed: int = 0
+    resume: bool = False
+
+
+def train_meshes(cad: Path, into: Path, split: str = "train") -> Path:
+    """Copy the vehicles of a split to one folder."""
+    with (cad / "manifest.csv").open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["split"] == split]
+    for row in rows:
+        if row["category"] in _VEHICLES:
+            shutil.copy(cad / row["file"], into / row["file"].replace("/", "_"))
+    return into
+
+
+def make_data(settings: Settings, path: Path, meshes: Path | None) -> None:
+    """Write the store: every sensor, procedural and CAD vehicles, a third with ground left in."""
+    described = provenance(f"python experiments/default_weights.py {settings}")
+    sources = (None, meshes) if meshes is not None else (None,)
+    share = settings.tracks // (len(_SENSORS) * len(sources))
+    with StoreWriter(path, described) as store:
+        for index, sensor in enumerate(_SENSORS):
+            for source in sources:
+                seed = settings.seed + 100 * index + (50 if source else 0)
+                config = SimulationConfig(
+                    tracks=share, sensor=sensor, meshes=source, ground=index == 1, shape_points=512
+                )
+                for track in simulate_tracks(config, seed):
+                    name = f"{sensor}-{seed}-{track.name}"
+                    store.add(replace(track, name=name))
+
+
+def main(settings: Settings) -> None:
+    """Make the data if it is not there yet, then train."""
+    data = settings.out / "data"
+    settings.out.mkdir(parents=True, exist_ok=True)
+    if not data.exists():
+        with TemporaryDirectory() as folder:
+            meshes = train_meshes(settings.cad, Path(folder)) if settings.cad else None
+            make_data(settings, data, meshes)
+    recipe = PRESETS[settings.preset]()
+    recipe = replace(recipe, optim=replace(recipe.optim, steps=settings.steps))
+    run = setup(
+        recipe,
+        open_store(data),
+        settings.out,
+        seed=settings.seed,
+        resume=settings.resume,
+        provenance=provenance(f"python experiments/default_weights.py {settings}"),
+    )
+    fit(run, lambda step, values: print(step, values, flush=True))
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Settings))
