@@ -78,7 +78,7 @@ def run(settings: Settings) -> None:
     Raises:
         BadInputError: the user's data cannot be used, or a demo is there already.
     """
-    from wildshape.cli.demo_data import prepare
+    from wildshape.cli.demo_data import Wanted, prepare
     from wildshape.cli.demo_results import draw, evaluate, process, verdict
     from wildshape.cli.output import begin, unfinished
     from wildshape.cli.terminal import answer
@@ -87,7 +87,9 @@ def run(settings: Settings) -> None:
     overwrite = settings.overwrite or unfinished(settings.out, "demo")
     output = begin(settings.out, "demo", {}, FILES, overwrite=overwrite)
     agenda.next()
-    data = prepare(settings)
+    data = prepare(
+        Wanted(settings.out, settings.data, settings.unit, settings.tracks, settings.test_tracks)
+    )
     agenda.next(f" on {data.described}")
     models = {f"{settings.preset}, just trained": train(settings)}
     models |= shipped()

@@ -5,7 +5,6 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from wildshape.cli.options import Unit
 from wildshape.cli.packing import Written, write_tracks
@@ -19,19 +18,23 @@ _TRAIN_SEED, _TEST_SEED = 0, 1
 _FEW, _LEAST_TESTED, _LEAST_POINTS = 8, 3, 100
 
 
-class Wanted(Protocol):
-    """What the demo's settings say about data."""
+@dataclass(frozen=True)
+class Wanted:
+    """What the demo is asked for.
 
-    @property
-    def out(self) -> Path: ...  # noqa: D102
-    @property
-    def data(self) -> Path | None: ...  # noqa: D102
-    @property
-    def unit(self) -> Unit: ...  # noqa: D102
-    @property
-    def tracks(self) -> int: ...  # noqa: D102
-    @property
-    def test_tracks(self) -> int: ...  # noqa: D102
+    Attributes:
+        out: its folder.
+        data: the user's own tracks, if any.
+        unit: of their coordinates.
+        tracks: simulated to train on.
+        test_tracks: at most, never trained on.
+    """
+
+    out: Path
+    data: Path | None
+    unit: Unit
+    tracks: int
+    test_tracks: int
 
 
 @dataclass(frozen=True)

@@ -73,8 +73,9 @@ def run(settings: Settings) -> None:
 
     if settings.seeds < 1:
         raise BadInputError(f"--seeds {settings.seeds}: expected 1 or more.")
-    reading = Reading(settings.data, settings.unit)
     baselines = choose_baselines(settings.baselines)
+    reading = Reading(settings.data, settings.unit)
+    _check_truth(reading)
     models = load_models(settings.model, settings.device)
     output = begin(
         settings.out, "evaluate", _identity(settings), FILES, overwrite=settings.overwrite
@@ -87,7 +88,6 @@ def run(settings: Settings) -> None:
     ]
     if pooled:
         runs = _with_selected(runs, models)
-    _check(runs, settings.data)
     made = {**output.record["provenance"], "settings": output.record["settings"]}
     drawn = next(iter(evaluated[0].items()))
     table = write(settings.out, reading, runs, drawn, made, settings.max_scans)
@@ -213,11 +213,11 @@ def _with_selected(runs: "list[Results]", models: "dict[str, Predictor]") -> "li
     ]
 
 
-def _check(runs: "list[Results]", data: Path) -> None:
-    scored = any(m.completions or m.registrations for run in runs for m in run.methods)
-    if not scored:
+def _check_truth(reading: "Reading") -> None:
+    if all(track.T_sensor_object is None for _, track in reading.tracks()):
         raise BadInputError(
-            f"{data}: no track has true poses (poses.txt) to measure against; complete it instead."
+            f"{reading.source.path}: no track has true poses (poses.txt) to measure against;"
+            " complete it instead."
         )
 
 

@@ -36,6 +36,12 @@ class Output:
     record: dict[str, Any]
     resumed: bool = False
 
+    def abandon(self) -> None:
+        """Leave no trace of a command that was refused before it wrote anything."""
+        if [entry.name for entry in self.path.iterdir()] == [MARKER]:
+            (self.path / MARKER).unlink()
+            self.path.rmdir()
+
     def finish(self, **more: object) -> None:
         """Say that everything is there."""
         write_json(self.path / MARKER, {**self.record, **more, "status": "finished"})
@@ -120,6 +126,8 @@ def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: 
             f"{path}: holds the unfinished output of `{record.get('command')}` with other"
             " settings; repeat it as it was, pass --overwrite, or choose another --out."
         )
+    for leftover in path.rglob(".*.part"):  # of a process that was killed while writing
+        leftover.unlink()
     say(f"going on with the unfinished output in {path}")
     return True
 

@@ -101,7 +101,11 @@ def perform(work: Work, *, overwrite: bool, as_json: bool) -> None:
     reading = Reading(work.input, work.unit)
     predictor = load_model(work.model, work.device)
     output = begin(work.out, work.command, work.identity(), FILES, overwrite=overwrite)
-    tally = write_results(reading, predictor, output, registers=work.command == "register")
+    try:
+        tally = write_results(reading, predictor, output, registers=work.command == "register")
+    except BadInputError:
+        output.abandon()
+        raise
     output.finish(skipped=tally.skipped)
     _conclude(work, tally, reading, time.monotonic() - began, as_json)
 

@@ -23,26 +23,42 @@ class Pace:
     def __init__(self, seconds: float) -> None:
         self.seconds, self.planned = seconds, 0
         self.began = time.monotonic()
-        self._last = (0, self.began)
+        self._first: tuple[int, float] | None = None
 
     def adjust(self, run: Run) -> bool:
-        """Look at the clock; whether the number of steps was changed."""
+        """Look at the clock, every so many steps; whether the number of steps was changed."""
         step, now = run.state.step, time.monotonic()
+        if self._first is None:  # the first steps are slow: memory is being touched
+            self._first = (step, now)
         left = self.seconds - (now - self.began)
-        first = self.planned == 0
-        if first and step < _MEASURED_STEPS and left > self.seconds / 2:
+        if self.planned == 0 and step < _MEASURED_STEPS and left > self.seconds / 2:
             return False
-        if not first and step >= self.planned:
+        steps = step + max(1, round(left * self._rate(step, now)))
+        if self.planned and not self._worth_a_change(run, steps):
             return False
-        rate = (step - self._last[0]) / max(1e-9, now - self._last[1])
-        self._last = (step, now)
-        steps = step + max(1, round(left * rate))
-        drift = max(_DRIFT * (self.planned - step), _MEASURED_STEPS)
-        if not first and abs(steps - self.planned) <= drift:
-            return False
+        validate_every = run.recipe.validate_every if self.planned else steps // _VALIDATIONS
         self.planned = steps
-        _plan(run, steps, max(1, steps // _VALIDATIONS) if first else run.recipe.validate_every)
+        _plan(run, steps, max(1, validate_every))
         return True
+
+    def _rate(self, step: int, now: float) -> float:
+        """Steps a second since the first look."""
+        first_step, first = self._first or (0, self.began)
+        if step == first_step:
+            return step / max(1e-9, now - self.began)
+        return (step - first_step) / max(1e-9, now - first)
+
+    def _worth_a_change(self, run: Run, steps: int) -> bool:
+        """Whether the new number is another, and jumps no share of the run still to come."""
+        step = run.state.step
+        if step >= self.planned:
+            return False
+        jumps = any(
+            (int(share * self.planned) >= step) != (int(share * steps) >= step)
+            for share in run.recipe.loss.agree_at
+        )
+        drift = max(_DRIFT * (self.planned - step), _MEASURED_STEPS)
+        return not jumps and abs(steps - self.planned) > drift
 
 
 def _plan(run: Run, steps: int, validate_every: int) -> None:

@@ -72,7 +72,7 @@ def load_state(folder: Path, state: TrainState, identity: dict[str, str]) -> Non
         if moments:
             described["state"][index] = moments
     state.optimiser.load_state_dict(described)
-    state.step = step
+    state.step, state.anchors = step, tensors.get("anchors")
 
 
 def _under(tensors: dict[str, torch.Tensor], prefix: str) -> dict[str, torch.Tensor]:

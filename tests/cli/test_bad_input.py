@@ -1,0 +1,210 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Each line of DESIGN's table of bad input, at the command line."""
+
+import errno
+import json
+import shutil
+
+import numpy as np
+import pytest
+from safetensors import safe_open
+from safetensors.torch import load_file, save_file
+
+from wildshape.cli import results
+from wildshape.io.points import read_points, write_ply
+
+
+@pytest.fixture
+def scan(dataset):
+    return read_points(dataset / "000000" / "scans" / "000000.ply")
+
+
+@pytest.fixture
+def track(dataset, tmp_path):
+    return shutil.copytree(dataset / "000000", tmp_path / "track")
+
+
+def bad_scan(kind, scan):
+    cases = {
+        "empty": (scan[:0], "0 finite points"),
+        "fewer than 16": (scan[:15], "15 finite points"),
+        "all equal": (np.repeat(scan[:1], 100, 0), "all 100 points are equal"),
+        "millimetres": (1000 * scan, "--unit mm"),
+        "tiny": (scan / 1000, "at least"),
+    }
+    return cases[kind]
+
+
+@pytest.mark.parametrize("kind", ["empty", "fewer than 16", "all equal", "millimetres", "tiny"])
+def test_scan(refused, scan, trained, tmp_path, kind):
+    points, reason = bad_scan(kind, scan)
+    path = tmp_path / "bad.npy"
+    np.save(path, points)
+    said = refused("complete", path, "--out", tmp_path / "c", "--model", trained)
+    assert str(path) in said
+    assert reason in said
+    assert not (tmp_path / "c").exists() or not list((tmp_path / "c").glob("*/*"))
+
+
+def test_unit_cures(wildshape, scan, trained, tmp_path):
+    write_ply(tmp_path / "mm.ply", 1000 * scan)
+    out = tmp_path / "c"
+    found = wildshape(
+        "complete", tmp_path / "mm.ply", "--out", out, "--model", trained, "--unit", "mm"
+    )
+    assert found.code == 0
+    completed = read_points(out / "mm" / "completed" / "mm.ply")
+    assert np.linalg.norm(completed.mean(0) - scan.mean(0)) < 5.0
+
+
+def test_a_dataset_goes_on_without_bad_scans(wildshape, dataset, trained, tmp_path):
+    data = shutil.copytree(dataset, tmp_path / "data")
+    write_ply(data / "000000" / "scans" / "000001.ply", np.zeros((3, 3), np.float32))
+    for file in (data / "000002" / "scans").iterdir():
+        file.write_bytes(b"ply\n")
+    found = wildshape("complete", data, "--out", tmp_path / "c", "--model", trained, "--json")
+    assert found.code == 0
+    said = json.loads(found.out)
+    assert (said["tracks"], said["scans"]) == (5, 29)
+    what = {entry["what"] for entry in said["skipped"]}
+    assert {"000000/000001.ply", "000002"} <= what
+    assert "000000/000001.ply: " in found.err
+    objects = json.loads((tmp_path / "c" / "000000" / "objects.json").read_text())
+    assert [entry["scan"] for entry in objects["skipped"]] == ["000001.ply"]
+    assert len((tmp_path / "c" / "000000" / "poses.txt").read_text().splitlines()) == 5
+
+
+def test_points_that_are_not_finite_are_dropped_and_said_once(wildshape, scan, trained, tmp_path):
+    scan[:7] = np.nan
+    np.save(tmp_path / "nan.npy", scan)
+    found = wildshape("complete", tmp_path / "nan.npy", "--out", tmp_path / "c", "--model", trained)
+    assert found.code == 0
+    assert found.err.count("dropped 7 points") == 1
+
+
+@pytest.mark.parametrize(
+    ("header", "body"),
+    [
+        ("element vertex 1000000000\nproperty float x\nproperty float y\nproperty float z", 120),
+        ("element vertex 100\nproperty float x\nproperty float y\nproperty float z", 60),
+        ("element vertex 10\nproperty quad x\nproperty float y\nproperty float z", 120),
+        ("element vertex -5\nproperty float x\nproperty float y\nproperty float z", 120),
+    ],
+)
+def test_damaged_file(refused, trained, tmp_path, header, body):
+    path = tmp_path / "bad.ply"
+    text = f"ply\nformat binary_little_endian 1.0\n{header}\nend_header\n"
+    path.write_bytes(text.encode() + bytes(body))
+    assert str(path) in refused("complete", path, "--out", tmp_path / "c", "--model", trained)
+
+
+def test_poses(refused, track, trained, tmp_path):
+    command = ("complete", track, "--out", tmp_path / "c", "--model", trained)
+    lines = (track / "poses.txt").read_text().splitlines()
+    (track / "poses.txt").write_text("\n".join(lines[:-1]) + "\n")
+    assert str(track / "poses.txt") in refused(*command)
+    lines[2] = "2 0 0 1 0 2 0 1 0 0 2 1"
+    (track / "poses.txt").write_text("\n".join(lines) + "\n")
+    said = refused(*command)
+    assert "3" in said
+    assert "8" in said  # line and determinant
+
+
+def test_input_that_is_none(refused, trained, tmp_path):
+    out = ("--out", tmp_path / "c", "--model", trained)
+    assert "no such" in refused("complete", tmp_path / "nowhere.ply", *out)
+    (tmp_path / "empty").mkdir()
+    assert "empty" in refused("complete", tmp_path / "empty", *out)
+    assert "no such" in refused("evaluate", tmp_path / "nowhere", *out)
+    assert "no such" in refused("train", tmp_path / "nowhere", "--out", tmp_path / "run")
+    assert "no such" in refused("report", tmp_path / "nowhere")
+    (tmp_path / "text.doc").write_text("hello")
+    assert "text.doc" in refused("complete", tmp_path / "text.doc", *out)
+
+
+def test_evaluate_needs_truth(refused, track, trained, tmp_path):
+    (track / "poses.txt").unlink()
+    out = ("--out", tmp_path / "e", "--model", trained)
+    assert "true poses" in refused("evaluate", track, *out)
+    assert "global-icp" in refused("evaluate", track, *out, "--baselines", "global-icp")
+
+
+def test_checkpoint(refused, dataset, trained, tmp_path):
+    model = tmp_path / "bad.safetensors"
+    command = ("complete", dataset, "--out", tmp_path / "c", "--model", model)
+    assert "no such checkpoint" in refused(*command)
+    model.write_bytes(b"no tensors at all")
+    assert str(model) in refused(*command)
+    weights = load_file(trained / "model.safetensors")
+    with safe_open(trained / "model.safetensors", framework="pt") as file:
+        metadata = file.metadata()
+    save_file(weights, model, {**metadata, "version": "99"})
+    said = refused(*command)
+    assert "expected" in said
+    assert "99" in said
+    name = next(iter(weights))
+    save_file({k: v for k, v in weights.items() if k != name}, model, metadata)
+    assert name in refused(*command)
+    assert not (tmp_path / "c").exists()
+
+
+def test_output_that_exists(wildshape, refused, dataset, trained, tmp_path):
+    out = tmp_path / "c"
+    command = ("complete", dataset / "000000", "--out", out, "--model", trained)
+    assert wildshape(*command).code == 0
+    assert "--overwrite" in refused(*command)
+    (out / "notes.txt").write_text("mine")
+    assert wildshape(*command, "--overwrite").code == 0
+    assert (out / "notes.txt").read_text() == "mine"
+    foreign = tmp_path / "foreign"
+    foreign.mkdir()
+    (foreign / "thesis.tex").write_text("mine")
+    other = ("complete", dataset / "000000", "--out", foreign, "--model", trained)
+    assert "not written by this command" in refused(*other, "--overwrite")
+    assert "is a file" in refused(*command[:3], foreign / "thesis.tex", "--model", trained)
+    assert "exists" in refused("simulate", foreign, "--tracks", 1)
+
+
+def test_another_half_finished_output_is_not_mixed_in(refused, dataset, trained, tmp_path):
+    out = tmp_path / "c"
+    out.mkdir()
+    marker = {"command": "complete", "status": "running", "settings": {"input": "other"}}
+    (out / "wildshape.json").write_text(json.dumps(marker))
+    said = refused("complete", dataset, "--out", out, "--model", trained)
+    assert "unfinished output" in said
+
+
+def test_full_disk(wildshape, dataset, trained, tmp_path, monkeypatch):
+    def full(path, points):
+        if path.name == "000002.ply":
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        write_ply(path, points)
+
+    command = ("complete", dataset, "--out", tmp_path / "c", "--model", trained)
+    with monkeypatch.context() as patch:
+        patch.setattr(results, "write_ply", full)
+        found = wildshape(*command)
+    assert found.code == 1
+    assert "no space left" in found.err
+    assert found.err.count("\n") == 1
+    assert wildshape(*command).code == 0
+    assert len(list((tmp_path / "c").glob("*/completed/*.ply"))) == 36
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("simulate", "{out}", "--tracks", "0"),
+        ("simulate", "{out}", "--seed", "-1"),
+        ("simulate", "{out}", "--category", "chair"),
+        ("simulate", "{out}", "--meshes", "{out}/none"),
+        ("convert", "kitti-raw", "{out}/none", "{out}"),
+        ("convert", "nuscenes", "{out}/none", "{out}"),
+        ("train", "{store}", "--out", "{out}", "--steps", "0"),
+        ("train", "{store}", "--out", "{out}", "--preset", "paper-views"),
+        ("evaluate", "{store}", "--out", "{out}", "--seeds", "0"),
+    ],
+)
+def test_settings(refused, store, tmp_path, arguments):
+    refused(*(text.format(out=tmp_path / "out", store=store) for text in arguments))
