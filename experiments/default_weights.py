@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Make the data and train the weights that the package ships.
 
-    python experiments/default_weights.py --cad CAD_FOLDER --out runs/default --steps 20000
+    python experiments/default_weights.py --cad CAD_FOLDER --out runs/default --steps 22000
 
 CAD_FOLDER holds `manifest.csv` (columns category, file, split) and the meshes it names; vehicles of
 split `train` are used, besides our own procedural ones. Without --cad only the latter.
@@ -44,8 +44,8 @@ class Settings:
     out: Path
     cad: Path | None = None
     tracks: int = 1600
-    steps: int = 20_000
-    preset: str = "small"
+    steps: int = 22_000
+    preset: str = "default"
     seed: int = 0
     resume: bool = False
 
