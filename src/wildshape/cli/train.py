@@ -115,13 +115,15 @@ def fit_with_progress(
     from wildshape.training.loop import StopRequested, fit
 
     first, silent = run.state.step, not run.processes.leads
-    planned = 0 if adjust else run.recipe.optim.steps
-    with stop_flag() as stopped, progress("training", planned, silent=silent, start=first) as bar:
+    planned = None if adjust else run.recipe.optim.steps
+    with stop_flag() as stopped, progress("training", planned or 0, silent=silent, start=first) as bar:
 
         def report(step: int, values: dict[str, Any]) -> None:
+            nonlocal planned
             if adjust is not None and adjust(run):
-                say(f"training for {run.recipe.optim.steps} steps, which fit into the time")
-            bar.at(step, _line(values), total=run.recipe.optim.steps)
+                planned = run.recipe.optim.steps
+                say(f"training for {planned} steps, which fit into the time")
+            bar.at(step, _line(values), total=planned)
 
         try:
             return fit(run, report, stopped)
