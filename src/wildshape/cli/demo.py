@@ -36,7 +36,7 @@ class Settings:
 
     out: OutFolder = Path("demo")
     data: OwnData = None
-    seconds: Annotated[float, arg(metavar="S")] = 150.0
+    seconds: Annotated[float, arg(metavar="S")] = 165.0
     tracks: Annotated[int, arg(metavar="N")] = 200
     test_tracks: Annotated[int, arg(metavar="N")] = 12
     preset: Literal["small", "default", "tiny"] = "small"

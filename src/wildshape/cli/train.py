@@ -116,7 +116,10 @@ def fit_with_progress(
 
     first, silent = run.state.step, not run.processes.leads
     planned = None if adjust else run.recipe.optim.steps
-    with stop_flag() as stopped, progress("training", planned or 0, silent=silent, start=first) as bar:
+    with (
+        stop_flag() as stopped,
+        progress("training", planned or 0, silent=silent, start=first) as bar,
+    ):
 
         def report(step: int, values: dict[str, Any]) -> None:
             nonlocal planned
