@@ -93,7 +93,7 @@ def test_ctrl_c_ends_with_one_sentence(dataset, trained, tmp_path):
 
 def test_a_half_written_store_is_begun_again(wildshape, refused, tmp_path):
     out = tmp_path / "s.store"
-    arguments = ("simulate", out, "--tracks", 200, "--scans", 6, "--workers", 1)
+    arguments = ("simulate", out, "--tracks", 80, "--scans", 6, "--workers", 1)
     with running(*arguments) as process:
         wait_for(lambda: any(out.glob("points-*")), process)
         process.send_signal(signal.SIGKILL)

@@ -118,5 +118,6 @@ def _system_sentence(error: OSError) -> str:
 
 
 def _leave(sentence: str, code: int) -> None:
-    print(f"wildshape: {' '.join(sentence.split())}", file=sys.stderr, flush=True)
+    if os.environ.get("RANK", "0") == "0":  # of torchrun's processes one talks
+        print(f"wildshape: {' '.join(sentence.split())}", file=sys.stderr, flush=True)
     raise SystemExit(code)

@@ -38,7 +38,8 @@ class Settings:
     """Train a model on tracks, without labels; RUN/model.safetensors is the result.
 
     Ctrl-C and SIGTERM save the state; `--resume` then goes on to the same weights as a run that
-    was never stopped. Under `torchrun --nproc-per-node N` the processes train together.
+    was never stopped. Under `torchrun --nproc-per-node N -m wildshape.cli train ...` the
+    processes train together.
 
     Attributes:
         preset: sizes, losses and schedule.

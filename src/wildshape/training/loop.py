@@ -110,7 +110,7 @@ def fit(
     Args:
         run: set up.
         progress: called every 25 steps with the step and the means since the last call.
-        stopped: asked after every step.
+        stopped: asked after every step; with several processes, every 25 steps.
 
     Raises:
         StopRequested: `stopped` said so; the state is saved.
@@ -123,7 +123,7 @@ def fit(
             meter.add(_step(run, objective))
             step, steps = run.state.step, run.recipe.optim.steps
             due = step < steps and step % run.recipe.validate_every == 0
-            stop = step < steps and stopped()
+            stop = step < steps and _stop_asked(run, stopped)
             # Whatever is saved below, its loss is read before and refused if not finite.
             if due or stop or step % _LOG_EVERY == 0 or step == steps:
                 values = meter.read(step)
@@ -137,6 +137,13 @@ def fit(
         log.write(run.state.step, checkpoint(run))
     run.processes.leave()
     return run.folder / MODEL
+
+
+def _stop_asked(run: Run, stopped: Callable[[], bool]) -> bool:
+    """Several processes stop at the same step, or those left would wait for ever."""
+    if run.processes.count == 1:
+        return stopped()
+    return run.state.step % _LOG_EVERY == 0 and run.processes.any(stopped())
 
 
 def _save_and_stop(run: Run) -> None:

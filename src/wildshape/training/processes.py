@@ -35,6 +35,14 @@ class Processes:
         if self.count > 1:
             distributed.barrier()
 
+    def any(self, flag: bool) -> bool:
+        """Whether the flag is set in any process; all of them must ask."""
+        if self.count == 1:
+            return flag
+        found = torch.tensor(int(flag), device=self.device)
+        distributed.all_reduce(found, distributed.ReduceOp.MAX)
+        return bool(found.item())
+
     def leave(self) -> None:
         """Close the group."""
         if self.count > 1:
