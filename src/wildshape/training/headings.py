@@ -15,11 +15,16 @@ from jaxtyping import Float
 from torch import Tensor
 
 from wildshape.datasets.views import ViewSampler
+from wildshape.errors import BadInputError
 from wildshape.geometry.se3 import SE3
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.losses.multiview import LossConfig
 from wildshape.models.shapepose import ShapePoseNet
 
+NOT_FINITE = (
+    "training stopped: the loss is not finite; resume from the last checkpoint with a smaller"
+    " learning rate, or check the data's units."
+)
 _BATCH, _POINTS, _REFERENCES, _NEIGHBOURS = 64, 256, 300, 5
 _BINS, _FEWEST, _TOP = 16, 20, 0.95
 _HALF_TURN = torch.diag(torch.tensor((-1.0, -1.0, 1.0)))
@@ -35,7 +40,12 @@ def agree_on_headings(
         network: poses the scans.
         sampler: of the tracks trained on.
         config: decides which branch speaks.
+
+    Raises:
+        BadInputError: the network's weights are no longer finite.
     """
+    if not all(bool(torch.isfinite(p).all()) for p in network.parameters()):
+        raise BadInputError(NOT_FINITE)
     anchors = torch.zeros(len(sampler.store.scan_sizes), 3, 3)
     outlines, kept = [], []
     for scans in sampler.scans_of:
@@ -47,7 +57,8 @@ def agree_on_headings(
         kept.append(steady)
     signs = agreed_signs(torch.stack(outlines))
     # Of the two ways that all may look, take the one that most scans look already.
-    way = torch.sign(sum((s * sign).sum() for s, sign in zip(kept, signs)) + 0.5)
+    looks = torch.stack([(s * sign).sum() for s, sign in zip(kept, signs)]).sum()
+    way = torch.where(looks < 0, -1.0, 1.0)
     for scans, sign in zip(sampler.scans_of, signs * way):
         rows = torch.from_numpy(scans)
         anchors[rows] = _turn(anchors[rows], sign.expand(len(rows)))

@@ -7,7 +7,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ from wildshape.training.objectives import Objective, WeaklySupervised
 from wildshape.training.processes import Processes, join
 from wildshape.training.schedule import learning_rate, template_weight
 from wildshape.training.state import STATE, TrainState, load_state, save_state
-from wildshape.training.validate import Validation, validate
+from wildshape.training.validate import Validation, truth_figures, validate
 
 MODEL = "model.safetensors"
 _HELD_OUT, _VALIDATION_BATCHES, _LOG_EVERY = 20, 8, 25
@@ -46,6 +46,7 @@ class Run:
     state: TrainState
     sampler: ViewSampler
     held_out: ViewSampler
+    held_tracks: np.ndarray
     identity: dict[str, str]
     provenance: dict[str, Any]
 
@@ -89,7 +90,9 @@ def setup(
     sampler = ViewSampler(store, fit_tracks, recipe.views)
     held_out = ViewSampler(store, held_tracks, recipe.views)
     described = {"recipe": asdict(recipe), "identity": identity, **(provenance or {})}
-    run = Run(recipe, seed, folder, processes, state, sampler, held_out, identity, described)
+    run = Run(
+        recipe, seed, folder, processes, state, sampler, held_out, held_tracks, identity, described
+    )
     if processes.leads:
         (folder / "run.json").write_text(json.dumps(described, indent=1, default=str))
     return run
@@ -192,8 +195,8 @@ def _agree_if_due(run: Run) -> None:
 def _average(state: TrainState, decay: float) -> None:
     """Running mean of the weights, young at first."""
     keep = min(decay, (1 + state.step) / (10 + state.step))
-    mean, now = list(state.mean.parameters()), list(state.network.parameters())
-    torch._foreach_lerp_(mean, now, 1 - keep)
+    for mean, now in zip(state.mean.parameters(), state.network.parameters()):
+        mean.lerp_(now, 1 - keep)
 
 
 def checkpoint(run: Run) -> dict[str, Any]:
@@ -208,10 +211,15 @@ def checkpoint(run: Run) -> dict[str, Any]:
     device = run.processes.device.type
     found = validate(run.state.mean, run.held_out, run.recipe.loss, _VALIDATION_BATCHES, device)
     _refuse_not_finite(found.observation, run.state.step)
-    save_checkpoint(run.folder / MODEL, run.state.mean, model_settings(run, found))
+    settings = model_settings(run, found)
+    truth = truth_figures(
+        run.state.mean, settings, run.sampler.store, run.held_tracks, run.recipe.views.turn
+    )
+    settings = replace(settings, metrics=settings.metrics | truth)
+    save_checkpoint(run.folder / MODEL, run.state.mean, settings)
     save_state(run.folder, run.state, run.identity)
     run.processes.wait()
-    return {f"validation/{k}": v for k, v in asdict(found).items()}
+    return {f"validation/{name}": value for name, value in settings.metrics.items()}
 
 
 def model_settings(run: Run, found: Validation) -> ModelSettings:

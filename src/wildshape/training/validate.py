@@ -1,20 +1,31 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Held-out figures without any truth: both loss terms, and cycle consistency over a track."""
+"""Held-out figures: the loss terms and cycle consistency without truth, and with it if there is."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from wildshape.datasets.views import Batch, ViewSampler
+from wildshape.evaluation import protocol
+from wildshape.evaluation.results import figures_of
 from wildshape.geometry.centring import scan_centre
 from wildshape.geometry.se3 import SE3
+from wildshape.inference.method import Learned
+from wildshape.inference.predictor import Predictor
+from wildshape.io.store import Store
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.losses.multiview import LossConfig, multiview_loss
+from wildshape.models.checkpoint import ModelSettings
 from wildshape.models.shapepose import Poses, ShapePoseNet
 
 _SEED = 20_200_823
+_TRUTH_TRACKS, _TRUTH_SCANS = 8, 6
+_TRUTH = ("cd", "acc30", "rot_median_deg", "trans_median_m")
 
 
 @dataclass(frozen=True)
@@ -35,6 +46,37 @@ class Validation:
     cost_median: float
     cost_p90: float
     cycle_deg: float
+
+
+def truth_figures(
+    network: ShapePoseNet,
+    settings: ModelSettings,
+    store: Store,
+    tracks: Sequence[int] | np.ndarray,
+    turn: Literal["none", "yaw", "so3"],
+) -> dict[str, float]:
+    """Registration and completion of held-out tracks against their truth, where they have it.
+
+    A view on the run for those who look; nothing is chosen by it.
+
+    Args:
+        network: in evaluation.
+        settings: of the checkpoint.
+        store: holds the tracks.
+        tracks: indices; the first few that have poses are used.
+        turn: rotation protocol of METHOD 8, that of training.
+    """
+    known = [int(t) for t in tracks if store.poses_of(int(t)) is not None][:_TRUTH_TRACKS]
+    if not known:
+        return {}
+    method = {"held out": Learned(Predictor(network, settings))}
+    found = protocol.run(
+        method, (store.track(t) for t in known), turn, _SEED, max_scans=_TRUTH_SCANS
+    )
+    figures = figures_of(found["held out"])
+    return {
+        f"truth_{name}": float(value) for name in _TRUTH if (value := figures[name]) is not None
+    }
 
 
 @torch.no_grad()
