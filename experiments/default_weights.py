@@ -19,10 +19,12 @@ import tyro
 from wildshape.io.provenance import provenance
 from wildshape.io.store import open_store
 from wildshape.io.store_writer import StoreWriter
+from wildshape.models.checkpoint import load_checkpoint, save_checkpoint
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.loop import fit, setup
 from wildshape.training.recipes import PRESETS
 
+STEPS = 22_000
 _VEHICLES = ("car", "truck", "bus")
 _SENSORS = ("hdl64", "hdl64", "hdl32", "os1-128")
 
@@ -44,7 +46,7 @@ class Settings:
     out: Path
     cad: Path | None = None
     tracks: int = 1600
-    steps: int = 22_000
+    steps: int = STEPS
     preset: str = "default"
     seed: int = 0
     resume: bool = False
@@ -95,7 +97,16 @@ def main(settings: Settings) -> None:
         resume=settings.resume,
         provenance=provenance(f"python experiments/default_weights.py {settings}"),
     )
-    fit(run, lambda step, values: print(step, values, flush=True))
+    model = fit(run, lambda step, values: print(step, values, flush=True))
+    ship(model, settings.out / "default.safetensors")
+
+
+def ship(model: Path, out: Path) -> None:
+    """The same checkpoint in half precision, as the package carries it."""
+    network, found = load_checkpoint(model)
+    command = f"python experiments/default_weights.py --cad CAD --out RUN --steps {STEPS}"
+    described = replace(found, provenance=found.provenance | {"command": command})
+    save_checkpoint(out, network, described, half=True)
 
 
 if __name__ == "__main__":

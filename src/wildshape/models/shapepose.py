@@ -9,6 +9,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from wildshape.errors import BadInputError
 from wildshape.models.heads import PoseDecoder, ShapeDecoder
 from wildshape.models.pcn import PCNEncoder
 from wildshape.models.pcn_winners import encode_winners
@@ -43,6 +44,13 @@ class NetworkConfig:
     mirror: bool = False
     start: tuple[float, float, float] = (0.5, 0.5, 0.5)
     scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse what would silently give another number of points."""
+        if self.mirror and self.points % 2:
+            raise BadInputError(
+                f"a mirrored shape needs an even number of points, not {self.points}"
+            )
 
 
 class Poses(NamedTuple):

@@ -30,7 +30,7 @@ _COLUMNS = (
     ("acc ≤ 30° sym, %", "acc30_sym", 100, 1),
     ("rotation sym, °", "rot_sym_median_deg", 1, 1),
 )
-_BASELINES = ("identity", "local-icp", "global-icp")
+_BASELINES = ("identity", "one-scan", "local-icp", "global-icp")
 _VALIDATION = "validation/"
 
 

@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The README's picture: the first three simulated cars of a seed, by the shipped weights.
+
+python experiments/readme_picture.py docs/picture.webp
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from wildshape.inference.predictor import load
+from wildshape.report.parts import track_object
+from wildshape.report.picture import write_picture
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Draw simulated cars that no training has seen.
+
+    Attributes:
+        out: .webp, .gif or .png.
+        model: checkpoint; by default the shipped weights.
+        seed: of the cars.
+    """
+
+    out: Annotated[Path, tyro.conf.Positional]
+    model: Path | None = None
+    seed: int = 77
+
+
+def main(settings: Settings) -> None:
+    model = load(settings.model)
+    objects = []
+    for track in simulate_tracks(SimulationConfig(tracks=3), seed=settings.seed):
+        done = model.complete(track.scans[track.middle], track.sensor)
+        T_middle_scan = model.register_track(track.scans, track.sensor)
+        objects.append(
+            track_object(track, completed=done.points, box=done.box, T_middle_scan=T_middle_scan)
+        )
+    write_picture(objects, settings.out)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Settings))
