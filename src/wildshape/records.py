@@ -79,12 +79,12 @@ class Box:
     """An oriented box in the sensor frame.
 
     Attributes:
-        center: `(3,)` metres.
+        centre: `(3,)` metres.
         size: `(3,)` full lengths along the box's own x (forward), y (left), z (up), metres.
         quaternion_wxyz: `(4,)` rotation from box to sensor frame.
     """
 
-    center: tuple[float, float, float]
+    centre: tuple[float, float, float]
     size: tuple[float, float, float]
     quaternion_wxyz: tuple[float, float, float, float]
 
@@ -125,8 +125,10 @@ class Registration:
         inlier_ratio: share of moved source points within 0.2 m (or 5 % of the object's extent
             where that is less) of a target point.
         confidence: 0 to 1, the smaller of the two completions'.
+        warning: empty, or one sentence (see `Completion.warning`).
     """
 
     T_target_source: SE3
     inlier_ratio: float
     confidence: float
+    warning: str = ""

@@ -204,7 +204,68 @@ def test_full_disk(wildshape, dataset, trained, tmp_path, monkeypatch):
         ("train", "{store}", "--out", "{out}", "--steps", "0"),
         ("train", "{store}", "--out", "{out}", "--preset", "paper-views"),
         ("evaluate", "{store}", "--out", "{out}", "--seeds", "0"),
+        ("evaluate", "{store}", "--out", "{out}", "--max-scans", "0"),
     ],
 )
 def test_settings(refused, store, tmp_path, arguments):
     refused(*(text.format(out=tmp_path / "out", store=store) for text in arguments))
+
+
+def test_a_refused_command_leaves_nothing_behind(wildshape, refused, dataset, tmp_path):
+    bad, out = tmp_path / "bad", tmp_path / "out"
+    bad.mkdir()
+    (bad / "scan.ply").write_bytes(b"ply")
+    for again in (
+        ("convert", "folder", "{}", out),
+        ("convert", "folder", "{}", out, "--layout", "folders"),
+        ("train", "{}", "--out", out, "--preset", "tiny", "--steps", 1),
+    ):
+        refused(*(str(word).format(bad) for word in again))
+        assert not out.exists()
+        assert wildshape(*(str(word).format(dataset) for word in again)).code == 0
+        shutil.rmtree(out)
+
+
+def test_the_input_is_never_overwritten(refused, dataset, store, trained, tmp_path):
+    data = shutil.copytree(dataset, tmp_path / "data")
+    packed = shutil.copytree(store, tmp_path / "packed")
+    before = sorted(tmp_path.rglob("*"))
+    for command in (
+        ("complete", data, "--out", data, "--model", trained),
+        ("complete", data / "000000", "--out", data, "--model", trained),
+        ("evaluate", data, "--out", data, "--model", trained),
+        ("train", data, "--out", data),
+        ("convert", "folder", data, data, "--layout", "folders"),
+        ("convert", "packed", packed, packed),
+    ):
+        assert "holds the input" in refused(*command, "--overwrite")
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_folder_that_cannot_be_written(refused, dataset, trained, tmp_path):
+    (tmp_path / "file").write_text("mine")
+    out = ("--out", tmp_path / "file" / "c", "--model", trained)
+    assert "check the path" in refused("complete", dataset, *out)
+
+
+def test_control_characters_of_a_file_do_not_reach_the_terminal(refused, trained, tmp_path):
+    path = tmp_path / "bad.pcd"
+    path.write_bytes(b"\x1b[2J\x07 VERSION")
+    said = refused("complete", path, "--out", tmp_path / "c", "--model", trained)
+    assert "\x1b" not in said
+
+
+def test_what_the_model_was_not_made_for_is_said(wildshape, dataset, trained, tmp_path):
+    scans = dataset / "000000" / "scans"
+    for i in range(2):
+        write_ply(tmp_path / "big" / f"{i}.ply", 8 * read_points(scans / f"00000{i}.ply"))
+    big = tmp_path / "big"
+    model = ("--model", trained)
+    found = wildshape("complete", big, "--out", tmp_path / "c", *model, "--json")
+    assert json.loads(found.out)["flagged"] == 2
+    objects = json.loads((tmp_path / "c" / "big" / "objects.json").read_text())
+    assert [scan["confidence"] for scan in objects["scans"]] == [0.0, 0.0]
+    assert "outside" in wildshape("fuse", big, "--out", tmp_path / "f.ply", *model).err
+    pair = wildshape("register", big / "0.ply", big / "1.ply", *model, "--json")
+    assert "outside" in pair.err
+    assert json.loads(pair.out)["confidence"] == 0.0

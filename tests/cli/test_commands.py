@@ -57,7 +57,7 @@ def check_entry(entry, shape, T_sensor_canonical):
     w, x, y, z = box["quaternion_wxyz"]
     assert abs(w * w + x * x + y * y + z * z - 1) < 1e-4
     R = rotation(w, x, y, z)
-    inside = np.abs((shape - box["center"]) @ R) <= np.asarray(box["size"]) / 2 + 1e-3
+    inside = np.abs((shape - box["centre"]) @ R) <= np.asarray(box["size"]) / 2 + 1e-3
     assert inside.all(1).mean() > 0.9
     assert 0 <= entry["confidence"] <= 1
     assert entry["seconds"] > 0

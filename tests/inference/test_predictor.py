@@ -48,7 +48,7 @@ def scan(seed=0, count=200):
 def assert_same(a, b, atol=2e-4):
     np.testing.assert_allclose(a.points, b.points, atol=atol)
     torch.testing.assert_close(a.pose.matrix, b.pose.matrix, atol=atol, rtol=0)
-    np.testing.assert_allclose(a.box.center, b.box.center, atol=atol)
+    np.testing.assert_allclose(a.box.centre, b.box.centre, atol=atol)
     assert a.branch == b.branch
     assert a.cost == pytest.approx(b.cost, abs=atol)
     assert a.confidence == pytest.approx(b.confidence, abs=atol)
@@ -136,7 +136,7 @@ def _only_branch(network, k):
 def test_box_holds_the_points_and_is_tight(predictor):
     done = predictor.complete(scan())
     R = rotation_from_quaternion(torch.tensor(done.box.quaternion_wxyz).double()).numpy()
-    local = (done.points - np.array(done.box.center)) @ R
+    local = (done.points - np.array(done.box.centre)) @ R
     half = np.array(done.box.size) / 2
     outside = (np.abs(local) > half + 1e-3).any(1).mean()
     assert outside <= 6 * 0.005
@@ -152,7 +152,7 @@ def test_what_comes_out_moves_with_the_scan(predictor):
     offset = np.array([4.0, -2.0, 8.0], np.float32)
     here, there = single.complete(scan()), single.complete(scan() + offset)
     np.testing.assert_allclose(there.points, here.points + offset, atol=1e-4)
-    np.testing.assert_allclose(there.box.center, here.box.center + offset, atol=0.1)
+    np.testing.assert_allclose(there.box.centre, here.box.centre + offset, atol=0.1)
     moved = there.pose.translation - here.pose.translation
     np.testing.assert_allclose(moved, offset, atol=1e-4)
     middle = (scan().min(0) + scan().max(0)) / 2

@@ -120,3 +120,20 @@ def test_unit(dataset: Path, tmp_path: Path, cloud: np.ndarray) -> None:
     np.testing.assert_allclose(open_tracks(tmp_path / "a.xyz", "mm")[0].scans[0], cloud, rtol=1e-6)
     with pytest.raises(BadInputError, match="--unit mm"):
         open_tracks(tmp_path / "a.xyz")[0]
+
+
+def test_links_to_one_track_are_two_tracks(dataset: Path) -> None:
+    links = dataset.parent / "links"
+    links.mkdir()
+    for name in ("first", "second"):
+        (links / name).symlink_to(dataset / "a")
+    assert [track.name for track in open_tracks(links)] == ["first", "second"]
+
+
+def test_one_scan_of_a_track_has_its_unit_and_sensor(dataset: Path) -> None:
+    scan = dataset / "a" / "scans" / "000011.ply"
+    (before,) = open_tracks(scan)
+    (dataset / "a" / "track.json").write_text('{"unit": "cm", "sensor": "camera"}')
+    (after,) = open_tracks(scan)
+    assert after.sensor.kind == "camera"
+    np.testing.assert_allclose(after.scans[0], before.scans[0] / 100, rtol=1e-5)

@@ -41,7 +41,7 @@ def _completed(folder: Path, track: Track, objects: object) -> None:
 
 
 def _entry(name: str) -> dict:
-    box = {"center": [11, 3, 0], "size": [4, 1.8, 1.4], "quaternion_wxyz": [1, 0, 0, 0]}
+    box = {"centre": [11, 3, 0], "size": [4, 1.8, 1.4], "quaternion_wxyz": [1, 0, 0, 0]}
     return {"scan": name, "box": box, "confidence": 0.75, "refined": True, "seconds": 0.02}
 
 

@@ -90,4 +90,4 @@ def test_completions_lie_on_the_scans_and_have_the_size_of_cars(overfitted, cars
         assert 0.7 < done.box.size[0] / size[0] < 1.3
         assert 0.6 < done.box.size[1] / size[1] < 1.5
         centre = track.T_sensor_object[track.middle].translation.numpy()
-        assert math.dist(done.box.center, centre) < 1.0
+        assert math.dist(done.box.centre, centre) < 1.0

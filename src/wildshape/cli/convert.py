@@ -56,6 +56,7 @@ def run(settings: Settings) -> None:
     Raises:
         BadInputError: an unknown source, files that are missing or damaged, an existing output.
     """
+    from wildshape.cli.output import keep_apart
     from wildshape.cli.packing import write_tracks
     from wildshape.cli.terminal import answer, duration, progress, say
 
@@ -65,6 +66,7 @@ def run(settings: Settings) -> None:
             f"'{settings.source}' is no source that can be converted; there are"
             f" {', '.join(SOURCES)}."
         )
+    keep_apart(settings.root, settings.out)
     source, total = SOURCES[settings.source](settings)
     with progress(f"converting {settings.source}", total) as bar:
         written = write_tracks(

@@ -67,16 +67,19 @@ def run(settings: Settings) -> None:
     Raises:
         BadInputError: data, models or settings that cannot be used; nothing with truth.
     """
-    from wildshape.cli.output import begin
+    from wildshape.cli.output import begin, keep_apart
     from wildshape.cli.reading import Reading
     from wildshape.cli.terminal import answer, say_skipped
 
     if settings.seeds < 1:
         raise BadInputError(f"--seeds {settings.seeds}: expected 1 or more.")
+    if settings.max_scans is not None and settings.max_scans < 1:
+        raise BadInputError(f"--max-scans {settings.max_scans}: expected 1 or more.")
     baselines = choose_baselines(settings.baselines)
     reading = Reading(settings.data, settings.unit)
     _check_truth(reading)
     models = load_models(settings.model, settings.device)
+    keep_apart(settings.data, settings.out)
     output = begin(
         settings.out, "evaluate", _identity(settings), FILES, overwrite=settings.overwrite
     )

@@ -43,22 +43,30 @@ def run(settings: Settings) -> None:
     from wildshape.cli.models import load_model
     from wildshape.cli.output import refuse_file
     from wildshape.cli.reading import Reading
-    from wildshape.cli.terminal import answer, say_skipped
+    from wildshape.cli.terminal import answer, say, say_skipped
+    from wildshape.geometry.se3 import stack
+    from wildshape.inference.predictor import fuse_scans, to_middle
 
     if settings.out.suffix.lower() not in _SUFFIXES:
         raise BadInputError(f"{settings.out}: give --out one of {', '.join(_SUFFIXES)}.")
     refuse_file(settings.out, overwrite=settings.overwrite)
     reading = Reading(settings.track, settings.unit)
     track = reading.single("fuse")
-    fused = load_model(settings.model, settings.device).fuse(track.scans, track.sensor)
+    predictor = load_model(settings.model, settings.device)
+    done = list(predictor.complete_many(track.scans, track.sensor))
+    fused = fuse_scans(track.scans, to_middle(stack([scan.pose for scan in done])))
     write_cloud(settings.out, fused)
     say_skipped(reading.skipped)
+    warnings = [scan.warning for scan in done if scan.warning]
+    if warnings:
+        say(f"{len(warnings)} scans are flagged, do not trust the result: {warnings[0]}")
     middle = track.scan_names[track.middle]
     text = (
         f"fused {len(track.scans)} scans, {len(fused)} points, in the frame of scan {middle};"
         f" see {settings.out}"
     )
     data = {"out": str(settings.out), "points": len(fused), "scans": len(track.scans)}
+    data |= {"flagged": len(warnings)}
     answer(text, {**data, "middle_scan": middle}, as_json=settings.json)
 
 

@@ -114,10 +114,14 @@ def _stopped() -> str:
 def _system_sentence(error: OSError) -> str:
     place = f"{error.filename}: " if error.filename else ""
     reason = (error.strerror or str(error)).lower()
+    if error.errno not in _NO_ROOM:
+        return f"{place}{reason}; check the path and its permissions."
     return f"{place}{reason}; what is finished stays valid, and the same command goes on from it."
 
 
 def _leave(sentence: str, code: int) -> None:
+    from wildshape.cli.terminal import say
+
     if os.environ.get("RANK", "0") == "0":  # of torchrun's processes one talks
-        print(f"wildshape: {' '.join(sentence.split())}", file=sys.stderr, flush=True)
+        say(f"wildshape: {' '.join(sentence.split())}")
     raise SystemExit(code)

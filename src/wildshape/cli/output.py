@@ -84,6 +84,17 @@ def begin(
     return Output(path, record, resumed)
 
 
+def keep_apart(source: Path, out: Path) -> None:
+    """Refuse to read from what is written: `--overwrite` would remove the input.
+
+    Raises:
+        BadInputError: the input is the output folder or lies in it.
+    """
+    source, target = source.resolve(), out.resolve()
+    if target == source or target in source.parents:
+        raise BadInputError(f"{out}: holds the input {source}; choose another place to write.")
+
+
 def unfinished(path: Path, command: str) -> bool:
     """Whether an interrupted run of a command left its output here."""
     if not (path / MARKER).is_file():

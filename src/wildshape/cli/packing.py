@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -82,10 +83,19 @@ def _packed(
     again = _half_written(out, made)
     if again:
         say(f"beginning the half-written store {out} again")
+    first, tracks = _first(tracks)
+    if not first:
+        return  # nothing half-written stays behind
     with StoreWriter(out, made, overwrite=overwrite or again) as writer:
-        for track in tracks:
+        for track in chain(first, tracks):
             writer.add(track)
             yield track
+
+
+def _first(tracks: Iterable[Track]) -> tuple[list[Track], Iterator[Track]]:
+    """The first track, if there is one, and an iterator over the others."""
+    rest = iter(tracks)
+    return list(islice(rest, 1)), rest
 
 
 def _half_written(out: Path, made: dict[str, Any]) -> bool:
@@ -107,7 +117,14 @@ def _folders(
     output = begin(out, command, settings, FILES, overwrite=overwrite)
     unfinished = out / _UNFINISHED
     shutil.rmtree(unfinished, ignore_errors=True)
-    for track in tracks:
+    try:
+        first, tracks = _first(tracks)
+    except BadInputError:
+        output.abandon()
+        raise
+    if not first:
+        return output.abandon()
+    for track in chain(first, tracks):
         folder = out / file_name(track.name)
         if not folder.exists():
             write_track(unfinished / track.name, track)

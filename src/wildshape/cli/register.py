@@ -75,7 +75,7 @@ def _tracks(settings: Settings, out: Path) -> None:
 
 def _pair(settings: Settings, target: Path) -> None:
     from wildshape.cli.models import load_model
-    from wildshape.cli.terminal import answer
+    from wildshape.cli.terminal import answer, say
 
     scans = [_scan(path, settings) for path in (settings.source, target)]
     found = load_model(settings.model, settings.device).register(*scans)
@@ -86,7 +86,10 @@ def _pair(settings: Settings, target: Path) -> None:
         "T_target_source": matrix,
         "inlier_ratio": found.inlier_ratio,
         "confidence": found.confidence,
+        "warning": found.warning,
     }
+    if found.warning:
+        say(found.warning)
     answer("\n".join(("T_target_source", *lines, shares)), data, as_json=settings.json)
 
 

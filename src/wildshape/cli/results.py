@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from wildshape.cli.models import fingerprint, load_model
 from wildshape.cli.options import Device, Unit
-from wildshape.cli.output import Output, begin
+from wildshape.cli.output import Output, begin, keep_apart
 from wildshape.cli.reading import Reading
 from wildshape.cli.terminal import answer, duration, progress, say, say_skipped
 from wildshape.errors import BadInputError
@@ -100,6 +100,7 @@ def perform(work: Work, *, overwrite: bool, as_json: bool) -> None:
     began = time.monotonic()
     reading = Reading(work.input, work.unit)
     predictor = load_model(work.model, work.device)
+    keep_apart(work.input, work.out)
     output = begin(work.out, work.command, work.identity(), FILES, overwrite=overwrite)
     try:
         tally = write_results(reading, predictor, output, registers=work.command == "register")
@@ -128,6 +129,7 @@ def _conclude(work: Work, tally: Tally, reading: Reading, seconds: float, as_jso
         "tracks_finished_before": tally.kept,
         "scans": tally.scans,
         "skipped": [{"what": what, "reason": reason} for what, reason in tally.skipped],
+        "flagged": tally.flagged,
         "seconds": round(seconds, 3),
     }
     answer(text, data, as_json=as_json)

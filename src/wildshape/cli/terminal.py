@@ -15,7 +15,12 @@ _LISTED = 20
 
 def say(text: str) -> None:
     """A message for people."""
-    print(text, file=sys.stderr, flush=True)
+    print(printable(text), file=sys.stderr, flush=True)
+
+
+def printable(text: str) -> str:
+    """Text without control characters, which a damaged file could send to the terminal."""
+    return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
 def answer(text: str, data: Mapping[str, Any], *, as_json: bool) -> None:

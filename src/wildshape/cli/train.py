@@ -16,6 +16,7 @@ from wildshape.errors import BadInputError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from wildshape.cli.output import Output
     from wildshape.io.store import Store
     from wildshape.training.config import Recipe
     from wildshape.training.loop import Run
@@ -46,6 +47,7 @@ class Settings:
         steps: gradient steps instead of the preset's; the schedule is stretched to them.
         seed: of weights and batches.
         resume: go on with RUN; a finished one is left as it is.
+        start: fine-tune these weights, a checkpoint of the same preset or `shipped`.
     """
 
     data: Data
@@ -54,6 +56,7 @@ class Settings:
     steps: Annotated[int | None, arg(metavar="N")] = None
     seed: Annotated[int, arg(metavar="S")] = 0
     resume: bool = False
+    start: Annotated[str | None, arg(metavar="M")] = None
     device: Device = "auto"
     unit: Unit = "m"
     overwrite: Overwrite = False
@@ -75,9 +78,14 @@ def run(settings: Settings) -> None:
     if settings.seed < 0:
         raise BadInputError(f"--seed {settings.seed}: expected 0 or more.")
     device = choose_device(settings.device)
-    _check_folder(settings)
-    store = open_data(settings)
-    recipe = recipe_for(store, settings.preset, settings.steps)
+    output = _check_folder(settings)
+    try:
+        store = open_data(settings)
+        recipe = recipe_for(store, settings.preset, settings.steps)
+    except BadInputError:
+        if output is not None:
+            output.abandon()
+        raise
     made = {**provenance(command_line()), "data": str(settings.data)}
     prepared = setup(
         recipe,
@@ -86,6 +94,7 @@ def run(settings: Settings) -> None:
         seed=settings.seed,
         device=device,
         resume=settings.resume,
+        start=_start(settings.start),
         provenance=made,
     )
     began, first = time.monotonic(), prepared.state.step
@@ -96,6 +105,15 @@ def run(settings: Settings) -> None:
     text = f"trained {prepared.state.step - first} steps"
     _conclude(settings, prepared, time.monotonic() - began, text)
     assert model.is_file() or not prepared.processes.leads
+
+
+def _start(model: str | None) -> Path | None:
+    """The checkpoint to fine-tune."""
+    from wildshape.cli.models import model_file
+
+    if model is None:
+        return None
+    return model_file(None if model == "shipped" else Path(model))
 
 
 def fit_with_progress(
@@ -198,14 +216,15 @@ def recipe_for(store: "Store", preset: str, steps: int | None) -> "Recipe":
     return replace(recipe, optim=replace(recipe.optim, steps=steps))
 
 
-def _check_folder(settings: Settings) -> None:
-    """The marker of the run; processes that do not lead leave the folder alone."""
-    from wildshape.cli.output import MARKER, begin
+def _check_folder(settings: Settings) -> "Output | None":
+    """The marker of a new run; processes that do not lead leave the folder alone."""
+    from wildshape.cli.output import MARKER, begin, keep_apart
 
     if int(os.environ.get("RANK", "0")) > 0:
-        return
+        return None
     if settings.resume and (settings.out / MARKER).is_file():
-        return
+        return None
+    keep_apart(settings.data, settings.out)
     began = settings.out.is_dir() and any(settings.out.iterdir())
     if began and not settings.overwrite:
         raise BadInputError(
@@ -213,7 +232,7 @@ def _check_folder(settings: Settings) -> None:
             " to replace it, or choose another --out."
         )
     identity = {name: str(getattr(settings, name)) for name in ("data", "preset", "steps", "seed")}
-    begin(settings.out, "train", identity, _FILES, overwrite=settings.overwrite)
+    return begin(settings.out, "train", identity, _FILES, overwrite=settings.overwrite)
 
 
 def _flag(settings: Settings) -> str:

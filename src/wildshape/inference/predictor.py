@@ -73,7 +73,8 @@ class Predictor:
         T_target_source = done_target.pose @ done_source.pose.inverse()
         ratio = inlier_ratio(T_target_source, *pair)
         confidence = min(done_source.confidence, done_target.confidence)
-        return Registration(T_target_source, ratio, confidence)
+        warning = done_source.warning or done_target.warning
+        return Registration(T_target_source, ratio, confidence, warning)
 
     def register_track(self, scans: Sequence[object], sensor: Sensor | None = None) -> SE3:
         """`T_middle_scan`: every scan to the frame of the track's middle scan."""

@@ -40,6 +40,11 @@ def read_npy(path: Path) -> Float[np.ndarray, "n 3"]:
     Raises:
         BadInputError: another shape or type, or a header that promises more than the file holds.
     """
+    with path.open("rb") as file:
+        if file.read(6) != b"\x93NUMPY":
+            raise BadInputError(
+                f"{path}: expected a numpy array (n, 3), found another kind of file."
+            )
     # Mapping compares the promise with the file's size before anything is allocated.
     return _columns(np.load(path, mmap_mode="r", allow_pickle=False), path)
 

@@ -12,6 +12,8 @@ from wildshape.io.store import is_store, open_store
 from wildshape.io.tracks import (
     NoUsableScanError,
     TrackFile,
+    folder_name,
+    read_info,
     read_track_file,
     scan_files,
     track_of_files,
@@ -128,9 +130,13 @@ def _single_scan(path: Path, unit: Unit) -> TrackSource:
 
 
 def _read_single(path: Path, unit: Unit) -> TrackFile:
-    scan = read_scan(path, unit)
+    """One scan; where it lies in a TRACK folder, of the unit and sensor that track.json says."""
+    beside = path.parent.parent / "track.json" if path.parent.name == "scans" else path / "none"
+    info = read_info(beside)
+    scan = read_scan(path, info["unit"] if unit == "m" else unit)
     dropped = ((path.name, scan.dropped_nonfinite),) if scan.dropped_nonfinite else ()
-    return TrackFile(Track(path.stem, (scan.points,), (path.stem,)), (), dropped)
+    track = Track(path.stem, (scan.points,), (path.stem,), sensor=info["sensor"])
+    return TrackFile(track, (), dropped)
 
 
 def _folder(path: Path, unit: Unit) -> TrackSource:
@@ -149,4 +155,4 @@ def _folder(path: Path, unit: Unit) -> TrackSource:
 
 
 def _name(path: Path) -> str:
-    return path.resolve().name or "track"
+    return folder_name(path) or "track"

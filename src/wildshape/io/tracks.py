@@ -77,12 +77,12 @@ def read_track_file(folder: Path | str, unit: Unit = "m") -> TrackFile:
     """
     folder = Path(folder)
     files = scan_files(folder / "scans")
-    info = _read_info(folder / "track.json")
+    info = read_info(folder / "track.json")
     unit = info["unit"] if unit == "m" else unit
     kept, skipped, dropped = _read_scans(files, folder, unit)
     poses = _read_truth(folder / "poses.txt", len(files), [files.index(f) for f in kept], unit)
     track = Track(
-        name=folder.resolve().name,
+        name=folder_name(folder),
         scans=tuple(kept.values()),
         scan_names=_stems(list(kept)),
         sensor=info["sensor"],
@@ -103,6 +103,11 @@ def track_of_files(files: list[Path], name: str, unit: Unit = "m") -> TrackFile:
     kept, skipped, dropped = _read_scans(files, files[0].parent, unit)
     track = Track(name, tuple(kept.values()), _stems(list(kept)))
     return TrackFile(track, skipped, dropped)
+
+
+def folder_name(folder: Path) -> str:
+    """What a folder is called: a link by its own name, `.` by that of the folder it is."""
+    return folder.name if folder.name not in ("", "..") else folder.resolve().name
 
 
 def scan_files(folder: Path) -> list[Path]:
@@ -155,8 +160,12 @@ def _read_shape(path: Path, unit: Unit) -> Float32[ndarray, "n 3"] | None:
     return read_points(path, unit) if path.exists() else None
 
 
-def _read_info(path: Path) -> dict[str, Any]:
-    """track.json with its gaps filled."""
+def read_info(path: Path) -> dict[str, Any]:
+    """track.json, its gaps filled: unit, sensor, category and source.
+
+    Raises:
+        BadInputError: no JSON object, or a value that makes no sense.
+    """
     raw: Any = {}
     if path.exists():
         with reading(path, "JSON with the keys of a track"):

@@ -173,7 +173,7 @@ def _entry(found: dict[str, Any], name: str) -> dict[str, Any]:
 def _box(entry: dict[str, Any]) -> Box | None:
     if not entry.get("box"):
         return None
-    x, y, z = (float(v) for v in entry["box"]["center"])
+    x, y, z = (float(v) for v in entry["box"]["centre"])
     length, width, height = (float(v) for v in entry["box"]["size"])
     qw, qx, qy, qz = (float(v) for v in entry["box"]["quaternion_wxyz"])
     return Box((x, y, z), (length, width, height), (qw, qx, qy, qz))

@@ -94,7 +94,7 @@ def box_segments(box: Box | None, sensor: SensorKind = "lidar") -> Segments:
     ends = np.concatenate((corners[np.array(_EDGES)], front[None]))
     wxyz = torch.tensor(box.quaternion_wxyz, dtype=torch.float64)
     rotation = rotation_from_quaternion(wxyz).numpy()
-    moved = ends @ rotation.T + np.asarray(box.center)
+    moved = ends @ rotation.T + np.asarray(box.centre)
     return upright(moved, sensor).astype(np.float32)
 
 

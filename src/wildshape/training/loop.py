@@ -18,7 +18,7 @@ from torch import Tensor
 from wildshape.datasets.views import ViewSampler
 from wildshape.errors import BadInputError
 from wildshape.io.store import Store
-from wildshape.models.checkpoint import ModelSettings, save_checkpoint
+from wildshape.models.checkpoint import ModelSettings, load_checkpoint, save_checkpoint
 from wildshape.models.shapepose import ShapePoseNet
 from wildshape.ops.allocator import keep_memory
 from wildshape.training.config import Recipe
@@ -63,26 +63,39 @@ def setup(
     seed: int = 0,
     device: str = "cpu",
     resume: bool = False,
+    start: Path | None = None,
     provenance: dict[str, Any] | None = None,
 ) -> Run:
     """Build the network, the optimiser and the samplers; load the state if resuming.
 
+    Args:
+        recipe: what to train and how.
+        store: the tracks.
+        folder: of the run, made if need be.
+        seed: of weights and batches.
+        device: cpu or cuda.
+        resume: go on from the folder's state, if it has one.
+        start: checkpoint whose weights are fine-tuned, instead of random ones.
+        provenance: written into the run and its checkpoint.
+
     Raises:
-        BadInputError: no usable scans; or a state that belongs to another run.
+        BadInputError: no usable scans; a state that belongs to another run; or a checkpoint of
+            other sizes than the recipe's.
     """
     keep_memory()
     processes = join(device)
     torch.manual_seed(seed)
-    network = ShapePoseNet(recipe.network).to(processes.device)
+    network = _network(recipe, start).to(processes.device)
     fused = processes.device.type == "cuda"
     optimiser = torch.optim.Adam(network.parameters(), lr=recipe.optim.lr, fused=fused)
     state = TrainState(network, copy.deepcopy(network), optimiser)
     fit_tracks, held_tracks = split_tracks(len(store))
     identity = {
-        "settings": _short_hash(repr(recipe)),
+        "settings": _short_hash(repr(recipe).encode()),
         "data": store.fingerprint,
         "seed": str(seed),
         "processes": str(processes.count),
+        "start": _short_hash(start.read_bytes()) if start else "",
     }
     folder.mkdir(parents=True, exist_ok=True)
     if resume and (folder / STATE).exists():
@@ -96,6 +109,19 @@ def setup(
     if processes.leads:
         (folder / "run.json").write_text(json.dumps(described, indent=1, default=str))
     return run
+
+
+def _network(recipe: Recipe, start: Path | None) -> ShapePoseNet:
+    """A new network, or the checkpoint's."""
+    if start is None:
+        return ShapePoseNet(recipe.network)
+    network, settings = load_checkpoint(start)
+    if settings.network != recipe.network:
+        raise BadInputError(
+            f"{start}: its sizes are not those of the preset {recipe.name}; choose the preset it"
+            f" was trained with ({settings.network.points} points, code {network.config.encoder[-1]})."
+        )
+    return network.train()
 
 
 def split_tracks(count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -300,5 +326,5 @@ def _refuse_not_finite(loss: float, step: int) -> None:
         )
 
 
-def _short_hash(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+def _short_hash(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:16]
