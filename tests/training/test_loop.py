@@ -186,3 +186,15 @@ def test_few_tracks_are_both_fitted_and_held_out_many_are_not():
     assert len(held) == 5
     assert sorted([*fitted, *held]) == list(range(100))
     assert list(split_tracks(100)[1]) == list(held)
+
+
+def test_fine_tuning_starts_from_the_checkpoint_and_refuses_another_size(car_store, tmp_path):
+    trained(car_store, tmp_path / "first", recipe=SMALLEST)
+    first = tmp_path / "first" / "model.safetensors"
+    run = setup(SMALLEST, car_store, tmp_path / "second", start=first)
+    saved, _ = load_checkpoint(first)
+    for name, value in run.state.network.state_dict().items():
+        assert torch.equal(value, saved.state_dict()[name])
+    wider = replace(SMALLEST, network=replace(SMALLEST.network, points=128))
+    with pytest.raises(BadInputError, match="choose the preset it was trained with"):
+        setup(wider, car_store, tmp_path / "third", start=first)

@@ -118,8 +118,8 @@ def _network(recipe: Recipe, start: Path | None) -> ShapePoseNet:
     network, settings = load_checkpoint(start)
     if settings.network != recipe.network:
         raise BadInputError(
-            f"{start}: its sizes are not those of the preset {recipe.name}; choose the preset it"
-            f" was trained with ({settings.network.points} points, code {network.config.encoder[-1]})."
+            f"{start}: its sizes are not those of the preset {recipe.name}: expected"
+            f" {recipe.network}, found {settings.network}; choose the preset it was trained with."
         )
     return network.train()
 

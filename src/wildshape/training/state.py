@@ -80,7 +80,7 @@ def _under(tensors: dict[str, torch.Tensor], prefix: str) -> dict[str, torch.Ten
 
 
 def _check_identity(path: Path, found: dict[str, str], expected: dict[str, str]) -> None:
-    different = [k for k in expected if found.get(k) != expected[k]]
+    different = [k for k in expected if found.get(k, "") != expected[k]]
     if different:
         raise BadInputError(
             f"{path}: was written by a run with another {' and '.join(different)};"

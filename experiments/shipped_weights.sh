@@ -1,0 +1,24 @@
+#!/bin/sh
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+#
+# The figures of the shipped weights in benchmarks/RESULTS.md: simulated drives of procedural and of
+# CAD vehicles that no training has seen, and real KITTI cars; three rotation protocols each.
+#
+#   experiments/shipped_weights.sh CAD_TEST_MESHES KITTI_RAW OUT
+#
+# CAD_TEST_MESHES: folder of vehicle meshes; KITTI_RAW: folder above 2011_09_26; OUT: to write.
+set -eu
+meshes=$1 kitti=$2 out=$3
+mkdir -p "$out"
+wildshape simulate "$out/procedural" --tracks 30 --seed 9001
+wildshape simulate "$out/cad" --tracks 30 --seed 9002 --meshes "$meshes"
+wildshape convert kitti-raw "$kitti" "$out/kitti" --every 2
+for data in procedural cad kitti; do
+    for rotate in none yaw so3; do
+        seeds=3
+        [ "$rotate" = none ] && seeds=1
+        wildshape evaluate "$out/$data" --out "$out/$data-$rotate" --rotate "$rotate" \
+            --seeds "$seeds" --max-scans 12 --baselines identity,one-scan,local-icp
+    done
+done
