@@ -137,3 +137,8 @@ def test_one_scan_of_a_track_has_its_unit_and_sensor(dataset: Path) -> None:
     (after,) = open_tracks(scan)
     assert after.sensor.kind == "camera"
     np.testing.assert_allclose(after.scans[0], before.scans[0] / 100, rtol=1e-5)
+
+
+def test_hidden_folders_are_no_tracks(dataset: Path) -> None:
+    (dataset / "a").rename(dataset / ".a")
+    assert open_tracks(dataset).names == ("b",)

@@ -106,6 +106,7 @@ def test_units_apply_to_everything(said_by: str, track: Track, tmp_path: Path) -
         ('{"sensor": "radar"}', "sensor 'radar' is unknown"),
         ('{"resolution_deg": 0.2}', "resolution_deg"),
         ('{"resolution_deg": ["a", 1]}', "resolution_deg"),
+        ('{"resolution_deg": [0.2, NaN]}', "no angles"),
         ('{"intrinsics": {"fx": 1}}', "intrinsics"),
     ],
 )

@@ -4,12 +4,15 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
 from wildshape.cli.options import AsJson, Device, Model, Overwrite, Unit
 from wildshape.errors import BadInputError
+
+if TYPE_CHECKING:
+    from wildshape.records import Track
 
 EXAMPLE = "wildshape register before.ply after.ply"
 
@@ -77,8 +80,9 @@ def _pair(settings: Settings, target: Path) -> None:
     from wildshape.cli.models import load_model
     from wildshape.cli.terminal import answer, say
 
-    scans = [_scan(path, settings) for path in (settings.source, target)]
-    found = load_model(settings.model, settings.device).register(*scans)
+    source, target_track = (_scan(path, settings) for path in (settings.source, target))
+    predictor = load_model(settings.model, settings.device)
+    found = predictor.register(source.scans[0], target_track.scans[0], source.sensor)
     matrix = found.T_target_source.matrix.tolist()
     lines = [" ".join(f"{value:12.6f}" for value in row) for row in matrix]
     shares = f"inlier ratio {found.inlier_ratio:.3f}, confidence {found.confidence:.3f}"
@@ -93,7 +97,7 @@ def _pair(settings: Settings, target: Path) -> None:
     answer("\n".join(("T_target_source", *lines, shares)), data, as_json=settings.json)
 
 
-def _scan(path: Path, settings: Settings) -> Any:
+def _scan(path: Path, settings: Settings) -> "Track":
     from wildshape.cli.reading import Reading
 
     track = Reading(path, settings.unit).single("a pair")
@@ -102,4 +106,4 @@ def _scan(path: Path, settings: Settings) -> Any:
             f"{path}: holds {len(track.scans)} scans, but a pair takes two files of one scan each;"
             " for a whole track name it alone with --out DIR."
         )
-    return track.scans[0]
+    return track

@@ -66,10 +66,12 @@ class Predictor:
             seconds = (time.perf_counter() - began) / len(batch)
             yield from (replace(item, seconds=seconds) for item in done)
 
-    def register(self, source: object, target: object) -> Registration:
+    def register(
+        self, source: object, target: object, sensor: Sensor | None = None
+    ) -> Registration:
         """`T_target_source = T_target_can inv(T_source_can)` (METHOD 7)."""
         pair = (as_points(source, "source"), as_points(target, "target"))
-        done_source, done_target = self.complete_many(pair)
+        done_source, done_target = self.complete_many(pair, sensor)
         T_target_source = done_target.pose @ done_source.pose.inverse()
         ratio = inlier_ratio(T_target_source, *pair)
         confidence = min(done_source.confidence, done_target.confidence)

@@ -142,7 +142,8 @@ def _read_single(path: Path, unit: Unit) -> TrackFile:
 def _folder(path: Path, unit: Unit) -> TrackSource:
     """A DATASET, or a plain folder of scan files."""
     entries = sorted(path.iterdir(), key=lambda entry: entry.name)
-    folders = [entry for entry in entries if (entry / "scans").is_dir()]
+    shown = [entry for entry in entries if not entry.name.startswith(".")]
+    folders = [entry for entry in shown if (entry / "scans").is_dir()]
     if folders:
         names = tuple(folder.name for folder in folders)
         return TrackSource(path, names, lambda index: read_track_file(folders[index], unit))

@@ -199,10 +199,12 @@ def sensor_from_json(raw: dict[str, Any], path: Path) -> Sensor:
         raise BadInputError(f"{path}: sensor {kind!r} is unknown; use 'lidar' or 'camera'.")
     try:
         steps, intrinsics = raw.get("resolution_deg"), raw.get("intrinsics")
-        azimuth, elevation = steps or (0.0, 0.0)
+        azimuth, elevation = (float(step) for step in steps or (1.0, 1.0))
+        if not (0.0 < azimuth < 360.0 and 0.0 < elevation < 360.0):
+            raise ValueError(f"steps {steps}, which are no angles in degrees")
         return Sensor(
             kind=kind,
-            resolution_deg=(float(azimuth), float(elevation)) if steps else None,
+            resolution_deg=(azimuth, elevation) if steps else None,
             intrinsics=_parse_intrinsics(intrinsics) if intrinsics else None,
         )
     except (TypeError, ValueError, KeyError) as error:
