@@ -1,0 +1,226 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A whole training step on the CPU: ours against its plain twin, equal weights and batch.
+
+    python benchmarks/bench_step.py            # four minutes
+    python benchmarks/bench_step.py --small    # seconds, `tiny` alone
+
+A step draws its batch of 8 tracks x 4 scans, and ends with the optimiser's and the mean weights. `plain` is the twin of
+`plain.py` as one runs it; `plain, kept` has our allocator's setting too. Each runs in a process of
+its own (memory is its own, and so is the allocator), and they take turns, so that busy neighbours
+hit them alike. Read the ratios.
+"""
+
+import argparse
+import copy
+import multiprocessing
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import torch
+from machine import header, median, peak_mib, verdict
+from plain import gradients_as_ours, plain_loss, twin_of
+
+from wildshape.datasets.views import Batch, ViewSampler
+from wildshape.io.store import open_store
+from wildshape.io.store_writer import StoreWriter
+from wildshape.models.shapepose import ShapePoseNet
+from wildshape.ops.allocator import keep_memory
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+from wildshape.training.config import Recipe
+from wildshape.training.objectives import WeaklySupervised
+from wildshape.training.recipes import PRESETS
+from wildshape.training.schedule import template_weight
+
+VARIANTS = ("ours", "plain", "plain, kept")
+LOSS_BAR, GRADIENT_BAR = 1e-5, 1e-4
+STEPS_BARS = {"small": 9.0, "tiny": 22.0}
+RATIO_BAR, MEMORY_BAR_MIB = 5.5, 2048.0
+_SEED, _CLEAR_OF_START = 0, 2
+
+
+@dataclass
+class Trained:
+    """A network, its loss, and a step with it."""
+
+    network: torch.nn.Module
+    loss: Callable[[Batch, float], torch.Tensor]
+    gradients: Callable[[], dict[str, torch.Tensor]]
+
+
+def trained(variant: str, recipe: Recipe) -> Trained:
+    """Networks of the same first weights whatever the variant."""
+    torch.manual_seed(_SEED)
+    ours = ShapePoseNet(recipe.network)
+    if variant == "ours":
+        objective = WeaklySupervised(ours, recipe.loss)
+        return Trained(
+            ours,
+            lambda batch, template: objective(batch, template).loss,
+            lambda: {name: p.grad for name, p in ours.named_parameters() if p.grad is not None},
+        )
+    plain = twin_of(ours)
+    return Trained(
+        plain,
+        lambda batch, template: plain_loss(plain, batch, recipe.loss, template),
+        lambda: gradients_as_ours(plain, ours),
+    )
+
+
+def serve(link: Connection, variant: str, preset: str, store: Path, threads: int) -> None:
+    """A process of its own: a step whenever asked, at last its peak memory."""
+    torch.set_num_threads(threads)
+    if variant != "plain":
+        keep_memory()
+    recipe = PRESETS[preset]()
+    opened = open_store(store)
+    sampler = ViewSampler(opened, np.arange(len(opened)), recipe.views)
+    held = trained(variant, recipe)
+    optimiser = torch.optim.Adam(held.network.parameters(), lr=recipe.optim.lr)
+    mean, step = copy.deepcopy(held.network), 0
+    while (asked := link.recv()) != "end":
+        began = time.perf_counter()
+        batch = sampler.draw(_SEED, step)
+        loss = held.loss(batch, template_weight(step, recipe.optim.steps, recipe.loss))
+        optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        if asked == "gradients":
+            found = {k: g.detach().numpy() for k, g in held.gradients().items()}
+            link.send((loss.item(), found))
+            continue
+        if recipe.optim.clip > 0:
+            torch.nn.utils.clip_grad_norm_(held.network.parameters(), recipe.optim.clip)
+        optimiser.step()
+        average(mean, held.network, recipe.optim.average)
+        step += 1
+        link.send(1e3 * (time.perf_counter() - began))
+    link.send(peak_mib())
+
+
+@torch.no_grad()
+def average(mean: torch.nn.Module, network: torch.nn.Module, decay: float) -> None:
+    for held, now in zip(mean.parameters(), network.parameters()):
+        held.lerp_(now, 1 - decay)
+
+
+@dataclass
+class Row:
+    """What was found of one variant."""
+
+    times: list[float]
+    loss: float
+    gradients: dict[str, np.ndarray]
+    peak_mib: float
+
+
+def measure(preset: str, store: Path, threads: int, seconds: float) -> dict[str, Row]:
+    """All variants of one preset, turn by turn."""
+    context = multiprocessing.get_context("spawn")
+    links: dict[str, Connection] = {}
+    processes = []
+    for variant in VARIANTS:
+        links[variant], theirs = context.Pipe()
+        arguments = (theirs, variant, preset, store, threads)
+        processes.append(context.Process(target=serve, args=arguments, daemon=True))
+        processes[-1].start()
+        theirs.close()
+    rows = {name: Row([], *ask(link, "gradients"), 0.0) for name, link in links.items()}
+    end, turns = time.perf_counter() + seconds, 0
+    while turns < _CLEAR_OF_START + 3 or time.perf_counter() < end:
+        turns += 1
+        for name, link in links.items():
+            ms = ask(link, "step")
+            if turns > _CLEAR_OF_START:
+                rows[name].times.append(ms)
+    for (name, link), process in zip(links.items(), processes):
+        rows[name].peak_mib = ask(link, "end")
+        process.join()
+    return rows
+
+
+def ask(link: Connection, what: str) -> Any:
+    link.send(what)
+    return link.recv()
+
+
+def gradient_difference(found: dict[str, np.ndarray], expected: dict[str, np.ndarray]) -> float:
+    """Norm of the difference over the norm, all parameters as one vector."""
+    assert set(found) == set(expected)
+    apart = sum(float(np.square(found[k] - expected[k], dtype=np.float64).sum()) for k in found)
+    size = sum(float(np.square(expected[k], dtype=np.float64).sum()) for k in found)
+    return (apart / size) ** 0.5
+
+
+def report(preset: str, rows: dict[str, Row]) -> None:
+    recipe, ours = PRESETS[preset](), rows["ours"]
+    print(
+        f"\n{preset}: {recipe.views.tracks} x {recipe.views.views} scans, n {recipe.views.points},"
+        f" m {recipe.network.points}, K {recipe.network.branches}; {len(ours.times)} steps each"
+    )
+    print(
+        f"{'step':<14}{'ms':>9}{'best':>9}{'steps/s':>9}{'x ours':>8}"
+        f"{'peak MiB':>10}{'loss off':>10}{'gradient off':>14}"
+    )
+    for name, row in rows.items():
+        ms, ratio = median(row.times), median(row.times) / median(ours.times)
+        loss, gradient = differences(ours, row)
+        apart = "" if row is ours else f"{loss:>10.0e}{gradient:>14.0e}"
+        print(
+            f"{name:<14}{ms:>9.1f}{min(row.times):>9.1f}{1e3 / ms:>9.2f}{ratio:>8.2f}"
+            f"{row.peak_mib:>10.0f}{apart}"
+        )
+    for line in bars(preset, rows):
+        print(line)
+
+
+def differences(ours: Row, twin: Row) -> tuple[float, float]:
+    loss = abs(twin.loss - ours.loss) / abs(twin.loss)
+    return loss, gradient_difference(ours.gradients, twin.gradients)
+
+
+def bars(preset: str, rows: dict[str, Row]) -> list[str]:
+    ours, plain = rows["ours"], rows["plain"]
+    loss, gradient = differences(ours, plain)
+    lines = [verdict("loss off", loss, LOSS_BAR), verdict("gradient off", gradient, GRADIENT_BAR)]
+    if preset in STEPS_BARS:
+        rate = 1e3 / median(ours.times)
+        lines.append(verdict("steps a second", rate, STEPS_BARS[preset], least=True))
+    if preset == "paper-lidar":
+        ratio = median(plain.times) / median(ours.times)
+        lines.append(verdict("plain / ours", ratio, RATIO_BAR, least=True))
+        lines.append(verdict("peak MiB", ours.peak_mib, MEMORY_BAR_MIB))
+    return lines
+
+
+def write_cars(store: Path, tracks: int) -> None:
+    with StoreWriter(store, {}) as writer:
+        for track in simulate_tracks(SimulationConfig(tracks=tracks), seed=_SEED, workers=1):
+            writer.add(track)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--small", action="store_true", help="a few seconds: `tiny` alone")
+    parser.add_argument("--threads", type=int, default=torch.get_num_threads())
+    parser.add_argument("--preset", choices=sorted(PRESETS), action="append")
+    parser.add_argument("--seconds", type=float, default=60.0, help="for each preset")
+    arguments = parser.parse_args()
+    torch.set_num_threads(arguments.threads)
+    print(header("bench_step.py"))
+    presets = ["tiny"] if arguments.small else ["paper-lidar", "small", "tiny"]
+    with TemporaryDirectory() as folder:
+        store = Path(folder) / "cars"
+        write_cars(store, tracks=8 if arguments.small else 64)
+        for preset in arguments.preset or presets:
+            seconds = 2.0 if arguments.small else arguments.seconds
+            report(preset, measure(preset, store, arguments.threads, seconds))
+
+
+if __name__ == "__main__":
+    main()
