@@ -130,3 +130,11 @@ def test_folder_without_anything_to_report_is_refused(tmp_path: Path, content: s
 def test_missing_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match="no such folder"):
         report_from_folder(tmp_path / "absent")
+
+
+@pytest.mark.parametrize("scans", [7, [{"scan": "000001", "box": {"size": 3}}]])
+def test_damaged_objects_are_named(tmp_path: Path, scans: object) -> None:
+    objects = {"input": str(tmp_path / "gone"), "scans": scans}
+    _completed(tmp_path / "0007", _track(), objects)
+    with pytest.raises(BadInputError, match=r"objects\.json"):
+        report_from_folder(tmp_path)

@@ -13,6 +13,7 @@ from typing import Any
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.se3 import SE3
+from wildshape.io.guard import reading
 from wildshape.io.inputs import open_tracks
 from wildshape.io.points import METRES, Unit, read_points
 from wildshape.io.poses import read_poses
@@ -51,7 +52,7 @@ def report_from_folder(folder: Path, inputs: Path | None = None) -> Report:
         summary=_summary(len(tracks), len(metrics), len(curves)),
         tables=tuple(metrics_table(found) for _, found in metrics),
         curves=tuple(curves),
-        objects=tuple(_object(track, inputs) for track in tracks[:MAX_OBJECTS]),
+        objects=tuple(_checked_object(track, inputs) for track in tracks[:MAX_OBJECTS]),
         notes=_notes(tracks),
         provenance=_provenance(folder, metrics),
         figures=tuple(_figure(file) for path, _ in metrics for file in _pictures(path)),
@@ -103,6 +104,12 @@ def _provenance(folder: Path, metrics: list[tuple[Path, dict[str, Any]]]) -> dic
         for path, found in outputs
         if found.get("provenance")
     }
+
+
+def _checked_object(folder: Path, inputs: Path | None) -> ReportObject:
+    """`_object`, a damaged objects.json named."""
+    with reading(folder / _OBJECTS, "what complete or register writes"):
+        return _object(folder, inputs)
 
 
 def _object(folder: Path, inputs: Path | None) -> ReportObject:
