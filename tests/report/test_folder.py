@@ -119,7 +119,9 @@ def test_metrics_and_log_become_table_and_curves(tmp_path: Path) -> None:
     assert "Each scan turned by its own random yaw" in render(report)
 
 
-@pytest.mark.parametrize("content", [None, "{", "[]"], ids=["empty", "broken", "a list"])
+@pytest.mark.parametrize(
+    "content", [None, "{", "[]", '{"methods": 3}'], ids=["empty", "broken", "a list", "other"]
+)
 def test_folder_without_anything_to_report_is_refused(tmp_path: Path, content: str | None) -> None:
     if content is not None:
         (tmp_path / "metrics.json").write_text(content, encoding="utf-8")

@@ -21,6 +21,7 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.se3 import stack
 from wildshape.inference.predictor import Predictor, to_middle
 from wildshape.io.atomic import write_json
+from wildshape.io.guard import reading as reading_file
 from wildshape.io.points import write_ply
 from wildshape.io.tracks import write_poses
 from wildshape.records import Completion, Track
@@ -157,8 +158,9 @@ def write_results(
         path = output.path / file_name(name) / OBJECTS
         if not path.is_file():
             return False
-        found = json.loads(path.read_text("utf-8"))["skipped"]
-        earlier.extend((f"{name}/{scan['scan']}", scan["reason"]) for scan in found)
+        with reading_file(path, "what an earlier run wrote"):
+            found = json.loads(path.read_text("utf-8"))["skipped"]
+            earlier.extend((f"{name}/{scan['scan']}", scan["reason"]) for scan in found)
         tally.kept += 1
         return True
 

@@ -18,7 +18,7 @@ from wildshape.io.inputs import open_tracks
 from wildshape.io.points import METRES, Unit, read_points
 from wildshape.io.poses import read_poses
 from wildshape.records import Box, Track
-from wildshape.report.content import Cloud, Figure, Report, ReportObject
+from wildshape.report.content import Cloud, Figure, Report, ReportObject, Table
 from wildshape.report.parts import metrics_table, track_object, training_curves
 
 MAX_OBJECTS = 24
@@ -50,7 +50,7 @@ def report_from_folder(folder: Path, inputs: Path | None = None) -> Report:
     return Report(
         title=f"Wildshape report: {folder.resolve().name}",
         summary=_summary(len(tracks), len(metrics), len(curves)),
-        tables=tuple(metrics_table(found) for _, found in metrics),
+        tables=tuple(_checked_table(*entry) for entry in metrics),
         curves=tuple(curves),
         objects=tuple(_checked_object(track, inputs) for track in tracks[:MAX_OBJECTS]),
         notes=_notes(tracks),
@@ -104,6 +104,12 @@ def _provenance(folder: Path, metrics: list[tuple[Path, dict[str, Any]]]) -> dic
         for path, found in outputs
         if found.get("provenance")
     }
+
+
+def _checked_table(path: Path, metrics: dict[str, Any]) -> Table:
+    """`metrics_table`, a damaged metrics.json named."""
+    with reading(path, "what evaluate writes"):
+        return metrics_table(metrics)
 
 
 def _checked_object(folder: Path, inputs: Path | None) -> ReportObject:
