@@ -6,9 +6,8 @@
     python benchmarks/bench_predict.py --small    # ten seconds
 
 `network` is centred points in, shape and poses out; `scored` has the cost of every branch too, by
-which one is chosen; `complete` is all that the library does with a scan: preparing it, all of that, the box.
-Speed does not depend on what the
-weights have learned: sizes without shipped weights are measured with random ones.
+which one is chosen; `complete` is all that the library does with a scan: preparing it, all of that,
+the box. Speed does not depend on what the weights have learned: they are random here.
 """
 
 import argparse
