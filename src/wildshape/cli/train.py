@@ -29,6 +29,7 @@ _FILES = (
     "*.safetensors",
     "run.json",
     "log.jsonl",
+    "profile.txt",
     "tensorboard/*",
     f"{_PACKED}/*",
 )
@@ -47,6 +48,7 @@ class Settings:
         steps: gradient steps instead of the preset's; the schedule is stretched to them.
         seed: of weights and batches.
         resume: go on with RUN; a finished one is left as it is.
+        profile: write where a step's time goes to RUN/profile.txt; the weights are the same.
         start: fine-tune these weights, a checkpoint of the same preset or `shipped`.
     """
 
@@ -60,6 +62,7 @@ class Settings:
     device: Device = "auto"
     unit: Unit = "m"
     overwrite: Overwrite = False
+    profile: bool = False
     json: AsJson = False
 
 
@@ -74,6 +77,7 @@ def run(settings: Settings) -> None:
     from wildshape.cli.output import command_line
     from wildshape.io.provenance import provenance
     from wildshape.training.loop import setup
+    from wildshape.training.profile import PROFILE
 
     if settings.seed < 0:
         raise BadInputError(f"--seed {settings.seed}: expected 0 or more.")
@@ -97,6 +101,8 @@ def run(settings: Settings) -> None:
         start=_start(settings.start),
         provenance=made,
     )
+    if settings.profile and prepared.processes.leads:
+        prepared.profile = settings.out / PROFILE
     began, first = time.monotonic(), prepared.state.step
     if first >= recipe.optim.steps:
         _conclude(settings, prepared, 0.0, f"{settings.out} was finished already")

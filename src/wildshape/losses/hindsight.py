@@ -11,6 +11,7 @@ from typing import NamedTuple
 import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
+from torch.profiler import record_function
 
 from wildshape.geometry.visibility import Projection, bin_points
 from wildshape.losses.chamfer import masked_mean
@@ -63,9 +64,11 @@ def score_hypotheses(
     flat = posed.flatten(0, 1)
     repeated = scans[:, None].expand(-1, hypotheses, -1, -1).flatten(0, 1)
     middle = centres[:, None].expand(-1, hypotheses, -1).flatten(0, 1)
-    to_shape, to_scan = nearest_both(repeated, flat)
-    bins = bin_points(flat + middle[:, None], middle, projection)
-    seen = visible(bins.index, bins.depth, bins.count)
+    with record_function("wildshape: search"):
+        to_shape, to_scan = nearest_both(repeated, flat)
+    with record_function("wildshape: z-buffer"):
+        bins = bin_points(flat + middle[:, None], middle, projection)
+        seen = visible(bins.index, bins.depth, bins.count)
     shape = (count, hypotheses)
     return Scores(
         _mean_distance(to_shape).view(shape),

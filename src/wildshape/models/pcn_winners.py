@@ -11,14 +11,27 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 from torch.nn.functional import relu
+from torch.profiler import record_function
 
 from wildshape.models.pcn import PCNEncoder
 
 
 def encode_winners(encoder: PCNEncoder, points: Float[Tensor, "B N 3"]) -> Float[Tensor, "B d"]:
     """`encoder(points)`, with a gradient to the weights; `points` get none."""
+    with record_function("wildshape: encoder scoring"):
+        pooled_row, code_row = _winning_rows(encoder, points)
+    with record_function("wildshape: encoder winners"):
+        return _code_of_winners(encoder, points, pooled_row, code_row)
+
+
+def _code_of_winners(
+    encoder: PCNEncoder,
+    points: Float[Tensor, "B N 3"],
+    pooled_row: Int[Tensor, "B b"],
+    code_row: Int[Tensor, "B d"],
+) -> Float[Tensor, "B d"]:
+    """The encoder on the winning rows alone, with a graph."""
     count, size, _ = points.shape
-    pooled_row, code_row = _winning_rows(encoder, points)
     start = torch.arange(count, device=points.device)[:, None] * size
     rows = torch.cat((pooled_row + start, code_row + start), dim=1)
     active, position = torch.unique(rows, return_inverse=True)

@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
+from torch.profiler import record_function
 
 from wildshape.errors import BadInputError
 from wildshape.models.heads import PoseDecoder, ShapeDecoder
@@ -92,7 +93,8 @@ class ShapePoseNet(nn.Module):
         scaled = scans / self.config.scale
         if torch.is_grad_enabled() and scans.device.type == "cpu":
             return encode_winners(self.encoder, scaled)
-        return self.encoder(scaled)
+        with record_function("wildshape: encoder dense"):
+            return self.encoder(scaled)
 
     def canonical(self, code: Float[Tensor, "B z"]) -> Float[Tensor, "B P 3"]:
         """`Y_can`, metres."""

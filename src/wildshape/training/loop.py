@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import torch
 from torch import Tensor
+from torch.profiler import record_function
 
 from wildshape.datasets.views import ViewSampler
 from wildshape.errors import BadInputError
@@ -26,6 +27,7 @@ from wildshape.training.headings import agree_on_headings
 from wildshape.training.log import RunLog
 from wildshape.training.objectives import Objective, WeaklySupervised
 from wildshape.training.processes import Processes, join
+from wildshape.training.profile import steps_profiled
 from wildshape.training.schedule import learning_rate, template_weight
 from wildshape.training.state import STATE, TrainState, load_state, save_state
 from wildshape.training.validate import Validation, truth_figures, validate
@@ -37,7 +39,7 @@ Progress = Callable[[int, dict[str, Any]], None]
 
 @dataclass
 class Run:
-    """All that a run needs, set up."""
+    """All that a run needs, set up; `profile` is where to write where a step's time goes."""
 
     recipe: Recipe
     seed: int
@@ -49,6 +51,7 @@ class Run:
     held_tracks: np.ndarray
     identity: dict[str, str]
     provenance: dict[str, Any]
+    profile: Path | None = None
 
 
 class StopRequested(Exception):  # noqa: N818
@@ -147,9 +150,13 @@ def fit(
     """
     objective = run.processes.wrap(WeaklySupervised(run.state.network, run.recipe.loss))
     meter = Meter(run.recipe.network.branches)
-    with RunLog(run.folder, run.state.step) if run.processes.leads else _Silent() as log:
+    with (
+        RunLog(run.folder, run.state.step) if run.processes.leads else _Silent() as log,
+        steps_profiled(run.profile) as step_done,
+    ):
         while run.state.step < run.recipe.optim.steps:
             meter.add(_step(run, objective))
+            step_done()
             step, steps = run.state.step, run.recipe.optim.steps
             due = step < steps and step % run.recipe.validate_every == 0
             stop = step < steps and _stop_asked(run, stopped)
@@ -190,20 +197,26 @@ def _report(run: Run, progress: Progress, values: dict[str, Any]) -> None:
         raise
 
 
+@record_function("wildshape: step")
 def _step(run: Run, objective: torch.nn.Module) -> Objective:
     """One gradient step; the batch depends on (seed, step, process) alone."""
     state, optim, step = run.state, run.recipe.optim, run.state.step
     _agree_if_due(run)
-    batch = run.sampler.draw(run.seed, step, run.processes.rank).to(run.processes.device)
-    result: Objective = objective(batch, template_weight(step, optim.steps, run.recipe.loss))
-    state.optimiser.zero_grad(set_to_none=True)
-    result.loss.backward()
-    if optim.clip > 0:
-        torch.nn.utils.clip_grad_norm_(state.network.parameters(), optim.clip)
-    for group in state.optimiser.param_groups:
-        group["lr"] = learning_rate(step, optim)
-    state.optimiser.step()
-    _average(state, optim.average)
+    with record_function("wildshape: sampling"):
+        batch = run.sampler.draw(run.seed, step, run.processes.rank).to(run.processes.device)
+    with record_function("wildshape: forward"):
+        weight = template_weight(step, optim.steps, run.recipe.loss)
+        result: Objective = objective(batch, weight)
+    with record_function("wildshape: backward"):
+        state.optimiser.zero_grad(set_to_none=True)
+        result.loss.backward()
+    with record_function("wildshape: optimiser"):
+        if optim.clip > 0:
+            torch.nn.utils.clip_grad_norm_(state.network.parameters(), optim.clip)
+        for group in state.optimiser.param_groups:
+            group["lr"] = learning_rate(step, optim)
+        state.optimiser.step()
+        _average(state, optim.average)
     state.step += 1
     return result
 

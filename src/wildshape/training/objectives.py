@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
+from torch.profiler import record_function
 
 from wildshape.datasets.views import Batch
 from wildshape.losses.hindsight import score_hypotheses
@@ -35,8 +36,9 @@ class WeaklySupervised(nn.Module):
     def forward(self, batch: Batch, template: float) -> Objective:
         """Loss of one batch; `template` is this step's weight of the template pull."""
         code = self.network.encode(batch.scans)
-        poses = self.network.poses(code)
-        shapes = self.network.canonical(code[batch.reference])
+        with record_function("wildshape: heads"):
+            poses = self.network.poses(code)
+            shapes = self.network.canonical(code[batch.reference])
         terms = multiview_loss(
             batch.scans,
             batch.centres,
