@@ -226,7 +226,8 @@ def _agree_if_due(run: Run) -> None:
     state, loss = run.state, run.recipe.loss
     due = {int(share * run.recipe.optim.steps) for share in loss.agree_at}
     if state.step in due:
-        state.anchors = agree_on_headings(state.mean, run.sampler, loss)
+        with record_function("wildshape: headings"):
+            state.anchors = agree_on_headings(state.mean, run.sampler, loss)
     run.sampler.anchors = state.anchors
 
 

@@ -6,18 +6,22 @@ The stages are labelled where they happen, by `record_function("wildshape: ...")
 microsecond or two while nothing is recorded.
 """
 
+import os
+from bisect import bisect_right
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import torch
+from torch._C._autograd import DeviceType
 from torch.profiler import ProfilerActivity, profile, schedule
 
 PROFILE = "profile.txt"
 _SKIPPED, _WARM_UP, _RECORDED, _SLOWEST = 2, 1, 20, 12
 _LABEL = "wildshape: "
-_IN_STEP = ("sampling", "forward", "backward", "optimiser")
+_IN_STEP = ("headings", "sampling", "forward", "backward", "optimiser")
 _IN_FORWARD = ("encoder scoring", "encoder winners", "encoder dense", "heads", "search", "z-buffer")
 
 
@@ -36,6 +40,7 @@ def steps_profiled(path: Path | None) -> Iterator[Callable[[], None]]:
     path.write_text(
         f"no step profiled: a run of {_SKIPPED + _WARM_UP + 1} steps or more is needed\n"
     )
+    os.environ.setdefault("KINETO_LOG_LEVEL", "99")  # it would announce itself on stderr
     activities = [ProfilerActivity.CPU]
     if torch.cuda.is_available():
         activities.append(ProfilerActivity.CUDA)
@@ -49,47 +54,72 @@ def steps_profiled(path: Path | None) -> Iterator[Callable[[], None]]:
 
 
 def _write(done: profile, path: Path) -> None:
-    found = {event.key: event for event in done.key_averages()}
-    if f"{_LABEL}step" in found:
-        path.write_text(report(found))
+    on_cpu = [e for e in done.events() or () if e.device_type == DeviceType.CPU]
+    in_step = _within(on_cpu, "step")
+    if in_step:
+        path.write_text(report(in_step))
 
 
-def report(events: dict[str, Any]) -> str:
-    """The table, from the profiler's averages by name."""
-    gpu = any(event.self_device_time_total > 0 for event in events.values())
-    stages = {key.removeprefix(_LABEL): e for key, e in events.items() if key.startswith(_LABEL)}
-    steps = stages["step"].count
-    columns = [{name: e.cpu_time_total / 1e3 / steps for name, e in stages.items()}]
-    if gpu:
-        columns.append({name: e.device_time_total / 1e3 / steps for name, e in stages.items()})
-    tables = [_with_rests(column) for column in columns]
+def _within(events: list[Any], stage: str) -> list[Any]:
+    """Events that begin and end while a stage runs, itself among them: no validation."""
+    spans = sorted(
+        (e.time_range.start, e.time_range.end) for e in events if e.name == _LABEL + stage
+    )
+    starts = [start for start, _ in spans]
+    kept = []
+    for event in events:
+        at = bisect_right(starts, event.time_range.start) - 1
+        if at >= 0 and event.time_range.end <= spans[at][1]:
+            kept.append(event)
+    return kept
+
+
+def report(events: list[Any]) -> str:
+    """The table, from the events of whole steps; `device` times are those of kernels launched."""
+    steps = sum(event.name == f"{_LABEL}step" for event in events)
+    fields = ["cpu_time_total"]
+    if any(event.self_device_time_total > 0 for event in events):
+        fields.append("device_time_total")
+    tables = [_stages(events, field, steps) for field in fields]
     lines = [f"{steps} steps, {torch.get_num_threads()} threads; milliseconds a step and share"]
-    lines.append(f"{'stage':<26}{'CPU':>10}" + (f"{'':>8}{'GPU':>10}" if gpu else ""))
+    lines.append(f"{'stage':<26}{'CPU':>10}" + f"{'':>8}{'GPU':>10}" * (len(fields) - 1))
     for name in tables[0]:
         cells = (f"{t[name]:>10.3f}{_percent(t[name], t['step']):>8}" for t in tables)
         lines.append(f"{name:<26}" + "".join(cells))
-    return "\n".join([*lines, "", *_slowest(events, steps, gpu)]) + "\n"
+    return "\n".join([*lines, "", *_slowest(events, f"self_{fields[-1]}", steps)]) + "\n"
+
+
+def _stages(events: list[Any], field: str, steps: int) -> dict[str, float]:
+    """Milliseconds a step of each stage; those within the forward pass only from there."""
+    found: dict[str, float] = defaultdict(float)
+    forward = {id(event) for event in _within(events, "forward")}
+    for event in events:
+        name = event.name.removeprefix(_LABEL)
+        if name in ("step", *_IN_STEP) or (name in _IN_FORWARD and id(event) in forward):
+            found[name] += getattr(event, field) / 1e3 / steps
+    return _with_rests(found)
 
 
 def _with_rests(found: dict[str, float]) -> dict[str, float]:
     """Stages in the order of a step, with what no label covers, indented under their parents."""
     inside = {f"  {name}": found[name] for name in _IN_FORWARD if name in found}
-    table = {name: found.get(name, 0.0) for name in _IN_STEP}
+    table = {name: found[name] for name in _IN_STEP if name in found}
     rest = {"  loss and the rest": table["forward"] - sum(inside.values())}
     other = {"rest of the step": found["step"] - sum(table.values())}
-    front = {name: table.pop(name) for name in ("sampling", "forward")}
-    return front | inside | rest | table | other | {"step": found["step"]}
+    after = {name: table.pop(name) for name in ("backward", "optimiser")}
+    return table | inside | rest | after | other | {"step": found["step"]}
 
 
-def _slowest(events: dict[str, Any], steps: int, gpu: bool) -> list[str]:
+def _slowest(events: list[Any], field: str, steps: int) -> list[str]:
     """The operations that take most time by themselves."""
-    field = "self_device_time_total" if gpu else "self_cpu_time_total"
-    plain = {
-        k: getattr(e, field) / 1e3 / steps for k, e in events.items() if not k.startswith(_LABEL)
-    }
-    first = sorted(plain, key=lambda key: -plain[key])[:_SLOWEST]
-    head = f"{'slowest operations, own':<46}{'ms':>10}{'calls':>9}"
-    return [head, *(f"{k[:45]:<46}{plain[k]:>10.3f}{events[k].count / steps:>9.1f}" for k in first)]
+    own: dict[str, float] = defaultdict(float)
+    calls = Counter(event.name for event in events)
+    for event in events:
+        own[event.name] += getattr(event, field) / 1e3 / steps
+    operations = [name for name in own if not name.startswith(_LABEL)]
+    first = sorted(operations, key=lambda name: -own[name])[:_SLOWEST]
+    head = f"{'slowest operations, own time':<46}{'ms':>10}{'calls':>9}"
+    return [head, *(f"{k[:45]:<46}{own[k]:>10.3f}{calls[k] / steps:>9.1f}" for k in first)]
 
 
 def _percent(part: float, whole: float) -> str:
