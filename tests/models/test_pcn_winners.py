@@ -8,7 +8,7 @@ from tests import naive
 from tests.strategies import clouds
 
 from wildshape.models.pcn import PCNEncoder
-from wildshape.models.pcn_winners import encode_winners
+from wildshape.models.pcn_winners import distinct_rows, encode_winners
 
 
 def encoder(seed=0):
@@ -64,6 +64,17 @@ def test_ties_between_different_points():
     points = clouds(8, 2, 40, 3)
     points[:, 20:, :2] = points[:, :20, :2]
     assert_same(net, points, net, skip=["point1.weight"])
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_repeated_points_are_scored_once(dtype):
+    points = clouds(12, 3, 40, 3).to(dtype)
+    pick = torch.randint(40, (3, 100), generator=torch.Generator().manual_seed(1))
+    pick[2] = 7
+    resampled = points.gather(1, pick[..., None].expand(-1, -1, 3)).mT.contiguous().mT
+    for rows, drawn in zip(distinct_rows(resampled), pick.tolist()):
+        assert rows.tolist() == sorted({point: drawn.index(point) for point in drawn}.values())
+    assert [rows.tolist() for rows in distinct_rows(points[:, :1])] == [[0], [0], [0]]
 
 
 def test_dead_units():

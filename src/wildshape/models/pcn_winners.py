@@ -4,9 +4,11 @@
 
 Max-pooling sends gradient through the arg-max points alone. A pass without a graph finds them, a
 second pass with a graph runs on them only: the same code and the same gradient, several times
-cheaper on a CPU. `tests/models/test_pcn_winners.py` proves it against `PCNEncoder.forward`.
+cheaper on a CPU. Points that repeat, as they do where scans are resampled with replacement, are
+scored once. `tests/models/test_pcn_winners.py` proves it against `PCNEncoder.forward`.
 """
 
+import numpy as np
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor
@@ -14,6 +16,8 @@ from torch.nn.functional import relu
 from torch.profiler import record_function
 
 from wildshape.models.pcn import PCNEncoder
+
+_MIXERS = np.array((0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)).view(np.int64)
 
 
 def encode_winners(encoder: PCNEncoder, points: Float[Tensor, "B N 3"]) -> Float[Tensor, "B d"]:
@@ -49,20 +53,38 @@ def _winning_rows(
 ) -> tuple[Int[Tensor, "B b"], Int[Tensor, "B d"]]:
     """Row of the maximum of each pooled feature and of each code entry, cloud by cloud.
 
-    One cloud at a time keeps its activations in the cache.
+    One cloud at a time keeps its activations in the cache. Of equal points the first counts.
     """
     weight3, weight4 = encoder.join_point.weight.T, encoder.point4.weight.T
     pooled_rows, code_rows = [], []
-    for cloud in points:
-        local = torch.addmm(encoder.point1.bias, cloud, encoder.point1.weight.T).relu_()
+    for cloud, distinct in zip(points, distinct_rows(points)):
+        local = torch.addmm(encoder.point1.bias, cloud[distinct], encoder.point1.weight.T).relu_()
         local = torch.addmm(encoder.point2.bias, local, encoder.point2.weight.T)
         row = _argmax_rows(local)
         pooled = local.gather(0, row[None])
         bias = (encoder.join_pooled(pooled) + encoder.join_point.bias)[0]
         joined = torch.addmm(bias, local, weight3).relu_()
-        pooled_rows.append(row)
-        code_rows.append(_argmax_rows(joined @ weight4))
+        pooled_rows.append(distinct[row])
+        code_rows.append(distinct[_argmax_rows(joined @ weight4)])
     return torch.stack(pooled_rows), torch.stack(code_rows)
+
+
+def distinct_rows(points: Float[Tensor, "B N 3"]) -> list[Int[Tensor, "n"]]:
+    """The first row of each distinct point, ascending, cloud by cloud.
+
+    Points are brought into the order of a hash of their bits, the row in its low bits, and compared
+    with their neighbours: where two hashes collide a repetition may stay, and nothing is lost.
+    """
+    count = points.shape[1]
+    rows = (1 << count.bit_length()) - 1
+    array = points.contiguous().numpy()
+    bits = array.view(f"i{array.itemsize}").astype(np.int64)
+    key = (bits * _MIXERS).sum(-1) * _MIXERS[0] & ~rows | np.arange(count)
+    order = np.sort(key, axis=1) & rows
+    ordered = np.take_along_axis(array, order[..., None], axis=1)
+    fresh = np.ones(order.shape, dtype=bool)
+    fresh[:, 1:] = (ordered[:, 1:] != ordered[:, :-1]).any(-1)
+    return [torch.from_numpy(np.sort(row[new])) for row, new in zip(order, fresh)]
 
 
 def _argmax_rows(values: Float[Tensor, "n c"]) -> Int[Tensor, "c"]:
