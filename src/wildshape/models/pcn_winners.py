@@ -16,6 +16,7 @@ from torch.nn.functional import relu
 from torch.profiler import record_function
 
 from wildshape.models.pcn import PCNEncoder
+from wildshape.ops.column_argmax import column_argmax
 
 _MIXERS = np.array((0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)).view(np.int64)
 
@@ -60,12 +61,12 @@ def _winning_rows(
     for cloud, distinct in zip(points, distinct_rows(points)):
         local = torch.addmm(encoder.point1.bias, cloud[distinct], encoder.point1.weight.T).relu_()
         local = torch.addmm(encoder.point2.bias, local, encoder.point2.weight.T)
-        row = _argmax_rows(local)
+        row = column_argmax(local)
         pooled = local.gather(0, row[None])
         bias = (encoder.join_pooled(pooled) + encoder.join_point.bias)[0]
         joined = torch.addmm(bias, local, weight3).relu_()
         pooled_rows.append(distinct[row])
-        code_rows.append(distinct[_argmax_rows(joined @ weight4)])
+        code_rows.append(distinct[column_argmax(joined @ weight4)])
     return torch.stack(pooled_rows), torch.stack(code_rows)
 
 
@@ -85,17 +86,6 @@ def distinct_rows(points: Float[Tensor, "B N 3"]) -> list[Int[Tensor, "n"]]:
     fresh = np.ones(order.shape, dtype=bool)
     fresh[:, 1:] = (ordered[:, 1:] != ordered[:, :-1]).any(-1)
     return [torch.from_numpy(np.sort(row[new])) for row, new in zip(order, fresh)]
-
-
-def _argmax_rows(values: Float[Tensor, "n c"]) -> Int[Tensor, "c"]:
-    """First row of each column's maximum: `amax` and a comparison, as torch's argmax is slow.
-
-    The last row where the maximum is NaN: weights that are no longer finite give a loss that is
-    not, and the trainer says so.
-    """
-    order = torch.arange(len(values), 0, -1, dtype=torch.int32, device=values.device)
-    first = (values == values.amax(0)).int().mul_(order[:, None]).amax(0).clamp_min_(1)
-    return (len(values) - first).long()
 
 
 class _GatherDot(torch.autograd.Function):

@@ -21,6 +21,7 @@ _SIGNATURES = {
         [_P, _I64, _P, _I64, _P, _P, _P, _I64, _I64, _I64, _P, _P, _INT],
         None,
     ),
+    "wildshape_column_argmax": ([_P, _I64, _I64, _P, _INT], None),
     "wildshape_visible": ([_P, _P, _I64, _I64, _I64, _P, _INT], _INT),
 }
 
