@@ -46,6 +46,6 @@ def fit_box(points: Float[Tensor, "n 3"]) -> FittedBox:
 
 
 def _trimmed_range(points: Float[Tensor, "a n 3"]) -> tuple[Tensor, Tensor]:
-    ordered = points.sort(dim=1).values
-    skip = int(_TRIM * points.shape[1])
-    return ordered[:, skip], ordered[:, points.shape[1] - 1 - skip]
+    outermost = int(_TRIM * points.shape[1]) + 1
+    low = points.topk(outermost, dim=1, largest=False).values[:, -1]
+    return low, points.topk(outermost, dim=1).values[:, -1]
