@@ -7,7 +7,7 @@
 #
 #   experiments/seeds.sh OUT [STEPS]
 set -eu
-out=$1 steps=${2:-1500}
+out=$1 steps=${2:-800}
 mkdir -p "$out"
 wildshape simulate "$out/train" --tracks 300 --seed 1
 wildshape simulate "$out/test" --tracks 30 --seed 9001
