@@ -10,17 +10,26 @@ from wildshape.records import Track
 
 @runtime_checkable
 class Source(Protocol):
-    """A data set as it lies on disk, read into tracks one at a time.
+    """A data set as it lies on disk, read part by part into tracks.
+
+    Readers are plain dataclasses that can be pickled: a worker gets its own copy.
 
     Attributes:
-        rejected: how many drives, objects and scans were left out so far, by reason; complete
-            once `tracks()` is exhausted, and started afresh by the next call.
+        rejected: how many drives, objects and scans were left out so far, by reason.
     """
 
     rejected: dict[str, int]
 
-    def tracks(self) -> Iterator[Track]:
-        """The tracks, in a fixed order.
+    def parts(self) -> list[str]:
+        """Names of the independent parts (drives, sequences, logs), in a fixed order; cheap.
+
+        Raises:
+            BadInputError: not such a data set; the message says what was expected and found.
+        """
+        ...
+
+    def tracks_of(self, part: str) -> Iterator[Track]:
+        """The tracks of one part, in a fixed order, one held at a time.
 
         Raises:
             BadInputError: a file is missing or corrupt; the message names it.
