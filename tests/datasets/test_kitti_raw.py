@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from tests.cars import poses_of
 
+from wildshape.datasets.boxes import Crop
 from wildshape.datasets.kitti_raw import KittiRaw
+from wildshape.datasets.selection import Selection
+from wildshape.datasets.source import all_tracks
 from wildshape.errors import BadInputError
 
 SIZE = (4.0, 1.8, 1.5)  # l w h
@@ -78,7 +81,7 @@ def drive(tmp_path):
 
 def test_a_vehicle_becomes_a_track(drive):
     source = KittiRaw(drive)
-    (track,) = source.tracks()
+    (track,) = all_tracks(source)
     assert track.name == "2011_09_26_drive_0099_sync_0000"
     assert track.category == "car"
     assert track.scan_names == tuple(f"{frame:010d}" for frame in (3, 4, 6, 8))
@@ -93,7 +96,7 @@ def test_a_vehicle_becomes_a_track(drive):
 
 
 def test_truth_has_its_origin_at_the_boxs_centre(drive):
-    (track,) = KittiRaw(drive).tracks()
+    (track,) = all_tracks(KittiRaw(drive))
     poses = poses_of(track)
     for i, frame in enumerate((3, 4, 6, 8)):
         x, y, z, yaw = POSES[frame - 3]
@@ -107,28 +110,28 @@ def test_truth_has_its_origin_at_the_boxs_centre(drive):
 
 
 def test_ground_margin_and_every(drive):
-    (kept,) = KittiRaw(drive, keep_ground=True).tracks()
+    (kept,) = all_tracks(KittiRaw(drive, crop=Crop(ground=-0.15)))
     assert len(kept.scans[0]) == 150
     # 0.35 m reaches the points 0.3 m beside, before and above the box.
-    (wide,) = KittiRaw(drive, margin=0.35).tracks()
+    (wide,) = all_tracks(KittiRaw(drive, crop=Crop(margin=0.35)))
     assert len(wide.scans[0]) == 123
-    (second,) = KittiRaw(drive, every=2, min_points=50).tracks()
+    (second,) = all_tracks(KittiRaw(drive, Selection(every=2, min_points=50)))
     assert second.scan_names == ("0000000003", "0000000005")
-    assert list(KittiRaw(drive, min_scans=9).tracks()) == []
+    assert list(all_tracks(KittiRaw(drive, Selection(min_scans=9)))) == []
 
 
 @pytest.mark.parametrize("level", [0, 1, 2])
 def test_root_may_be_a_drive_a_date_or_the_folder_above(drive, level):
     root = (drive, *drive.parents)[level]
-    assert [track.name for track in KittiRaw(root).tracks()] == [f"{drive.name}_0000"]
+    assert [track.name for track in all_tracks(KittiRaw(root))] == [f"{drive.name}_0000"]
 
 
 def test_cut_scans_stand_in_where_full_ones_are_missing(drive):
-    (full,) = KittiRaw(drive).tracks()
+    (full,) = all_tracks(KittiRaw(drive))
     cut = {7: in_velo(np.random.default_rng(1).uniform(0.3, 0.8, (110, 3)), POSES[4])}
     cut[3] = np.zeros((1, 3))
     write_drive(drive, [("Car", 3, POSES)], cut, "velodyne_objects_xyz0")
-    (track,) = KittiRaw(drive).tracks()
+    (track,) = all_tracks(KittiRaw(drive))
     assert track.scan_names[3] == "0000000007"
     assert np.array_equal(track.scans[0], full.scans[0])
 
@@ -136,13 +139,13 @@ def test_cut_scans_stand_in_where_full_ones_are_missing(drive):
 def test_a_drive_without_labels_among_others_is_counted(drive):
     (drive.parent / "2011_09_26_drive_0100_sync" / "velodyne_points" / "data").mkdir(parents=True)
     source = KittiRaw(drive.parent)
-    assert len(list(source.tracks())) == 1
+    assert len(list(all_tracks(source))) == 1
     assert source.rejected["drive without tracklet_labels.xml"] == 1
 
 
 def refused(root, match):
     with pytest.raises(BadInputError, match=match):
-        list(KittiRaw(root).tracks())
+        list(all_tracks(KittiRaw(root)))
 
 
 def test_missing_and_corrupt_files_are_named(drive):

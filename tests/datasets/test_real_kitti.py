@@ -11,7 +11,10 @@ from tests.cars import known
 from wildshape.baselines.identity import Identity, OneScan
 from wildshape.baselines.local_icp import LocalIcp
 from wildshape.datasets.accumulate import fuse_by_truth, shape_mirrored
+from wildshape.datasets.boxes import Crop, points_in_box
 from wildshape.datasets.kitti_raw import KittiRaw
+from wildshape.datasets.selection import Selection
+from wildshape.datasets.source import all_tracks
 from wildshape.datasets.tracklets import read_tracklets
 from wildshape.evaluation.protocol import run
 from wildshape.evaluation.results import figures_of
@@ -25,12 +28,12 @@ pytestmark = pytest.mark.skipif(
 
 @pytest.fixture(scope="module")
 def tracks():
-    return list(KittiRaw(ROOT).tracks())
+    return list(all_tracks(KittiRaw(ROOT)))
 
 
 def test_twelve_cars_nine_with_enough_scans(tracks):
     source = KittiRaw(ROOT)
-    assert len(list(source.tracks())) == 9
+    assert len(list(all_tracks(source))) == 9
     assert source.rejected["object: fewer than 1 scans left"] == 3
     assert source.rejected["object: category Cyclist"] == 2
     assert source.rejected["object: category Tram"] == 1
@@ -45,7 +48,8 @@ def test_cut_frames_hold_the_same_points_as_full_scans(tracks):
     for frame in range(5):
         full = read_velodyne(DRIVE / "velodyne_points" / "data" / f"{frame:010d}.bin")
         cut = read_velodyne(DRIVE / "velodyne_objects_xyz0" / f"{frame:010d}.bin")
-        a, b = (tracklet.crop(cloud, frame, 0.15, 0.2) for cloud in (full, cut))
+        T = tracklet.T_velo_object[frame - tracklet.first_frame]
+        a, b = (points_in_box(cloud, T, tracklet.size, Crop()) for cloud in (full, cut))
         assert len(a) == pytest.approx(len(b), rel=0.02)
 
 
@@ -70,7 +74,7 @@ def test_baselines_come_out_as_measured_before(tracks):
     Those were taken with another crop and truth density, hence the margins.
     """
     methods = {"identity": Identity(), "icp": LocalIcp(), "scan": OneScan()}
-    results = run(methods, KittiRaw(ROOT, every=2).tracks())
+    results = run(methods, all_tracks(KittiRaw(ROOT, Selection(every=2))))
     identity, icp, scan = (known(figures_of(results[name])) for name in methods)
     assert identity["acc30"] == icp["acc30"] == 1
     assert identity["rot_median_deg"] == pytest.approx(0.46, abs=0.1)

@@ -3,27 +3,18 @@
 """`wildshape convert`: data sets as they lie on disk become tracks."""
 
 import time
-from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from tyro.conf import Positional, arg
 
 from wildshape.cli.options import AsJson, Layout, Overwrite, Unit
-from wildshape.errors import BadInputError
-
-if TYPE_CHECKING:
-    from wildshape.cli.reading import Reading
-    from wildshape.datasets.source import Source
-    from wildshape.records import Track
+from wildshape.cli.sources import SOURCES, open_source
 
 EXAMPLE = "wildshape convert kitti-raw 2011_09_26 cars.store"
 
-Name = Annotated[
-    str, Positional, arg(metavar="SOURCE", help="kitti-raw, folder (track folders) or packed")
-]
+Name = Annotated[str, Positional, arg(metavar="SOURCE", help=", ".join(SOURCES))]
 Root = Annotated[Path, Positional, arg(metavar="ROOT", help="where it lies")]
 Out = Annotated[Path, Positional, arg(metavar="OUT", help="packed store, or folder, to write")]
 
@@ -42,10 +33,10 @@ class Settings:
     root: Root
     out: Out
     layout: Layout = "packed"
-    unit: Unit = "m"
-    min_points: Annotated[int, arg(metavar="N")] = 100
-    min_scans: Annotated[int, arg(metavar="N")] = 1
-    every: Annotated[int, arg(metavar="K")] = 1
+    unit: Unit | None = None
+    min_points: Annotated[int | None, arg(metavar="N")] = None
+    min_scans: Annotated[int | None, arg(metavar="N")] = None
+    every: Annotated[int | None, arg(metavar="K")] = None
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -59,18 +50,14 @@ def run(settings: Settings) -> None:
     from wildshape.cli.output import keep_apart
     from wildshape.cli.packing import write_tracks
     from wildshape.cli.terminal import answer, duration, progress, say
+    from wildshape.datasets.source import all_tracks
 
     began = time.monotonic()
-    if settings.source not in SOURCES:
-        raise BadInputError(
-            f"'{settings.source}' is no source that can be converted; there are"
-            f" {', '.join(SOURCES)}."
-        )
     keep_apart(settings.root, settings.out)
-    source, total = SOURCES[settings.source](settings)
-    with progress(f"converting {settings.source}", total) as bar:
+    source = open_source(settings.source, settings.root, _options(settings))
+    with progress(f"converting {settings.source}", 0) as bar:
         written = write_tracks(
-            source.tracks(),
+            all_tracks(source),
             settings.out,
             settings.layout,
             command="convert",
@@ -95,40 +82,8 @@ def _identity(settings: Settings) -> dict[str, Any]:
     return {**chosen, "root": str(settings.root.resolve())}
 
 
-@dataclass
-class Opened:
-    """Whatever `Reading` opens, as a source."""
-
-    reading: "Reading"
-    rejected: dict[str, int] = field(default_factory=Counter)
-
-    def tracks(self) -> "Iterator[Track]":
-        """The tracks that can be used."""
-        yield from (track for _, track in self.reading.tracks())
-        self.rejected = Counter(f"{what} ({reason})" for what, reason in self.reading.skipped)
-
-
-def _kitti_raw(settings: Settings) -> "tuple[Source, int]":
-    from wildshape.datasets.kitti_raw import KittiRaw
-
-    source = KittiRaw(
-        settings.root,
-        every=settings.every,
-        min_points=settings.min_points,
-        min_scans=settings.min_scans,
-    )
-    return source, 0
-
-
-def _opened(settings: Settings) -> "tuple[Source, int]":
-    from wildshape.cli.reading import Reading
-
-    source = Opened(Reading(settings.root, settings.unit))
-    return source, len(source.reading.source)
-
-
-SOURCES: dict[str, "Callable[[Settings], tuple[Source, int]]"] = {
-    "kitti-raw": _kitti_raw,
-    "folder": _opened,
-    "packed": _opened,
-}
+def _options(settings: Settings) -> dict[str, Any]:
+    """What the user gave, by the names of the readers' fields."""
+    names = ("unit", "min_points", "min_scans", "every")
+    given = {name: getattr(settings, name) for name in names}
+    return {name: value for name, value in given.items() if value is not None}

@@ -7,54 +7,55 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from wildshape.errors import BadInputError
+from wildshape.datasets.filtering import filtered
+from wildshape.datasets.groups import groups, members
+from wildshape.datasets.selection import Selection
+from wildshape.io.inputs import open_tracks
 from wildshape.io.points import Unit
-from wildshape.io.tracks import NoUsableScanError, read_track_file
+from wildshape.io.tracks import NoUsableScanError
 from wildshape.records import Track
 
 
 @dataclass
 class Folder:
-    """One TRACK folder, or a DATASET folder of them.
+    """A DATASET folder of TRACK folders, one of these, a folder of scan files, or one scan.
 
     Attributes:
-        root: holds `scans/`, or folders that do.
+        root: whatever `io.inputs.open_tracks` takes.
+        selection: which objects and scans; 16 points are the least that any model takes.
         unit: of the coordinates on disk.
         rejected: see `Source`.
     """
 
     root: Path
+    selection: Selection = Selection(min_points=16)
     unit: Unit = "m"
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
 
-    def tracks(self) -> Iterator[Track]:
-        """Tracks in the order of their names.
+    def parts(self) -> list[str]:
+        """Groups of tracks in the order of their names.
 
         Raises:
-            BadInputError: no track folder, or a track's poses, shape or track.json is damaged.
+            BadInputError: nothing at `root` that can be read as scans.
         """
-        self.rejected = Counter()
-        for folder in track_folders(Path(self.root)):
+        return groups(len(open_tracks(self.root, self.unit)))
+
+    def tracks_of(self, part: str) -> Iterator[Track]:
+        """Tracks in the order of their names; scans that cannot be used are left out and counted.
+
+        Raises:
+            BadInputError: a track's poses, shape or track.json is damaged.
+        """
+        source = open_tracks(self.root, self.unit)
+        rejected = Counter(self.rejected)
+        for index in members(part):
             try:
-                read = read_track_file(folder, self.unit)
-            except NoUsableScanError as error:
-                self.rejected["scan: cannot be used"] += len(error.skipped)
-                self.rejected["track: no scan left"] += 1
+                track = filtered(source[index], self.selection, rejected)
+            except NoUsableScanError:
+                rejected["object: no scan that can be used"] += 1
                 continue
-            if read.skipped:
-                self.rejected["scan: cannot be used"] += len(read.skipped)
-            yield read.track
-
-
-def track_folders(root: Path) -> list[Path]:
-    """The track folders at or directly below `root`, sorted by name.
-
-    Raises:
-        BadInputError: there is none.
-    """
-    if (root / "scans").is_dir():
-        return [root]
-    folders = sorted(scans.parent for scans in root.glob("*/scans") if scans.is_dir())
-    if not folders:
-        raise BadInputError(f"{root}: no track folder here; a track keeps its scans in scans/.")
-    return folders
+            if track is not None:
+                yield track
+        for _, reason in source.skipped:
+            rejected[f"scan: {reason.partition(': ')[2] or reason}"] += 1
+        self.rejected = rejected

@@ -12,97 +12,95 @@ from pathlib import Path
 
 import numpy as np
 
+from wildshape.datasets.boxes import Crop, points_in_box
+from wildshape.datasets.gathering import Gathering
+from wildshape.datasets.selection import Selection
 from wildshape.datasets.tracklets import Tracklet, read_tracklets
 from wildshape.errors import BadInputError
-from wildshape.geometry.se3 import stack
 from wildshape.records import Points, Sensor, Track
 
 HDL64E = Sensor(kind="lidar", resolution_deg=(0.18, 0.42))
+VEHICLES = ("Car", "Van", "Truck")
 _TRACKLETS = "tracklet_labels.xml"
 # Full scans first; the second is how a drive cut down to its vehicles is kept.
 _SCAN_FOLDERS = ("velodyne_points/data", "velodyne_objects_xyz0")
-_Crop = tuple[int, Points]
 
 
 @dataclass
 class KittiRaw:
-    """Vehicles of KITTI raw.
+    """Labelled objects of KITTI raw; a part is a drive.
 
     Attributes:
         root: a drive folder, a date folder or the folder above.
-        every: take every k-th labelled frame of an object.
-        min_points: a scan with fewer points on the object is left out (METHOD 2).
-        min_scans: an object with fewer scans is left out.
-        categories: the `objectType`s taken.
-        margin: the labelled box is enlarged by this, metres; labels are good to 5 cm.
-        keep_ground: keep the points below `ground`, and those just under the box's floor.
-        ground: height of the strip above the box's floor that is left out otherwise, metres.
+        selection: which objects and scans; its categories are `objectType`s, by default `VEHICLES`.
+        crop: how much around the labelled box belongs to the object.
         rejected: see `Source`.
     """
 
     root: Path
-    every: int = 1
-    min_points: int = 100
-    min_scans: int = 1
-    categories: tuple[str, ...] = ("Car", "Van", "Truck")
-    margin: float = 0.15
-    keep_ground: bool = False
-    ground: float = 0.2
+    selection: Selection = Selection()
+    crop: Crop = Crop()
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
 
-    def tracks(self) -> Iterator[Track]:
-        """Tracks drive by drive, in the order of the tracklets; only one drive is held at a time.
+    def parts(self) -> list[str]:
+        """The drives' folders, as seen from `root`.
 
         Raises:
-            BadInputError: no drive below `root`, or a file of one is missing or corrupt.
+            BadInputError: no drive below `root`, or none with tracklets.
         """
-        self.rejected = Counter()
-        for drive in find_drives(Path(self.root)):
-            if (drive / _TRACKLETS).is_file():
-                yield from self._drive_tracks(drive)
-            else:
-                self.rejected[f"drive without {_TRACKLETS}"] += 1
+        root = Path(self.root)
+        return [_part(drive, root) for drive in find_drives(root)]
+
+    def tracks_of(self, part: str) -> Iterator[Track]:
+        """Tracks of a drive, each as soon as its object is labelled no more.
+
+        Raises:
+            BadInputError: a file of the drive is missing or corrupt.
+        """
+        root = Path(self.root)
+        drive = root if _is_drive(root) else root / part
+        if (drive / _TRACKLETS).is_file():
+            yield from self._drive_tracks(drive)
+        else:
+            self.rejected[f"drive without {_TRACKLETS}"] += 1
 
     def _drive_tracks(self, drive: Path) -> Iterator[Track]:
         tracklets = read_tracklets(drive / _TRACKLETS)
+        wanted = {f"{drive.name}_{i:04d}": t for i, t in enumerate(tracklets) if self._is_wanted(t)}
+        gathering = Gathering(self.selection, HDL64E)
         files = scan_files(drive)
-        wanted = {i: t for i, t in enumerate(tracklets) if self._is_wanted(t)}
-        crops: dict[int, list[_Crop]] = {i: [] for i in wanted}
         for frame in range(max((t.frames.stop for t in wanted.values()), default=0)):
-            active = {i: t for i, t in wanted.items() if frame in t.frames[:: self.every]}
-            self._crop_frame(active, frame, files, crops)
-        for i, tracklet in wanted.items():
-            if len(crops[i]) >= self.min_scans:
-                yield _track(f"{drive.name}_{i:04d}", tracklet, crops[i])
-            else:
-                self.rejected[f"object: fewer than {self.min_scans} scans left"] += 1
+            self._crop_frame(wanted, frame, files, gathering)
+            yield from gathering.finished(before=frame)
+        yield from gathering.finished()
+        for reason, count in gathering.rejected.items():
+            self.rejected[reason] += count
 
     def _is_wanted(self, tracklet: Tracklet) -> bool:
-        if tracklet.category not in self.categories:
+        if tracklet.category not in (self.selection.categories or VEHICLES):
             self.rejected[f"object: category {tracklet.category}"] += 1
             return False
         return True
 
     def _crop_frame(
-        self,
-        active: dict[int, Tracklet],
-        frame: int,
-        files: dict[int, Path],
-        crops: dict[int, list[_Crop]],
+        self, tracklets: dict[str, Tracklet], frame: int, files: dict[int, Path], to: Gathering
     ) -> None:
+        active = {
+            name: t
+            for name, t in tracklets.items()
+            if frame in t.frames
+            and to.wants(name, frame, category=t.category.lower(), source=_source(t))
+        }
         if not active:
             return
         if frame not in files:
             self.rejected["scan: the frame has no velodyne file"] += len(active)
             return
         cloud = read_velodyne(files[frame])
-        ground = -self.margin if self.keep_ground else self.ground
-        for i, tracklet in active.items():
-            points = tracklet.crop(cloud, frame, self.margin, ground)
-            if len(points) >= self.min_points:
-                crops[i].append((frame, points))
-            else:
-                self.rejected[f"scan: fewer than {self.min_points} points on the object"] += 1
+        for name, tracklet in active.items():
+            T = tracklet.T_velo_object[frame - tracklet.first_frame]
+            points = points_in_box(cloud, T, tracklet.size, self.crop)
+            to.add(name, f"{frame:010d}", points, T)
 
 
 def find_drives(root: Path) -> list[Path]:
@@ -166,15 +164,10 @@ def read_velodyne(path: Path) -> Points:
     return np.ascontiguousarray(points[np.isfinite(points).all(axis=1)], dtype=np.float32)
 
 
-def _track(name: str, tracklet: Tracklet, crops: list[_Crop]) -> Track:
-    frames = [frame for frame, _ in crops]
+def _part(drive: Path, root: Path) -> str:
+    return drive.name if drive == root else drive.relative_to(root).as_posix()
+
+
+def _source(tracklet: Tracklet) -> str:
     length, width, height = tracklet.size
-    return Track(
-        name=name,
-        scans=tuple(points for _, points in crops),
-        scan_names=tuple(f"{frame:010d}" for frame in frames),
-        sensor=HDL64E,
-        category=tracklet.category.lower(),
-        source=f"KITTI raw, labelled box {length:.2f} x {width:.2f} x {height:.2f} m",
-        T_sensor_object=stack([tracklet.T_velo_object[f - tracklet.first_frame] for f in frames]),
-    )
+    return f"KITTI raw, labelled box {length:.2f} x {width:.2f} x {height:.2f} m"

@@ -1,12 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The packed store as a source: nothing is left out, it was chosen when it was written."""
+"""The packed store as a source, for choosing from it, or for making folders of it."""
 
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from wildshape.datasets.filtering import filtered
+from wildshape.datasets.groups import groups, members
+from wildshape.datasets.selection import Selection
 from wildshape.io.store import open_store
 from wildshape.records import Track
 
@@ -17,16 +20,27 @@ class Packed:
 
     Attributes:
         root: of the store.
-        rejected: see `Source`; always empty.
+        selection: which objects and scans; 16 points are the least that any model takes.
+        rejected: see `Source`.
     """
 
     root: Path
+    selection: Selection = Selection(min_points=16)
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
 
-    def tracks(self) -> Iterator[Track]:
-        """Tracks in the order of the store, one held at a time.
+    def parts(self) -> list[str]:
+        """Groups of tracks in the order of the store.
 
         Raises:
             BadInputError: no store, or a damaged one.
         """
-        yield from open_store(self.root)
+        return groups(len(open_store(self.root)))
+
+    def tracks_of(self, part: str) -> Iterator[Track]:
+        """Tracks in the order of the store, one held at a time."""
+        store, rejected = open_store(self.root), Counter(self.rejected)
+        for index in members(part):
+            track = filtered(store.track(index), self.selection, rejected)
+            if track is not None:
+                yield track
+        self.rejected = rejected

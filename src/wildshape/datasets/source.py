@@ -35,3 +35,13 @@ class Source(Protocol):
             BadInputError: a file is missing or corrupt; the message names it.
         """
         ...
+
+
+def all_tracks(source: Source) -> Iterator[Track]:
+    """The tracks of all parts of a data set, one held at a time.
+
+    Raises:
+        BadInputError: see `Source`.
+    """
+    for part in source.parts():
+        yield from source.tracks_of(part)

@@ -13,7 +13,6 @@ from jaxtyping import Float
 from wildshape.errors import BadInputError
 from wildshape.geometry.rotation import rotation_z
 from wildshape.geometry.se3 import SE3
-from wildshape.records import Points
 
 
 @dataclass(frozen=True)
@@ -36,23 +35,6 @@ class Tracklet:
     def frames(self) -> range:
         """The frames in which the object is labelled."""
         return range(self.first_frame, self.first_frame + len(self.T_velo_object))
-
-    def crop(self, cloud: Points, frame: int, margin: float, ground: float) -> Points:
-        """The points `(n, 3)` of a velodyne scan that belong to the object, in the same frame.
-
-        Args:
-            cloud: `(s, 3)` velodyne frame, metres.
-            frame: which pose to use.
-            margin: the box is enlarged by this on each side and at the top, metres.
-            ground: points lower than this above the box's floor are left out, metres; a negative
-                value reaches under the floor.
-        """
-        T = self.T_velo_object[frame - self.first_frame]
-        local = (cloud - T.translation.numpy()) @ T.rotation.numpy()
-        half = np.asarray(self.size) / 2
-        low = np.asarray((-half[0] - margin, -half[1] - margin, -half[2] + ground))
-        inside = ((local >= low) & (local <= half + margin)).all(axis=1)
-        return cloud[inside]
 
 
 def read_tracklets(path: Path) -> list[Tracklet]:

@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Names of the data sets that `convert` reads, and what reads them.
+
+To add a reader (see `datasets.source.Source`): one line in `SOURCES`, in the order in
+which the help is to list them. Its own options are fields of `convert.Settings` with the names of
+the reader's fields; whoever passes one to a reader that lacks it is told so.
+"""
+
+from dataclasses import fields, replace
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wildshape.errors import BadInputError
+
+if TYPE_CHECKING:
+    from wildshape.datasets.source import Source
+
+SOURCES = {
+    "kitti-raw": "wildshape.datasets.kitti_raw:KittiRaw",
+    "folder": "wildshape.datasets.folder:Folder",
+    "packed": "wildshape.datasets.packed:Packed",
+}
+"""Name on the command line -> module and class; imported when it is asked for."""
+
+_NESTED = ("selection", "crop")
+
+
+def open_source(name: str, root: Path, options: dict[str, Any]) -> "Source":
+    """The reader of a data set, with its own defaults where nothing else is wanted.
+
+    Args:
+        name: of `SOURCES`.
+        root: where the data set lies.
+        options: values for the fields of `Selection`, of `Crop` or of the reader itself, as far as
+            the user gave them.
+
+    Raises:
+        BadInputError: no such source, or an option that it does not have.
+    """
+    if name not in SOURCES:
+        raise BadInputError(
+            f"'{name}' is no source that can be converted; there are {', '.join(SOURCES)}."
+        )
+    module, _, kind = SOURCES[name].partition(":")
+    source = getattr(import_module(module), kind)(root)
+    for option, value in options.items():
+        source = _with(source, name, option, value)
+    return source
+
+
+def _with(source: Any, name: str, option: str, value: object) -> Any:
+    own = _settable(source)
+    if option in own:
+        return replace(source, **{option: value})
+    for group in own & set(_NESTED):
+        if option in _settable(getattr(source, group)):
+            return replace(source, **{group: replace(getattr(source, group), **{option: value})})
+    raise BadInputError(f"--{option.replace('_', '-')}: {name} has no such option; leave it out.")
+
+
+def _settable(record: Any) -> set[str]:
+    return {field.name for field in fields(record) if field.init}
