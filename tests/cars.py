@@ -86,3 +86,14 @@ def poses_of(track):
 def known(figures):
     """The figures that there are."""
     return {name: value for name, value in figures.items() if value is not None}
+
+
+def off_surface(points):
+    """Distance of points `(n, 3)` in the object frame from the car's nearest face, metres."""
+    distances = []
+    for low, high in (_BODY, _CABIN):
+        middle, half = (np.add(high, low)) / 2, (np.subtract(high, low)) / 2
+        beyond = np.abs(points - middle) - half
+        outside = np.linalg.norm(np.maximum(beyond, 0), axis=1)
+        distances.append(np.where(outside > 0, outside, -beyond.max(axis=1)))
+    return np.min(distances, axis=0)
