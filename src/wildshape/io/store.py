@@ -147,6 +147,16 @@ class Store:
             self._sensors[number] = sensor_from_json(raw, self.path)
         return self._sensors[number]
 
+    def column(self, name: str) -> np.ndarray:
+        """A column of the index (`store_format.INDEX`): a view of the mapped file."""
+        return self._index[name]
+
+    def how_often(self, column: str) -> dict[str, int]:
+        """Tracks that bear each text of `categories`, `sources` or `sensors`, most first."""
+        _, rows, counts = np.unique(self._index[column], return_index=True, return_counts=True)
+        found = [(self._text(column, int(r)), int(c)) for r, c in zip(rows, counts)]
+        return dict(sorted(found, key=lambda pair: -pair[1]))
+
     def verify(self) -> None:
         """Read everything and compare the checksums.
 
