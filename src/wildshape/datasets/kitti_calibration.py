@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""KITTI's text files of matrices: calibration (`name: numbers`) and odometry (12 numbers a line)."""
+"""KITTI's text files of matrices: calibration (`name: numbers`) and odometry (a pose a line)."""
 
 from pathlib import Path
 
