@@ -104,10 +104,15 @@ class ReportObject:
 
 @dataclass(frozen=True)
 class Figure:
-    """A finished picture, embedded as it is."""
+    """A finished picture, embedded as it is.
+
+    Attributes:
+        wide: across the whole page, not beside others.
+    """
 
     title: str
     png: bytes
+    wide: bool = False
 
 
 @dataclass(frozen=True)

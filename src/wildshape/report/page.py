@@ -195,7 +195,8 @@ def _curves(curves: tuple[Curve, ...]) -> str:
 
 def _figures(report: Report) -> str:
     images = "".join(
-        f'<figure><figcaption>{escape(figure.title)}</figcaption><img alt="{escape(figure.title)}"'
+        f"<figure{' class=wide' if figure.wide else ''}><figcaption>{escape(figure.title)}"
+        f'</figcaption><img alt="{escape(figure.title)}"'
         f' src="{_png(figure.png)}"></figure>'
         for figure in report.figures
     )

@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a store of tracks holds, on one sheet or one page: distributions, then thumbnails."""
+
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wildshape.datasets.accumulate import fuse_by_truth
+from wildshape.datasets.statistics import Quantity, Statistics
+from wildshape.io.atomic import atomic_write
+from wildshape.records import Track
+from wildshape.report.content import Cell, Cloud, Figure, Report, ReportObject, Table
+from wildshape.report.histograms import INK, SOFT, draw_panel, is_rose, number, panels_of
+from wildshape.report.page import write_report
+from wildshape.report.thumbnails import PANELS, draw_track
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
+
+_COLUMNS = 4
+_SHARES = (0.05, 0.5, 0.95)
+_IN_3D = 4
+
+
+def write_sheet(title: str, found: Statistics, tracks: Sequence[Track], path: Path) -> None:
+    """One PNG: all distributions, and thumbnails of the tracks."""
+    with atomic_write(path) as file:
+        _draw_sheet(title, found, tracks).savefig(file, format="png", dpi=110, facecolor="white")
+
+
+def write_statistics_page(
+    title: str, found: Statistics, tracks: Sequence[Track], path: Path
+) -> None:
+    """One self-contained HTML page: numbers, distributions, thumbnails, a few tracks in 3D."""
+    write_report(_report(title, found, tracks), path)
+
+
+def summary_line(found: Statistics) -> str:
+    """How much there is, in one line."""
+    parts = [f"{found.tracks:,} tracks"]
+    if found.scans is not None and found.points is not None:
+        parts += [f"{found.scans:,} scans", f"{found.points:,} points"]
+    if found.with_poses is not None:
+        parts += [f"{found.with_poses:,} tracks with true poses, {found.with_shape:,} with shapes"]
+    return "; ".join(parts)
+
+
+def read_line(found: Statistics) -> str:
+    """What was read to find that out."""
+    if found.read == found.tracks:
+        return "The points of all tracks were read."
+    return f"Points were read of a sample of {found.read:,} tracks, drawn by chance, seed 0."
+
+
+def _draw_sheet(title: str, found: Statistics, tracks: Sequence[Track]) -> "Drawing":
+    panels = panels_of(found)
+    upper = math.ceil(len(panels) / _COLUMNS)
+    lower = math.ceil(len(tracks) / 2)
+    heights = (0.5, 2.1 * upper, 0.35 + 1.42 * lower)
+    figure = _figure(14, sum(heights))
+    top, middle, bottom = figure.subfigures(3, 1, height_ratios=heights)
+    top.text(0.012, 0.55, title, fontsize=15, weight="bold", color=INK, va="center")
+    top.text(0.012, 0.0, f"{summary_line(found)}. {read_line(found)}", fontsize=9, color=SOFT)
+    _draw_panels(middle, panels, upper)
+    if tracks:
+        _draw_thumbnails(bottom, tracks)
+    return figure
+
+
+def _draw_panels(figure: Any, panels: list[Any], rows: int) -> None:
+    for place, panel in enumerate(panels, start=1):
+        kind = "polar" if is_rose(panel) else None
+        draw_panel(figure.add_subplot(rows, _COLUMNS, place, projection=kind), panel)
+
+
+def _draw_thumbnails(figure: Any, tracks: Sequence[Track]) -> None:
+    """Two tracks a row, each with its name above its panels."""
+    rows = math.ceil(len(tracks) / 2)
+    for place, (half, track) in enumerate(
+        zip(figure.subfigures(rows, 2, squeeze=False, wspace=0.02).flat, tracks)
+    ):
+        axes = half.subplots(1, PANELS, gridspec_kw={"wspace": 0.03})
+        draw_track(list(axes), track)
+        words = (track.name, track.category, f"{len(track.scans)} scans", track.source)
+        half.suptitle(
+            ", ".join(word for word in words if word)[:90], fontsize=8, color=INK, x=0.01, ha="left"
+        )
+        assert place < len(tracks)
+
+
+def _figure(width: float, height: float) -> "Drawing":
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure as MatplotlibFigure
+
+    figure = MatplotlibFigure(figsize=(width, height), facecolor="white", layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _png(figure: "Drawing") -> bytes:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=160, facecolor="white")
+    return buffer.getvalue()
+
+
+def _report(title: str, found: Statistics, tracks: Sequence[Track]) -> Report:
+    figures = [Figure(_caption(panel), _panel_png(panel)) for panel in panels_of(found)]
+    if tracks:
+        thumbnails = _figure(14, 1.42 * math.ceil(len(tracks) / 2))
+        _draw_thumbnails(thumbnails, tracks)
+        figures.append(Figure("Tracks", _png(thumbnails), wide=True))
+    return Report(
+        title=title,
+        summary=f"{summary_line(found)}.\n\n{read_line(found)}",
+        tables=tuple(_tables(found)),
+        objects=tuple(_in_3d(track) for track in tracks[:_IN_3D]),
+        notes=tuple(f"{what}: {why}" for what, why in list(found.unusable.items())[:20]),
+        provenance=found.provenance,
+        figures=tuple(figures),
+    )
+
+
+def _panel_png(panel: Any) -> bytes:
+    figure = _figure(4.6, 2.6)
+    draw_panel(figure.add_subplot(projection="polar" if is_rose(panel) else None), panel)
+    return _png(figure)
+
+
+def _caption(panel: Any) -> str:
+    return f"{panel.title} ({panel.basis})" if isinstance(panel, Quantity) else panel[0]
+
+
+def _tables(found: Statistics) -> list[Table]:
+    columns = ("", "counted", "least", "5 %", "median", "95 %", "most", "mean", "from")
+    rows = tuple(_row(quantity) for quantity in found.quantities)
+    tables = [Table("Distributions", columns, rows)]
+    counted = (
+        ("Categories", found.categories, "tracks"),
+        ("Sensors", found.sensors, "tracks"),
+        ("Sources", found.sources, "tracks"),
+        ("Left out when the tracks were made", found.left_out, "how many"),
+    )
+    for name, counts, what in counted:
+        rows = tuple((word or "not said", count) for word, count in list(counts.items())[:30])
+        if counts and set(counts) != {""}:
+            tables.append(Table(name, ("", what), rows))
+    return tables
+
+
+def _row(quantity: Quantity) -> tuple[Cell, ...]:
+    tally = quantity.tally
+    name = f"{quantity.title}{f', {quantity.unit}' if quantity.unit else ''}"
+    numbers = (tally.least, *(tally.quantile(s) for s in _SHARES), tally.most, tally.mean)
+    return (name, f"{tally.count:,}", *map(number, numbers), quantity.basis)
+
+
+def _in_3d(track: Track) -> ReportObject:
+    """A track as linked panels in the frame of its middle scan."""
+    middle = track.middle
+    clouds = [Cloud("input scan", track.scans[middle], size=2.6)]
+    if track.T_sensor_object is not None:
+        pose = track.T_sensor_object[middle]
+        clouds.append(Cloud("fused by truth", pose.apply_numpy(fuse_by_truth(track))))
+        if track.shape is not None:
+            clouds.append(Cloud("truth", pose.apply_numpy(track.shape)))
+    words = (track.category, f"{len(track.scans)} scans", track.source)
+    return ReportObject(
+        name=track.name,
+        subtitle=", ".join(word for word in words if word),
+        clouds=tuple(clouds),
+        sensor=track.sensor.kind,
+    )
