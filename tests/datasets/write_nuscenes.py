@@ -1,0 +1,232 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Small scenes in nuScenes' own layout, byte for byte, with known objects."""
+
+import hashlib
+import json
+import random
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+SENSORS = {  # channel: (translation, roll pitch yaw in degrees); LIDAR_TOP is y forward
+    "LIDAR_TOP": ((0.94, 0.02, 1.84), (1.2, -0.7, -89.6)),
+    "CAM_FRONT": ((1.70, 0.01, 1.51), (-90.4, 0.3, -90.1)),
+}
+
+
+@dataclass(frozen=True)
+class Thing:
+    """A box that moves evenly: place and heading are linear in time."""
+
+    name: str
+    category: str = "vehicle.car"
+    size: tuple[float, float, float] = (4.6, 1.9, 1.6)  # length width height
+    start: tuple[float, float, float] = (412.0, 1182.0, 0.9)
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yaw: float = 0.4
+    yaw_rate: float = 0.0
+    keys: tuple[int, ...] = (0, 1, 2, 3)  # the key frames in which it is labelled
+
+    def pose(self, t):
+        """T_global_object at t seconds."""
+        rotation = Rotation.from_euler("z", self.yaw + self.yaw_rate * t)
+        return rotation, np.add(self.start, np.multiply(self.velocity, t))
+
+
+@dataclass(frozen=True)
+class Scene:
+    name: str = "scene-0061"
+    things: tuple[Thing, ...] = ()
+    keys: int = 4
+    sweeps_between: int = 4
+
+
+def token(*words):
+    return hashlib.md5(" ".join(map(str, words)).encode()).hexdigest()
+
+
+def ego_pose(t):
+    """T_global_ego: along a bend, rolling a little."""
+    angles = (0.5 + 0.2 * t, -0.4, 31.0 + 9.0 * t)
+    return Rotation.from_euler("xyz", angles, degrees=True), np.array((400.0 + 8 * t, 1180.0, 0.0))
+
+
+def sensor_pose(channel):
+    translation, angles = SENSORS[channel]
+    return Rotation.from_euler("xyz", angles, degrees=True), np.asarray(translation)
+
+
+def box_surface(size, count, seed):
+    """Points on a box's sides and top, above the strip that readers cut off at its floor."""
+    rng = np.random.default_rng(seed)
+    half = np.asarray(size) / 2
+    points = rng.uniform(-half, half, (count, 3))
+    points[:, 2] = rng.uniform(-half[2] + 0.25, half[2], count)
+    faces = np.array(((0, 1), (0, -1), (1, 1), (1, -1), (2, 1)))[rng.integers(5, size=count)]
+    points[np.arange(count), faces[:, 0]] = faces[:, 1] * half[faces[:, 0]]
+    return points
+
+
+def off_surface(points, size):
+    """How far points lie from a box's surface."""
+    away = np.abs(points) - np.asarray(size) / 2
+    outside = np.linalg.norm(np.maximum(away, 0), axis=1)
+    return np.abs(outside + np.minimum(away.max(axis=1), 0))
+
+
+def cloud_at(scene, t, count):
+    """What LIDAR_TOP sees at t: the things' surfaces and some world, in its own frame."""
+    world = np.random.default_rng(7).uniform((330, 1100, -1), (470, 1260, 6), (200, 3))
+    parts = [world]
+    for number, thing in enumerate(scene.things):
+        rotation, place = thing.pose(t)
+        parts.append(rotation.apply(box_surface(thing.size, count, number)) + place)
+    points = np.concatenate(parts)
+    for rotation, place in (ego_pose(t), sensor_pose("LIDAR_TOP")):
+        points = rotation.inv().apply(points - place)
+    return points
+
+
+def write_nuscenes(root, scenes, *, version="v1.0-mini", sweeps=True, count=400):
+    """Tables and files of the scenes; rows in no order, as in the real tables."""
+    rows = {name: [] for name in _NAMES}
+    rows["sensor"] = [
+        {"token": token(c), "channel": c, "modality": "lidar" if "LIDAR" in c else "camera"}
+        for c in SENSORS
+    ]
+    for scene in scenes:
+        _add_scene(rows, scene, root, sweeps, count)
+    shuffle = random.Random(3)
+    (root / version).mkdir(parents=True, exist_ok=True)
+    for name, table in rows.items():
+        shuffle.shuffle(table)
+        (root / version / f"{name}.json").write_text(json.dumps(table, indent=0))
+    return root
+
+
+_NAMES = (
+    *("attribute", "calibrated_sensor", "category", "ego_pose", "instance", "log", "map"),
+    *("sample", "sample_annotation", "sample_data", "scene", "sensor", "visibility"),
+)
+
+
+def _add_scene(rows, scene, root, sweeps, count):
+    name = scene.name
+    samples = [token(name, "sample", key) for key in range(scene.keys)]
+    rows["scene"].append(
+        {
+            "token": token(name),
+            "name": name,
+            "description": "a \\ test, \"{]\" and 'umlaut' \u00fc",
+            "log_token": token(name, "log"),
+            "nbr_samples": scene.keys,
+            "first_sample_token": samples[0],
+            "last_sample_token": samples[-1],
+        }
+    )
+    for channel in SENSORS:
+        rows["calibrated_sensor"].append(
+            {
+                "token": token(name, channel),
+                "sensor_token": token(channel),
+                **_pose(*sensor_pose(channel)),
+                "camera_intrinsic": [],
+            }
+        )
+    for key in range(scene.keys):
+        time = 1532402927647951 + 500_000 * key
+        rows["sample"].append(
+            {"token": samples[key], "timestamp": time, "scene_token": token(name)}
+            | _links(samples, key)
+        )
+    _add_things(rows, scene, samples)
+    _add_data(rows, scene, samples, root, sweeps, count)
+
+
+def _add_things(rows, scene, samples):
+    for thing in scene.things:
+        category, instance = token(thing.category), token(scene.name, thing.name)
+        if category not in {row["token"] for row in rows["category"]}:
+            rows["category"].append({"token": category, "name": thing.category, "description": ""})
+        marks = [token(instance, key) for key in thing.keys]
+        rows["instance"].append(
+            {
+                "token": instance,
+                "category_token": category,
+                "nbr_annotations": len(marks),
+                "first_annotation_token": marks[0],
+                "last_annotation_token": marks[-1],
+            }
+        )
+        length, width, height = thing.size
+        for i, key in enumerate(thing.keys):
+            rows["sample_annotation"].append(
+                {
+                    "token": marks[i],
+                    "sample_token": samples[key],
+                    "instance_token": instance,
+                    "visibility_token": "4",
+                    "attribute_tokens": [],
+                    **_pose(*thing.pose(0.5 * key)),
+                    "size": [width, length, height],
+                    **_links(marks, i),
+                    "num_lidar_pts": 400,
+                    "num_radar_pts": 0,
+                }
+            )
+
+
+def _add_data(rows, scene, samples, root, sweeps, count):
+    steps = scene.sweeps_between + 1
+    for step in range((scene.keys - 1) * steps + 1):
+        t = 0.5 * step / steps
+        key = step % steps == 0
+        for channel in SENSORS if key else ("LIDAR_TOP",):
+            micros = 1532402927647951 + round(1e6 * t)
+            folder = f"{'samples' if key else 'sweeps'}/{channel}"
+            suffix = "pcd.bin" if channel == "LIDAR_TOP" else "jpg"
+            file = f"{folder}/n015-2018-07-24__{scene.name}__{channel}__{micros}.{suffix}"
+            data = token(scene.name, channel, step)
+            rows["sample_data"].append(
+                {
+                    "token": data,
+                    "sample_token": samples[-(-step // steps)],  # the one that follows
+                    "ego_pose_token": data,
+                    "calibrated_sensor_token": token(scene.name, channel),
+                    "timestamp": micros,
+                    "fileformat": "pcd" if channel == "LIDAR_TOP" else "jpg",
+                    "is_key_frame": key,
+                    "height": 0,
+                    "width": 0,
+                    "filename": file,
+                    "prev": "",
+                    "next": "",
+                }
+            )
+            lag = 0.0 if channel == "LIDAR_TOP" else 0.03
+            rows["ego_pose"].append(
+                {"token": data, "timestamp": micros, **_pose(*ego_pose(t + lag))}
+            )
+            if channel == "LIDAR_TOP" and (key or sweeps):
+                _write_cloud(root / file, cloud_at(scene, t, count))
+
+
+def _write_cloud(path, points):
+    ring = np.arange(len(points)) % 32
+    columns = np.column_stack((points, np.full(len(points), 17.0), ring))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    columns.astype("<f4").tofile(path)
+
+
+def _pose(rotation, translation):
+    x, y, z, w = rotation.as_quat().tolist()
+    return {"translation": np.asarray(translation).tolist(), "rotation": [w, x, y, z]}
+
+
+def _links(tokens, i):
+    return {
+        "prev": tokens[i - 1] if i else "",
+        "next": tokens[i + 1] if i + 1 < len(tokens) else "",
+    }
