@@ -121,7 +121,7 @@ def handicap(
     if not config.steady:
         return torch.zeros_like(cost)
     anchor = batch.anchor
-    if anchor is None:
+    if not anchor.any():
         at = batch.reference
         branch = (cost[at] - config.belief * log_belief[at]).argmin(1)
         own = rotation[at, branch]

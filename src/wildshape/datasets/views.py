@@ -49,24 +49,19 @@ class Batch(NamedTuple):
         centres: the centres in the (turned) sensor frames.
         reference: row of the reference scan of each track.
         turn: rotation by which each scan was turned about its sensor.
-        anchor: `R_sensor_canonical` that each scan, as recorded, is held to, once headings are
-            agreed on.
+        anchor: `R_sensor_canonical` that each scan, as recorded, is held to; zero until headings
+            are agreed on.
     """
 
     scans: Float[Tensor, "B N 3"]
     centres: Float[Tensor, "B 3"]
     reference: Tensor
     turn: Float[Tensor, "B 3 3"]
-    anchor: Float[Tensor, "B 3 3"] | None = None
+    anchor: Float[Tensor, "B 3 3"]
 
     def to(self, device: torch.device | str) -> "Batch":
         """The same batch on a device."""
-        moved = {
-            name: part.to(device, non_blocking=True)
-            for name, part in self._asdict().items()
-            if part is not None
-        }
-        return self._replace(**moved)
+        return Batch(*(part.to(device, non_blocking=True) for part in self))
 
 
 class ViewSampler:
@@ -104,7 +99,9 @@ class ViewSampler:
         reference = torch.from_numpy(first + rng.integers(config.views, size=config.tracks))
         rotation = _turns(len(rows), config.turn, int(rng.integers(2**62)))
         turned = (rotation @ centres[..., None])[..., 0]
-        anchor = None if self.anchors is None else self.anchors[torch.from_numpy(rows)]
+        anchor = torch.zeros_like(rotation)
+        if self.anchors is not None:
+            anchor = self.anchors[torch.from_numpy(rows)]
         return Batch(scans @ rotation.mT, turned, reference, rotation, anchor)
 
     def gather(

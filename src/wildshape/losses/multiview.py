@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Multi-view consistency with hindsight (paper eq. 5, METHOD 6)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -40,6 +41,10 @@ class LossConfig:
     agree_at: tuple[float, ...] = ()
 
 
+# From the cost of each branch, metres added to it when the winner is chosen: (B, K) to (B, K).
+Handicap = Callable[[Tensor], Tensor]
+
+
 class LossTerms(NamedTuple):
     """The loss and its parts.
 
@@ -63,7 +68,7 @@ def multiview_loss(
     rotation: Float[Tensor, "B K 3 3"],
     translation: Float[Tensor, "B K 3"],
     config: LossConfig,
-    handicap: Float[Tensor, "B K"] | None = None,
+    handicap: Handicap | None = None,
 ) -> LossTerms:
     """The shape of each track's reference scan, posed by every scan's own pose, explains it.
 
@@ -74,7 +79,7 @@ def multiview_loss(
         rotation: of every scan's pose hypotheses.
         translation: of the same.
         config: weights.
-        handicap: metres added to a branch's cost when the winner is chosen.
+        handicap: what keeps branches from winning besides their cost, given that cost.
     """
     views = len(scans) // len(shapes)
     shape = shapes.repeat_interleave(views, dim=0)
@@ -82,7 +87,7 @@ def multiview_loss(
         posed = shape[:, None] @ rotation.mT + translation[:, :, None]
         scores = score_hypotheses(scans, centres, posed, config.projection)
         cost = scores.cost(config.beta)
-        winner = (cost if handicap is None else cost + handicap).argmin(-1)
+        winner = (cost if handicap is None else cost + handicap(cost)).argmin(-1)
     observation, projection = _winner_terms(scans, shape, rotation, translation, scores, winner)
     total = (observation + config.beta * projection).mean() * views
     return LossTerms(total, observation.mean().detach(), projection.mean().detach(), winner)
@@ -98,7 +103,9 @@ def _winner_terms(
 ) -> tuple[Tensor, Tensor]:
     """Both terms of the winning hypothesis of each scan, differentiable (winner takes all)."""
     rows = torch.arange(len(scans), device=scans.device)
-    posed = shape @ rotation[rows, winner].mT + translation[rows, winner][:, None]
+    R = rotation.gather(1, winner[:, None, None, None].expand(-1, 1, 3, 3))[:, 0]
+    t = translation.gather(1, winner[:, None, None].expand(-1, 1, 3))
+    posed = shape @ R.mT + t
     observation = observation_term(scans, posed, scores.to_shape[rows, winner])
     seen = scores.visible[rows, winner]
     projection = projection_term(posed, scans, scores.to_scan[rows, winner], seen)

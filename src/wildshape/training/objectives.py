@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is minimised, as a module: the loop and DistributedDataParallel know nothing else of it."""
 
+from functools import partial
 from typing import NamedTuple
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 from torch.profiler import record_function
 
 from wildshape.datasets.views import Batch
-from wildshape.losses.hindsight import score_hypotheses
 from wildshape.losses.multiview import LossConfig, multiview_loss
 from wildshape.losses.steady import turning_handicap
 from wildshape.losses.template import template_deviation
@@ -33,12 +34,12 @@ class WeaklySupervised(nn.Module):
         super().__init__()
         self.network, self.config = network, config
 
-    def forward(self, batch: Batch, template: float) -> Objective:
+    def forward(self, batch: Batch, template: float | Tensor) -> Objective:
         """Loss of one batch; `template` is this step's weight of the template pull."""
         code = self.network.encode(batch.scans)
         with record_function("wildshape: heads"):
             poses = self.network.poses(code)
-            shapes = self.network.canonical(code[batch.reference])
+            shapes = self.network.canonical(code.index_select(0, batch.reference))
         terms = multiview_loss(
             batch.scans,
             batch.centres,
@@ -46,11 +47,11 @@ class WeaklySupervised(nn.Module):
             poses.rotation,
             poses.translation,
             self.config,
-            self._handicap(batch, shapes, poses),
+            partial(self._handicap, batch, poses) if self.config.steady else None,
         )
         deviation = template_deviation(shapes)
         loss = terms.total
-        if template > 0:
+        if self.config.template > 0:
             loss = loss + template * deviation
         if self.config.belief > 0:
             belief = poses.log_belief.gather(1, terms.winner[:, None]).mean()
@@ -59,22 +60,25 @@ class WeaklySupervised(nn.Module):
             loss, terms.observation, terms.projection, deviation.detach(), terms.winner
         )
 
-    @torch.no_grad()
-    def _handicap(self, batch: Batch, shapes: Tensor, poses: Poses) -> Tensor | None:
-        """What keeps branches from winning besides their cost: belief, and turning around."""
-        config = self.config
-        if not config.steady:
-            return None
-        anchor = batch.anchor if batch.anchor is not None else self._anchor(batch, shapes, poses)
-        return turning_handicap(poses.rotation, batch.turn, anchor)
+    def _handicap(
+        self, batch: Batch, poses: Poses, cost: Float[Tensor, "B K"]
+    ) -> Float[Tensor, "B K"]:
+        """What keeps a track from turning around between its scans."""
+        believed = cost - self.config.belief * poses.log_belief
+        own = own_anchor(batch, poses.rotation, believed)
+        agreed = batch.anchor.any(-1).any(-1)[:, None, None]
+        return turning_handicap(poses.rotation, batch.turn, torch.where(agreed, batch.anchor, own))
 
-    def _anchor(self, batch: Batch, shapes: Tensor, poses: Poses) -> Tensor:
-        """The reference scan's own pose, as recorded, for every scan of its track."""
-        config, at = self.config, batch.reference
-        own = Poses(*(part[at] for part in poses))
-        scores = score_hypotheses(
-            batch.scans[at], batch.centres[at], own.apply(shapes), config.projection
-        )
-        branch = (scores.cost(config.beta) - config.belief * own.log_belief).argmin(-1)
-        anchor = batch.turn[at].mT @ own.choose(branch).rotation[:, 0]
-        return anchor.repeat_interleave(len(batch.scans) // len(at), dim=0)
+
+def own_anchor(
+    batch: Batch, rotation: Float[Tensor, "B K 3 3"], cost: Float[Tensor, "B K"]
+) -> Float[Tensor, "B 3 3"]:
+    """The reference scan's own pose, as recorded, for every scan of its track.
+
+    The reference scan is one of its track's views and is posed with its own shape, so the costs of
+    its branches are among those of the batch.
+    """
+    at = batch.reference
+    branch = cost[at].argmin(-1)
+    anchor = batch.turn[at].mT @ rotation[at, branch]
+    return anchor.repeat_interleave(len(batch.scans) // len(at), dim=0)

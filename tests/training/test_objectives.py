@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a track is held to before and after headings are agreed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from tests.training.worker import SMALLEST
+
+from wildshape.datasets.views import ViewSampler
+from wildshape.geometry.rotation import random_rotation
+from wildshape.losses.hindsight import score_hypotheses
+from wildshape.losses.steady import turning_handicap
+from wildshape.models.shapepose import Poses, ShapePoseNet
+from wildshape.training import objectives
+from wildshape.training.objectives import WeaklySupervised, own_anchor
+
+VIEWS = replace(SMALLEST.views, tracks=4, views=3)
+
+
+@pytest.fixture(scope="module")
+def batch(car_store):
+    return ViewSampler(car_store, np.arange(len(car_store)), VIEWS).draw(0, 0)
+
+
+def searched_again(network, batch, config):
+    """The reference scans scored by a search of their own, under their own shapes."""
+    code = network.encode(batch.scans)
+    poses, at = network.poses(code), batch.reference
+    own = Poses(*(part[at] for part in poses))
+    posed = own.apply(network.canonical(code[at]))
+    scores = score_hypotheses(batch.scans[at], batch.centres[at], posed, config.projection)
+    branch = (scores.cost(config.beta) - config.belief * own.log_belief).argmin(-1)
+    anchor = batch.turn[at].mT @ own.choose(branch).rotation[:, 0]
+    return anchor.repeat_interleave(len(batch.scans) // len(at), dim=0)
+
+
+def anchors_held_to(network, batch, monkeypatch):
+    """What the objective hands to the handicap."""
+    seen = []
+
+    def spy(rotation, turn, anchor):
+        seen.append(anchor)
+        return turning_handicap(rotation, turn, anchor)
+
+    monkeypatch.setattr(objectives, "turning_handicap", spy)
+    WeaklySupervised(network, SMALLEST.loss)(batch, 0.5)
+    return seen[0]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_anchor_is_that_of_a_search_of_its_own(batch, seed, monkeypatch):
+    torch.manual_seed(seed)
+    network = ShapePoseNet(SMALLEST.network)
+    expected = searched_again(network, batch, SMALLEST.loss)
+    found = anchors_held_to(network, batch, monkeypatch)
+    torch.testing.assert_close(found, expected, atol=1e-6, rtol=0)
+
+
+def test_agreed_headings_take_the_anchors_place(batch, monkeypatch):
+    torch.manual_seed(0)
+    network = ShapePoseNet(SMALLEST.network)
+    agreed = random_rotation(12, torch.Generator().manual_seed(3))
+    found = anchors_held_to(network, batch._replace(anchor=agreed), monkeypatch)
+    torch.testing.assert_close(found, agreed)
+
+
+def test_the_least_cost_of_the_reference_scan_decides(batch):
+    rotation = random_rotation(12 * 4, torch.Generator().manual_seed(1)).view(12, 4, 3, 3)
+    cost = torch.ones(12, 4)
+    cost[batch.reference, torch.tensor([0, 1, 2, 3])] = 0.0
+    anchor = own_anchor(batch, rotation, cost).view(4, 3, 3, 3)
+    for track, at in enumerate(batch.reference.tolist()):
+        expected = batch.turn[at].T @ rotation[at, track]
+        torch.testing.assert_close(anchor[track], expected.expand(3, 3, 3))
