@@ -2,58 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """A drive written here in KITTI's own layout, with known points."""
 
-import math
-
 import numpy as np
 import pytest
 from tests.cars import poses_of
+from tests.datasets.write_kitti_raw import SIZE, in_velo, write_drive
 
 from wildshape.datasets.boxes import Crop
 from wildshape.datasets.kitti_raw import KittiRaw
 from wildshape.datasets.selection import Selection
 from wildshape.datasets.source import all_tracks
 from wildshape.errors import BadInputError
-
-SIZE = (4.0, 1.8, 1.5)  # l w h
-
-
-def pose_xml(tx, ty, tz, rz):
-    fields = {"tx": tx, "ty": ty, "tz": tz, "rx": 0, "ry": 0, "rz": rz}
-    return "<item>" + "".join(f"<{k}>{v}</{k}>" for k, v in fields.items()) + "</item>"
-
-
-def tracklet_xml(category, first_frame, poses):
-    length, width, height = SIZE
-    return (
-        f"<item><objectType>{category}</objectType><h>{height}</h><w>{width}</w><l>{length}</l>"
-        f"<first_frame>{first_frame}</first_frame><poses><count>{len(poses)}</count>"
-        f"<item_version>2</item_version>{''.join(pose_xml(*p) for p in poses)}</poses></item>"
-    )
-
-
-def write_drive(folder, tracklets, clouds, scans="velodyne_points/data"):
-    folder.mkdir(parents=True, exist_ok=True)
-    body = "".join(tracklet_xml(*tracklet) for tracklet in tracklets)
-    (folder / "tracklet_labels.xml").write_text(
-        '<?xml version="1.0" encoding="UTF-8" standalone="yes" ?><!DOCTYPE boost_serialization>'
-        f"<boost_serialization><tracklets><count>{len(tracklets)}</count>{body}</tracklets>"
-        "</boost_serialization>"
-    )
-    (folder / scans).mkdir(parents=True, exist_ok=True)
-    for frame, cloud in clouds.items():
-        rows = np.concatenate((cloud, np.zeros((len(cloud), 1))), axis=1)
-        rows.astype("<f4").tofile(folder / scans / f"{frame:010d}.bin")
-    return folder
-
-
-def in_velo(points, pose):
-    """By hand: turn about z, then from the box's floor centre."""
-    x, y, z, yaw = pose
-    c, s = math.cos(yaw), math.sin(yaw)
-    p = np.atleast_2d(points)
-    turned = np.stack((c * p[:, 0] - s * p[:, 1], s * p[:, 0] + c * p[:, 1], p[:, 2]), axis=1)
-    return turned + np.array((x, y, z))
-
 
 POSES = [(10.0 - i, 4.0, -1.7, 0.5) for i in range(6)]
 
