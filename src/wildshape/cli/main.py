@@ -16,6 +16,7 @@ COMMANDS = {
     "demo": "the whole way on simulated scans, or on yours, in five minutes on a CPU",
     "simulate": "make tracks of scans, with their truth, by ray casting",
     "convert": "turn a published data set, or your own folders, into tracks",
+    "info": "say and draw what tracks hold: points, ranges, viewing angles, lengths",
     "train": "learn completion and pose from tracks, without labels",
     "complete": "complete the object of each scan: shape, pose, box, confidence",
     "register": "align two scans of an object, or all scans of its track",

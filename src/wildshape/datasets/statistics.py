@@ -245,6 +245,7 @@ def _quantities(gauge: Gauge, read: str, indexed: str) -> tuple[Quantity, ...]:
     """
     by_truth = gauge.seen[0].count > 0
     where = "object's frame, by truth" if by_truth else "sensor's frame, middle of each scan"
+    seen = "viewpoint" if by_truth else "object"
     basis = f"{where}; {indexed if by_truth else read} tracks"
     ranges, azimuth, elevation = gauge.seen[:3] if by_truth else gauge.sensed
     kind = next((k for k, tallies in gauge.extents.items() if tallies[0].count), "scan")
@@ -253,8 +254,8 @@ def _quantities(gauge: Gauge, read: str, indexed: str) -> tuple[Quantity, ...]:
         Quantity("points", "points per scan", "", f"{indexed} tracks", gauge.points),
         Quantity("scans", "scans per track", "", f"{indexed} tracks", gauge.scans),
         Quantity("range", "range", "m", basis, ranges),
-        Quantity("azimuth", "azimuth", "°", basis, azimuth),
-        Quantity("elevation", "elevation", "°", basis, elevation),
+        Quantity("azimuth", f"azimuth of the {seen}", "°", basis, azimuth),
+        Quantity("elevation", f"elevation of the {seen}", "°", basis, elevation),
         Quantity("turn", "viewpoint change", "°", basis, gauge.seen[3]),
         Quantity("length", "length", "m", extents, gauge.extents[kind][0]),
         Quantity("width", "width", "m", extents, gauge.extents[kind][1]),

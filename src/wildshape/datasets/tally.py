@@ -21,6 +21,7 @@ class Tally:
         count: numbers added.
         least: smallest of them; infinite while there is none.
         most: largest of them.
+        whole: whether all of them are whole numbers.
     """
 
     def __init__(self, edges: Float[np.ndarray, "b"]) -> None:
@@ -28,6 +29,7 @@ class Tally:
         self.counts = np.zeros(len(edges) - 1, np.int64)
         self.count = 0
         self.least, self.most = np.inf, -np.inf
+        self.whole = True
         self._sum = 0.0
 
     def add(self, values: Num[np.ndarray, "n"]) -> None:
@@ -41,6 +43,7 @@ class Tally:
         self.count += len(values)
         self.least = min(self.least, float(values.min()))
         self.most = max(self.most, float(values.max()))
+        self.whole = self.whole and bool((values == np.round(values)).all())
         self._sum += float(values.sum())
 
     @property
@@ -63,7 +66,7 @@ class Tally:
         return self.edges is LENGTHS and low > 0 and high / low > 20
 
     def bars(self, bins: int) -> tuple[Float[np.ndarray, "edges"], Float[np.ndarray, "bars"]]:
-        """Edges and heights (shares of all) of about `bins` bars over all but the outermost 1 %.
+        """Edges and heights (shares of all) of at most `bins` bars over all but the outermost 1 %.
 
         What lies beyond the bars counts in the first and the last. Numbers that are whole and few
         get a bar each.
@@ -78,5 +81,8 @@ class Tally:
         low, high = (0.0, 1.0) if not self.count else (self.quantile(0.005), self.quantile(0.995))
         if self.spans_decades():
             return np.geomspace(low * 0.97, high * 1.03, bins + 1)
-        step = max(high - low, 1e-2 * max(abs(high), 1.0), 1e-6) / bins
-        return np.linspace(low - step / 2, high + step / 2, bins + 1)
+        if self.whole and high - low < bins:
+            return np.arange(round(low), round(high) + 2) - 0.5
+        middle, half = (low + high) / 2, (high - low) / 2 * (1 + 1 / bins)
+        half = max(half, 0.02 * abs(middle), 1e-6)
+        return np.linspace(middle - half, middle + half, bins + 1)

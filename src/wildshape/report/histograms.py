@@ -13,6 +13,7 @@ from wildshape.report.content import BLUE, GREY, ORANGE
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.projections.polar import PolarAxes
+    from matplotlib.ticker import Locator
 
 INK, SOFT, GRID = "#16191d", "#59616c", "#e3e7ec"
 _BINS, _ROSE_BINS, _NAMED = 28, 24, 8
@@ -41,8 +42,10 @@ def draw_bars(axes: "Axes", quantity: Quantity) -> None:
     median = tally.quantile(0.5)
     axes.axvline(median, color=ORANGE, linewidth=1.4)
     label = f"median {number(median)}{_unit(quantity)}"
-    axes.text(0.98, 0.97, label, color=ORANGE, ha="right", va="top", transform=axes.transAxes)
+    axes.set_title(label, color=ORANGE, fontsize=9, loc="right", pad=3)
     axes.set_xlabel(f"{quantity.title}{f', {quantity.unit}' if quantity.unit else ''}")
+    if tally.whole and not tally.spans_decades():
+        axes.xaxis.set_major_locator(_few(whole=True))
     furnish(axes)
 
 
@@ -66,7 +69,7 @@ def draw_rose(axes: "PolarAxes", quantity: Quantity) -> None:
     axes.tick_params(labelsize=8, colors=SOFT, pad=-2)
     axes.grid(color=GRID)
     axes.spines["polar"].set_color(GRID)
-    axes.set_xlabel(f"{quantity.title} of the viewpoint", labelpad=2)
+    axes.set_xlabel(quantity.title, labelpad=2)
 
 
 def draw_counts(axes: "Axes", counts: dict[str, int], title: str) -> None:
@@ -103,9 +106,9 @@ def furnish(axes: "Axes") -> None:
 
 
 def panels_of(found: Statistics) -> list[Quantity | tuple[str, dict[str, int]]]:
-    """What is drawn, in order: the distributions, then categories and sensors."""
+    """What is drawn, in order: the distributions, then what there is more than one kind of."""
     counted = (("tracks by category", found.categories), ("tracks by sensor", found.sensors))
-    told = [(title, counts) for title, counts in counted if set(counts) != {""}]
+    told = [(title, counts) for title, counts in counted if len(counts) > 1]
     return [*found.quantities, *told]
 
 
@@ -122,16 +125,14 @@ def draw_panel(axes: "Axes", panel: Quantity | tuple[str, dict[str, int]]) -> No
 def is_rose(panel: Quantity | tuple[str, dict[str, int]]) -> bool:
     """Whether it is drawn on polar axes: azimuths about the object itself."""
     return (
-        isinstance(panel, Quantity)
-        and panel.name == "azimuth"
-        and panel.basis.startswith("object")
+        isinstance(panel, Quantity) and panel.name == "azimuth" and panel.basis.startswith("object")
     )
 
 
-def _few() -> object:
+def _few(*, whole: bool = False) -> "Locator":
     from matplotlib.ticker import MaxNLocator
 
-    return MaxNLocator(4)
+    return MaxNLocator(4, integer=whole)
 
 
 def _unit(quantity: Quantity) -> str:

@@ -44,8 +44,9 @@ def summary_line(found: Statistics) -> str:
     if found.scans is not None and found.points is not None:
         parts += [f"{found.scans:,} scans", f"{found.points:,} points"]
     if found.with_poses is not None:
-        parts += [f"{found.with_poses:,} tracks with true poses, {found.with_shape:,} with shapes"]
-    return "; ".join(parts)
+        parts += [f"{found.with_poses:,} with true poses, {found.with_shape:,} with true shapes"]
+    single = [next(iter(c)) for c in (found.categories, found.sensors) if len(c) == 1]
+    return "; ".join([*parts, *filter(None, single)])
 
 
 def read_line(found: Statistics) -> str:
@@ -61,7 +62,8 @@ def _draw_sheet(title: str, found: Statistics, tracks: Sequence[Track]) -> "Draw
     lower = math.ceil(len(tracks) / 2)
     heights = (0.5, 2.1 * upper, 0.35 + 1.42 * lower)
     figure = _figure(14, sum(heights))
-    top, middle, bottom = figure.subfigures(3, 1, height_ratios=heights)
+    bands: Any = figure.subfigures(3, 1, height_ratios=heights)
+    top, middle, bottom = bands
     top.text(0.012, 0.55, title, fontsize=15, weight="bold", color=INK, va="center")
     top.text(0.012, 0.0, f"{summary_line(found)}. {read_line(found)}", fontsize=9, color=SOFT)
     _draw_panels(middle, panels, upper)
@@ -79,16 +81,13 @@ def _draw_panels(figure: Any, panels: list[Any], rows: int) -> None:
 def _draw_thumbnails(figure: Any, tracks: Sequence[Track]) -> None:
     """Two tracks a row, each with its name above its panels."""
     rows = math.ceil(len(tracks) / 2)
-    for place, (half, track) in enumerate(
-        zip(figure.subfigures(rows, 2, squeeze=False, wspace=0.02).flat, tracks)
-    ):
+    for half, track in zip(figure.subfigures(rows, 2, squeeze=False, wspace=0.02).flat, tracks):
         axes = half.subplots(1, PANELS, gridspec_kw={"wspace": 0.03})
         draw_track(list(axes), track)
         words = (track.name, track.category, f"{len(track.scans)} scans", track.source)
         half.suptitle(
             ", ".join(word for word in words if word)[:90], fontsize=8, color=INK, x=0.01, ha="left"
         )
-        assert place < len(tracks)
 
 
 def _figure(width: float, height: float) -> "Drawing":

@@ -91,9 +91,7 @@ def _project(points: np.ndarray, azimuth_deg: float) -> Float[np.ndarray, "n 3"]
     """Orthographic, from an azimuth and a little above; z is up in `points`."""
     azimuth, elevation = math.radians(azimuth_deg), math.radians(_ELEVATION_DEG)
     flat = math.cos(elevation)
-    towards = np.asarray(
-        (flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation))
-    )
+    towards = np.asarray((flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation)))
     right = np.asarray((-math.sin(azimuth), math.cos(azimuth), 0.0))
     axes = np.stack((right, np.cross(towards, right), towards), axis=1)
     return np.asarray(points, np.float64) @ axes
@@ -125,7 +123,7 @@ def _frame(axes: "Axes", bounds: tuple[float, float, float, float], label: str) 
     axes.set(xlim=(left, right), ylim=(bottom, top), xticks=[], yticks=[], aspect="equal")
     for spine in axes.spines.values():
         spine.set_color("#e3e7ec")
-    axes.text(0.03, 0.04, label, fontsize=6.5, color="#59616c", transform=axes.transAxes)
+    axes.set_xlabel(label, fontsize=7, color="#59616c", labelpad=1)
 
 
 def _tail(name: str, limit: int = 12) -> str:
