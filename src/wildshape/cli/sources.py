@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 SOURCES = {
     "kitti-raw": "wildshape.datasets.kitti_raw:KittiRaw",
+    "kitti-tracking": "wildshape.datasets.kitti_tracking:KittiTracking",
+    "semantic-kitti": "wildshape.datasets.semantic_kitti:SemanticKitti",
     "folder": "wildshape.datasets.folder:Folder",
     "packed": "wildshape.datasets.packed:Packed",
 }

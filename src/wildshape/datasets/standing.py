@@ -27,7 +27,7 @@ class Standing:
             scans, x along its longer side, z up as the sensor's was at the middle scan. Which end
             is the front is not known: x is the end that looks forward in the middle scan.
         size: of that box along its own x, y, z, metres.
-        spread: the furthest that the middle of a scan lies from the middle of them all, metres.
+        spread: diagonal of the smallest upright box around the middles of the scans, metres.
     """
 
     T_sensor_object: SE3
@@ -67,4 +67,4 @@ def without_lonely(points: Points) -> Points:
 
 def _spread(moved: list[Points]) -> float:
     middles: Float[np.ndarray, "V 3"] = np.stack([np.median(points, axis=0) for points in moved])
-    return float(np.linalg.norm(middles - np.median(middles, axis=0), axis=1).max())
+    return float(np.linalg.norm(np.ptp(middles, axis=0)))
