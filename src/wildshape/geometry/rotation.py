@@ -89,6 +89,16 @@ def rotation_angle(rotation: Float[Tensor, "*batch 3 3"]) -> Float[Tensor, "*bat
     return 2 * torch.atan2(q[..., 1:].norm(dim=-1), q[..., 0].abs())
 
 
+def rotation_from_uniform(draws: Float[Tensor, "*batch 3"]) -> Float[Tensor, "*batch 3 3"]:
+    """Uniform draws from SO(3) of three numbers uniform in [0, 1) each (Shoemake 1992)."""
+    share, first, second = draws.unbind(-1)
+    a, b = 2 * torch.pi * first, 2 * torch.pi * second
+    low, high = (1 - share).sqrt(), share.sqrt()
+    return rotation_from_quaternion(
+        torch.stack((high * b.cos(), low * a.sin(), low * a.cos(), high * b.sin()), dim=-1)
+    )
+
+
 def random_rotation(count: int, generator: torch.Generator) -> Float[Tensor, "count 3 3"]:
     """Uniform draws from SO(3): normalised Gaussian quaternions (Shoemake 1992)."""
     return rotation_from_quaternion(torch.randn(count, 4, generator=generator))
