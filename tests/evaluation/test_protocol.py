@@ -12,6 +12,7 @@ from wildshape.baselines.local_icp import LocalIcp
 from wildshape.errors import BadInputError
 from wildshape.evaluation.protocol import run
 from wildshape.evaluation.results import figures_of
+from wildshape.evaluation.skipped import Skipped, by_reason
 from wildshape.evaluation.turning import turn_track
 from wildshape.geometry.rotation import random_rotation
 from wildshape.geometry.se3 import SE3
@@ -183,7 +184,7 @@ def test_what_is_left_out_is_counted_with_its_reason():
     scans[3], scans[4] = scans[3][:30], scans[4][:40]
     track = replace(track, scans=tuple(scans))
     results = run({"picky": Picky()}, [track, replace(track, name="bare", T_sensor_object=None)])
-    assert results["picky"].skipped == {
+    assert by_reason(results["picky"].skipped) == {
         "fewer than 16 finite points": 4,
         "all points equal": 2,
         "completion: refused by the method": 1,

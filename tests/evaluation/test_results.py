@@ -23,6 +23,7 @@ from wildshape.evaluation.results import (
     write_metrics,
     write_scores,
 )
+from wildshape.evaluation.skipped import Skipped
 from wildshape.evaluation.tables import markdown, paper_markdown, write_table
 
 FIXED = ["cd", "precision", "coverage", "acc30", "rot_median_deg"]
@@ -44,7 +45,7 @@ def scores(scale=1.0, name="ours"):
             RegistrationScore("a", "1", 170.0, 10.0, 0.2 * scale),
             RegistrationScore("b", "0", 40.0, 40.0, 0.6 * scale),
         ),
-        {"all points equal": 2},
+        (Skipped("a", "7", "all points equal"), Skipped("b", "3", "all points equal")),
     )
 
 
@@ -74,7 +75,7 @@ def test_mean_and_std_over_seeds():
 
 
 def test_metrics_json_has_the_fixed_names(tmp_path):
-    bare = MethodScores("pose only", (), scores().registrations, {})
+    bare = MethodScores("pose only", (), scores().registrations, ())
     runs = [Results("yaw", seed, (scores(), bare)) for seed in (0, 5)]
     path = write_metrics(tmp_path / "new", runs, {"command": "wildshape evaluate"})
     content = json.loads(path.read_text())
@@ -118,13 +119,13 @@ def test_paper_rows_add_up():
 def test_examples_are_picked_by_error():
     rows = tuple(completion(name, cd, 0.0) for name, cd in zip("abcde", (0.5, 0.1, 0.9, 0.2, 0.3)))
     extra = completion("a", 0.1, 0.0)  # The mean of a is 0.3: a tie with e, settled by name.
-    chosen = pick(MethodScores("m", (*rows, extra), (), {}))
+    chosen = pick(MethodScores("m", (*rows, extra), (), ()))
     assert {label: name for label, (name, _) in chosen.items()} == {
         "best": "b",
         "median": "a",
         "worst": "c",
     }
-    assert pick(MethodScores("m", (), (), {})) == {}
+    assert pick(MethodScores("m", (), (), ())) == {}
 
 
 class Method(OneScan, LocalIcp):

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A track made ready for evaluation: usable scans, turned, and the truth kept apart from them."""
 
-from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +9,7 @@ import torch
 
 from wildshape.datasets.accumulate import shape_mirrored, shape_partial
 from wildshape.evaluation.metrics import hull_area
+from wildshape.evaluation.skipped import Skipped
 from wildshape.evaluation.turning import Rotate, turn_track
 from wildshape.geometry.se3 import SE3
 from wildshape.records import Points, Sensor, Track
@@ -46,7 +46,7 @@ class Case:
         sensor: how they were taken.
         T_sensor_object: true poses of the scans as turned, if known.
         truth: if known.
-        skipped: scans left out, by reason.
+        skipped: scans left out.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Case:
     sensor: Sensor
     T_sensor_object: SE3 | None
     truth: Truth | None
-    skipped: dict[str, int]
+    skipped: tuple[Skipped, ...]
 
     @property
     def middle(self) -> int:
@@ -87,12 +87,14 @@ def prepare(track: Track, rotate: Rotate, seed: int, max_scans: int | None = Non
     )
 
 
-def _usable(track: Track) -> tuple[Track, dict[str, int]]:
+def _usable(track: Track) -> tuple[Track, tuple[Skipped, ...]]:
     finite = [scan[np.isfinite(scan).all(axis=1)] for scan in track.scans]
     reasons = [_unusable(scan) for scan in finite]
     kept = [i for i, reason in enumerate(reasons) if not reason]
     cleaned = replace(track, scans=tuple(finite))
-    return _select(cleaned, kept), dict(Counter(reason for reason in reasons if reason))
+    named = zip(track.scan_names, reasons, strict=True)
+    skipped = tuple(Skipped(track.name, scan, reason) for scan, reason in named if reason)
+    return _select(cleaned, kept), skipped
 
 
 def _unusable(scan: Points) -> str:

@@ -40,6 +40,16 @@ class TrackCompleter(Protocol):
 
 
 @runtime_checkable
+class Described(Protocol):
+    """Says what it is, for the foot of a table."""
+
+    @property
+    def about(self) -> str:
+        """Method, engine and settings in a line."""
+        ...
+
+
+@runtime_checkable
 class Registrar(Protocol):
     """Finds how the object moved."""
 

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The evaluation protocol of METHOD 8: methods see points and the sensor, never the truth."""
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -15,6 +14,7 @@ from wildshape.evaluation.cases import Case, Truth, prepare
 from wildshape.evaluation.method import (
     BatchCompleter,
     Completer,
+    Described,
     Method,
     Registrar,
     TrackCompleter,
@@ -26,6 +26,7 @@ from wildshape.evaluation.results import (
     RegistrationScore,
     Results,
 )
+from wildshape.evaluation.skipped import Skipped
 from wildshape.evaluation.turning import Rotate
 from wildshape.geometry.se3 import SE3
 from wildshape.records import Points, Track
@@ -41,11 +42,18 @@ class _Ledger:
 
     completions: list[CompletionScore] = field(default_factory=list)
     registrations: list[RegistrationScore] = field(default_factory=list)
-    skipped: Counter[str] = field(default_factory=Counter)
+    skipped: list[Skipped] = field(default_factory=list)
 
-    def close(self, name: str) -> MethodScores:
+    def skip(self, case: Case, scan: int, reason: str) -> None:
+        self.skipped.append(Skipped(case.name, case.scan_names[scan], reason))
+
+    def close(self, name: str, about: str) -> MethodScores:
         return MethodScores(
-            name, tuple(self.completions), tuple(self.registrations), dict(self.skipped)
+            name=name,
+            completions=tuple(self.completions),
+            registrations=tuple(self.registrations),
+            skipped=tuple(self.skipped),
+            about=about,
         )
 
 
@@ -78,7 +86,8 @@ def run(
             _evaluate(name, method, case, ledgers)
         if progress is not None:
             progress(done, track.name)
-    rows = tuple(ledger.close(name) for name, ledger in ledgers.items())
+    about = {name: m.about for name, m in methods.items() if isinstance(m, Described)}
+    rows = tuple(ledger.close(name, about.get(name, "")) for name, ledger in ledgers.items())
     return Results(rotate=rotate, seed=seed, methods=rows)
 
 
@@ -90,7 +99,7 @@ def whole_track_name(name: str, method: Method) -> str:
 
 def _evaluate(name: str, method: Method, case: Case, ledgers: dict[str, _Ledger]) -> None:
     ledger = ledgers[name]
-    ledger.skipped.update(case.skipped)
+    ledger.skipped.extend(case.skipped)
     if not case.scans:
         return
     if isinstance(method, Completer):
@@ -103,7 +112,8 @@ def _evaluate(name: str, method: Method, case: Case, ledgers: dict[str, _Ledger]
 
 def _score_scans(method: Completer, case: Case, ledger: _Ledger) -> None:
     if case.truth is None or case.T_sensor_object is None:
-        ledger.skipped["completion: no true shape"] += len(case.scans)
+        for i in range(len(case.scans)):
+            ledger.skip(case, i, "completion: no true shape")
         return
     for i, predicted in enumerate(complete_scans(method, case)):
         _score_completion(predicted, case, case.truth, case.T_sensor_object, i, ledger)
@@ -127,7 +137,7 @@ def _complete(method: Completer, scan: Points, case: Case) -> Points | None:
 
 def _score_whole(method: TrackCompleter, case: Case, ledger: _Ledger) -> None:
     if case.truth is None or case.T_sensor_object is None:
-        ledger.skipped["completion: no true shape"] += 1
+        ledger.skip(case, case.middle, "completion: no true shape")
         return
     try:
         predicted = method.complete_track(case.inputs(), case.sensor)
@@ -145,10 +155,10 @@ def _score_completion(
     ledger: _Ledger,
 ) -> None:
     if predicted is None:
-        ledger.skipped[f"completion: {REFUSED}"] += 1
+        ledger.skip(case, i, f"completion: {REFUSED}")
         return
     if len(predicted) == 0 or not np.isfinite(predicted).all():
-        ledger.skipped[f"completion: {NOT_FINITE}"] += 1
+        ledger.skip(case, i, f"completion: {NOT_FINITE}")
         return
     local = T_sensor_object[i].inverse().apply_numpy(np.asarray(predicted, dtype=np.float32))
     partial = None if truth.partial is None else completion_error(local, truth.partial)
@@ -171,12 +181,14 @@ def _score_registration(method: Registrar, case: Case, ledger: _Ledger) -> None:
     others = [i for i in range(len(case.scans)) if i != case.middle]
     if case.T_sensor_object is None or not others:
         reason = "no true poses" if others else "a track of one scan"
-        ledger.skipped[f"registration: {reason}"] += len(case.scans)
+        for i in range(len(case.scans)):
+            ledger.skip(case, i, f"registration: {reason}")
         return
     try:
         T_middle_scan = method.register_track(case.inputs(), case.sensor)
     except BadInputError:
-        ledger.skipped[f"registration: {REFUSED}"] += len(others)
+        for i in others:
+            ledger.skip(case, i, f"registration: {REFUSED}")
         return
     # The middle scan against itself is no test and is not counted.
     index = torch.tensor(others)
@@ -188,6 +200,6 @@ def _score_registration(method: Registrar, case: Case, ledger: _Ledger) -> None:
     columns = (error.rotation_deg, error.rotation_sym_deg, error.translation_m)
     for i, values in zip(others, torch.stack(columns, dim=1).tolist(), strict=True):
         if not np.isfinite(values).all():
-            ledger.skipped[f"registration: {NOT_FINITE}"] += 1
+            ledger.skip(case, i, f"registration: {NOT_FINITE}")
             continue
         ledger.registrations.append(RegistrationScore(case.name, case.scan_names[i], *values))

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from wildshape.evaluation.metrics import ACCURATE_DEG, CompletionError
+from wildshape.evaluation.skipped import Skipped, by_reason
 from wildshape.evaluation.turning import Rotate
 from wildshape.io.atomic import write_json
 
@@ -80,12 +81,21 @@ class RegistrationScore:
 
 @dataclass(frozen=True)
 class MethodScores:
-    """One method under one seed; `skipped` counts scans by reason."""
+    """One method under one seed.
+
+    Attributes:
+        name: of its row.
+        completions: one a scan, or one a track.
+        registrations: one a scan.
+        skipped: what counted in neither.
+        about: method and settings in a line, if it says.
+    """
 
     name: str
     completions: tuple[CompletionScore, ...]
     registrations: tuple[RegistrationScore, ...]
-    skipped: dict[str, int]
+    skipped: tuple[Skipped, ...]
+    about: str = ""
 
 
 @dataclass(frozen=True)
@@ -113,6 +123,7 @@ class Summary:
         completions: scans (or whole tracks) counted, all seeds together.
         registrations: scans counted, all seeds together.
         skipped: scans left out by reason, all seeds together.
+        about: method and settings in a line, if it says.
     """
 
     name: str
@@ -123,6 +134,7 @@ class Summary:
     completions: int
     registrations: int
     skipped: dict[str, int]
+    about: str
 
 
 def figures_of(scores: MethodScores) -> Figures:
@@ -177,10 +189,6 @@ def summarise(runs: Sequence[Results]) -> list[Summary]:
 def _summary(name: str, runs: Sequence[Results]) -> Summary:
     scores = {run.seed: s for run in runs for s in run.methods if s.name == name}
     per_seed = {seed: figures_of(s) for seed, s in scores.items()}
-    skipped: dict[str, int] = {}
-    for s in scores.values():
-        for reason, count in s.skipped.items():
-            skipped[reason] = skipped.get(reason, 0) + count
     truths = sorted({row.truth for s in scores.values() for row in s.completions})
     return Summary(
         name=name,
@@ -190,7 +198,8 @@ def _summary(name: str, runs: Sequence[Results]) -> Summary:
         std={key: _over_seeds(per_seed, key, spread=True) for key in NAMES},
         completions=sum(len(s.completions) for s in scores.values()),
         registrations=sum(len(s.registrations) for s in scores.values()),
-        skipped=skipped,
+        skipped=by_reason(one for s in scores.values() for one in s.skipped),
+        about=next((s.about for s in scores.values() if s.about), ""),
     )
 
 
@@ -210,12 +219,26 @@ def as_json(runs: Sequence[Results], provenance: Mapping[str, object]) -> dict[s
         "units": UNITS,
         "provenance": {**_machine(), **provenance},
         "methods": {summary.name: _method_json(summary) for summary in summarise(runs)},
+        "skipped": _skipped_json(runs),
     }
+
+
+def _skipped_json(runs: Sequence[Results]) -> list[dict[str, object]]:
+    """Every scan left out, once a reason, with the rows that it is missing from."""
+    rows: dict[Skipped, list[str]] = {}
+    for run in runs:
+        for scores in run.methods:
+            for one in scores.skipped:
+                names = rows.setdefault(one, [])
+                if scores.name not in names:
+                    names.append(scores.name)
+    return [{**asdict(one), "methods": names} for one, names in rows.items()]
 
 
 def _method_json(summary: Summary) -> dict[str, object]:
     return {
         **summary.mean,
+        "about": summary.about,
         "std": summary.std,
         "per_seed": {str(seed): figures for seed, figures in summary.per_seed.items()},
         "truth": summary.truth,

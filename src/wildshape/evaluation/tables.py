@@ -100,6 +100,7 @@ def _notes(summaries: Sequence[Summary]) -> str:
         lines.append("CD floor: 0.5 sqrt(area / count), both sides; compare CD at like counts.")
     if "mirrored" in truths:
         lines.append("Mirrored truth is made of the scans; clouds of them can be under the floor.")
+    lines += [f"{summary.name}: {summary.about}." for summary in summaries if summary.about]
     lines += [
         f"Left out, {summary.name}: {count} x {reason}."
         for summary in summaries

@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""FPFH and fast global registration (Zhou et al., ECCV 2016) by Open3D, as in the paper."""
+
+from dataclasses import dataclass
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from wildshape.baselines.pairs import about_centroids
+from wildshape.errors import MissingExtraError
+from wildshape.geometry.se3 import SE3
+from wildshape.records import Points
+
+
+def load_open3d() -> ModuleType:
+    """The library.
+
+    Raises:
+        MissingExtraError: it is not installed, or a library of the system that it needs is not.
+    """
+    try:
+        return import_module("open3d")
+    except ModuleNotFoundError as error:
+        raise MissingExtraError(
+            f"Open3D is not installed ({error}): pip install 'wildshape[open3d]'."
+        ) from error
+    except (ImportError, OSError) as error:
+        raise MissingExtraError(
+            f"Open3D is installed but does not load ({error}): install the system library that it"
+            " names (on Debian and Ubuntu: apt install libgl1 libegl1 libx11-6 libusb-1.0-0)."
+        ) from error
+
+
+@dataclass(frozen=True)
+class FastGlobal:
+    """A coarse alignment of a pair, with no start.
+
+    Normals are turned towards the sensor, which stands at the origin: without that FPFH cannot
+    tell one side of a car from the other.
+
+    Attributes:
+        voxel: edge of the cubes the clouds are thinned by, metres; radii are multiples of it.
+    """
+
+    voxel: float = 0.125
+
+    def __post_init__(self) -> None:
+        """Refuse at once what could not run later.
+
+        Raises:
+            MissingExtraError: Open3D is not installed or does not load.
+        """
+        load_open3d()
+
+    @property
+    def engine(self) -> str:
+        """The library."""
+        return f"Open3D {load_open3d().__version__}"
+
+    def align(self, source: Points, target: Points) -> SE3:
+        """`T_target_source`; centroids aligned, no rotation, where nothing matches."""
+        library = load_open3d()
+        registration = library.pipelines.registration
+        library.utility.random.seed(0)
+        a, b = (self._features(library, points) for points in (source, target))
+        option = registration.FastGlobalRegistrationOption(
+            maximum_correspondence_distance=0.5 * self.voxel
+        )
+        try:
+            found = registration.registration_fgr_based_on_feature_matching(
+                a[0], b[0], a[1], b[1], option
+            )
+            return SE3.from_matrix(np.array(found.transformation))
+        except (RuntimeError, ValueError):
+            # Too few points for features: Open3D's own refusal, or a matrix that is no rotation.
+            return about_centroids(source, target, lambda *_: SE3.identity())
+
+    def _features(self, library: ModuleType, points: Points) -> tuple[Any, Any]:
+        around = library.geometry.KDTreeSearchParamHybrid
+        cloud = library.geometry.PointCloud(library.utility.Vector3dVector(points.astype(float)))
+        cloud = cloud.voxel_down_sample(self.voxel)
+        cloud.estimate_normals(around(2 * self.voxel, 30))
+        cloud.orient_normals_towards_camera_location(np.zeros(3))
+        compute = library.pipelines.registration.compute_fpfh_feature
+        return cloud, compute(cloud, around(5 * self.voxel, 100))

@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Global-ICP of the paper's section 4: features find a start, ICP does the rest (METHOD 9)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from wildshape.baselines.fast_global import FastGlobal
+from wildshape.baselines.icp import point_to_point
+from wildshape.baselines.kiss_matcher import KissMatcher
+from wildshape.baselines.pairs import Cloud, chain, from_here, fuse
+from wildshape.errors import MissingExtraError
+from wildshape.geometry.se3 import SE3
+from wildshape.records import Points, Sensor
+
+
+class Coarse(Protocol):
+    """Aligns a pair of scans with no start."""
+
+    @property
+    def engine(self) -> str:
+        """The library, with its version."""
+        ...
+
+    @property
+    def voxel(self) -> float:
+        """How finely it looks, metres."""
+        ...
+
+    def align(self, source: Points, target: Points) -> SE3:
+        """`T_target_source`."""
+        ...
+
+
+@dataclass(frozen=True)
+class GlobalIcp:
+    """Features of consecutive scans matched, then point-to-point ICP, chained to the middle scan.
+
+    Attributes:
+        coarse: finds the start of a pair.
+        distance: of ICP: correspondences further apart are ignored, metres.
+        iterations: of ICP, at most, a pair.
+    """
+
+    coarse: Coarse
+    distance: float = 0.175
+    iterations: int = 30
+
+    @property
+    def about(self) -> str:
+        """The method, its engine and its settings in a line."""
+        return (
+            f"features by {self.coarse.engine}, then ICP, of neighbours, chained;"
+            f" voxel {self.coarse.voxel:g} m, threshold {self.distance:g} m"
+        )
+
+    def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:  # noqa: ARG002
+        """`T_middle_scan`, one a scan."""
+        return chain(scans, self.align)
+
+    def complete_track(self, scans: Sequence[Points], sensor: Sensor) -> Points:
+        """The fused scans, `(m, 3)` in the middle scan's frame."""
+        return fuse(scans, self.register_track(scans, sensor))
+
+    def align(self, source: Points, target: Points) -> SE3:
+        """`T_target_source`."""
+        T_target_source = self.coarse.align(source, target)
+        moved = T_target_source.apply_numpy(source)
+        return from_here(moved, target, self._solve) @ T_target_source
+
+    def _solve(self, source: Cloud, target: Cloud) -> SE3:
+        return point_to_point(source, target, self.distance, self.iterations).T
+
+
+def available(voxel: float = 0.125) -> Coarse:
+    """Open3D's fast global registration as in the paper, or KISS-Matcher where it is missing.
+
+    Raises:
+        MissingExtraError: neither is installed; says how to get one.
+    """
+    try:
+        return FastGlobal(voxel)
+    except MissingExtraError as missing:
+        try:
+            return KissMatcher(voxel)
+        except MissingExtraError as also:
+            raise MissingExtraError(f"global-icp: {missing} Or else: {also}") from also

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""KISS-Matcher (Lim et al., ICRA 2025): features and a robust solver, no start needed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import version
+from types import ModuleType
+
+import numpy as np
+
+from wildshape.baselines.pairs import about_centroids, chain, fuse
+from wildshape.errors import MissingExtraError
+from wildshape.geometry.outliers import radius_inliers, voxel_thin
+from wildshape.geometry.se3 import SE3
+from wildshape.records import Points, Sensor
+
+# The library's radius of a normal, in voxels; and how many features, on how many points each.
+_NORMAL_RADIUS, _ENOUGH, _NEIGHBOURS = 3.0, 10, 5
+
+
+def load_kiss_matcher() -> ModuleType:
+    """The library.
+
+    Raises:
+        MissingExtraError: it is not installed.
+    """
+    try:
+        return import_module("kiss_matcher")
+    except ImportError as error:
+        raise MissingExtraError(
+            "kiss-matcher is not installed or does not load; `pip install kiss-matcher` has wheels"
+            f" for Python 3.11 and 3.12 on Linux (x86-64) and macOS (arm64) ({error})."
+        ) from error
+
+
+@dataclass(frozen=True)
+class KissMatcher:
+    """Consecutive scans matched by features, chained to the middle scan.
+
+    Clouds stay in their sensors' frames: the library turns normals towards the origin.
+
+    Attributes:
+        voxel: edge of the cubes the clouds are thinned by, metres; scales every radius.
+    """
+
+    voxel: float = 0.2
+
+    def __post_init__(self) -> None:
+        """Refuse at once what could not run later.
+
+        Raises:
+            MissingExtraError: the library is not installed.
+        """
+        load_kiss_matcher()
+
+    @property
+    def about(self) -> str:
+        """The method and its settings in a line."""
+        return f"{self.engine} of neighbours, chained; voxel {self.voxel:g} m"
+
+    @property
+    def engine(self) -> str:
+        """The library."""
+        return f"KISS-Matcher {version('kiss-matcher')}"
+
+    def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:  # noqa: ARG002
+        """`T_middle_scan`, one a scan."""
+        return chain(scans, self.align)
+
+    def complete_track(self, scans: Sequence[Points], sensor: Sensor) -> Points:
+        """The fused scans, `(m, 3)` in the middle scan's frame."""
+        return fuse(scans, self.register_track(scans, sensor))
+
+    def align(self, source: Points, target: Points) -> SE3:
+        """`T_target_source`; centroids aligned, no rotation, where nothing matches."""
+        library = load_kiss_matcher()
+        clouds = [voxel_thin(points, self.voxel) for points in (source, target)]
+        # Without features on either side the library ends the whole process (measured).
+        if min(_featured(cloud, _NORMAL_RADIUS * self.voxel) for cloud in clouds) >= _ENOUGH:
+            config = library.KISSMatcherConfig(voxel_size=self.voxel, use_voxel_sampling=False)
+            found = library.KISSMatcher(config).estimate(*(list(cloud) for cloud in clouds))
+            if found.valid:
+                return _transform(found.rotation, found.translation)
+        return about_centroids(source, target, lambda *_: SE3.identity())
+
+
+def _featured(cloud: Points, radius: float) -> int:
+    """Points with a neighbourhood large enough for a normal."""
+    return int(radius_inliers(cloud, radius, _NEIGHBOURS).sum())
+
+
+def _transform(rotation: np.ndarray, translation: np.ndarray) -> SE3:
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = rotation, np.ravel(translation)
+    return SE3.from_matrix(matrix)
