@@ -9,11 +9,13 @@ A store is a folder:
   below count through all shards.
 - `index.safetensors`: where everything lies, the poses and all texts (tensors of `INDEX`).
 - `index.json`: format, version, checksums, provenance. Written last: no store without it.
-- `writing.json` while it is being written.
+- `writing.json` while it is being written; then there may be finished `parts/`, each with a store
+  of its own, and `joining.json` while these become one.
 """
 
+import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +29,8 @@ VERSION = 1
 INDEX_JSON = "index.json"
 INDEX_TENSORS = "index.safetensors"
 WRITING_JSON = "writing.json"
+JOINING_JSON = "joining.json"
+PARTS = "parts"
 SHARD_NAME = "points-{:05d}.safetensors"
 POINT_BYTES = 12
 
@@ -49,7 +53,10 @@ INDEX: dict[str, str] = {
 }
 """Tensors of `index.safetensors` and their types; T tracks, S scans, K shards."""
 
-_TYPES = {"F32": "float32", "F64": "float64", "I64": "int64", "I32": "int32", "U8": "uint8"}
+DTYPES = {"float32": "F32", "float64": "F64", "int64": "I64", "int32": "I32", "uint8": "U8"}
+"""numpy's names of types -> those of safetensors."""
+
+_TYPES = {theirs: ours for ours, theirs in DTYPES.items()}
 _KEYS = {"fingerprint", "tracks", "scans", "points", "index", "shards", "provenance"}
 _LONGEST_HEADER = 1 << 20
 
@@ -91,6 +98,29 @@ class FileRecord:
     sha256: str
 
 
+def manifest_of(
+    index: FileRecord, shards: list[FileRecord], counts: dict[str, int], provenance: dict[str, Any]
+) -> dict[str, Any]:
+    """What `index.json` says.
+
+    Args:
+        index: the file of the index.
+        shards: the files of points, in order.
+        counts: of `tracks`, `scans` and `points`.
+        provenance: JSON values.
+    """
+    digest = hashlib.sha256("".join(f.sha256 for f in (index, *shards)).encode()).hexdigest()
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "fingerprint": digest[:16],
+        **counts,
+        "index": asdict(index),
+        "shards": [asdict(shard) for shard in shards],
+        "provenance": provenance,
+    }
+
+
 def read_manifest(path: Path) -> dict[str, Any]:
     """`index.json` of a finished store of this version.
 
@@ -102,7 +132,7 @@ def read_manifest(path: Path) -> dict[str, Any]:
         if (path / WRITING_JSON).exists():
             raise BadInputError(
                 f"{path}: a half-written packed store (its writer was stopped or still runs); "
-                "write it again with --overwrite."
+                "repeat the command that was writing it, or write it again with --overwrite."
             )
         raise BadInputError(f"{path}: no packed store ({INDEX_JSON} is missing); check the path.")
     with reading(manifest, "the index of a packed store"):

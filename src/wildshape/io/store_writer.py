@@ -1,12 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Writing a packed store: points stream into shards, memory holds the index alone."""
+"""Writing a packed store: points stream into shards and the index into its columns."""
 
-import hashlib
 import json
 import os
-from array import array
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,24 +12,25 @@ from jaxtyping import Float32
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.se3 import SE3
-from wildshape.io.atomic import atomic_write, write_json
+from wildshape.io.atomic import write_json
 from wildshape.io.store_format import (
     FORMAT,
-    INDEX,
     INDEX_JSON,
     INDEX_TENSORS,
+    JOINING_JSON,
     POINT_BYTES,
     SHARD_NAME,
     VERSION,
     WRITING_JSON,
     FileRecord,
+    manifest_of,
 )
+from wildshape.io.store_index import IndexWriter, file_record
 from wildshape.io.tracks import sensor_to_json
 from wildshape.records import Track
 
 _SHARD_BYTES = 256 << 20
 _HEADER_BYTES = 256
-_CODES = {"int64": "q", "int32": "i", "float64": "d", "uint8": "B"}
 
 
 class StoreWriter:
@@ -70,10 +68,7 @@ class StoreWriter:
             self.path / WRITING_JSON,
             {"format": FORMAT, "version": VERSION, "provenance": provenance},
         )
-        self._columns = {name: array(_CODES[kind]) for name, kind in INDEX.items()}
-        for name in ("track_starts", "shard_starts", "text_starts"):
-            self._columns[name].append(0)
-        self._texts: dict[str, int] = {}
+        self._index = IndexWriter(self.path)
         self._names: set[str] = set()
         self._points = 0
         self._shards: list[FileRecord] = []
@@ -85,11 +80,11 @@ class StoreWriter:
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None:
             self.close()
-        elif self._shard is not None:
-            self._shard.abandon()
+        else:
+            self._abandon()
 
     def __len__(self) -> int:
-        return len(self._columns["track_names"])
+        return self._index.count("track_names")
 
     def add(self, track: Track) -> None:
         """Append a track.
@@ -100,18 +95,18 @@ class StoreWriter:
             OSError: the disk is full.
         """
         self._check(track)
-        columns = self._columns
+        index = self._index
         if self._shard is None:
             self._shard = _Shard(self.path / SHARD_NAME.format(len(self._shards)))
         for points, name in zip(track.scans, track.scan_names):
-            columns["scan_names"].append(self._text(name))
-            columns["scan_sizes"].append(len(points))
-            columns["scan_starts"].append(self._write(points))
-        columns["track_starts"].append(len(columns["scan_sizes"]))
-        columns["track_names"].append(self._text(track.name))
-        columns["categories"].append(self._text(track.category))
-        columns["sources"].append(self._text(track.source))
-        columns["sensors"].append(self._text(json.dumps(sensor_to_json(track.sensor))))
+            index.append("scan_names", index.text(name))
+            index.append("scan_sizes", len(points))
+            index.append("scan_starts", self._write(points))
+        index.append("track_starts", index.count("scan_sizes"))
+        index.append("track_names", index.text(track.name))
+        index.append("categories", index.text(track.category))
+        index.append("sources", index.text(track.source))
+        index.append("sensors", index.text(json.dumps(sensor_to_json(track.sensor))))
         self._add_truth(track.T_sensor_object, track.shape)
         if self._shard.points * POINT_BYTES >= self._shard_bytes:
             self._end_shard()
@@ -127,20 +122,12 @@ class StoreWriter:
             raise BadInputError(f"{self.path}: no track to store; check the source.")
         if self._shard is not None:
             self._end_shard()
-        index = self._write_index()
-        files = [index, *self._shards]
-        digest = hashlib.sha256("".join(f.sha256 for f in files).encode()).hexdigest()
-        manifest = {
-            "format": FORMAT,
-            "version": VERSION,
-            "fingerprint": digest[:16],
+        counts = {
             "tracks": len(self),
-            "scans": len(self._columns["scan_sizes"]),
+            "scans": self._index.count("scan_sizes"),
             "points": self._points,
-            "index": asdict(index),
-            "shards": [asdict(shard) for shard in self._shards],
-            "provenance": self._provenance,
         }
+        manifest = manifest_of(self._index.finish(), self._shards, counts, self._provenance)
         write_json(self.path / INDEX_JSON, manifest)
         (self.path / WRITING_JSON).unlink(missing_ok=True)
 
@@ -157,13 +144,12 @@ class StoreWriter:
         self._names.add(track.name)
 
     def _add_truth(self, poses: SE3 | None, shape: Float32[np.ndarray, "n 3"] | None) -> None:
-        columns = self._columns
-        columns["pose_starts"].append(-1 if poses is None else len(columns["poses"]) // 12)
+        index = self._index
+        index.append("pose_starts", -1 if poses is None else index.count("poses") // 12)
         if poses is not None:
-            rows = poses.matrix[:, :3].detach().cpu().numpy().astype(np.float64)
-            columns["poses"].frombytes(np.ascontiguousarray(rows).tobytes())
-        columns["shape_sizes"].append(0 if shape is None else len(shape))
-        columns["shape_starts"].append(-1 if shape is None else self._write(shape))
+            index.extend("poses", poses.matrix[:, :3].detach().cpu().numpy())
+        index.append("shape_sizes", 0 if shape is None else len(shape))
+        index.append("shape_starts", -1 if shape is None else self._write(shape))
 
     def _write(self, points: Float32[np.ndarray, "n 3"]) -> int:
         """Append a cloud to the shard; returns its first row."""
@@ -173,29 +159,16 @@ class StoreWriter:
         self._points += len(points)
         return start
 
-    def _text(self, text: str) -> int:
-        """The number of a text; equal texts are kept once."""
-        if text not in self._texts:
-            self._texts[text] = len(self._texts)
-            self._columns["text_bytes"].frombytes(text.encode())
-            self._columns["text_starts"].append(len(self._columns["text_bytes"]))
-        return self._texts[text]
-
     def _end_shard(self) -> None:
         assert self._shard is not None
         self._shards.append(self._shard.finish())
-        self._columns["shard_starts"].append(self._points)
+        self._index.append("shard_starts", self._points)
         self._shard = None
 
-    def _write_index(self) -> FileRecord:
-        from safetensors.numpy import save
-
-        tensors = {n: np.frombuffer(self._columns[n], kind) for n, kind in INDEX.items()}
-        tensors["poses"] = tensors["poses"].reshape(-1, 3, 4)
-        path = self.path / INDEX_TENSORS
-        with atomic_write(path) as file:
-            file.write(save(tensors))
-        return _record(path)
+    def _abandon(self) -> None:
+        self._index.abandon()
+        if self._shard is not None:
+            self._shard.abandon()
 
 
 class _Shard:
@@ -222,16 +195,10 @@ class _Shard:
         os.fsync(self._file.fileno())
         self._file.close()
         self._temporary.replace(self.path)
-        return _record(self.path)
+        return file_record(self.path)
 
     def abandon(self) -> None:
         self._file.close()
-
-
-def _record(path: Path) -> FileRecord:
-    with path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    return FileRecord(path.name, path.stat().st_size, digest)
 
 
 def _make_room(path: Path, *, overwrite: bool) -> None:
@@ -244,7 +211,12 @@ def _make_room(path: Path, *, overwrite: bool) -> None:
     if not overwrite:
         state = "a packed store" if (path / INDEX_JSON).exists() else "a half-written packed store"
         raise BadInputError(f"{path}: {state} is there already; pass --overwrite to replace it.")
+    remove_store(path)
+
+
+def remove_store(path: Path) -> None:
+    """Remove a store, finished or half-written: its own files, no others."""
     # The store ends to exist with its manifest, which therefore goes first.
-    for pattern in (INDEX_JSON, "index.safetensors", "points-*.safetensors*", ".*.part"):
-        for file in path.glob(pattern):
-            file.unlink()
+    own = (INDEX_JSON, JOINING_JSON, INDEX_TENSORS, "points-*.safetensors*", ".*.part")
+    for file in [file for pattern in own for file in path.glob(pattern)]:
+        file.unlink()

@@ -9,13 +9,13 @@ import numpy as np
 import torch
 
 from wildshape.geometry.se3 import SE3
+from wildshape.io.crew import in_order
 from wildshape.records import Intrinsics, Sensor, Track
 from wildshape.simulate.config import SimulationConfig
 from wildshape.simulate.drive import RawTrack
 from wildshape.simulate.job import Job
 from wildshape.simulate.meshes import mesh_files
 from wildshape.simulate.sensor import DepthCamera, SpinningLidar
-from wildshape.simulate.worker import in_parallel
 
 __all__ = ["SimulationConfig", "simulate_tracks"]
 
@@ -46,7 +46,7 @@ def simulate_tracks(
     cores = os.cpu_count() or 1
     count = min(cores, config.tracks // _WORTH_A_WORKER) if workers is None else workers
     if count > 1:
-        raw = in_parallel(job, count)
+        raw = in_order(job.track, range(config.tracks), count)
     else:
         raw = (job.track(index) for index in range(config.tracks))
     for index, made in enumerate(raw):
