@@ -29,7 +29,7 @@ def table_text(title: str, found: Statistics) -> str:
     width = None if on_terminal else _WIDTH
     console = Console(file=buffer, width=width, force_terminal=on_terminal, highlight=False)
     glyphs = _BLOCKS if _shows_blocks() else _PLAIN
-    console.print(f"[bold]{_plain(title)}[/bold]: {summary_line(found)}", soft_wrap=True)
+    console.print(f"[bold]{_plain(title)}[/bold]: {_plain(summary_line(found))}", soft_wrap=True)
     console.print(_distributions(found, glyphs, ascii_only=glyphs is _PLAIN))
     for text in _bases(found):
         console.print(_plain(text), soft_wrap=True, style="dim")

@@ -5,9 +5,10 @@
 import numpy as np
 from jaxtyping import Float, Num
 
-_PER_DECADE = 240
+_PER_DECADE = 2400
+_FEWEST_BARS = 7
 LENGTHS = np.logspace(-4, 9, 13 * _PER_DECADE + 1)
-"""Bins for what is positive and spans decades: points, metres, scans; 1 % wide."""
+"""Bins for what is positive and spans decades: points, metres, scans; 0.1 % wide."""
 ANGLES = np.linspace(-180.0, 180.0, 721)
 """Bins for degrees, half a degree wide."""
 
@@ -58,7 +59,7 @@ class Tally:
         at = int(np.searchsorted(np.cumsum(self.counts), share * self.count))
         at = min(at, len(self.counts) - 1)
         middle = (self.edges[at] + self.edges[at + 1]) / 2
-        return float(np.clip(middle, self.least, self.most))
+        return float(np.clip(round(middle) if self.whole else middle, self.least, self.most))
 
     def spans_decades(self) -> bool:
         """Whether a logarithmic axis shows these numbers better than a linear one."""
@@ -81,8 +82,15 @@ class Tally:
         low, high = (0.0, 1.0) if not self.count else (self.quantile(0.005), self.quantile(0.995))
         if self.spans_decades():
             return np.geomspace(low * 0.97, high * 1.03, bins + 1)
-        if self.whole and high - low < bins:
-            return np.arange(round(low), round(high) + 2) - 0.5
+        if self.whole:
+            return _whole_edges(round(low), round(high), bins)
         middle, half = (low + high) / 2, (high - low) / 2 * (1 + 1 / bins)
-        half = max(half, 0.02 * abs(middle), 1e-6)
+        half = max(half, 0.15 * abs(middle), 1e-6)
         return np.linspace(middle - half, middle + half, bins + 1)
+
+
+def _whole_edges(low: int, high: int, bins: int) -> Float[np.ndarray, "edges"]:
+    """Between whole numbers, the same number of them in each bar, and not too few bars."""
+    step = -(-(high - low + 1) // bins)
+    apart = max(0, _FEWEST_BARS - (high - low + 1)) // 2
+    return np.arange(low - apart, high + apart + step + 1, step) - 0.5

@@ -28,6 +28,12 @@ def number(value: float) -> str:
     return f"{float(f'{value:.3g}'):g}"
 
 
+def literal(text: str) -> str:
+    """Text that matplotlib draws as it is: no formulas, no control characters."""
+    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+    return shown.replace("$", r"\$")
+
+
 def draw_bars(axes: "Axes", quantity: Quantity) -> None:
     """A histogram; logarithmic where the numbers span decades."""
     tally = quantity.tally
@@ -78,7 +84,7 @@ def draw_counts(axes: "Axes", counts: dict[str, int], title: str) -> None:
     rest = sum(counts.values()) - sum(count for _, count in shown)
     if rest:
         shown.append((f"{len(counts) - len(shown)} others", rest))
-    names = [_short(name) or "not said" for name, _ in shown]
+    names = [literal(_short(name)) or "not said" for name, _ in shown]
     values = [count for _, count in shown]
     places = np.arange(len(shown))
     colors = [GREY if i == len(shown) - 1 and rest else BLUE for i in places]

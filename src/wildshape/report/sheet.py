@@ -4,6 +4,7 @@
 
 import io
 import math
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,7 @@ from wildshape.datasets.statistics import Quantity, Statistics
 from wildshape.io.atomic import atomic_write
 from wildshape.records import Track
 from wildshape.report.content import Cell, Cloud, Figure, Report, ReportObject, Table
-from wildshape.report.histograms import INK, SOFT, draw_panel, is_rose, number, panels_of
+from wildshape.report.histograms import INK, SOFT, draw_panel, is_rose, literal, number, panels_of
 from wildshape.report.page import write_report
 from wildshape.report.thumbnails import PANELS, draw_track
 
@@ -27,8 +28,9 @@ _IN_3D = 4
 
 def write_sheet(title: str, found: Statistics, tracks: Sequence[Track], path: Path) -> None:
     """One PNG: all distributions, and thumbnails of the tracks."""
+    png = _png(_draw_sheet(title, found, tracks), dpi=110)
     with atomic_write(path) as file:
-        _draw_sheet(title, found, tracks).savefig(file, format="png", dpi=110, facecolor="white")
+        file.write(png)
 
 
 def write_statistics_page(
@@ -61,11 +63,13 @@ def _draw_sheet(title: str, found: Statistics, tracks: Sequence[Track]) -> "Draw
     upper = math.ceil(len(panels) / _COLUMNS)
     lower = math.ceil(len(tracks) / 2)
     heights = (0.5, 2.1 * upper, 0.35 + 1.42 * lower)
-    figure = _figure(14, sum(heights))
+    figure = _figure(14.0, sum(heights))
     bands: Any = figure.subfigures(3, 1, height_ratios=heights)
     top, middle, bottom = bands
-    top.text(0.012, 0.55, title, fontsize=15, weight="bold", color=INK, va="center")
-    top.text(0.012, 0.0, f"{summary_line(found)}. {read_line(found)}", fontsize=9, color=SOFT)
+    top.text(0.012, 0.55, literal(title), fontsize=15, weight="bold", color=INK, va="center")
+    top.text(
+        0.012, 0.0, literal(f"{summary_line(found)}. {read_line(found)}"), fontsize=9, color=SOFT
+    )
     _draw_panels(middle, panels, upper)
     if tracks:
         _draw_thumbnails(bottom, tracks)
@@ -85,9 +89,8 @@ def _draw_thumbnails(figure: Any, tracks: Sequence[Track]) -> None:
         axes = half.subplots(1, PANELS, gridspec_kw={"wspace": 0.03})
         draw_track(list(axes), track)
         words = (track.name, track.category, f"{len(track.scans)} scans", track.source)
-        half.suptitle(
-            ", ".join(word for word in words if word)[:90], fontsize=8, color=INK, x=0.01, ha="left"
-        )
+        name = literal(", ".join(word for word in words if word)[:90])
+        half.suptitle(name, fontsize=8, color=INK, x=0.01, ha="left")
 
 
 def _figure(width: float, height: float) -> "Drawing":
@@ -99,16 +102,18 @@ def _figure(width: float, height: float) -> "Drawing":
     return figure
 
 
-def _png(figure: "Drawing") -> bytes:
+def _png(figure: "Drawing", dpi: int = 160) -> bytes:
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=160, facecolor="white")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # names in scripts that matplotlib's font lacks
+        figure.savefig(buffer, format="png", dpi=dpi, facecolor="white")
     return buffer.getvalue()
 
 
 def _report(title: str, found: Statistics, tracks: Sequence[Track]) -> Report:
     figures = [Figure(_caption(panel), _panel_png(panel)) for panel in panels_of(found)]
     if tracks:
-        thumbnails = _figure(14, 1.42 * math.ceil(len(tracks) / 2))
+        thumbnails = _figure(14.0, 1.42 * math.ceil(len(tracks) / 2))
         _draw_thumbnails(thumbnails, tracks)
         figures.append(Figure("Tracks", _png(thumbnails), wide=True))
     return Report(

@@ -12,6 +12,7 @@ from jaxtyping import Float
 from wildshape.datasets.accumulate import fuse_by_truth
 from wildshape.records import Points, Track
 from wildshape.report.content import GREEN, GREY, ORANGE
+from wildshape.report.histograms import literal
 from wildshape.report.scene import thin, upright
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ _AZIMUTH_DEG, _ELEVATION_DEG = 40.0, 22.0
 
 
 def draw_track(row: Sequence["Axes"], track: Track) -> None:
-    """Draw first, middle and last scan of a track, then the whole of it.
+    """Draw a few scans of a track from first to last, then all of them together.
 
     With truth all panels are in the object's frame, from one viewpoint, what other scans see in
     grey. Without it each scan is drawn as its sensor sees it, from a little higher up.
@@ -36,13 +37,13 @@ def draw_track(row: Sequence["Axes"], track: Track) -> None:
     clouds = _scans(track)
     whole = _whole(track)
     bounds = _bounds([*clouds, *([] if whole is None else [whole])])
-    chosen = _chosen(len(track.scans))
+    chosen = _chosen(track)
     for axes, number, cloud in zip(row, chosen, clouds):
         if whole is not None:
             _dots(axes, whole, GREY, 0.25)
         _dots(axes, cloud, ORANGE, 1.0)
         points = f"{len(track.scans[number]):,} points"
-        _frame(axes, bounds, f"{_tail(track.scan_names[number])}: {points}")
+        _frame(axes, bounds, literal(f"{_tail(track.scan_names[number])}: {points}"))
     for axes in row[len(clouds) :]:
         axes.set_axis_off()
     if whole is not None:
@@ -56,15 +57,16 @@ def spread(count: int, wanted: int) -> list[int]:
     return sorted({round(i) for i in np.linspace(0, count - 1, min(wanted, count))})
 
 
-def _chosen(count: int) -> list[int]:
-    return spread(count, SCANS)
+def _chosen(track: Track) -> list[int]:
+    """Scans to draw: where truth is known, the last panel is for all of them."""
+    return spread(len(track.scans), SCANS if track.T_sensor_object is not None else PANELS)
 
 
 def _scans(track: Track) -> list[Float[np.ndarray, "n 3"]]:
     """The chosen scans as right, up, towards the viewer."""
     poses = track.T_sensor_object
     clouds = []
-    for number in _chosen(len(track.scans)):
+    for number in _chosen(track):
         scan = thin(track.scans[number], _POINTS)
         if poses is not None:
             clouds.append(_project(poses[number].inverse().apply_numpy(scan), _AZIMUTH_DEG))
