@@ -46,7 +46,7 @@ class Batch(NamedTuple):
 
     Attributes:
         scans: B = I x V clouds of n points, metres, about their own centres.
-        centres: the centres in the (turned) sensor frames.
+        centres: label-free centres of the whole scans, found in the (turned) sensor frames.
         reference: row of the reference scan of each track.
         turn: rotation by which each scan was turned about its sensor.
         anchor: `R_sensor_canonical` that each scan, as recorded, is held to; zero until headings
@@ -98,11 +98,14 @@ class ViewSampler:
         first = np.arange(config.tracks) * config.views
         reference = torch.from_numpy(first + rng.integers(config.views, size=config.tracks))
         rotation = _turns(len(rows), config.turn, int(rng.integers(2**62)))
-        turned = (rotation @ centres[..., None])[..., 0]
+        scans, turned = scans @ rotation.mT, (rotation @ centres[..., None])[..., 0]
+        if not centre_turns_along(config):
+            middle = torch.stack([self._turned_centre(int(s), R) for s, R in zip(rows, rotation)])
+            scans, turned = scans + (turned - middle)[:, None], middle
         anchor = torch.zeros_like(rotation)
         if self.anchors is not None:
             anchor = self.anchors[torch.from_numpy(rows)]
-        return Batch(scans @ rotation.mT, turned, reference, rotation, anchor)
+        return Batch(scans, turned, reference, rotation, anchor)
 
     def gather(
         self, scans: list[int], rng: np.random.Generator
@@ -137,9 +140,24 @@ class ViewSampler:
         """The label-free centre of a scan, found once."""
         centre = self._centres[scan]
         if np.isnan(centre[0]):
-            points = torch.from_numpy(np.ascontiguousarray(self.store.scan_points(scan)))
-            centre[:] = scan_centre(points, self.config.sensor).numpy()
+            centre[:] = scan_centre(self._points(scan), self.config.sensor).numpy()
         return torch.from_numpy(centre)
+
+    def _turned_centre(self, scan: int, rotation: Float[Tensor, "3 3"]) -> Float[Tensor, "3"]:
+        """The centre of the whole scan as it is seen when turned."""
+        return scan_centre(self._points(scan) @ rotation.mT, self.config.sensor)
+
+    def _points(self, scan: int) -> Float[Tensor, "n 3"]:
+        return torch.from_numpy(np.ascontiguousarray(self.store.scan_points(scan)))
+
+
+def centre_turns_along(config: ViewConfig) -> bool:
+    """Whether the centre of a turned scan is its centre, turned.
+
+    A frustum about the vertical axis turns along in yaw; a box and any other turn need the centre
+    to be found again, as it will be of any scan posed later.
+    """
+    return config.turn == "none" or (config.turn == "yaw" and config.sensor == "lidar")
 
 
 def _turns(count: int, turn: str, seed: int) -> Float[Tensor, "B 3 3"]:
