@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""How fast a sequence of SemanticKITTI becomes tracks, on one core, and in how much memory.
+
+python benchmarks/bench_convert.py [--frames N] [--sequence DIR --labels FOLDER]
+
+Replays the scans of a sequence (or made-up ones of the same size) as a long one: every 50 frames
+the cars get new numbers. Memory must not grow with --frames.
+"""
+
+import argparse
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+from machine import header, peak_mib, verdict
+
+from wildshape.datasets.semantic_kitti import SemanticKitti
+
+_POINTS, _CARS, _ON_CAR, _BLOCK = 124_000, 8, 1000, 50
+
+
+def made_up(folder: Path, frames: int = 6) -> Path:
+    """Cars of random points in a cloud of random points: nobody looks at shapes here."""
+    rng = np.random.default_rng(0)
+    for name in ("velodyne", "labels"):
+        (folder / name).mkdir(parents=True)
+    for i in range(frames):
+        points = rng.uniform(-40, 40, (_POINTS, 4)).astype("<f4")
+        labels = np.full(_POINTS, 40, "<u4")
+        for car in range(_CARS):
+            mine = slice(car * _ON_CAR, (car + 1) * _ON_CAR)
+            points[mine, :3] = rng.uniform((-2, -0.9, -0.7), (2, 0.9, 0.7), (_ON_CAR, 3)) + 3 * car
+            labels[mine] = (car + 1) << 16 | 10
+        points.tofile(folder / "velodyne" / f"{i:06d}.bin")
+        labels.tofile(folder / "labels" / f"{i:06d}.label")
+    (folder / "calib.txt").write_text("Tr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n")
+    (folder / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * frames)
+    return folder
+
+
+def replay(source: Path, labels: str, folder: Path, frames: int) -> None:
+    """Write a long sequence: links to the scans, labels with numbers that move on."""
+    scans = sorted((source / "velodyne").glob("*.bin"))
+    poses = (source / "poses.txt").read_text().splitlines()
+    for name in ("velodyne", "labels"):
+        (folder / name).mkdir(parents=True)
+    (folder / "calib.txt").write_text((source / "calib.txt").read_text())
+    (folder / "poses.txt").write_text("".join(f"{poses[i % len(scans)]}\n" for i in range(frames)))
+    for i in range(frames):
+        scan = scans[i % len(scans)]
+        (folder / "velodyne" / f"{i:06d}.bin").symlink_to(scan.resolve())
+        found = np.fromfile(source / labels / f"{scan.stem}.label", "<u4")
+        block = np.uint32(600 * (i // _BLOCK % 100) << 16)
+        np.where(found >> 16 > 0, found + block, found).tofile(folder / "labels" / f"{i:06d}.label")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--frames", type=int, default=300)
+    parser.add_argument("--sequence", type=Path)
+    parser.add_argument("--labels", default="labels")
+    arguments = parser.parse_args()
+    torch.set_num_threads(1)
+    print(header("bench_convert"))
+    with tempfile.TemporaryDirectory() as scratch:
+        source = arguments.sequence or made_up(Path(scratch) / "made_up")
+        replay(source, arguments.labels, Path(scratch) / "00", arguments.frames)
+        began, tracks, scans = time.perf_counter(), 0, 0
+        for track in SemanticKitti(Path(scratch) / "00").tracks_of("00"):
+            tracks, scans = tracks + 1, scans + len(track.scans)
+        seconds = time.perf_counter() - began
+    print(f"{arguments.frames} frames, {tracks} tracks, {scans} scans in {seconds:.1f} s")
+    print(verdict("frames a second", arguments.frames / seconds, 10, least=True))
+    print(verdict("peak memory, MiB", peak_mib(), 1024))
+
+
+if __name__ == "__main__":
+    main()
