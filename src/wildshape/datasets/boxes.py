@@ -5,6 +5,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Int
 
 from wildshape.geometry.se3 import SE3
 from wildshape.records import Points
@@ -36,6 +37,13 @@ def points_in_box(
         size: full lengths along the box's own x, y, z, metres.
         crop: see there.
     """
+    return cloud[rows_in_box(cloud, T_sensor_object, size, crop)]
+
+
+def rows_in_box(
+    cloud: Points, T_sensor_object: SE3, size: tuple[float, float, float], crop: Crop
+) -> Int[np.ndarray, " n"]:
+    """Which points of a whole scan `points_in_box` takes, as rows of it in rising order."""
     half = np.asarray(size) / 2
     # Cheap first: a whole scan has 100,000 points and a box a few hundred.
     away = cloud - T_sensor_object.translation.numpy()
@@ -43,4 +51,4 @@ def points_in_box(
     local = away[near] @ T_sensor_object.rotation.numpy()
     low = np.asarray((-half[0] - crop.margin, -half[1] - crop.margin, -half[2] + crop.ground))
     inside = ((local >= low) & (local <= half + crop.margin)).all(axis=1)
-    return cloud[np.flatnonzero(near)[inside]]
+    return np.flatnonzero(near)[inside]
