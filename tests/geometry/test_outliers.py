@@ -58,3 +58,8 @@ def test_voxel_thin_does_not_depend_on_order():
     assert thin.dtype == np.float32
     assert len(thin) < 400
     assert voxel_thin(points[::-1].copy(), 0.5) == pytest.approx(thin, abs=1e-6)
+
+
+def test_voxel_thin_of_points_with_more_cells_than_an_integer_counts():
+    points = np.array([[1e6, 0, 0], [0, 1e6, 0], [0, 0, 1e6], [0, 0, 1e6 + 1e-4]])
+    assert voxel_thin(points, 1e-3) == pytest.approx(points[[2, 1, 0]], abs=1e-3)

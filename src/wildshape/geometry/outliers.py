@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Outliers of accumulated clouds, and thinning to an even density (METHOD 8)."""
 
+import math
+
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int64
 
 
 def statistical_inliers(
@@ -44,9 +46,17 @@ def voxel_thin(points: Float[np.ndarray, "n 3"], size: float) -> Float[np.ndarra
     """The mean of the points in each occupied cube of edge `size` metres, in a fixed order."""
     if len(points) == 0:
         return points
-    cells = np.floor(points / size).astype(np.int64)
-    _, index = np.unique(cells, axis=0, return_inverse=True)
-    index = index.reshape(-1)
+    _, index = np.unique(_cell_numbers(points, size), return_inverse=True)
     counts = np.bincount(index)
     sums = [np.bincount(index, weights=points[:, axis]) for axis in range(3)]
     return (np.stack(sums, axis=1) / counts[:, None]).astype(points.dtype)
+
+
+def _cell_numbers(points: Float[np.ndarray, "n 3"], size: float) -> Int64[np.ndarray, "n"]:
+    """A number for each point's cube, rising with x, then y, then z."""
+    cells = np.floor(points / size).astype(np.int64)
+    cells -= cells.min(axis=0)
+    counts = [int(count) for count in cells.max(axis=0) + 1]
+    if math.prod(counts) >= 2**63:  # tens of kilometres at centimetres
+        return np.unique(cells, axis=0, return_inverse=True)[1].reshape(-1)
+    return np.ravel_multi_index(tuple(cells.T), tuple(counts))
