@@ -59,4 +59,4 @@ def _cell_numbers(points: Float[np.ndarray, "n 3"], size: float) -> Int64[np.nda
     counts = [int(count) for count in cells.max(axis=0) + 1]
     if math.prod(counts) >= 2**63:  # tens of kilometres at centimetres
         return np.unique(cells, axis=0, return_inverse=True)[1].reshape(-1)
-    return np.ravel_multi_index(tuple(cells.T), tuple(counts))
+    return np.asarray(np.ravel_multi_index(tuple(cells.T), tuple(counts)))
