@@ -45,10 +45,12 @@ def rows_in_box(
 ) -> Int[np.ndarray, " n"]:
     """Which points of a whole scan `points_in_box` takes, as rows of it in rising order."""
     half = np.asarray(size) / 2
-    # Cheap first: a whole scan has 100,000 points and a box a few hundred.
-    away = cloud - T_sensor_object.translation.numpy()
-    near = np.abs(away).max(axis=1) <= np.linalg.norm(half + crop.margin)
-    local = away[near] @ T_sensor_object.rotation.numpy()
+    centre = T_sensor_object.translation.numpy()
+    # Cheap first, an axis at a time: a whole scan has 100,000 points and a box a few hundred.
+    reach = np.linalg.norm(half + crop.margin)
+    near = np.flatnonzero(np.abs(cloud[:, 0] - centre[0]) <= reach)
+    near = near[np.abs(cloud[near, 1] - centre[1]) <= reach]
+    local = (cloud[near] - centre) @ T_sensor_object.rotation.numpy()
     low = np.asarray((-half[0] - crop.margin, -half[1] - crop.margin, -half[2] + crop.ground))
     inside = ((local >= low) & (local <= half + crop.margin)).all(axis=1)
-    return np.flatnonzero(near)[inside]
+    return near[inside]
