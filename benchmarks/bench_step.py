@@ -84,7 +84,7 @@ def in_double(held: Trained) -> Trained:
     for layer in layers:
         if not isinstance(layer, torch.nn.Sequential | torch.nn.ModuleList):
             layer.double()
-    network.encode = lambda scans: encode(scans.double()).float()
+    network.encode = lambda scans, *how: encode(scans.double(), *how).float()
     return held
 
 

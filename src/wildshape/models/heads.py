@@ -39,6 +39,8 @@ class ShapeDecoder(nn.Module):
         self.layer1 = nn.Linear(code, widths[0])
         self.layer2 = nn.Linear(widths[0], widths[1])
         self.layer3 = nn.Linear(widths[1], 3 * (points // 2 if mirror else points))
+        # Made once: a tensor made of numbers in every pass would be a copy that a GPU waits for.
+        self.register_buffer("reflection", torch.tensor((1.0, -1.0, 1.0)), persistent=False)
         self._start_as_ellipsoid(start)
 
     @torch.no_grad()
@@ -54,8 +56,7 @@ class ShapeDecoder(nn.Module):
         points = self.layer3(relu(self.layer2(relu(self.layer1(code))))).unflatten(-1, (-1, 3))
         if not self.mirror:
             return points
-        reflected = points * points.new_tensor((1.0, -1.0, 1.0))
-        return torch.cat((points, reflected), dim=1)
+        return torch.cat((points, points * self.reflection), dim=1)
 
 
 class PoseDecoder(nn.Module):

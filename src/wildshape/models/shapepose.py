@@ -13,7 +13,12 @@ from torch.profiler import record_function
 from wildshape.errors import BadInputError
 from wildshape.models.heads import PoseDecoder, ShapeDecoder
 from wildshape.models.pcn import PCNEncoder
+from wildshape.models.pcn_static import encode_static
 from wildshape.models.pcn_winners import encode_winners
+
+# How codes with a gradient are computed: through the winning points (CPU), in passes of fixed shape
+# (GPU), or those with products in bfloat16.
+Encoding = Literal["winners", "static", "bf16"]
 
 
 @dataclass(frozen=True)
@@ -88,13 +93,23 @@ class ShapePoseNet(nn.Module):
         self.shape = ShapeDecoder(code, config.decoder, config.points, config.mirror, config.start)
         self.pose = PoseDecoder(code, config.pose, config.branches, config.spread, config.selector)
 
-    def encode(self, scans: Float[Tensor, "B N 3"]) -> Float[Tensor, "B z"]:
-        """Code of centred scans; training on a CPU runs through the winning points only."""
+    def encode(
+        self, scans: Float[Tensor, "B N 3"], encoding: Encoding | None = None
+    ) -> Float[Tensor, "B z"]:
+        """Code of centred scans; `encoding` matters to training alone, by default as exact as fast.
+
+        Without a gradient the encoder runs as it is, in the type of its weights.
+        """
         scaled = scans / self.config.scale
-        if torch.is_grad_enabled() and scans.device.type == "cpu":
+        if not torch.is_grad_enabled():
+            with record_function("wildshape: encoder dense"):
+                return self.encoder(scaled)
+        on_cpu = scans.device.type == "cpu"
+        if encoding == "winners" or (encoding is None and on_cpu):
             return encode_winners(self.encoder, scaled)
-        with record_function("wildshape: encoder dense"):
-            return self.encoder(scaled)
+        inner = torch.bfloat16 if encoding == "bf16" else scaled.dtype
+        with record_function("wildshape: encoder static"):
+            return encode_static(self.encoder, scaled, inner)
 
     def canonical(self, code: Float[Tensor, "B z"]) -> Float[Tensor, "B P 3"]:
         """`Y_can`, metres."""

@@ -14,7 +14,7 @@ from wildshape.datasets.views import Batch
 from wildshape.losses.multiview import LossConfig, multiview_loss
 from wildshape.losses.steady import turning_handicap
 from wildshape.losses.template import template_deviation
-from wildshape.models.shapepose import Poses, ShapePoseNet
+from wildshape.models.shapepose import Encoding, Poses, ShapePoseNet
 
 
 class Objective(NamedTuple):
@@ -30,13 +30,15 @@ class Objective(NamedTuple):
 class WeaklySupervised(nn.Module):
     """The paper's objective (eq. 5), with the pull to a shared template where asked."""
 
-    def __init__(self, network: ShapePoseNet, config: LossConfig) -> None:
+    def __init__(
+        self, network: ShapePoseNet, config: LossConfig, encoding: Encoding | None = None
+    ) -> None:
         super().__init__()
-        self.network, self.config = network, config
+        self.network, self.config, self.encoding = network, config, encoding
 
     def forward(self, batch: Batch, template: float | Tensor) -> Objective:
         """Loss of one batch; `template` is this step's weight of the template pull."""
-        code = self.network.encode(batch.scans)
+        code = self.network.encode(batch.scans, self.encoding)
         with record_function("wildshape: heads"):
             poses = self.network.poses(code)
             shapes = self.network.canonical(code.index_select(0, batch.reference))

@@ -22,7 +22,15 @@ PROFILE = "profile.txt"
 _SKIPPED, _WARM_UP, _RECORDED, _SLOWEST = 2, 1, 20, 12
 _LABEL = "wildshape: "
 _IN_STEP = ("headings", "sampling", "forward", "backward", "optimiser")
-_IN_FORWARD = ("encoder scoring", "encoder winners", "encoder dense", "heads", "search", "z-buffer")
+_IN_FORWARD = (
+    "encoder scoring",
+    "encoder winners",
+    "encoder static",
+    "encoder dense",
+    "heads",
+    "search",
+    "z-buffer",
+)
 
 
 @contextmanager
