@@ -10,7 +10,7 @@ the reader's fields; whoever passes one to a reader that lacks it is told so.
 from dataclasses import fields, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
 from wildshape.errors import BadInputError
 
@@ -21,6 +21,9 @@ SOURCES = {
     "kitti-raw": "wildshape.datasets.kitti_raw:KittiRaw",
     "kitti-tracking": "wildshape.datasets.kitti_tracking:KittiTracking",
     "semantic-kitti": "wildshape.datasets.semantic_kitti:SemanticKitti",
+    "nuscenes": "wildshape.datasets.nuscenes:NuScenes",
+    "waymo": "wildshape.datasets.waymo:Waymo",
+    "shapenet-views": "wildshape.datasets.shapenet_views:ShapeNetViews",
     "folder": "wildshape.datasets.folder:Folder",
     "packed": "wildshape.datasets.packed:Packed",
 }
@@ -53,14 +56,26 @@ def open_source(name: str, root: Path, options: dict[str, Any]) -> "Source":
 
 
 def _with(source: Any, name: str, option: str, value: object) -> Any:
+    """The reader with one option set, wherever among its records the option belongs."""
     own = _settable(source)
     if option in own:
-        return replace(source, **{option: value})
+        return replace(source, **{option: _checked(source, option, value)})
     for group in own & set(_NESTED):
-        if option in _settable(getattr(source, group)):
-            return replace(source, **{group: replace(getattr(source, group), **{option: value})})
+        record = getattr(source, group)
+        if option in _settable(record):
+            changed = replace(record, **{option: _checked(record, option, value)})
+            return replace(source, **{group: changed})
     raise BadInputError(f"--{option.replace('_', '-')}: {name} has no such option; leave it out.")
 
 
 def _settable(record: Any) -> set[str]:
     return {field.name for field in fields(record) if field.init}
+
+
+def _checked(record: Any, option: str, value: object) -> object:
+    """The value, if the field's type lists the words it may be."""
+    hint = get_type_hints(type(record))[option]
+    if get_origin(hint) is Literal and value not in get_args(hint):
+        expected = ", ".join(map(str, get_args(hint)))
+        raise BadInputError(f"--{option.replace('_', '-')} {value}: expected one of {expected}.")
+    return value
