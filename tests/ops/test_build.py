@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from wildshape.ops import library
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -36,7 +38,7 @@ def test_compiles_one_library_and_leaves_nothing_else(hook, sources, monkeypatch
     before = {path.name for path in sources.iterdir()}
     assert hook.compile_library(sources) == ""
     assert {path.name for path in sources.iterdir()} == before | {hook.LIBRARY}
-    assert ctypes.CDLL(str(sources / hook.LIBRARY)).wildshape_abi() == 1
+    assert ctypes.CDLL(str(sources / hook.LIBRARY)).wildshape_abi() == library._ABI
 
 
 def test_without_a_compiler_it_says_so_and_goes_on(hook, sources, monkeypatch):

@@ -6,7 +6,7 @@ import ctypes
 from functools import cache
 from pathlib import Path
 
-_ABI = 1
+_ABI = 2
 _PATH = Path(__file__).parent / "native" / "libwildshape_ops.so"
 
 _P, _I64, _INT = ctypes.c_void_p, ctypes.c_int64, ctypes.c_int
@@ -14,7 +14,7 @@ _SIGNATURES = {
     "wildshape_abi": ([], _INT),
     "wildshape_level": ([], _INT),
     "wildshape_nearest": (
-        [_P, _I64, _P, _P, _I64, _P, _I64, _I64, _I64, _P, _P, _INT, _INT],
+        [_P, _I64, _P, _P, _I64, _P, _I64, _I64, _I64, _P, _P, _P, _P, _INT, _INT],
         _INT,
     ),
     "wildshape_nearest_gradient": (

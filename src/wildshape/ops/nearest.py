@@ -16,7 +16,7 @@ from torch import Tensor
 
 from wildshape.errors import BadInputError
 from wildshape.ops.library import library
-from wildshape.ops.nearest_native import NativeDistance, nearest_native
+from wildshape.ops.nearest_native import NativeDistance, nearest_both_native, nearest_native
 from wildshape.ops.nearest_torch import nearest_blocked, nearest_reference
 from wildshape.ops.neighbours import Neighbours
 
@@ -68,6 +68,9 @@ def nearest_both(
     b_sizes: Int64[Tensor, "B"] | None = None,
 ) -> tuple[Neighbours, Neighbours]:
     """`nearest` from a to b and from b to a."""
+    a, b = _at_least_float32(a.detach()), _at_least_float32(b.detach())
+    if _backend_for(a, b) == "native":
+        return nearest_both_native(a, b, a_sizes, b_sizes)
     return nearest(a, b, a_sizes, b_sizes), nearest(b, a, b_sizes, a_sizes)
 
 

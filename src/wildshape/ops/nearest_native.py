@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nearest neighbours on the CPU by the compiled kernel of `native/nearest.c`.
 
-Brute force with queries in vector lanes: faster than trees up to some ten thousand points.
-Clouds are read where they lie: rows must be dense, the stride between clouds is free.
+Points are sorted along a curve, queries lie in vector lanes, and blocks of targets whose box is out
+of reach are left out: exact all the same, and faster than building a tree. Clouds are read where
+they lie: rows must be dense, the stride between clouds is free.
 """
 
 import ctypes
@@ -28,31 +29,68 @@ def nearest_native(
     """Exact search; `level` picks the instruction set (0 portable, 1 AVX2, 2 AVX-512).
 
     Raises:
-        MemoryError: no room for one cloud's targets a thread.
+        MemoryError: no room for one cloud's points a thread.
     """
-    (B, N), M = query.shape[:2], target.shape[1]
-    query, target = _dense_rows(query), _dense_rows(target)
-    query_sizes, target_sizes = _sizes(query_sizes), _sizes(target_sizes)
-    squared = torch.empty(B, N, dtype=torch.float32)
-    index = torch.empty(B, N, dtype=torch.int64)
+    found = _room(query)
+    _search(query, target, query_sizes, target_sizes, found, None, level)
+    return found
+
+
+def nearest_both_native(
+    a: Float32[Tensor, "B N 3"],
+    b: Float32[Tensor, "B M 3"],
+    a_sizes: Int64[Tensor, "B"] | None = None,
+    b_sizes: Int64[Tensor, "B"] | None = None,
+    level: int = WIDEST,
+) -> tuple[Neighbours, Neighbours]:
+    """From a to b and from b to a; each cloud is sorted once.
+
+    Raises:
+        MemoryError: no room for one cloud's points a thread.
+    """
+    there, back = _room(a), _room(b)
+    _search(a, b, a_sizes, b_sizes, there, back, level)
+    return there, back
+
+
+def _room(points: Float32[Tensor, "B n 3"]) -> Neighbours:
+    return Neighbours(
+        torch.empty(points.shape[:2], dtype=torch.float32),
+        torch.empty(points.shape[:2], dtype=torch.int64),
+    )
+
+
+def _search(
+    a: Tensor,
+    b: Tensor,
+    a_sizes: Tensor | None,
+    b_sizes: Tensor | None,
+    there: Neighbours,
+    back: Neighbours | None,
+    level: int,
+) -> None:
+    """Fill `there`, and `back` where it is wanted."""
+    a, b = _dense_rows(a), _dense_rows(b)
+    a_sizes, b_sizes = _sizes(a_sizes), _sizes(b_sizes)
     failed = _kernels().wildshape_nearest(
-        query.data_ptr(),
-        query.stride(0),
-        query_sizes.data_ptr() if query_sizes is not None else None,
-        target.data_ptr(),
-        target.stride(0),
-        target_sizes.data_ptr() if target_sizes is not None else None,
-        B,
-        N,
-        M,
-        squared.data_ptr(),
-        index.data_ptr(),
+        a.data_ptr(),
+        a.stride(0),
+        a_sizes.data_ptr() if a_sizes is not None else None,
+        b.data_ptr(),
+        b.stride(0),
+        b_sizes.data_ptr() if b_sizes is not None else None,
+        len(a),
+        a.shape[1],
+        b.shape[1],
+        there.distance_squared.data_ptr(),
+        there.index.data_ptr(),
+        back.distance_squared.data_ptr() if back is not None else None,
+        back.index.data_ptr() if back is not None else None,
         torch.get_num_threads(),
         level,
     )
     if failed:
-        raise MemoryError(f"no room to search {M} targets.")
-    return Neighbours(squared, index)
+        raise MemoryError(f"no room to search {a.shape[1]} and {b.shape[1]} points.")
 
 
 class NativeDistance(torch.autograd.Function):

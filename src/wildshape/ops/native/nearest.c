@@ -1,18 +1,20 @@
 /* SPDX-FileCopyrightText: 2026 The Wildshape developers
  * SPDX-License-Identifier: Apache-2.0
  *
- * Exact nearest neighbours of small clouds by brute force, plain C ABI, no array of N x M.
+ * Exact nearest neighbours, both ways, plain C ABI, no array of N x M. Points are sorted along a
+ * Z-curve, and blocks out of reach of a tile of queries are left out (nearest_kernel.h).
  * Clouds are row-major float32 (N, 3) at any stride between clouds.
  */
+#include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "cloud.h"
 #include "workers.h"
 
 #define ALIGNED __attribute__((aligned(64)))
-enum { BLOCK = 64, PART = 256 };
 
 /* ---- portable: vectors of four, by the compiler's own means (SSE2, NEON, ...) ---- */
 
@@ -25,40 +27,58 @@ static inline four four_load(const float *p)
     memcpy(&v, p, sizeof v);
     return v;
 }
-static inline four four_min(four a, four b)
+static inline void four_store(float *p, four v) { memcpy(p, &v, sizeof v); }
+static inline four four_pick(four_bits mask, four yes, four no)
 {
-    four_bits less = a < b;
-    return (four)(((four_bits)a & less) | ((four_bits)b & ~less));
+    return (four)(((four_bits)yes & mask) | ((four_bits)no & ~mask));
 }
-static inline unsigned four_equal(four a, four b)
+static inline float four_highest(four v)
 {
-    four_bits bits = (a == b) & (four_bits){1, 2, 4, 8};
+    float a = v[0] > v[1] ? v[0] : v[1], b = v[2] > v[3] ? v[2] : v[3];
+    return a > b ? a : b;
+}
+static inline unsigned four_flags(four_bits mask)
+{
+    four_bits bits = mask & (four_bits){1, 2, 4, 8};
     return (unsigned)(bits[0] | bits[1] | bits[2] | bits[3]);
 }
 
-#define TILE_NAME tile_portable
+#define NAME(x) portable_##x
 #define TARGET
 #define VECTOR four
+#define MASK four_bits
 #define LANES 4
-#define ROWS 2
 #define LOAD(p) four_load(p)
-#define STORE(p, v) memcpy(p, &(v), sizeof(four))
+#define STORE(p, v) four_store(p, v)
 #define SET1(s) ((four){(s), (s), (s), (s)})
 #define SUB(a, b) ((a) - (b))
 #define MUL(a, b) ((a) * (b))
 #define FMA(a, b, c) ((a) * (b) + (c))
-#define MIN(a, b) four_min(a, b)
-#define EQUAL_MASK(a, b) four_equal(a, b)
+#define MIN(a, b) four_pick((a) < (b), a, b)
+#define MAX(a, b) four_pick((a) > (b), a, b)
+#define HIGHEST(v) four_highest(v)
+#define LESS(a, b) ((a) < (b))
+#define AT_MOST(a, b) ((a) <= (b))
+#define SAME(a, b) ((a) == (b))
+#define PICK(mask, yes, no) four_pick(mask, yes, no)
+#define BITS(mask) four_flags(mask)
 #include "nearest_kernel.h"
 
 #if defined(__x86_64__) || defined(_M_X64)
 #include <immintrin.h>
 
-#define TILE_NAME tile_avx2
+__attribute__((target("avx2"))) static inline float eight_highest(__m256 v)
+{
+    __m128 a = _mm_max_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));
+    a = _mm_max_ps(a, _mm_movehl_ps(a, a));
+    return _mm_cvtss_f32(_mm_max_ss(a, _mm_movehdup_ps(a)));
+}
+
+#define NAME(x) avx2_##x
 #define TARGET __attribute__((target("avx2,fma")))
 #define VECTOR __m256
+#define MASK __m256
 #define LANES 8
-#define ROWS 2
 #define LOAD(p) _mm256_load_ps(p)
 #define STORE(p, v) _mm256_store_ps(p, v)
 #define SET1(s) _mm256_set1_ps(s)
@@ -66,14 +86,20 @@ static inline unsigned four_equal(four a, four b)
 #define MUL(a, b) _mm256_mul_ps(a, b)
 #define FMA(a, b, c) _mm256_fmadd_ps(a, b, c)
 #define MIN(a, b) _mm256_min_ps(a, b)
-#define EQUAL_MASK(a, b) (unsigned)_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_EQ_OQ))
+#define MAX(a, b) _mm256_max_ps(a, b)
+#define HIGHEST(v) eight_highest(v)
+#define LESS(a, b) _mm256_cmp_ps(a, b, _CMP_LT_OQ)
+#define AT_MOST(a, b) _mm256_cmp_ps(a, b, _CMP_LE_OQ)
+#define SAME(a, b) _mm256_cmp_ps(a, b, _CMP_EQ_OQ)
+#define PICK(mask, yes, no) _mm256_blendv_ps(no, yes, mask)
+#define BITS(mask) (unsigned)_mm256_movemask_ps(mask)
 #include "nearest_kernel.h"
 
-#define TILE_NAME tile_avx512
+#define NAME(x) avx512_##x
 #define TARGET __attribute__((target("avx512f")))
 #define VECTOR __m512
+#define MASK __mmask16
 #define LANES 16
-#define ROWS 4
 #define LOAD(p) _mm512_load_ps(p)
 #define STORE(p, v) _mm512_store_ps(p, v)
 #define SET1(s) _mm512_set1_ps(s)
@@ -81,13 +107,19 @@ static inline unsigned four_equal(four a, four b)
 #define MUL(a, b) _mm512_mul_ps(a, b)
 #define FMA(a, b, c) _mm512_fmadd_ps(a, b, c)
 #define MIN(a, b) _mm512_min_ps(a, b)
-#define EQUAL_MASK(a, b) (unsigned)_mm512_cmp_ps_mask(a, b, _CMP_EQ_OQ)
+#define MAX(a, b) _mm512_max_ps(a, b)
+#define HIGHEST(v) _mm512_reduce_max_ps(v)
+#define LESS(a, b) _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ)
+#define AT_MOST(a, b) _mm512_cmp_ps_mask(a, b, _CMP_LE_OQ)
+#define SAME(a, b) _mm512_cmp_ps_mask(a, b, _CMP_EQ_OQ)
+#define PICK(mask, yes, no) _mm512_mask_blend_ps(mask, no, yes)
+#define BITS(mask) (unsigned)(mask)
 #include "nearest_kernel.h"
 #endif
 
 /* ---- dispatch ---- */
 
-typedef void (*tile_function)(const float *, int, const float *, int64_t, float *, int64_t *);
+typedef void (*search_tile)(const cloud *, int64_t, const cloud *, float *, float *, int64_t *);
 enum { PORTABLE = 0, AVX2 = 1, AVX512 = 2 };
 
 /* The widest instruction set of this processor: 0 portable, 1 AVX2 + FMA, 2 AVX-512. */
@@ -103,175 +135,125 @@ int wildshape_level(void)
     return PORTABLE;
 }
 
-static tile_function choose(int level, int *tile)
+static search_tile choose(int level)
 {
     int widest = wildshape_level();
     if (level < 0 || level > widest)
         level = widest;
 #if defined(__x86_64__) || defined(_M_X64)
     if (level == AVX512)
-        return *tile = 64, tile_avx512;
+        return avx512_search;
     if (level == AVX2)
-        return *tile = 16, tile_avx2;
+        return avx2_search;
 #endif
-    return *tile = 8, tile_portable;
+    return portable_search;
 }
 
 /* ---- work sharing ---- */
 
 typedef struct {
-    const float *query, *target;
-    int64_t query_stride, target_stride;
-    const int64_t *query_sizes, *target_sizes;
-    int64_t clouds, queries, targets, parts;
-    float *squared;
+    const float *points;
+    int64_t stride;
+    const int64_t *sizes;
+    int64_t most;
+    float *squared; /* of these points to the other side's; NULL: not wanted */
     int64_t *index;
-    tile_function tile_of;
-    int tile, failed;
+} side;
+
+typedef struct {
+    side sides[2];
+    int64_t clouds, parts;
+    search_tile search;
+    int failed;
     int64_t counter;
 } search_job;
 
-static int64_t clamp_size(const int64_t *sizes, int64_t b, int64_t most)
+static int64_t size_of(const side *points, int64_t b)
 {
-    if (!sizes || sizes[b] > most)
-        return most;
-    return sizes[b] < 0 ? 0 : sizes[b];
+    if (!points->sizes || points->sizes[b] > points->most)
+        return points->most;
+    return points->sizes[b] < 0 ? 0 : points->sizes[b];
 }
 
-/* Row-major targets to three aligned axes, padded to whole blocks with points out of reach. */
-static void spread(const float *points, int64_t count, int64_t padded, float *axes)
+static void blank(const side *from, int64_t b, int64_t start, float squared)
 {
-    for (int64_t j = 0; j < count; j++)
-        for (int c = 0; c < 3; c++)
-            axes[c * padded + j] = points[3 * j + c];
-    for (int c = 0; c < 3; c++)
-        for (int64_t j = count; j < padded; j++)
-            axes[c * padded + j] = INFINITY;
-}
-
-static void search_part(const search_job *job, int64_t b, int64_t start, int64_t stop,
-                        const float *axes, int64_t padded)
-{
-    const float *query = job->query + b * job->query_stride;
-    float *squared = job->squared + b * job->queries;
-    int64_t *index = job->index + b * job->queries;
-    int64_t size = clamp_size(job->query_sizes, b, job->queries);
-    int64_t i = start;
-    for (; i < stop && i < size; i += job->tile) {
-        int64_t end = stop < size ? stop : size, left = end - i;
-        int count = (int)(left < job->tile ? left : job->tile);
-        job->tile_of(query + 3 * i, count, axes, padded, squared + i, index + i);
+    for (int64_t i = b * from->most + start; i < (b + 1) * from->most; i++) {
+        from->squared[i] = squared;
+        from->index[i] = 0;
     }
-    for (i = start > size ? start : size; i < stop; i++) {
-        squared[i] = 0.0f;
-        index[i] = 0;
+}
+
+/* One part of the tiles of one side; the first part sees to all that has no neighbour too. */
+static void search_part(const search_job *job, const side *from, int64_t b, int64_t part,
+                        const cloud *queries, const cloud *targets, float *bound)
+{
+    if (!from->squared)
+        return;
+    if (part == 0 && targets->count == 0)
+        blank(from, b, 0, INFINITY);
+    if (part == 0)
+        blank(from, b, queries->count, 0.0f);
+    float *squared = from->squared + b * from->most;
+    int64_t *index = from->index + b * from->most;
+    int64_t start = part * queries->blocks / job->parts;
+    int64_t stop = targets->count ? (part + 1) * queries->blocks / job->parts : start;
+    for (int64_t tile = start; tile < stop; tile++)
+        job->search(queries, tile, targets, bound, squared, index);
+}
+
+/* Every worker sorts the clouds that it takes part in for itself: no waiting for another. */
+static void search_all(search_job *job, cloud held[2], float *bound)
+{
+    for (int64_t task, at = -1; (task = next_task(&job->counter)) < job->clouds * job->parts;) {
+        int64_t b = task / job->parts;
+        for (int s = 0; s < 2 && b != at; s++) {
+            const side *from = &job->sides[s];
+            cloud_fill(&held[s], from->points + b * from->stride, size_of(from, b));
+        }
+        at = b;
+        for (int s = 0; s < 2; s++)
+            search_part(job, &job->sides[s], b, task % job->parts, &held[s], &held[1 - s], bound);
     }
 }
 
 static void *search_worker(void *argument)
 {
     search_job *job = argument;
-    int64_t room = (job->targets + BLOCK - 1) / BLOCK * BLOCK, at = -1, padded = 0;
-    float *axes = aligned_alloc(64, (size_t)(room ? room : BLOCK) * 3 * sizeof(float));
-    if (!axes) {
+    int64_t n = job->sides[0].most, m = job->sides[1].most, boxes = in_blocks(n > m ? n : m) + 1;
+    cloud held[2];
+    cloud_allocate(&held[0], n);
+    cloud_allocate(&held[1], m);
+    float *bound = aligned_alloc(BYTES, (size_t)in_blocks(boxes) * BLOCK * sizeof(float));
+    if (held[0].axes[0] && held[1].axes[0] && bound)
+        search_all(job, held, bound);
+    else
         __atomic_store_n(&job->failed, 1, __ATOMIC_RELAXED);
-        return NULL;
-    }
-    for (;;) {
-        int64_t task = next_task(&job->counter), b = task / job->parts, part = task % job->parts;
-        if (task >= job->clouds * job->parts)
-            break;
-        if (b != at) {
-            int64_t count = clamp_size(job->target_sizes, b, job->targets);
-            padded = (count + BLOCK - 1) / BLOCK * BLOCK;
-            spread(job->target + b * job->target_stride, count, padded, axes);
-            at = b;
-        }
-        int64_t start = job->parts == 1 ? 0 : part * PART;
-        int64_t stop = job->parts == 1 || start + PART > job->queries ? job->queries : start + PART;
-        search_part(job, b, start, stop, axes, padded);
-    }
-    free(axes);
+    free(held[0].axes[0]);
+    free(held[1].axes[0]);
+    free(bound);
     return NULL;
 }
 
-/* Nearest target of each query; sizes may be NULL; strides count floats between clouds.
- * level: instruction set (-1: the widest). Returns 0, or 1 if memory ran out. */
-int wildshape_nearest(const float *query, int64_t query_stride, const int64_t *query_sizes,
-                      const float *target, int64_t target_stride, const int64_t *target_sizes,
-                      int64_t clouds, int64_t queries, int64_t targets, float *squared,
-                      int64_t *index, int threads, int level)
+/* Nearest b of each a, and nearest a of each b where `b_squared` is not NULL. Sizes may be NULL;
+ * strides count floats between clouds. level: instruction set (-1: the widest). Returns 0, or 1 if
+ * memory ran out or a cloud has over 2^28 points. */
+int wildshape_nearest(const float *a, int64_t a_stride, const int64_t *a_sizes, const float *b,
+                      int64_t b_stride, const int64_t *b_sizes, int64_t clouds, int64_t n,
+                      int64_t m, float *a_squared, int64_t *a_index, float *b_squared,
+                      int64_t *b_index, int threads, int level)
 {
     search_job job = {
-        .query = query, .target = target,
-        .query_stride = query_stride, .target_stride = target_stride,
-        .query_sizes = query_sizes, .target_sizes = target_sizes,
-        .clouds = clouds, .queries = queries, .targets = targets,
-        .squared = squared, .index = index,
+        .sides = {{a, a_stride, a_sizes, n, a_squared, a_index},
+                  {b, b_stride, b_sizes, m, b_squared, b_index}},
+        .clouds = clouds,
+        .search = choose(level),
     };
-    job.tile_of = choose(level, &job.tile);
-    job.parts = clouds >= 4 * (int64_t)threads ? 1 : (queries + PART - 1) / PART;
-    if (clouds == 0 || queries == 0)
+    if (clouds == 0)
         return 0;
-    int worth = clouds * queries * targets > 500000;
+    job.parts = clouds < 4 * (int64_t)threads ? (4 * threads + clouds - 1) / clouds : 1;
+    if (n > (int64_t)1 << 28 || m > (int64_t)1 << 28)
+        return 1;
+    int worth = clouds * (n + m) > 4000;
     run_workers(search_worker, &job, worth ? threads : 1);
     return job.failed;
-}
-
-/* ---- gradient of the distances ---- */
-
-typedef struct {
-    const float *query, *target;
-    int64_t query_stride, target_stride;
-    const int64_t *index;
-    const float *distance, *gradient;
-    int64_t clouds, queries, targets;
-    float *to_query, *to_target;
-    int64_t counter;
-} gradient_job;
-
-static void *gradient_worker(void *argument)
-{
-    gradient_job *job = argument;
-    for (int64_t b; (b = next_task(&job->counter)) < job->clouds;) {
-        const float *query = job->query + b * job->query_stride;
-        const float *target = job->target + b * job->target_stride;
-        float *to_query = job->to_query ? job->to_query + b * job->queries * 3 : NULL;
-        float *to_target = job->to_target ? job->to_target + b * job->targets * 3 : NULL;
-        if (to_target)
-            memset(to_target, 0, (size_t)job->targets * 3 * sizeof(float));
-        for (int64_t i = 0; i < job->queries; i++) {
-            int64_t at = b * job->queries + i, j = job->index[at];
-            float distance = job->distance[at];
-            int active = distance > 0 && distance < INFINITY && j >= 0 && j < job->targets;
-            float scale = active ? job->gradient[at] / distance : 0.0f;
-            for (int c = 0; c < 3; c++) {
-                float pull = active ? scale * (query[3 * i + c] - target[3 * j + c]) : 0.0f;
-                if (to_query)
-                    to_query[3 * i + c] = pull;
-                if (to_target && active)
-                    to_target[3 * j + c] -= pull;
-            }
-        }
-    }
-    return NULL;
-}
-
-/* d distance / d query and / d target, times `gradient`; each output may be NULL. Targets are
- * summed in the order of the queries, one thread a cloud: the same bits at any thread count. */
-void wildshape_nearest_gradient(const float *query, int64_t query_stride, const float *target,
-                                int64_t target_stride, const int64_t *index,
-                                const float *distance, const float *gradient, int64_t clouds,
-                                int64_t queries, int64_t targets, float *to_query,
-                                float *to_target, int threads)
-{
-    gradient_job job = {
-        .query = query, .target = target,
-        .query_stride = query_stride, .target_stride = target_stride,
-        .index = index, .distance = distance, .gradient = gradient,
-        .clouds = clouds, .queries = queries, .targets = targets,
-        .to_query = to_query, .to_target = to_target,
-    };
-    int worth = clouds * (queries + targets) > 100000;
-    run_workers(gradient_worker, &job, worth ? threads : 1);
 }
