@@ -30,6 +30,7 @@ CLASSES: dict[str, tuple[int, ...]] = {
     "other-vehicle": (20, 259),
 }
 VEHICLES = ("car", "bus", "truck", "other-vehicle")
+LABELS_CURE = "SemanticKITTI's archive (data_odometry_labels.zip) brings it"
 _OTHERS = (0, 1, 30, 31, 32, 40, 44, 48, 49, 50, 51, 52, 60, 70, 71, 72, 80, 81, 99, 253, 254, 255)
 _KNOWN = np.isin(np.arange(1 << 16), (*_OTHERS, *(i for ids in CLASSES.values() for i in ids)))
 
@@ -74,6 +75,19 @@ def kinds_of(categories: Iterable[str], motion: Motion) -> dict[int, Kind]:
             if motion == "any" or moved == (motion == "moving"):
                 kinds[class_id] = Kind(category, moved)
     return kinds
+
+
+def label_files(folder: Path) -> dict[int, Path]:
+    """The label file of each frame that has one.
+
+    Raises:
+        BadInputError: there is none.
+    """
+    found = folder.glob("*.label")
+    files = {int(path.stem): path for path in sorted(found) if path.stem.isdigit()}
+    if not files:
+        raise BadInputError(f"{folder}: no .label files; {LABELS_CURE}.")
+    return files
 
 
 def read_labels(path: Path) -> Labels:

@@ -10,9 +10,11 @@ import numpy as np
 
 from wildshape.datasets.kitti_calibration import read_calibration, read_odometry, rigid
 from wildshape.datasets.semantic_kitti_labels import (
+    LABELS_CURE,
     Kind,
     Labels,
     Visit,
+    label_files,
     on_objects,
     read_labels,
 )
@@ -22,7 +24,6 @@ from wildshape.records import Points
 
 _SCANS = "velodyne"
 _CALIBRATION_CURE = "KITTI odometry's calibration archive (data_odometry_calib.zip) brings it"
-_LABELS_CURE = "SemanticKITTI's archive (data_odometry_labels.zip) brings it"
 
 
 class Words(TypedDict):
@@ -97,19 +98,21 @@ def open_sequence(folder: Path, name: str, labels: str, kinds: dict[int, Kind]) 
     """Read what all frames share.
 
     Raises:
-        BadInputError: no labels, calibration or poses, or fewer poses than frames.
+        BadInputError: no labels, scans, calibration or poses, or fewer poses than frames.
     """
-    found = (folder / labels).glob("*.label")
-    files = {int(path.stem): path for path in found if path.stem.isdigit()}
-    if not files:
-        raise BadInputError(f"{folder / labels}: no .label files; {_LABELS_CURE}.")
+    files = label_files(folder / labels)
+    if not (folder / _SCANS).is_dir():
+        raise BadInputError(
+            f"{folder / _SCANS}: no such folder; KITTI odometry's scans "
+            "(data_odometry_velodyne.zip) bring it."
+        )
     calibration = read_calibration(folder / "calib.txt", _CALIBRATION_CURE)
     T_camera_velo = rigid(calibration, ("Tr", "Tr_velo_to_cam"), folder / "calib.txt")
-    T_world_camera = read_odometry(folder / "poses.txt", _LABELS_CURE)
+    T_world_camera = read_odometry(folder / "poses.txt", LABELS_CURE)
     if len(T_world_camera) <= max(files):
         raise BadInputError(
             f"{folder / 'poses.txt'}: {len(T_world_camera)} poses, but there is a frame "
-            f"{max(files)}; {_LABELS_CURE} whole."
+            f"{max(files)}; {LABELS_CURE} whole."
         )
     T_world_velo = T_camera_velo.inverse() @ T_world_camera @ T_camera_velo
     return Sequence(folder, name, files, kinds, T_world_velo.inverse())
@@ -137,4 +140,4 @@ def find_sequences(root: Path) -> dict[str, Path]:
 
 
 def _is_sequence(folder: Path) -> bool:
-    return (folder / _SCANS).is_dir()
+    return (folder / _SCANS).is_dir() or (folder / "labels").is_dir()
