@@ -33,6 +33,11 @@ from wildshape.report.picture import write_picture
 
 WRITERS = {
     "kitti-raw": "tests.datasets.write_kitti_raw:picture_scene",
+    "kitti-tracking": "tests.datasets.write_kitti_tracking:picture_scene",
+    "semantic-kitti": "tests.datasets.write_semantic_kitti:picture_scene",
+    "shapenet-views": "tests.datasets.write_shapenet_views:picture_scene",
+    "nuscenes": "tests.datasets.write_nuscenes:picture_scene",
+    "waymo": "tests.datasets.write_waymo:picture_scene",
 }
 """Name on the command line of `convert` -> module and function `(root: Path) -> None`."""
 
