@@ -1,0 +1,187 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""PandaSet as it lies on disk: cuboids and sweeps of the Pandar64 become tracks."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from wildshape.datasets.boxes import Crop, rows_in_box
+from wildshape.datasets.gathering import Gathering
+from wildshape.datasets.pandaset_scene import (
+    CUBOIDS,
+    PANDARGT,
+    SWEEPS,
+    Cuboids,
+    Drive,
+    read_cuboids,
+    read_drive,
+    read_sweep,
+)
+from wildshape.datasets.selection import Selection
+from wildshape.errors import BadInputError
+from wildshape.records import Sensor, Track
+
+PANDAR64_SENSOR = Sensor(kind="lidar", resolution_deg=(0.2, 0.167))
+VEHICLES = (
+    "Car",
+    "Pickup Truck",
+    "Medium-sized Truck",
+    "Semi-truck",
+    "Bus",
+    "Emergency Vehicle",
+    "Other Vehicle - Construction Vehicle",
+)
+_FILE = ".pkl.gz"
+
+
+@dataclass
+class PandaSet:
+    """Labelled objects of PandaSet; a part is a scene.
+
+    Only points of the Pandar64 are taken. Where an object moves through the view of both LiDARs it
+    is labelled twice, once for the time at which each saw it; the PandarGT's label is left out.
+
+    Attributes:
+        root: a scene, the folder of the scenes, or the folder above.
+        selection: which objects and scans; its categories are the data set's, default `VEHICLES`.
+        crop: how much around the labelled cuboid belongs to the object.
+        rejected: see `Source`.
+    """
+
+    root: Path
+    selection: Selection = Selection()
+    crop: Crop = Crop()
+    rejected: dict[str, int] = field(default_factory=Counter, init=False)
+
+    def parts(self) -> list[str]:
+        """The scenes' folders, as seen from `root`.
+
+        Raises:
+            BadInputError: no labelled scene at or below `root`.
+        """
+        root = Path(self.root)
+        return [_part(scene, root) for scene in find_scenes(root)]
+
+    def tracks_of(self, part: str) -> Iterator[Track]:
+        """Tracks of a scene, at its end: an object may leave sight and come back.
+
+        Raises:
+            BadInputError: a file of the scene is missing or corrupt.
+        """
+        root = Path(self.root)
+        scene = root if _is_scene(root) else root / part
+        labels = sorted((scene / CUBOIDS).glob(f"*{_FILE}"))
+        drive = read_drive(scene, 1 + max(map(_number, labels), default=-1))
+        gathering = Gathering(self.selection, PANDAR64_SENSOR)
+        left_out: dict[str, str] = {}
+        for path in labels:
+            cuboids = read_cuboids(path)
+            rows = self._wanted(cuboids, left_out)
+            self._crop_frame(scene, drive, path, cuboids, rows, gathering)
+        yield from gathering.finished()
+        for reason, count in (Counter(left_out.values()) + gathering.rejected).items():
+            self.rejected[reason] += count
+
+    def _wanted(self, cuboids: Cuboids, left_out: dict[str, str]) -> list[int]:
+        """Rows to take; why an object is not taken is noted under its name."""
+        rows = []
+        for row, (name, category) in enumerate(zip(cuboids.tracks, cuboids.categories)):
+            if category not in (self.selection.categories or VEHICLES):
+                left_out[name] = f"object: category {category}"
+            elif cuboids.sensors[row] == PANDARGT:
+                left_out[name] = "object: the PandarGT's label of an object that has two"
+            else:
+                rows.append(row)
+        return rows
+
+    def _crop_frame(
+        self,
+        scene: Path,
+        drive: Drive,
+        label: Path,
+        cuboids: Cuboids,
+        rows: list[int],
+        to: Gathering,
+    ) -> None:
+        frame = _number(label)
+        active = []
+        for row in rows:
+            name, category = _name(scene, cuboids, row), str(cuboids.categories[row]).lower()
+            if to.wants(name, frame, category=category, source=_SOURCE):
+                active.append(row)
+        sweep = scene / SWEEPS / label.name
+        if active and not sweep.is_file():
+            self.rejected["scan: the frame has no LiDAR file"] += len(active)
+        elif active:
+            self._crop_sweep(scene, drive, sweep, cuboids, active, to)
+
+    def _crop_sweep(
+        self,
+        scene: Path,
+        drive: Drive,
+        sweep: Path,
+        cuboids: Cuboids,
+        rows: list[int],
+        to: Gathering,
+    ) -> None:
+        cloud, times = read_sweep(sweep)
+        frame = _number(sweep)
+        for row in rows:
+            T_world_object = cuboids.T_world_object[row]
+            length, width, height = cuboids.sizes[row].tolist()
+            inside = rows_in_box(cloud, T_world_object, (length, width, height), self.crop)
+            # The sensor stands where it was when its beams passed the object.
+            time = float(times[inside].mean()) if len(inside) else drive.stamps[frame]
+            T_sensor_world = drive.sensor_pose(frame, time).inverse()
+            to.add(
+                _name(scene, cuboids, row),
+                sweep.name.removesuffix(_FILE),
+                T_sensor_world.apply_numpy(cloud[inside]),
+                T_sensor_world @ T_world_object,
+                T_world_object.translation.numpy(),
+            )
+
+
+_SOURCE = "PandaSet, labelled cuboid"
+
+
+def find_scenes(root: Path) -> list[Path]:
+    """Labelled scenes at, or one or two levels below `root`, sorted.
+
+    Raises:
+        BadInputError: there is none.
+    """
+    if not root.is_dir():
+        raise BadInputError(
+            f"{root}: no such folder; give a scene of PandaSet or the folder of its scenes."
+        )
+    for level in ("", "*/", "*/*/"):
+        scenes = sorted(path.parents[1] for path in root.glob(f"{level}{CUBOIDS}"))
+        if any(map(_is_scene, scenes)):
+            return [scene for scene in scenes if _is_scene(scene)]
+    found = sorted(path.name for path in root.iterdir())
+    raise BadInputError(
+        f"{root}: expected PandaSet's <scene>/{CUBOIDS}/00{_FILE} and <scene>/{SWEEPS}, found "
+        f"{', '.join(found[:5]) or 'an empty folder'}."
+    )
+
+
+def _is_scene(folder: Path) -> bool:
+    return (folder / CUBOIDS).is_dir() and (folder / SWEEPS).is_dir()
+
+
+def _part(scene: Path, root: Path) -> str:
+    return scene.name if scene == root else scene.relative_to(root).as_posix()
+
+
+def _number(path: Path) -> int:
+    stem = path.name.removesuffix(_FILE)
+    if not stem.isdigit():
+        raise BadInputError(f"{path}: frames are named 00{_FILE} to 79{_FILE}; move it away.")
+    return int(stem)
+
+
+def _name(scene: Path, cuboids: Cuboids, row: int) -> str:
+    return f"{scene.resolve().name}_{cuboids.tracks[row]}"
