@@ -48,9 +48,12 @@ def shape_mirrored(track: Track, *, floor: float | None = None, voxel: float = V
     Raises:
         BadInputError: the track has no poses.
     """
-    points = _clean(track, floor)
-    both = np.concatenate((points, points * np.asarray((1, -1, 1), points.dtype)))
-    return voxel_thin(both, voxel)
+    return voxel_thin(mirrored(_clean(track, floor)), voxel)
+
+
+def mirrored(points: Points) -> Points:
+    """Points of the object frame with their reflections at its x-z plane (y -> -y)."""
+    return np.concatenate((points, points * np.asarray((1, -1, 1), points.dtype)))
 
 
 def _clean(track: Track, floor: float | None) -> Points:

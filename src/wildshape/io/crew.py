@@ -168,7 +168,7 @@ def serve() -> None:
         task = pickle.load(source)
         Thread(target=_receive, args=(source, items), daemon=True).start()
         while True:
-            pickle.dump(_result(task, items.get()), sink, protocol=pickle.HIGHEST_PROTOCOL)
+            pickle.dump(guarded(task, items.get()), sink, protocol=pickle.HIGHEST_PROTOCOL)
             sink.flush()
     except (EOFError, KeyboardInterrupt, BrokenPipeError):
         os._exit(0)
@@ -183,8 +183,8 @@ def _receive(source: BinaryIO, items: "SimpleQueue[Any]") -> None:
             os._exit(0)
 
 
-def _result(task: Callable[[Any], Any], item: Any) -> Any:
-    """What the task returns, or raises, as something that arrives whole at the other end."""
+def guarded(task: Callable[[Any], Any], item: Any) -> Any:
+    """What the task returns, or raises: something that arrives whole in another process."""
     try:
         return task(item)
     except Exception as error:  # noqa: BLE001

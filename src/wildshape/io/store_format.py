@@ -9,7 +9,7 @@ A store is a folder:
   below count through all shards.
 - `index.safetensors`: where everything lies, the poses and all texts (tensors of `INDEX`).
 - `index.json`: format, version, checksums, provenance. Written last: no store without it.
-- `writing.json` while it is being written; then there may be finished `parts/`, each with a store
+- `writing.json` while it is being written; then there may be finished `.parts/`, each with a store
   of its own, and `joining.json` while these become one.
 """
 
@@ -30,7 +30,7 @@ INDEX_JSON = "index.json"
 INDEX_TENSORS = "index.safetensors"
 WRITING_JSON = "writing.json"
 JOINING_JSON = "joining.json"
-PARTS = "parts"
+PARTS = ".parts"
 SHARD_NAME = "points-{:05d}.safetensors"
 POINT_BYTES = 12
 

@@ -7,6 +7,7 @@ No point is read. Until the parts' shards begin to move, the parts are whole; fr
 """
 
 import json
+import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +23,7 @@ from wildshape.io.store_format import (
     INDEX_JSON,
     INDEX_TENSORS,
     JOINING_JSON,
+    PARTS,
     SHARD_NAME,
     WRITING_JSON,
     FileRecord,
@@ -45,7 +47,7 @@ def join_stores(parts: Sequence[Path], out: Path, provenance: dict[str, Any]) ->
     """Make one store of several, in their order; they are used up.
 
     Args:
-        parts: finished stores, below `out`.
+        parts: finished stores, below `out` in `.parts`, which is removed.
         out: the folder of the new store; an older store there is replaced.
         provenance: JSON values kept with the store.
 
@@ -59,16 +61,19 @@ def join_stores(parts: Sequence[Path], out: Path, provenance: dict[str, Any]) ->
     renamed = [replace(s, file=SHARD_NAME.format(i)) for i, s in enumerate(shards)]
     places = [part / shard["file"] for part, m in zip(parts, manifests) for shard in m["shards"]]
     counts = {key: sum(m[key] for m in manifests) for key in ("tracks", "scans", "points")}
-    remove_store(out)
+    remove_store(out, parts=False)
     index = _join_indexes(parts, out)
-    moves = [[str(place.relative_to(out)), s.file] for place, s in zip(places, renamed)]
+    moves = [
+        [str(place.absolute().relative_to(out.absolute())), s.file]
+        for place, s in zip(places, renamed)
+    ]
     manifest = manifest_of(index, renamed, counts, provenance)
     write_json(out / JOINING_JSON, {"moves": moves, "manifest": manifest})
     finish_join(out)
 
 
-def finish_join(out: Path) -> None:
-    """Go on with a join whose `joining.json` is written.
+def finish_join(out: Path) -> dict[str, Any]:
+    """Go on with a join whose `joining.json` is written; returns what `index.json` says.
 
     Raises:
         BadInputError: a shard is neither where it was nor where it goes.
@@ -76,14 +81,17 @@ def finish_join(out: Path) -> None:
     with reading(out / JOINING_JSON, "the plan of a join"):
         plan = json.loads((out / JOINING_JSON).read_text("utf-8"))
         moves, manifest = plan["moves"], plan["manifest"]
+    # Each step can be repeated; what the parts say of themselves is in the plan.
     for source, target in moves:
         if (out / source).is_file():
             (out / source).replace(out / target)
         elif not (out / target).is_file():
             raise BadInputError(f"{out / source}: lost; write the store again with --overwrite.")
+    shutil.rmtree(out / PARTS, ignore_errors=True)
     write_json(out / INDEX_JSON, manifest)
     (out / WRITING_JSON).unlink(missing_ok=True)
     (out / JOINING_JSON).unlink()
+    return manifest
 
 
 def _check_names(parts: Iterable[Path]) -> None:

@@ -4,6 +4,7 @@
 
 import json
 import os
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from wildshape.io.store_format import (
     INDEX_JSON,
     INDEX_TENSORS,
     JOINING_JSON,
+    PARTS,
     POINT_BYTES,
     SHARD_NAME,
     VERSION,
@@ -202,7 +204,17 @@ class _Shard:
 
 
 def _make_room(path: Path, *, overwrite: bool) -> None:
-    """Refuse an existing output, or remove the store that is there: its own files, no others."""
+    check_room(path, overwrite=overwrite)
+    if path.exists():
+        remove_store(path)
+
+
+def check_room(path: Path, *, overwrite: bool) -> None:
+    """Refuse an output where something else is, or a store that must not be replaced.
+
+    Raises:
+        BadInputError: either.
+    """
     if not path.exists() or (path.is_dir() and not any(path.iterdir())):
         return
     ours = path.is_dir() and any((path / name).exists() for name in (INDEX_JSON, WRITING_JSON))
@@ -211,12 +223,18 @@ def _make_room(path: Path, *, overwrite: bool) -> None:
     if not overwrite:
         state = "a packed store" if (path / INDEX_JSON).exists() else "a half-written packed store"
         raise BadInputError(f"{path}: {state} is there already; pass --overwrite to replace it.")
-    remove_store(path)
 
 
-def remove_store(path: Path) -> None:
-    """Remove a store, finished or half-written: its own files, no others."""
+def remove_store(path: Path, *, parts: bool = True) -> None:
+    """Remove a store, finished or half-written: its own files, no others.
+
+    Args:
+        path: its folder.
+        parts: remove the finished parts of a conversion as well.
+    """
     # The store ends to exist with its manifest, which therefore goes first.
     own = (INDEX_JSON, JOINING_JSON, INDEX_TENSORS, "points-*.safetensors*", ".*.part")
     for file in [file for pattern in own for file in path.glob(pattern)]:
         file.unlink()
+    if parts:
+        shutil.rmtree(path / PARTS, ignore_errors=True)

@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A whole conversion: its parts shared out over cores or a cluster, then put together."""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from wildshape.cli.converted import Destination, PackedStore, TrackFolders, left_out
+from wildshape.cli.options import Layout
+from wildshape.cli.terminal import progress
+from wildshape.datasets.conversion import Conversion, Part, PartResult
+from wildshape.datasets.source import Source
+from wildshape.datasets.truth import TruthBuilder
+from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.io.crew import as_done
+from wildshape.io.ray_crew import on_ray
+from wildshape.io.store_format import PARTS
+
+
+@dataclass(frozen=True)
+class Order:
+    """A conversion that is wanted.
+
+    Attributes:
+        name: of the data set, for people.
+        source: the data set.
+        out: where the tracks go.
+        layout: as one store or as folders.
+        truth: what makes shapes from poses, if anything.
+        settings: JSON values; what decides the tracks beside `layout` and `truth`.
+        workers: processes; None: one a core.
+        ray: address of a Ray cluster instead, if any.
+        overwrite: replace an earlier output.
+    """
+
+    name: str
+    source: Source
+    out: Path
+    layout: Layout
+    truth: TruthBuilder | None
+    settings: dict[str, Any]
+    workers: int | None = None
+    ray: str | None = None
+    overwrite: bool = False
+
+
+def convert(order: Order) -> list[PartResult]:
+    """Convert all parts, or those that an earlier run did not finish; their results in order.
+
+    The output depends on the data set and the settings alone, not on who worked on what when.
+
+    Raises:
+        BadInputError: the data set or the output cannot be used, or no track came.
+        MissingExtraError: Ray is not installed.
+    """
+    parts = [Part(i, name) for i, name in enumerate(order.source.parts())]
+    settings = json.loads(json.dumps(_identity(order, parts), default=str), parse_constant=str)
+    kind = PackedStore if order.layout == "packed" else TrackFolders
+    destination: Destination = kind(order.out, settings, order.overwrite)
+    earlier = destination.begin()
+    if earlier is not None:
+        return earlier
+    task = Conversion(order.source, (order.out / PARTS).absolute(), order.layout, order.truth)
+    try:
+        results = _all_parts(task, parts, order)
+    except (BadInputError, MissingExtraError):
+        if not any(task.finished(part) for part in parts):
+            destination.abandon()
+        raise
+    if not any(result.tracks for result in results):
+        destination.abandon()
+        raise BadInputError(_nothing(order.out, results))
+    destination.finish([(task.place(part), result) for part, result in zip(parts, results)])
+    return results
+
+
+def _identity(order: Order, parts: list[Part]) -> dict[str, Any]:
+    """All that decides the output; parts are part of it, lest a data set grows between two runs."""
+    names = "\n".join(part.name for part in parts)
+    return {
+        **order.settings,
+        "layout": order.layout,
+        "truth": asdict(order.truth) if order.truth else None,
+        "parts": {"count": len(parts), "names": hashlib.sha256(names.encode()).hexdigest()[:16]},
+    }
+
+
+def _all_parts(task: Conversion, parts: list[Part], order: Order) -> list[PartResult]:
+    """The results in order, of this run and of earlier ones; progress is shown."""
+    found = {part: task.finished(part) for part in parts}
+    results = {part: result for part, result in found.items() if result is not None}
+    todo = [part for part in parts if part not in results]
+    with progress(f"converting {order.name}", len(parts), start=len(results)) as bar:
+        for part, result in _shared_out(task, todo, order):
+            results[part] = result
+            bar.at(len(results), _so_far(list(results.values())))
+    return [results[part] for part in parts]
+
+
+def _shared_out(
+    task: Conversion, todo: list[Part], order: Order
+) -> Iterator[tuple[Part, PartResult]]:
+    workers = min(order.workers or os.cpu_count() or 1, len(todo))
+    if order.ray is not None and todo:
+        return on_ray(task, todo, order.ray, order.workers)
+    return as_done(task, todo, workers) if workers > 1 else map(task, todo)
+
+
+def _so_far(results: list[PartResult]) -> str:
+    tracks, scans = sum(r.tracks for r in results), sum(r.scans for r in results)
+    return f"{tracks} tracks, {scans} scans"
+
+
+def _nothing(out: Path, results: list[PartResult]) -> str:
+    reasons = left_out(results)
+    most = next(iter(reasons), "")
+    why = f" (most often, {reasons[most]} times: {most.rstrip('.')})" if most else ""
+    return f"{out}: no track came out of the source{why}; check it and its options."
