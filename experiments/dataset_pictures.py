@@ -38,6 +38,8 @@ WRITERS = {
     "shapenet-views": "tests.datasets.write_shapenet_views:picture_scene",
     "nuscenes": "tests.datasets.write_nuscenes:picture_scene",
     "waymo": "tests.datasets.write_waymo:picture_scene",
+    "argoverse2": "tests.datasets.write_argoverse2:picture_scene",
+    "pandaset": "tests.datasets.write_pandaset:picture_scene",
 }
 """Name on the command line of `convert` -> module and function `(root: Path) -> None`."""
 

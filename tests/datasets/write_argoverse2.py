@@ -5,7 +5,7 @@
 import numpy as np
 import pyarrow as pa
 from pyarrow import feather
-from tests.datasets.street import SIZE, moved, rigid, wxyz
+from tests.datasets.street import SIZE, moved, rigid, street, wxyz
 
 LOG = "0aa4e8f5-2f9a-39a1-8f80-c2fdde4405a2"
 UUIDS = {
@@ -79,3 +79,8 @@ def write_sweep(path, points):
     columns |= {"laser_number": (index % 2 * 32 + index % 31).astype(np.uint8)}
     columns |= {"offset_ns": (index * 1000).astype(np.int32)}
     write_table(path, columns)
+
+
+def picture_scene(root):
+    """A parked car, passed; what the documentation shows."""
+    write_log(root / "sensor" / "val" / LOG, street(frames=9, points=6000))

@@ -6,7 +6,7 @@ import json
 import math
 
 import numpy as np
-from tests.datasets.street import SIZE, moved, rigid, wxyz
+from tests.datasets.street import SIZE, moved, rigid, street, wxyz
 from tests.datasets.write_pandas import write_frame
 
 UUIDS = {
@@ -84,3 +84,8 @@ def write_sweep(path, points, times, lidars):
     columns = {axis: points[:, k] for k, axis in enumerate("xyz")}
     columns |= {"i": np.full(len(points), 7.0), "t": times, "d": lidars.astype(np.int64)}
     write_frame(path, columns)
+
+
+def picture_scene(root):
+    """A parked car, passed; what the documentation shows."""
+    write_scene(root / "pandaset" / "001", street(frames=9, points=6000))
