@@ -3,6 +3,7 @@
 """A list read a piece at a time is the list read at once."""
 
 import json
+import tracemalloc
 
 import pytest
 
@@ -38,3 +39,15 @@ def test_what_is_no_whole_list_of_objects_is_named(tmp_path, text):
     (tmp_path / "table.json").write_text(text)
     with pytest.raises(BadInputError, match=r"table\.json: expected a list of JSON objects"):
         list(json_rows(tmp_path / "table.json"))
+
+
+def test_memory_does_not_grow_with_the_table(tmp_path):
+    path = tmp_path / "table.json"
+    path.write_text(json.dumps([{"token": f"{i:0500d}"} for i in range(20_000)]))
+    tracemalloc.start()
+    count = sum(1 for _ in json_rows(path))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert count == 20_000
+    assert path.stat().st_size > 10e6
+    assert peak < 7e6  # a few pieces of a million characters

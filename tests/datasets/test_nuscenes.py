@@ -5,6 +5,7 @@
 import json
 import os
 import pickle
+import shutil
 import threading
 
 import numpy as np
@@ -188,6 +189,9 @@ def test_a_wrong_root_says_what_was_expected_and_found(own, tmp_path):
     refused(own / "samples", tmp_path, r"expected <root>/v1\.0-trainval.*found LIDAR_TOP")
     write_nuscenes(own, (SECOND,), version="v1.0-trainval")
     refused(own, tmp_path, r"holds v1\.0-mini and v1\.0-trainval.*give one of them")
+    shutil.rmtree(own / "v1.0-trainval")
+    (own / "v1.0-mini" / "sample_annotation.json").write_text("[]")
+    refused(own, tmp_path, r"sample_annotation\.json: no labels \(v1\.0-test has none\)")
     (own / "samples").rename(own / "elsewhere")
     refused(own / "v1.0-mini", tmp_path, r"expected samples/LIDAR_TOP beside v1\.0-mini, found")
 

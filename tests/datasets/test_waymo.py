@@ -26,7 +26,7 @@ from tests.datasets.write_waymo import (
 from wildshape.datasets.selection import Selection
 from wildshape.datasets.source import Source, all_tracks
 from wildshape.datasets.waymo import Waymo, find_splits, frames
-from wildshape.datasets.waymo_tables import COMPONENTS, read_boxes
+from wildshape.datasets.waymo_tables import COMPONENTS, range_images, read_boxes
 from wildshape.errors import BadInputError, MissingExtraError
 from wildshape.geometry.se3 import SE3
 
@@ -201,6 +201,29 @@ def test_frames_without_an_image_are_counted(own):
     source = Waymo(own)
     assert {len(track.scans) for track in all_tracks(source)} == {1, 2}
     assert source.rejected["scan: the frame has no range image of TOP"] == 2
+
+
+def test_one_image_is_held_of_a_row_group_of_many(tmp_path):
+    rng = np.random.default_rng(0)
+    images = rng.random((40, 64 * 650 * 6), np.float32)  # 1 MB each
+    column = "[LiDARPoseComponent].range_image_return1"
+    table = pa.table(
+        {
+            "key.frame_timestamp_micros": np.arange(40),
+            "key.laser_name": np.ones(40, np.int8),
+            f"{column}.values": pa.array(list(images), pa.list_(pa.float32())),
+            f"{column}.shape": pa.array([[64, 650, 6]] * 40, pa.list_(pa.int32(), 3)),
+        }
+    )
+    path = tmp_path / "poses.parquet"
+    parquet.write_table(table, path)
+    del table
+    assert parquet.ParquetFile(path).num_row_groups == 1
+    before = pa.total_allocated_bytes()
+    for i, (time, image) in enumerate(range_images(path, "LiDARPoseComponent")):
+        assert time == i
+        assert np.array_equal(image.ravel(), images[i])
+        assert pa.total_allocated_bytes() - before < 10e6
 
 
 def test_pyarrow_is_asked_for_by_name(split, monkeypatch):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from tests.cars import car_surface
 
 SENSORS = {  # channel: (translation, roll pitch yaw in degrees); LIDAR_TOP is y forward
     "LIDAR_TOP": ((0.94, 0.02, 1.84), (1.2, -0.7, -89.6)),
@@ -28,6 +29,7 @@ class Thing:
     yaw: float = 0.4
     yaw_rate: float = 0.0
     keys: tuple[int, ...] = (0, 1, 2, 3)  # the key frames in which it is labelled
+    is_car: bool = False  # the sides of `tests.cars` that face the sensor, instead of the box
 
     def pose(self, t):
         """T_global_object at t seconds."""
@@ -69,6 +71,13 @@ def box_surface(size, count, seed):
     return points
 
 
+def facing(eye, count, seed):
+    """Points on the small car of `tests.cars` that a sensor at `eye` may see, 1 cm of noise."""
+    points, normals = car_surface(10 * count, seed)
+    seen = points[((eye - points) * normals).sum(axis=1) > 0][:count]
+    return seen + np.random.default_rng(seed).normal(scale=0.01, size=seen.shape)
+
+
 def off_surface(points, size):
     """How far points lie from a box's surface."""
     away = np.abs(points) - np.asarray(size) / 2
@@ -82,7 +91,13 @@ def cloud_at(scene, t, count):
     parts = [world]
     for number, thing in enumerate(scene.things):
         rotation, place = thing.pose(t)
-        parts.append(rotation.apply(box_surface(thing.size, count, number)) + place)
+        if thing.is_car:
+            ego, sensor = ego_pose(t), sensor_pose("LIDAR_TOP")
+            eye = rotation.inv().apply(ego[0].apply(sensor[1]) + ego[1] - place)
+            surface = facing(eye, count, round(10 * t))
+        else:
+            surface = box_surface(thing.size, count, number)
+        parts.append(rotation.apply(surface) + place)
     points = np.concatenate(parts)
     for rotation, place in (ego_pose(t), sensor_pose("LIDAR_TOP")):
         points = rotation.inv().apply(points - place)
@@ -230,3 +245,10 @@ def _links(tokens, i):
         "prev": tokens[i - 1] if i else "",
         "next": tokens[i + 1] if i + 1 < len(tokens) else "",
     }
+
+
+def picture_scene(root):
+    """A small car, passed; what the documentation shows."""
+    keys = tuple(range(8))
+    car = Thing("car", size=(4.2, 1.7, 1.5), start=(415.0, 1188.0, 0.9), keys=keys, is_car=True)
+    write_nuscenes(root, [Scene(things=(car,), keys=len(keys), sweeps_between=0)])

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 SEGMENT = "10023947602400723454_1120_000_1140_000"
 START, PERIOD = 1552440195362591, 100_000
 MOUNT = ((1.43, 0.02, 2.184), (0.9, -1.3, 148.2))  # of TOP: place, roll pitch yaw in degrees
-ROWS, COLUMNS = 40, 900
+SHAPE = (40, 900)  # the real ones are (64, 2650)
 LIMITS = (-0.33, 0.05)
 _KEY = [("key.segment_context_name", pa.string())]
 _FRAME = [*_KEY, ("key.frame_timestamp_micros", pa.int64())]
@@ -31,6 +31,7 @@ class Thing:
     Attributes:
         kind: 1 vehicle, 2 pedestrian, 3 sign, 4 cyclist.
         frames: in which it is labelled.
+        solid: boxes it is made of, as size and place in its own frame; default the labelled one.
     """
 
     token: str
@@ -40,6 +41,7 @@ class Thing:
     step: tuple[float, float, float] = (0.0, 0.0, 0.0)
     yaw: float = 0.7
     frames: tuple[int, ...] = (0, 1, 2)
+    solid: tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ...] = ()
 
     def pose(self, frame):
         """T_world_object; upright in the vehicle's frame, as labels are."""
@@ -80,36 +82,40 @@ def mount():
     return matrix.astype(np.float32).astype(np.float64)  # as the file holds it
 
 
-def beams(table):
+def beams(table, rows):
     """Inclination of each row from the highest down: as in a table, or spread evenly."""
     low, high = LIMITS
-    share = (np.arange(ROWS) + 0.5) / ROWS
+    share = (np.arange(rows) + 0.5) / rows
     return (low + (share**1.3 if table else share) * (high - low))[::-1]
 
 
-def render(things, frame, *, table):
+def render(things, frame, *, table, shape):
     """Range image (H, W, 4) and pixel poses (H, W, 6), float32, by rays against boxes."""
-    azimuth = np.pi - 2 * np.pi * (np.arange(COLUMNS) + 0.5) / COLUMNS  # from the vehicle's x
-    poses = vehicle_pose(frame + np.arange(COLUMNS) / COLUMNS - 0.5).astype(np.float32)
+    rows, columns = shape
+    azimuth = np.pi - 2 * np.pi * (np.arange(columns) + 0.5) / columns  # from the vehicle's x
+    poses = vehicle_pose(frame + np.arange(columns) / columns - 0.5).astype(np.float32)
     rotations, places = as_pose(poses.astype(np.float64))
     matrix = mount()
-    up = beams(table)[:, None]
+    up = beams(table, rows)[:, None]
     turned = azimuth - np.arctan2(matrix[1, 0], matrix[0, 0])
     level = np.cos(up)
     rays = np.stack(
-        (level * np.cos(turned), level * np.sin(turned), np.sin(up) * np.ones(COLUMNS)),
+        (level * np.cos(turned), level * np.sin(turned), np.sin(up) * np.ones(columns)),
         axis=-1,
     )
     T = rotations.as_matrix()
     rays = np.einsum("wij,hwj->hwi", T, rays @ matrix[:3, :3].T)
     origins = np.einsum("wij,j->wi", T, matrix[:3, 3]) + places
-    ranges = np.full((ROWS, COLUMNS), np.inf)
+    ranges = np.full((rows, columns), np.inf)
     for thing in things:
-        ranges = np.minimum(ranges, hit(origins, rays, thing.size, *thing.pose(frame)))
-    image = np.zeros((ROWS, COLUMNS, 4), np.float32)
+        rotation, place = thing.pose(frame)
+        for size, at in thing.solid or ((thing.size, (0, 0, 0)),):
+            middle = place + rotation.apply(at)
+            ranges = np.minimum(ranges, hit(origins, rays, size, rotation, middle))
+    image = np.zeros((rows, columns, 4), np.float32)
     image[..., 0] = np.where(np.isfinite(ranges), ranges, -1.0)
     image[..., 1:] = (0.3, 0.1, -1.0)
-    return image, np.broadcast_to(poses, (ROWS, COLUMNS, 6)).copy()
+    return image, np.broadcast_to(poses, (rows, columns, 6)).copy()
 
 
 def hit(origins, rays, size, rotation, place):
@@ -123,12 +129,12 @@ def hit(origins, rays, size, rotation, place):
     return np.where((enter > 0) & (enter < leave), enter, np.inf)
 
 
-def write_waymo(split, things, *, frames=3, table=True, segment=SEGMENT):
+def write_waymo(split, things, *, frames=3, table=True, shape=SHAPE):
     """All tables of a segment; other lasers and a second return are there to be left alone."""
     lidar, poses, vehicle, boxes = [], [], [], []
     for frame in range(frames):
-        key = (segment, START + PERIOD * frame)
-        image, pixel_poses = render(things, frame, table=table)
+        key = (SEGMENT, START + PERIOD * frame)
+        image, pixel_poses = render(things, frame, table=table, shape=shape)
         other = np.full((5, 7, 4), 3.0, np.float32)
         lidar += [(*key, 2, *_flat(other), *_flat(other))]
         lidar += [(*key, 1, *_flat(image), *_flat(np.zeros_like(image)))]
@@ -148,10 +154,10 @@ def write_waymo(split, things, *, frames=3, table=True, segment=SEGMENT):
     pose = [("world_from_vehicle.transform", _TRANSFORM)]
     _write(split, "vehicle_pose", _FRAME, "VehiclePoseComponent", pose, vehicle)
     _write(split, "lidar_box", [*_FRAME, _OBJECT], "LiDARBoxComponent", _BOX, boxes)
-    inclinations = beams(table)[::-1].tolist() if table else None
+    inclinations = beams(table, shape[0])[::-1].tolist() if table else None
     calibrations = [
-        (segment, 2, np.eye(4).ravel().tolist(), -1.57, 0.52, None),
-        (segment, 1, mount().ravel().tolist(), *LIMITS, inclinations),
+        (SEGMENT, 2, np.eye(4).ravel().tolist(), -1.57, 0.52, None),
+        (SEGMENT, 1, mount().ravel().tolist(), *LIMITS, inclinations),
     ]
     name = "LiDARCalibrationComponent"
     _write(split, "lidar_calibration", [*_KEY, _LASER], name, _CALIBRATION, calibrations)
@@ -193,4 +199,12 @@ def _write(split, component, keys, name, columns, rows):
     folder = split / component
     folder.mkdir(parents=True, exist_ok=True)
     table = pa.Table.from_arrays(arrays, schema=pa.schema(fields))
-    parquet.write_table(table, folder / f"{rows[0][0] if rows else SEGMENT}.parquet")
+    parquet.write_table(table, folder / f"{SEGMENT}.parquet")
+
+
+def picture_scene(root):
+    """A car of two boxes, passed; what the documentation shows."""
+    solid = (((4.7, 2.0, 0.85), (0, 0, -0.4)), ((2.6, 1.7, 0.8), (-0.4, 0, 0.45)))
+    frames = tuple(range(12))
+    car = Thing("Kw3hbYbGR0iVbsqyFoD9uQ", start=(875.0, 1513.0, -50.1), frames=frames, solid=solid)
+    write_waymo(root / "training", [car], frames=len(frames), shape=(64, 2650))

@@ -61,6 +61,9 @@ class NuScenes:
                 f"{tables.parent}: expected samples/{CHANNEL} beside {tables.name}, found "
                 f"{_found(tables.parent)}; unpack nuScenes' file blobs there."
             )
+        labels = tables / "sample_annotation.json"
+        if next(json_rows(labels), None) is None:
+            raise BadInputError(f"{labels}: no labels (v1.0-test has none); give another release.")
         return sorted(str(row.get("name")) for row in json_rows(tables / "scene.json"))
 
     def tracks_of(self, part: str) -> Iterator[Track]:
