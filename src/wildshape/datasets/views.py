@@ -12,9 +12,13 @@ from torch import Tensor
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.centring import scan_centre
+from wildshape.geometry.facing import Facing, face, roll
 from wildshape.geometry.rotation import random_rotation, random_yaw
 from wildshape.io.store import Store
 from wildshape.records import SensorKind
+
+Turn = Literal["none", "yaw", "so3", "facing"]
+_ROLL_RAD = 0.1
 
 
 @dataclass(frozen=True)
@@ -27,7 +31,9 @@ class ViewConfig:
         points: n, each scan resampled with replacement to this many.
         window: the V scans lie within this many consecutive frames of the track.
         turn: each scan turned about the sensor by its own random rotation before training:
-            `none` (the paper), `yaw` or `so3`.
+            `none` (the paper), `yaw` or `so3`; or `facing`: turned towards its object and, as a
+            share `roll` of them, rolled about the line of sight (LiDAR; `geometry/facing.py`).
+        roll: share of the scans rolled at random under `facing`; the others hardly roll.
         sensor: decides the centring: `lidar` the frustum's middle, `camera` the box's.
         min_points: scans with fewer are never drawn.
     """
@@ -36,7 +42,8 @@ class ViewConfig:
     views: int = 4
     points: int = 1024
     window: int = 20
-    turn: Literal["none", "yaw", "so3"] = "none"
+    turn: Turn = "none"
+    roll: float = 0.0
     sensor: SensorKind = "lidar"
     min_points: int = 100
 
@@ -86,6 +93,7 @@ class ViewSampler:
                 " nothing to train on."
             )
         self.anchors: Float[Tensor, "S 3 3"] | None = None
+        self._faced: dict[int, Facing] = {}
         self._centres = np.full((len(sizes), 3), np.nan, dtype=np.float32)
 
     def draw(self, *seed: int) -> Batch:
@@ -94,18 +102,42 @@ class ViewSampler:
         config = self.config
         chosen = rng.integers(len(self.scans_of), size=config.tracks)
         rows = np.concatenate([self._window(self.scans_of[t], rng) for t in chosen])
-        scans, centres = self.gather([int(s) for s in rows], rng)
         first = np.arange(config.tracks) * config.views
         reference = torch.from_numpy(first + rng.integers(config.views, size=config.tracks))
+        scans, centres, rotation = self.turned(rows, rng)
+        anchor = torch.zeros_like(rotation)
+        if self.anchors is not None:
+            anchor = self.anchors[torch.from_numpy(rows)]
+        return Batch(scans, centres, reference, rotation, anchor)
+
+    def turned(
+        self, rows: np.ndarray, rng: np.random.Generator
+    ) -> tuple[Float[Tensor, "B n 3"], Float[Tensor, "B 3"], Float[Tensor, "B 3 3"]]:
+        """Scans of the store, turned as configured, centred and resampled; centres; turns."""
+        config = self.config
+        if config.turn == "facing":
+            scans, centres, turn = self.gather_as_posed([int(s) for s in rows], rng)
+            rolled = _rolls(len(rows), config.roll, rng)
+            return scans @ rolled.mT, centres, rolled @ turn
+        scans, centres = self.gather([int(s) for s in rows], rng)
         rotation = _turns(len(rows), config.turn, int(rng.integers(2**62)))
         scans, turned = scans @ rotation.mT, (rotation @ centres[..., None])[..., 0]
         if not centre_turns_along(config):
             middle = torch.stack([self._turned_centre(int(s), R) for s, R in zip(rows, rotation)])
             scans, turned = scans + (turned - middle)[:, None], middle
-        anchor = torch.zeros_like(rotation)
-        if self.anchors is not None:
-            anchor = self.anchors[torch.from_numpy(rows)]
-        return Batch(scans, turned, reference, rotation, anchor)
+        return scans, turned, rotation
+
+    def gather_as_posed(
+        self, scans: list[int], rng: np.random.Generator
+    ) -> tuple[Float[Tensor, "B n 3"], Float[Tensor, "B 3"], Float[Tensor, "B 3 3"]]:
+        """As `gather`, but turned as a scan to be posed is: towards its object, or not at all."""
+        if self.config.turn != "facing":
+            return *self.gather(scans, rng), torch.eye(3).repeat(len(scans), 1, 1)
+        faced = [self._facing(scan) for scan in scans]
+        turn = torch.stack([found.turn for found in faced])
+        centres = torch.stack([found.centre for found in faced])
+        clouds = torch.stack([self._picked(scan, rng) for scan in scans])
+        return clouds @ turn.mT - centres[:, None], centres, turn
 
     def gather(
         self, scans: list[int], rng: np.random.Generator
@@ -132,9 +164,17 @@ class ViewSampler:
         return rng.choice(near, size=config.views, replace=len(near) < config.views)
 
     def _resampled(self, scan: int, rng: np.random.Generator) -> Tensor:
+        return self._picked(scan, rng) - self._centre(scan)
+
+    def _picked(self, scan: int, rng: np.random.Generator) -> Tensor:
         points = self.store.scan_points(scan)
-        picked = points[rng.integers(len(points), size=self.config.points)]
-        return torch.from_numpy(picked) - self._centre(scan)
+        return torch.from_numpy(points[rng.integers(len(points), size=self.config.points)])
+
+    def _facing(self, scan: int) -> Facing:
+        """The facing frame of a scan, found once."""
+        if scan not in self._faced:
+            self._faced[scan] = face(self._points(scan))
+        return self._faced[scan]
 
     def _centre(self, scan: int) -> Tensor:
         """The label-free centre of a scan, found once."""
@@ -158,6 +198,13 @@ def centre_turns_along(config: ViewConfig) -> bool:
     to be found again, as it will be of any scan posed later.
     """
     return config.turn == "none" or (config.turn == "yaw" and config.sensor == "lidar")
+
+
+def _rolls(count: int, share: float, rng: np.random.Generator) -> Float[Tensor, "B 3 3"]:
+    """Turns about the line of sight: any for a share of the scans, a few degrees for the others."""
+    free = rng.random(count) < share
+    angle = np.where(free, rng.uniform(-np.pi, np.pi, count), rng.normal(0.0, _ROLL_RAD, count))
+    return roll(torch.from_numpy(angle.astype(np.float32)))
 
 
 def _turns(count: int, turn: str, seed: int) -> Float[Tensor, "B 3 3"]:

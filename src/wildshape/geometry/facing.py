@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A scan seen along its own line of sight (beyond the paper).
+
+Every scan is taken from the origin, so the direction in which an object lies needs no label. Turned
+so that the object lies straight ahead, scans that differ by a turn of the sensor about its vertical
+become the same scan, and of a free rotation nothing is left but the roll about the line of sight.
+"""
+
+from typing import NamedTuple
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from wildshape.geometry.visibility import facing_rotation
+
+_AHEAD, _SMALLEST_M = (1.0, 0.0, 0.0), 1e-6
+
+
+class Facing(NamedTuple):
+    """How one scan is turned and centred.
+
+    Attributes:
+        turn: `R_facing_sensor`: x along the mean direction of the points, z as far up as can be.
+        centre: on that line of sight, at the middle of the ranges; turned frame, metres.
+    """
+
+    turn: Float[Tensor, "3 3"]
+    centre: Float[Tensor, "3"]
+
+
+def face(points: Float[Tensor, "n 3"]) -> Facing:
+    """The facing frame of a scan, sensor frame, none of its points at the sensor itself.
+
+    Turns of the sensor change the roll of the frame about the line of sight, and nothing else.
+    """
+    exact = points.double()
+    distance = exact.norm(dim=-1)
+    direction = (exact / distance[:, None].clamp_min(_SMALLEST_M)).mean(0)
+    middle = (distance.amin() + distance.amax()) / 2
+    turn = facing_rotation(direction[None])[0]
+    return Facing(turn.to(points.dtype), (middle * exact.new_tensor(_AHEAD)).to(points.dtype))
+
+
+def roll(angle: Float[Tensor, "B"]) -> Float[Tensor, "B 3 3"]:
+    """Rotations about x, the line of sight; radians, right-handed."""
+    cosine, sine = torch.cos(angle), torch.sin(angle)
+    zero, one = torch.zeros_like(angle), torch.ones_like(angle)
+    rows = (one, zero, zero, zero, cosine, -sine, zero, sine, cosine)
+    return torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
+
+
+def roll_angle(R_facing_object: Float[Tensor, "B 3 3"]) -> Float[Tensor, "B"]:
+    """The angle to `roll` by so that the object's z axis points up beside the line of sight."""
+    up = R_facing_object[:, :, 2]
+    return torch.atan2(up[:, 1], up[:, 2])
