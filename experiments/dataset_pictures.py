@@ -36,6 +36,8 @@ WRITERS = {
     "kitti-tracking": "tests.datasets.write_kitti_tracking:picture_scene",
     "semantic-kitti": "tests.datasets.write_semantic_kitti:picture_scene",
     "shapenet-views": "tests.datasets.write_shapenet_views:picture_scene",
+    "rgbd": "tests.datasets.write_rgbd:picture_scene",
+    "bop": "tests.datasets.write_rgbd:picture_bop",
     "nuscenes": "tests.datasets.write_nuscenes:picture_scene",
     "waymo": "tests.datasets.write_waymo:picture_scene",
     "argoverse2": "tests.datasets.write_argoverse2:picture_scene",

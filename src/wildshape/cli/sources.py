@@ -26,12 +26,14 @@ SOURCES = {
     "waymo": "wildshape.datasets.waymo:Waymo",
     "pandaset": "wildshape.datasets.pandaset:PandaSet",
     "shapenet-views": "wildshape.datasets.shapenet_views:ShapeNetViews",
+    "rgbd": "wildshape.datasets.rgbd:Rgbd",
+    "bop": "wildshape.datasets.bop:Bop",
     "folder": "wildshape.datasets.folder:Folder",
     "packed": "wildshape.datasets.packed:Packed",
 }
 """Name on the command line -> module and class; imported when it is asked for."""
 
-_NESTED = ("selection", "crop")
+_NESTED = ("selection", "crop", "cut")
 
 
 def open_source(name: str, root: Path, options: dict[str, Any]) -> "Source":
