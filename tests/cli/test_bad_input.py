@@ -127,7 +127,7 @@ def test_evaluate_needs_truth(refused, track, trained, tmp_path):
     (track / "poses.txt").unlink()
     out = ("--out", tmp_path / "e", "--model", trained)
     assert "true poses" in refused("evaluate", track, *out)
-    assert "global-icp" in refused("evaluate", track, *out, "--baselines", "global-icp")
+    assert "no-such-icp" in refused("evaluate", track, *out, "--baselines", "no-such-icp")
 
 
 def test_checkpoint(refused, dataset, trained, tmp_path):

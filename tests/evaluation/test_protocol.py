@@ -192,6 +192,15 @@ def test_what_is_left_out_is_counted_with_its_reason():
         "completion: no true shape": 5,
     }
     assert [row.scan for row in results["picky"].completions] == ["000005", "000006", "000007"]
+    # Named, too.
+    named = [one for one in results["picky"].skipped if one.track == "drive"]
+    assert named == [
+        Skipped("drive", "000000", "fewer than 16 finite points"),
+        Skipped("drive", "000001", "all points equal"),
+        Skipped("drive", "000002", "fewer than 16 finite points"),
+        Skipped("drive", "000003", "completion: refused by the method"),
+        Skipped("drive", "000004", "completion: prediction empty or not finite"),
+    ]
 
 
 def test_truth_is_accumulated_where_no_shape_is_given():

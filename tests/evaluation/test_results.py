@@ -88,6 +88,11 @@ def test_metrics_json_has_the_fixed_names(tmp_path):
     assert set(ours["per_seed"]) == {"0", "5"}
     assert ours["scans_counted"] == {"completion": 4, "registration": 6}
     assert ours["scans_skipped"] == {"all points equal": 4}
+    # Named once, however many seeds, with the rows they are missing from.
+    assert content["skipped"] == [
+        {"track": "a", "scan": "7", "reason": "all points equal", "methods": ["ours"]},
+        {"track": "b", "scan": "3", "reason": "all points equal", "methods": ["ours"]},
+    ]
     assert content["methods"]["pose only"]["cd"] is None
     every = json.loads(write_scores(tmp_path / "new", runs).read_text())
     assert len(every["runs"]) == 2

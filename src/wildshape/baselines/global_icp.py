@@ -4,7 +4,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from wildshape.baselines.fast_global import FastGlobal
 from wildshape.baselines.icp import point_to_point
@@ -13,24 +12,6 @@ from wildshape.baselines.pairs import Cloud, chain, from_here, fuse
 from wildshape.errors import MissingExtraError
 from wildshape.geometry.se3 import SE3
 from wildshape.records import Points, Sensor
-
-
-class Coarse(Protocol):
-    """Aligns a pair of scans with no start."""
-
-    @property
-    def engine(self) -> str:
-        """The library, with its version."""
-        ...
-
-    @property
-    def voxel(self) -> float:
-        """How finely it looks, metres."""
-        ...
-
-    def align(self, source: Points, target: Points) -> SE3:
-        """`T_target_source`."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -43,7 +24,7 @@ class GlobalIcp:
         iterations: of ICP, at most, a pair.
     """
 
-    coarse: Coarse
+    coarse: FastGlobal | KissMatcher
     distance: float = 0.175
     iterations: int = 30
 
@@ -73,7 +54,7 @@ class GlobalIcp:
         return point_to_point(source, target, self.distance, self.iterations).T
 
 
-def available(voxel: float = 0.125) -> Coarse:
+def available(voxel: float = 0.125) -> FastGlobal | KissMatcher:
     """Open3D's fast global registration as in the paper, or KISS-Matcher where it is missing.
 
     Raises:

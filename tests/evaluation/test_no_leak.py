@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Guard: poses, boxes and shapes of the truth change no bit of what any method answers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from tests.cars import drive_by, poses_of
+
+from wildshape.baselines.named import NAMES, baseline
+from wildshape.errors import MissingExtraError
+from wildshape.evaluation.examples import gather
+from wildshape.evaluation.protocol import run
+from wildshape.evaluation.results import figures_of
+from wildshape.geometry.rotation import random_rotation
+from wildshape.geometry.se3 import SE3
+from wildshape.geometry.visibility import FacingBins
+from wildshape.inference.method import Learned
+from wildshape.inference.predictor import Predictor
+from wildshape.models.checkpoint import ModelSettings
+from wildshape.models.shapepose import NetworkConfig, ShapePoseNet
+
+LEARNED = "learned"
+
+
+def learned():
+    """A network that learned nothing: what it sees is all that matters here."""
+    torch.manual_seed(0)
+    network = NetworkConfig(
+        encoder=(16, 16, 32, 32),
+        decoder=(32, 32),
+        pose=(16, 16),
+        points=300,
+        mirror=True,
+        scale=2.0,
+    )
+    settings = ModelSettings(
+        network=network,
+        sensor="lidar",
+        input_points=128,
+        projection=FacingBins(0.3),
+        beta=0.25,
+        extent_m=(2.0, 6.0),
+        cost_m=(0.1, 0.3),
+    )
+    return Learned(Predictor(ShapePoseNet(network).eval(), settings))
+
+
+def method_named(name):
+    try:
+        return learned() if name == LEARNED else baseline(name)
+    except MissingExtraError as error:
+        pytest.skip(str(error))
+
+
+class Listening:
+    """A method whose every answer is kept, to the bit; offers just what the method offers."""
+
+    def __init__(self, method):
+        self.answers = []
+        for name in ("complete", "complete_many", "complete_track", "register_track"):
+            if hasattr(method, name):
+                setattr(self, name, self._kept(getattr(method, name)))
+
+    def _kept(self, function):
+        def answer(given, sensor):
+            made = function(given, sensor)
+            made = made if isinstance(made, (SE3, np.ndarray)) else list(made)
+            for one in made if isinstance(made, list) else [made]:
+                array = one.matrix.numpy() if isinstance(one, SE3) else one
+                self.answers.append((array.shape, array.tobytes()))
+            return made
+
+        return answer
+
+
+def other_truth(track):
+    """The same scans; every pose, the accumulated cloud, its box and the shape are others."""
+    generator = torch.Generator().manual_seed(9)
+    u, _, vt = torch.linalg.svd(random_rotation(len(track.scans), generator).double())
+    shift = 9 * torch.randn(len(track.scans), 3, generator=generator).double()
+    shape = np.random.default_rng(9).normal(size=(77, 3)).astype(np.float32) * [9, 2, 5]
+    return replace(
+        track,
+        T_sensor_object=SE3(u @ vt, shift),
+        shape=None if track.shape is None else shape.astype(np.float32),
+    )
+
+
+@pytest.mark.parametrize(
+    ("rotate", "accumulated"), [("none", False), ("yaw", True), ("so3", False)]
+)
+@pytest.mark.parametrize("name", [*NAMES, LEARNED])
+def test_no_bit_of_an_answer_depends_on_the_truth(name, accumulated, rotate):
+    track = drive_by(scans=3, points=150)
+    track = replace(track, shape=None) if accumulated else track
+    heard, figures = [], []
+    for given in (track, other_truth(track)):
+        listening = Listening(method_named(name))
+        results = run({name: listening}, [given], rotate, seed=4)
+        heard.append(listening.answers)
+        figures += [figures_of(row) for row in results.methods]
+    assert len(heard[0]) >= 1
+    assert heard[0] == heard[1]
+    # The guard guards: it is other truth that the answers were held against.
+    half = len(figures) // 2
+    assert figures[:half] != figures[half:]
+
+
+def test_the_guard_hears_a_method_that_looks_at_the_truth():
+    class Peeking:
+        """Its answer is the truth, behind the protocol's back."""
+
+        def __init__(self, track):
+            self.track = track
+
+        def register_track(self, scans, sensor):
+            poses = poses_of(self.track)
+            return poses[self.track.middle] @ poses.inverse()
+
+    track = drive_by(scans=3, points=60)
+    heard = []
+    for given in (track, other_truth(track)):
+        listening = Listening(Peeking(given))
+        run({"peeking": listening}, [given])
+        heard.append(listening.answers)
+    assert heard[0] != heard[1]
+
+
+def test_drawn_examples_come_from_the_same_blind_answers():
+    track = drive_by(scans=3, points=150)
+    heard = []
+    for given in (track, other_truth(track)):
+        listening = Listening(learned())
+        gather([given], run({"it": listening}, [given]), "it", listening)
+        heard.append(listening.answers)
+    assert heard[0] == heard[1]
