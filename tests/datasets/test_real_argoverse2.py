@@ -93,7 +93,7 @@ def test_accumulated_cars_fill_their_boxes(tracks):
 
 
 def test_boxes_agree_with_icp_on_well_seen_cars(tracks):
-    """Within 2 degrees and 10 cm, measured at the car; 4 cars of over 500 points."""
+    """Within 2 degrees and 10 cm, measured at the car: four of the five of over 500 points."""
     seen = [track for track in tracks if len(track.scans[0]) > 500]
     assert len(seen) == 5
     agree = 0
@@ -104,7 +104,6 @@ def test_boxes_agree_with_icp_on_well_seen_cars(tracks):
         middle = torch.as_tensor(track.scans[0].mean(axis=0, keepdims=True), dtype=torch.float64)
         apart = float((T_icp.apply(middle) - T_box.apply(middle)).norm())
         agree += apart < 0.1 and np.degrees(float((T_box.inverse() @ T_icp).angle())) < 2
-    # The fifth drives by within 6 m: half a length of its side comes into sight.
     assert agree == 4
 
 

@@ -39,6 +39,7 @@ VEHICLES = (
 )
 """The rigid ones: articulated buses and trains bend."""
 _SWEEPS = "sensors/lidar"
+_SOURCE = "Argoverse 2 sensor, labelled box"
 
 
 @dataclass
@@ -144,9 +145,6 @@ class _Frames:
                 f"{stamp}; the two are of different logs or releases, copy the log again."
             )
         return self.T_city_ego[stamp]
-
-
-_SOURCE = "Argoverse 2 sensor, labelled box"
 
 
 def find_logs(root: Path) -> list[Path]:

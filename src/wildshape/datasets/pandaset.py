@@ -34,6 +34,7 @@ VEHICLES = (
     "Other Vehicle - Construction Vehicle",
 )
 _FILE = ".pkl.gz"
+_SOURCE = "PandaSet, labelled cuboid"
 
 
 @dataclass
@@ -79,7 +80,7 @@ class PandaSet:
         for path in labels:
             cuboids = read_cuboids(path)
             rows = self._wanted(cuboids, left_out)
-            self._crop_frame(scene, drive, path, cuboids, rows, gathering)
+            self._crop_frame(_Frame(scene, _number(path), drive, cuboids), rows, gathering)
         yield from gathering.finished()
         for reason, count in (Counter(left_out.values()) + gathering.rejected).items():
             self.rejected[reason] += count
@@ -96,55 +97,51 @@ class PandaSet:
                 rows.append(row)
         return rows
 
-    def _crop_frame(
-        self,
-        scene: Path,
-        drive: Drive,
-        label: Path,
-        cuboids: Cuboids,
-        rows: list[int],
-        to: Gathering,
-    ) -> None:
-        frame = _number(label)
+    def _crop_frame(self, frame: "_Frame", rows: list[int], to: Gathering) -> None:
+        cuboids = frame.cuboids
         active = []
         for row in rows:
-            name, category = _name(scene, cuboids, row), str(cuboids.categories[row]).lower()
-            if to.wants(name, frame, category=category, source=_SOURCE):
+            category = str(cuboids.categories[row]).lower()
+            if to.wants(frame.track(row), frame.number, category=category, source=_SOURCE):
                 active.append(row)
-        sweep = scene / SWEEPS / label.name
-        if active and not sweep.is_file():
+        if active and not frame.sweep.is_file():
             self.rejected["scan: the frame has no LiDAR file"] += len(active)
         elif active:
-            self._crop_sweep(scene, drive, sweep, cuboids, active, to)
+            self._crop_sweep(frame, active, to)
 
-    def _crop_sweep(
-        self,
-        scene: Path,
-        drive: Drive,
-        sweep: Path,
-        cuboids: Cuboids,
-        rows: list[int],
-        to: Gathering,
-    ) -> None:
-        cloud, times = read_sweep(sweep)
-        frame = _number(sweep)
+    def _crop_sweep(self, frame: "_Frame", rows: list[int], to: Gathering) -> None:
+        cloud, times = read_sweep(frame.sweep)
         for row in rows:
-            T_world_object = cuboids.T_world_object[row]
-            length, width, height = cuboids.sizes[row].tolist()
+            T_world_object = frame.cuboids.T_world_object[row]
+            length, width, height = frame.cuboids.sizes[row].tolist()
             inside = rows_in_box(cloud, T_world_object, (length, width, height), self.crop)
             # The sensor stands where it was when its beams passed the object.
-            time = float(times[inside].mean()) if len(inside) else drive.stamps[frame]
-            T_sensor_world = drive.sensor_pose(frame, time).inverse()
+            time = float(times[inside].mean()) if len(inside) else frame.drive.stamps[frame.number]
+            T_sensor_world = frame.drive.sensor_pose(frame.number, time).inverse()
             to.add(
-                _name(scene, cuboids, row),
-                sweep.name.removesuffix(_FILE),
+                frame.track(row),
+                frame.sweep.name.removesuffix(_FILE),
                 T_sensor_world.apply_numpy(cloud[inside]),
                 T_sensor_world @ T_world_object,
                 T_world_object.translation.numpy(),
             )
 
 
-_SOURCE = "PandaSet, labelled cuboid"
+@dataclass(frozen=True)
+class _Frame:
+    """A frame of a scene: its labels and where its sweep lies."""
+
+    scene: Path
+    number: int
+    drive: Drive
+    cuboids: Cuboids
+
+    @property
+    def sweep(self) -> Path:
+        return self.scene / SWEEPS / f"{self.number:02d}{_FILE}"
+
+    def track(self, row: int) -> str:
+        return f"{self.scene.resolve().name}_{self.cuboids.tracks[row]}"
 
 
 def find_scenes(root: Path) -> list[Path]:
@@ -181,7 +178,3 @@ def _number(path: Path) -> int:
     if not stem.isdigit():
         raise BadInputError(f"{path}: frames are named 00{_FILE} to 79{_FILE}; move it away.")
     return int(stem)
-
-
-def _name(scene: Path, cuboids: Cuboids, row: int) -> str:
-    return f"{scene.resolve().name}_{cuboids.tracks[row]}"
