@@ -19,6 +19,8 @@ from typing import Annotated
 
 import numpy as np
 import tyro
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -30,6 +32,7 @@ from wildshape.io.atomic import atomic_write
 from wildshape.records import Track
 from wildshape.report.content import GREEN, ORANGE, Cloud, ReportObject
 from wildshape.report.picture import write_picture
+from wildshape.report.thumbnails import PANELS, draw_track
 
 WRITERS = {
     "kitti-raw": "tests.datasets.write_kitti_raw:picture_scene",
@@ -46,7 +49,7 @@ WRITERS = {
 """Name on the command line of `convert` -> module and function `(root: Path) -> None`."""
 
 
-_WIDTH = 1200
+_WIDTH, _ROWS = 1200, 3
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,23 @@ def main(settings: Settings) -> None:
 
 def draw(name: str, root: Path, settings: Settings) -> None:
     tracks = list(all_tracks(open_source(name, root, {})))
-    write_webp(posed(tracks[settings.track]), settings.out)
+    if tracks[0].sensor.kind == "camera":
+        write_rows(tracks[:_ROWS], settings.out)
+    else:
+        write_webp(posed(tracks[settings.track]), settings.out)
+
+
+def write_rows(tracks: list[Track], out: Path) -> None:
+    """A row a track: some of its scans and, where truth is known, all of them."""
+    figure = Figure(figsize=(9, 1.75 * len(tracks)), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(len(tracks), PANELS, squeeze=False)
+    for row, track in zip(axes, tracks):
+        draw_track(list(row), track)
+    with tempfile.TemporaryDirectory() as folder:
+        png = Path(folder) / "rows.png"
+        figure.savefig(png, dpi=_WIDTH / 9)
+        save_webp(Image.open(png).convert("RGB"), out)
 
 
 def posed(track: Track) -> ReportObject:
@@ -109,6 +128,10 @@ def write_webp(shown: ReportObject, out: Path) -> None:
     pixels = pixels.resize(
         (_WIDTH, _WIDTH * pixels.height // pixels.width), Image.Resampling.LANCZOS
     )
+    save_webp(pixels, out)
+
+
+def save_webp(pixels: Image.Image, out: Path) -> None:
     with atomic_write(out) as file:
         pixels.save(file, format="WEBP", quality=70, method=6)
     print(f"{out}: {out.stat().st_size} bytes")

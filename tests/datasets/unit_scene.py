@@ -59,6 +59,27 @@ def render(T_camera_boxes, camera, boxes=CHAIR):
     return nearest.reshape(height, width)
 
 
+def rendering(solid=None):
+    """`render` of the boxes, or of a `simulate.Solid` by Embree, for pictures."""
+    if solid is None:
+        return render
+    from wildshape.simulate.raycast import Scene
+
+    scene = Scene([solid])
+
+    def cast(T_camera_boxes, camera):
+        fx, fy, cx, cy, width, height = camera
+        u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+        rays = np.stack(((u - cx) / fx, (v - cy) / fy, np.ones_like(u)), axis=-1).reshape(-1, 3)
+        length = np.linalg.norm(rays, axis=1)
+        T = np.linalg.inv(T_camera_boxes)
+        toward = (rays / length[:, None]) @ T[:3, :3].T
+        hits = scene.cast(np.broadcast_to(T[:3, 3], toward.shape), toward)
+        return (hits.distance / length).reshape(height, width)
+
+    return cast
+
+
 def surface(count, boxes=CHAIR, seed=0):
     """Points `(count, 3)` on the boxes' faces."""
     rng = np.random.default_rng(seed)

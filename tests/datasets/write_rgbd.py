@@ -11,7 +11,7 @@ import json
 import numpy as np
 from PIL import Image
 from tests.datasets.street import rigid
-from tests.datasets.unit_scene import CHAIR, look_at, render
+from tests.datasets.unit_scene import CHAIR, look_at, render, rendering
 
 CAMERA = {"fx": 140.0, "fy": 143.0, "cx": 78.7, "cy": 61.2, "width": 160, "height": 120}
 WALL = (((-9.0, 2.0, -9.0), (9.0, 2.1, 9.0)),)
@@ -25,14 +25,15 @@ def camera_poses(count):
     return [look_at((1.6 * np.sin(a), -1.6 * np.cos(a), 0.5 + 0.1 * a)) for a in angles]
 
 
-def frame(T_camera_world, things=None):
+def frame(T_camera_world, things=None, camera=None, solid=None):
     """Depth `(h, w)` metres, and instance numbers."""
-    lens = (CAMERA["fx"], CAMERA["fy"], CAMERA["cx"] + 0.5, CAMERA["cy"] + 0.5)
-    lens += (CAMERA["width"], CAMERA["height"])
+    camera, draw = camera or CAMERA, rendering(solid)
+    lens = (camera["fx"], camera["fy"], camera["cx"] + 0.5, camera["cy"] + 0.5)
+    lens += (camera["width"], camera["height"])
     depth = render(T_camera_world, lens, WALL)
     ids = np.zeros(depth.shape, np.uint16)
     for number, T_world_object in (THINGS if things is None else things).items():
-        seen = render(T_camera_world @ T_world_object, lens, CHAIR)
+        seen = draw(T_camera_world @ T_world_object, lens)
         ids[seen < depth] = number
         depth = np.minimum(depth, seen)
     return np.where(np.isfinite(depth), depth, 0.0), ids
@@ -50,18 +51,20 @@ def write_png(path, pixels):
     Image.fromarray(pixels).save(path)
 
 
-def write_sequence(folder, count=5, scale=10000.0, *, apart=False, poses=True, moves=False):
+def write_sequence(
+    folder, count=5, scale=10000.0, *, apart=False, poses=True, moves=False, camera=None, solid=None
+):
     """A sequence of RGB-D frames; masks together, or `apart` in a folder an instance."""
     T_camera_world = camera_poses(count)
     for i, T in enumerate(T_camera_world):
-        depth, ids = frame(T, moving(i, count) if moves else None)
+        depth, ids = frame(T, moving(i, count) if moves else None, camera, solid)
         write_png(folder / "depth" / f"{i:06d}.png", np.round(depth * scale).astype(np.uint16))
         if not apart:
             write_png(folder / "masks" / f"{i:06d}.png", ids)
         for number in THINGS if apart else ():
             mask = np.where(ids == number, 255, 0).astype(np.uint8)
             write_png(folder / "masks" / str(number) / f"{i:06d}.png", mask)
-    (folder / "camera.json").write_text(json.dumps(CAMERA | {"depth_scale": scale}))
+    (folder / "camera.json").write_text(json.dumps((camera or CAMERA) | {"depth_scale": scale}))
     (folder / "objects.json").write_text(json.dumps({"1": "chair", "2": "stool"}))
     if poses:
         rows = [np.linalg.inv(T)[:3].ravel() for T in T_camera_world]
@@ -70,14 +73,14 @@ def write_sequence(folder, count=5, scale=10000.0, *, apart=False, poses=True, m
     return T_camera_world
 
 
-def write_bop(root, count=4, scale=0.1, *, world=False, split="test", scene="000001"):
+def write_bop(root, count=4, scale=0.1, *, world=False, camera=None, solid=None):
     """A scene in the BOP format: obj_000007 twice; millimetres; returns T_camera_world."""
-    folder = root / split / scene
+    folder, lens = root / "test" / "000001", camera or CAMERA
     T_camera_world = camera_poses(count)
     cameras, truth = {}, {}
-    K = [CAMERA["fx"], 0, CAMERA["cx"], 0, CAMERA["fy"], CAMERA["cy"], 0, 0, 1]
+    K = [lens["fx"], 0, lens["cx"], 0, lens["fy"], lens["cy"], 0, 0, 1]
     for i, T in enumerate(T_camera_world):
-        depth, ids = frame(T)
+        depth, ids = frame(T, None, camera, solid)
         pixels = np.round(depth * 1000 / scale).astype(np.uint16)
         write_png(folder / "depth" / f"{i:06d}.png", pixels)
         cameras[str(i)] = {"cam_K": K, "depth_scale": scale}
@@ -111,11 +114,19 @@ def write_model(root):
 
 
 def picture_scene(root):
-    """For docs/datasets."""
-    write_sequence(root / "kitchen", count=9)
+    """For docs/datasets: a chair of the simulator's own, twice."""
+    write_sequence(root / "kitchen", count=9, camera=_LARGE, solid=_chair())
 
 
 def picture_bop(root):
     """For docs/datasets."""
-    write_bop(root, count=9)
-    write_model(root)
+    write_bop(root, count=9, camera=_LARGE, solid=_chair())
+
+
+_LARGE = {"fx": 560.0, "fy": 560.0, "cx": 319.2, "cy": 239.6, "width": 640, "height": 480}
+
+
+def _chair():
+    from wildshape.simulate.unit_shapes import chair
+
+    return chair(np.random.default_rng(1)).centred(1.0)

@@ -5,9 +5,10 @@
 import numpy as np
 from PIL import Image
 from scipy.io import savemat
-from tests.datasets.unit_scene import CHAIR, look_at, render, surface
+from tests.datasets.unit_scene import look_at, rendering, surface
 
 SYNSET = "03001627"
+render = rendering()
 
 
 def write_data(
@@ -27,7 +28,7 @@ def write_list(root, split, models):
     (root / "splits" / f"{SYNSET}_{split}.txt").write_text("\n".join(models) + "\n")
 
 
-def write_model(root, model, views=5, seed=0, pixels=128, with_K=True):
+def write_model(root, model, views=5, seed=0, pixels=128, with_K=True, render=render):
     """Views from 2 away, azimuth and elevation in whole degrees as DRC draws them."""
     folder = root / "renders" / SYNSET / model
     folder.mkdir(parents=True)
@@ -38,14 +39,14 @@ def write_model(root, model, views=5, seed=0, pixels=128, with_K=True):
         flat = 2 * np.cos(elevation)
         eye = np.array((flat * np.cos(azimuth), flat * np.sin(azimuth), 2 * np.sin(elevation)))
         poses.append(look_at(eye))
-        write_view(folder, i, poses[-1], eye, pixels, with_K)
+        write_view(folder, i, poses[-1], eye, pixels, with_K, render)
     return poses
 
 
-def write_view(folder, number, T_camera_world, eye, pixels, with_K):
+def write_view(folder, number, T_camera_world, eye, pixels, with_K, render=render):
     """A lens of 60 mm before a chip of 32 mm; 16 bits for 0 to 10, cut off, not rounded."""
     focal, middle = 60.0 * pixels / 32.0, pixels / 2
-    depth = render(T_camera_world, (focal, focal, middle, middle, pixels, pixels), CHAIR)
+    depth = render(T_camera_world, (focal, focal, middle, middle, pixels, pixels))
     stored = (np.minimum(depth, 10.0) * 65535 / 10).astype(np.uint16)
     Image.fromarray(stored).save(folder / f"depth_{number}.png")
     alpha = np.where(np.isfinite(depth), 255, 0).astype(np.uint8)
@@ -64,5 +65,12 @@ def write_truth(root, model, kind="downsampled"):
 
 
 def picture_scene(root):
-    """For docs/datasets."""
-    write_data(root)
+    """For docs/datasets: chairs of the simulator's own."""
+    from wildshape.simulate.unit_shapes import chair
+
+    for seed in range(3):
+        solid = chair(np.random.default_rng(seed)).centred(1.0)
+        write_model(root, f"chair{seed}", seed=seed, render=rendering(solid))
+    write_list(root, "train", [f"chair{seed}" for seed in range(3)])
+    for split in ("val", "test"):
+        write_list(root, split, ["none"])

@@ -59,11 +59,13 @@ class Settings:
         unit: of the coordinates in the files (folder).
         split: of the data set (semantic-kitti, shapenet-views).
         labels: folder of the labels (semantic-kitti).
-        gap: frames an object may be out of sight (semantic-kitti).
+        gap: frames an object may be out of sight (semantic-kitti, rgbd).
         sweeps: the scans between the labelled ones, too (nuscenes).
         lidar: up, down or both (argoverse2).
         views: of each object (shapenet-views).
         pixels: edge of its images (shapenet-views).
+        max_depth: farther pixels are left out, metres (rgbd, bop).
+        edge: so many pixels at a mask's border are left out (rgbd, bop).
         workers: processes; by default one a core.
         ray: spread the work over the Ray cluster at this address; `auto` finds the one that this
             machine belongs to, `local` starts one. OUT must lie where all its machines see it.
@@ -96,6 +98,8 @@ class Settings:
     lidar: Word = None
     views: Count = None
     pixels: Count = None
+    max_depth: Metres = None
+    edge: Count = None
     workers: Annotated[int | None, arg(metavar="N")] = None
     ray: Annotated[str | None, arg(metavar="ADDRESS")] = None
     overwrite: Overwrite = False
@@ -160,7 +164,9 @@ def _identity(settings: Settings, source: "Source") -> dict[str, Any]:
     """The reader with all its options, those included that the user did not give."""
     own = {f.name: getattr(source, f.name) for f in fields(source) if f.init}  # pyright: ignore[reportArgumentType]
     options = {name: value for name, value in own.items() if name != "root"}
-    nested = {name: asdict(options[name]) for name in ("selection", "crop") if name in options}
+    nested = {
+        name: asdict(options[name]) for name in ("selection", "crop", "cut") if name in options
+    }
     return {"source": settings.source, "root": str(settings.root.resolve()), **options, **nested}
 
 
