@@ -3,6 +3,7 @@
 """What holds for every baseline, and what each is known to do and not to do."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ LIDAR = Sensor()
 REGISTRARS = [name for name in NAMES if name != "one-scan"]
 
 
-def named(name):
+def named(name) -> Any:
     """The baseline, where its library is installed."""
     try:
         return baseline(name)
@@ -98,15 +99,15 @@ def test_global_methods_survive_a_half_turn(name):
     assert errors(named(name), track).rotation_deg.max() < 10
 
 
-def test_headings_turn_about_the_vertical_of_the_sensor():
-    for kind, axis in (("lidar", 2), ("camera", 1)):
-        turns = headings(4, kind)
-        up = torch.eye(3, dtype=torch.float64)[axis]
-        assert torch.allclose(torch.stack([T.rotation @ up for T in turns]), up)
-        degrees = [round(math.degrees(float(T.angle()))) for T in turns]
-        assert degrees == [0, 90, 180, 90]
-        # Two different quarter turns.
-        assert float((turns[1] @ turns[3]).angle()) < 1e-6
+@pytest.mark.parametrize(("kind", "axis"), [("lidar", 2), ("camera", 1)])
+def test_headings_turn_about_the_vertical_of_the_sensor(kind, axis):
+    turns = headings(4, kind)
+    up = torch.eye(3, dtype=torch.float64)[axis]
+    assert torch.allclose(torch.stack([T.rotation @ up for T in turns]), up)
+    degrees = [round(math.degrees(float(T.angle()))) for T in turns]
+    assert degrees == [0, 90, 180, 90]
+    # Two different quarter turns.
+    assert float((turns[1] @ turns[3]).angle()) < 1e-6
 
 
 def test_multi_start_icp_knows_a_cameras_vertical():

@@ -3,6 +3,7 @@
 """Guard: poses, boxes and shapes of the truth change no bit of what any method answers."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -76,6 +77,11 @@ class Listening:
         return answer
 
 
+def listen(method) -> Any:
+    """Whether it completes or registers is seen when it runs."""
+    return Listening(method)
+
+
 def other_truth(track):
     """The same scans; every pose, the accumulated cloud, its box and the shape are others."""
     generator = torch.Generator().manual_seed(9)
@@ -98,7 +104,7 @@ def test_no_bit_of_an_answer_depends_on_the_truth(name, accumulated, rotate):
     track = replace(track, shape=None) if accumulated else track
     heard, figures = [], []
     for given in (track, other_truth(track)):
-        listening = Listening(method_named(name))
+        listening = listen(method_named(name))
         results = run({name: listening}, [given], rotate, seed=4)
         heard.append(listening.answers)
         figures += [figures_of(row) for row in results.methods]
@@ -123,7 +129,7 @@ def test_the_guard_hears_a_method_that_looks_at_the_truth():
     track = drive_by(scans=3, points=60)
     heard = []
     for given in (track, other_truth(track)):
-        listening = Listening(Peeking(given))
+        listening = listen(Peeking(given))
         run({"peeking": listening}, [given])
         heard.append(listening.answers)
     assert heard[0] != heard[1]
@@ -133,7 +139,7 @@ def test_drawn_examples_come_from_the_same_blind_answers():
     track = drive_by(scans=3, points=150)
     heard = []
     for given in (track, other_truth(track)):
-        listening = Listening(learned())
+        listening = listen(learned())
         gather([given], run({"it": listening}, [given]), "it", listening)
         heard.append(listening.answers)
     assert heard[0] == heard[1]

@@ -22,7 +22,8 @@ class Gicp:
         iterations: at most, a pair.
     """
 
-    distance: float = 0.5
+    # From experiments/search_baselines.py.
+    distance: float = 0.3
     neighbours: int = 20
     iterations: int = 30
 

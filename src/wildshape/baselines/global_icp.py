@@ -25,6 +25,7 @@ class GlobalIcp:
     """
 
     coarse: FastGlobal | KissMatcher
+    # That of Local-ICP; the voxel of `available` is the paper's (experiments/search_baselines.py).
     distance: float = 0.175
     iterations: int = 30
 

@@ -45,7 +45,8 @@ class KissMatcher:
         voxel: edge of the cubes the clouds are thinned by, metres; scales every radius.
     """
 
-    voxel: float = 0.2
+    # From experiments/search_baselines.py.
+    voxel: float = 0.1
 
     def __post_init__(self) -> None:
         """Refuse at once what could not run later.

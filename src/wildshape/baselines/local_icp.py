@@ -25,6 +25,7 @@ class LocalIcp:
         iterations: at most, a pair (30: Open3D's default, which the paper used).
     """
 
+    # The paper's; experiments/search_baselines.py finds nothing that is clearly better.
     distance: float = 0.175
     iterations: int = 30
 

@@ -32,8 +32,9 @@ class MultiStartIcp:
         iterations: at most, a start.
     """
 
+    # From experiments/search_baselines.py.
     starts: int = 12
-    distance: float = 0.5
+    distance: float = 0.175
     voxel: float = 0.15
     iterations: int = 30
 
