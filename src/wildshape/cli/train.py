@@ -75,6 +75,7 @@ def run(settings: Settings) -> None:
     """
     from wildshape.cli.models import choose_device
     from wildshape.cli.output import command_line
+    from wildshape.cli.terminal import say
     from wildshape.io.provenance import provenance
     from wildshape.training.loop import setup
     from wildshape.training.profile import PROFILE
@@ -100,6 +101,7 @@ def run(settings: Settings) -> None:
         resume=settings.resume,
         start=_start(settings.start),
         provenance=made,
+        say=say,
     )
     if settings.profile and prepared.processes.leads:
         prepared.profile = settings.out / PROFILE

@@ -3,6 +3,7 @@
 """An experiment is a value: frozen dataclasses, saved with every result."""
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from wildshape.datasets.views import ViewConfig
 from wildshape.losses.multiview import LossConfig
@@ -21,6 +22,8 @@ class OptimConfig:
         warmup: steps over which the learning rate rises from zero.
         average: decay of the running mean of the weights that is kept; 0 keeps the last.
         clip: largest norm of the gradient; 0 is none.
+        precision: of the encoder's matrix products when training on a GPU, `bf16` or `fp32`; all
+            else, and all on a CPU, is float32.
     """
 
     steps: int = 400_000
@@ -30,6 +33,7 @@ class OptimConfig:
     warmup: int = 0
     average: float = 0.0
     clip: float = 0.0
+    precision: Literal["bf16", "fp32"] = "bf16"
 
 
 @dataclass(frozen=True)

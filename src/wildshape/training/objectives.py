@@ -34,7 +34,8 @@ class WeaklySupervised(nn.Module):
         self, network: ShapePoseNet, config: LossConfig, encoding: Encoding | None = None
     ) -> None:
         super().__init__()
-        self.network, self.config, self.encoding = network, config, encoding
+        self.network, self.config = network, config
+        self.encoding: Encoding | None = encoding
 
     def forward(self, batch: Batch, template: float | Tensor) -> Objective:
         """Loss of one batch; `template` is this step's weight of the template pull."""

@@ -1,0 +1,204 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""All that a training run needs, made from its recipe."""
+
+import copy
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from wildshape.datasets.host import HostViews
+from wildshape.datasets.resident import ResidentViews
+from wildshape.datasets.views import ViewSampler
+from wildshape.errors import BadInputError
+from wildshape.io.store import Store
+from wildshape.models.checkpoint import load_checkpoint
+from wildshape.models.shapepose import ShapePoseNet
+from wildshape.ops.allocator import keep_memory
+from wildshape.training.capture import Captured
+from wildshape.training.config import Recipe
+from wildshape.training.meter import Meter
+from wildshape.training.objectives import WeaklySupervised
+from wildshape.training.processes import Processes, join
+from wildshape.training.state import STATE, TrainState, load_state
+from wildshape.training.step import Step, Views
+
+_HELD_OUT = 20
+_RESIDENT_SHARE = 0.5
+Say = Callable[[str], None]
+
+
+def _silent(_: str) -> None:
+    """Say nothing."""
+
+
+@dataclass
+class Run:
+    """All that a run needs, set up; `profile` is where to write where a step's time goes.
+
+    Attributes:
+        sampler: draws from the tracks that are fitted.
+        held_out: draws from those that are not.
+        views: give the steps their batches, drawn by `sampler` or as it does.
+        say: is told what a user should know.
+    """
+
+    recipe: Recipe
+    seed: int
+    folder: Path
+    processes: Processes
+    state: TrainState
+    sampler: ViewSampler
+    held_out: ViewSampler
+    held_tracks: np.ndarray
+    views: Views
+    identity: dict[str, str]
+    provenance: dict[str, Any]
+    say: Say
+    profile: Path | None = None
+
+
+def setup(
+    recipe: Recipe,
+    store: Store,
+    folder: Path,
+    *,
+    seed: int = 0,
+    device: str = "cpu",
+    resume: bool = False,
+    start: Path | None = None,
+    provenance: dict[str, Any] | None = None,
+    say: Say = _silent,
+) -> Run:
+    """Build the network, the optimiser and the samplers; load the state if resuming.
+
+    Args:
+        recipe: what to train and how.
+        store: the tracks.
+        folder: of the run, made if need be.
+        seed: of weights and batches.
+        device: cpu or cuda.
+        resume: go on from the folder's state, if it has one.
+        start: checkpoint whose weights are fine-tuned, instead of random ones.
+        provenance: written into the run and its checkpoint.
+        say: is told what a user should know, a sentence each.
+
+    Raises:
+        BadInputError: no usable scans; a state that belongs to another run; or a checkpoint of
+            other sizes than the recipe's.
+    """
+    keep_memory()
+    processes = join(device)
+    say = say if processes.leads else _silent
+    _use_exact_products(processes.device)
+    state = _new_state(recipe, start, seed, processes.device)
+    fit_tracks, held_tracks = split_tracks(len(store))
+    identity = _identity(recipe, store, seed, processes, start)
+    folder.mkdir(parents=True, exist_ok=True)
+    if resume and (folder / STATE).exists():
+        load_state(folder, state, identity)
+    sampler = ViewSampler(store, fit_tracks, recipe.views)
+    held_out = ViewSampler(store, held_tracks, recipe.views)
+    views = _views(sampler, seed, processes, say)
+    if state.anchors is not None:
+        views.hold(state.anchors)
+    described = {"recipe": asdict(recipe), "identity": identity, **(provenance or {})}
+    if processes.leads:
+        (folder / "run.json").write_text(json.dumps(described, indent=1, default=str))
+    parts = (state, sampler, held_out, held_tracks, views, identity, described, say)
+    return Run(recipe, seed, folder, processes, *parts)
+
+
+def _use_exact_products(device: torch.device) -> None:
+    """Geometry is float32 and stays so: no TF32, which knows a car's far end to 2 mm only."""
+    if device.type == "cuda":
+        torch.set_float32_matmul_precision("highest")
+        torch.backends.cuda.matmul.allow_bf16_reduced_precision_reduction = False
+
+
+def _new_state(recipe: Recipe, start: Path | None, seed: int, device: torch.device) -> TrainState:
+    """Network, mean and optimiser; its learning rate lies on the device, for the step to turn."""
+    torch.manual_seed(seed)
+    network = _network(recipe, start).to(device)
+    rate = torch.tensor(recipe.optim.lr, device=device)
+    captured = device.type == "cuda"
+    optimiser = torch.optim.Adam(network.parameters(), lr=rate, fused=True, capturable=captured)
+    return TrainState(network, copy.deepcopy(network), optimiser)
+
+
+def _identity(
+    recipe: Recipe, store: Store, seed: int, processes: Processes, start: Path | None
+) -> dict[str, str]:
+    """What a state must share with a run that resumes it."""
+    return {
+        "settings": _short_hash(repr(recipe).encode()),
+        "data": store.fingerprint,
+        "seed": str(seed),
+        "processes": str(processes.count),
+        "start": _short_hash(start.read_bytes()) if start else "",
+    }
+
+
+def _views(sampler: ViewSampler, seed: int, processes: Processes, say: Say) -> Views:
+    """On a GPU the scans lie there, if they fit; on a CPU they stay in the mapped store."""
+    device = processes.device
+    if device.type != "cuda":
+        return HostViews(sampler, seed, processes.rank, device)
+    most = int(_RESIDENT_SHARE * torch.cuda.mem_get_info(device)[1])
+    try:
+        return ResidentViews(sampler, seed, processes.rank, device, most)
+    except BadInputError as error:
+        say(f"{error} Batches are drawn on the CPU instead, which is slower.")
+        return HostViews(sampler, seed, processes.rank, device)
+
+
+def step_of(run: Run, meter: Meter) -> tuple[Step, Callable[[], None]]:
+    """The run's step, and how its device's part is called: as it is, or recorded and replayed."""
+    encoding = None
+    if run.processes.device.type == "cuda":
+        encoding = "bf16" if run.recipe.optim.precision == "bf16" else "static"
+    objective = WeaklySupervised(run.state.network, run.recipe.loss, encoding)
+    wrapped = run.processes.wrap(objective)
+    step = Step(run.state, wrapped, run.views, meter, run.recipe.optim.clip)
+    return step, Captured(step.advance, run.say) if _records(run) else step.advance
+
+
+def _records(run: Run) -> bool:
+    """Whether the step may be recorded; says so once where a GPU could do more."""
+    if run.processes.device.type != "cuda":
+        return False
+    if run.processes.count == 1 and run.profile is None:
+        return True
+    why = "is profiled" if run.profile else "is shared by several processes"
+    run.say(f"the step {why}, so it is not recorded as a CUDA graph")
+    return False
+
+
+def _network(recipe: Recipe, start: Path | None) -> ShapePoseNet:
+    """A new network, or the checkpoint's."""
+    if start is None:
+        return ShapePoseNet(recipe.network)
+    network, settings = load_checkpoint(start)
+    if settings.network != recipe.network:
+        raise BadInputError(
+            f"{start}: its sizes are not those of the preset {recipe.name}: expected"
+            f" {recipe.network}, found {settings.network}; choose the preset it was trained with."
+        )
+    return network.train()
+
+
+def split_tracks(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Tracks to fit and tracks held out: one in 20, the same for every seed; all if few."""
+    order = np.random.default_rng(0).permutation(count)
+    held = count // _HELD_OUT if count >= _HELD_OUT else 0
+    return (order[held:], order[:held]) if held else (order, order)
+
+
+def _short_hash(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:16]
