@@ -62,12 +62,15 @@ def test_bad_inputs_are_one_sentence(refused, store, tmp_path):
 def test_what_was_left_out_and_names_with_markup_are_shown_as_they_are(wildshape, tmp_path):
     scan = np.random.default_rng(0).normal(5.0, 1.0, (40, 3)).astype(np.float32)
     made = {"command": "convert [bold]x[/bold]", "left_out": {"scan: [red]few": 7, "object: no": 9}}
+    made |= {"settings": {"selection": {"motion": "parked"}}, "parts": [{"part": "part 17"}]}
     with StoreWriter(tmp_path / "s", made) as writer:
         writer.add(Track("[link=x]", (scan,), ("0",), category="[/]$x^\x1b[31m"))
     found = wildshape("info", tmp_path / "s", "--out", tmp_path / "s.html")
     assert found.code == 0
     assert "object: no 9; scan: [red]few 7" in found.out
     assert "convert [bold]x[/bold]" in found.out
+    assert "parked objects only" in found.out
+    assert "part 17" not in (tmp_path / "s.html").read_text(encoding="utf-8")
     assert "\x1b[31m" not in found.out
     assert "scan: [red]few" in (tmp_path / "s.html").read_text(encoding="utf-8")
 

@@ -17,7 +17,7 @@ class Made:
     """How some tracks came about.
 
     Attributes:
-        provenance: JSON values; empty if nobody kept them.
+        provenance: JSON values, without the list of parts; empty if nobody kept them.
         left_out: how many scans and objects were left out then, by reason.
     """
 
@@ -37,6 +37,7 @@ def how_made(path: Path) -> Made:
 def _parse(record: dict[str, Any]) -> Made:
     provenance = record.get("provenance")
     provenance = dict(provenance) if isinstance(provenance, dict) else {}
+    provenance.pop("parts", None)  # of a large data set there are thousands
     raw = provenance.pop("left_out", None) or record.get("left_out")
     left_out = raw if isinstance(raw, dict) else {}
     counted = {str(k): v for k, v in left_out.items() if isinstance(v, int)}

@@ -48,7 +48,15 @@ def summary_line(found: Statistics) -> str:
     if found.with_poses is not None:
         parts += [f"{found.with_poses:,} with true poses, {found.with_shape:,} with true shapes"]
     single = [next(iter(c)) for c in (found.categories, found.sensors) if len(c) == 1]
-    return "; ".join([*parts, *filter(None, single)])
+    return "; ".join([*parts, *filter(None, single), *filter(None, [_motion(found)])])
+
+
+def _motion(found: Statistics) -> str:
+    """Whether only moving or only parked objects were asked for when the tracks were made."""
+    settings = found.provenance.get("settings")
+    selection = settings.get("selection") if isinstance(settings, dict) else None
+    motion = selection.get("motion") if isinstance(selection, dict) else None
+    return f"{motion} objects only" if motion in ("moving", "parked") else ""
 
 
 def read_line(found: Statistics) -> str:
