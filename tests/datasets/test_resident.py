@@ -13,10 +13,12 @@ from wildshape.datasets.resident import ResidentViews
 from wildshape.datasets.views import ViewConfig, ViewSampler
 from wildshape.errors import BadInputError
 from wildshape.geometry.centring import scan_centre
+from wildshape.geometry.facing import face
 from wildshape.io.store import StoreWriter, open_store
 from wildshape.records import Track
 
 CPU = torch.device("cpu")
+EXACT = "donot_use_mm_for_euclid_dist"
 VIEWS, WINDOW = 3, 5
 # Long, with gaps of scans too sparse to use, shorter than a window, shorter than the views.
 TRACKS = [[150] * 12, [150 if i % 4 else 50 for i in range(20)], [150] * 4, [150, 150], [50] * 9]
@@ -128,6 +130,26 @@ def test_centres_are_those_of_the_whole_turned_scan(store, turn, sensor):
             points = min(whole, key=lambda scan: float((scan - recorded[i]).norm(dim=1).min()))
             expected = scan_centre(points @ batch.turn[i].mT, sensor)
             torch.testing.assert_close(batch.centres[i], expected, atol=2e-4, rtol=0)
+
+
+def test_scans_face_their_object_and_roll_as_those_of_the_host(store):
+    sampler, resident = both(store, turn="facing", roll=0.5, tracks=200, points=4)
+    numbers = np.concatenate(sampler.scans_of)
+    scans = [torch.from_numpy(np.array(store.scan_points(int(n)))) for n in numbers]
+    turns, points = torch.stack([face(s).turn for s in scans]), torch.stack(scans)
+    rolls = []
+    for batch in (sampler.draw(0, 0), resident.batch(torch.tensor(0))):
+        assert float(batch.centres[:, 1:].abs().max()) == 0
+        recorded = (batch.scans + batch.centres[:, None]) @ batch.turn
+        apart = torch.cdist(recorded[:, 0], points.flatten(0, 1), compute_mode=EXACT)
+        assert float(apart.amin(1).max()) < 1e-3
+        # What is left between the facing frame and the drawn one is a roll about x.
+        left = batch.turn @ turns[apart.argmin(1) // points.shape[1]].mT
+        torch.testing.assert_close(left[:, 0, 0], torch.ones(600), atol=1e-5, rtol=0)
+        rolls.append(torch.atan2(left[:, 2, 1], left[:, 2, 2]).abs())
+    bounds = torch.tensor([0.05, 0.1, 0.3, 1.0, 2.0])
+    host, device = ((r[:, None] > bounds).float().mean(0) for r in rolls)
+    torch.testing.assert_close(device, host, atol=4 * (0.5 / 600) ** 0.5, rtol=0)
 
 
 def test_turns_are_spread_like_those_of_the_host(store):

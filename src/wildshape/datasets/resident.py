@@ -13,9 +13,16 @@ import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
-from wildshape.datasets.views import Batch, ViewConfig, ViewSampler, centre_turns_along
+from wildshape.datasets.views import (
+    ROLL_RAD,
+    Batch,
+    ViewConfig,
+    ViewSampler,
+    centre_turns_along,
+)
 from wildshape.errors import BadInputError
 from wildshape.geometry.centring import scan_centre
+from wildshape.geometry.facing import Facing, face, roll
 from wildshape.geometry.rotation import rotation_from_uniform, rotation_z
 from wildshape.ops.counter_random import integers, random_bits, uniform
 
@@ -31,7 +38,7 @@ class _Scans(NamedTuple):
         points: of all scans, one after the other, metres, each in its sensor's frame.
         first_point: row of each scan's first point.
         sizes: points of each scan.
-        centres: label-free centre of each.
+        frames: turn and label-free centre of each as the network sees it before any random turn.
         reach: how many usable scans the window that begins at each scan holds.
         number: of each scan in the store.
         first_scan: row of each track's first scan.
@@ -41,7 +48,7 @@ class _Scans(NamedTuple):
     points: Float[Tensor, "P 3"]
     first_point: Int64[Tensor, "U"]
     sizes: Int64[Tensor, "U"]
-    centres: Float[Tensor, "U 3"]
+    frames: Facing
     reach: Int64[Tensor, "U"]
     number: Int64[Tensor, "U"]
     first_scan: Int64[Tensor, "T"]
@@ -94,8 +101,8 @@ class ResidentViews:
         track, begin, order, again, reference, turn, pick = bits.split(lanes)
         row = self._window(track, begin, order, again)
         first = torch.arange(0, count, config.views, device=step.device)
-        rotation = _turns(uniform(turn).view(count, 3), config.turn)
-        clouds, centres = self._clouds(row, pick.view(count, -1), rotation)
+        extra = _turns(uniform(turn).view(count, 3), config)
+        clouds, centres, rotation = self._clouds(row, pick.view(count, -1), extra)
         anchor = self._anchors[scans.number[row]]
         chosen = first + integers(reference, config.views)
         return Batch(clouds, centres, chosen, rotation, anchor)
@@ -112,18 +119,18 @@ class ResidentViews:
         repeated = integers(again.view(config.tracks, -1), reach)
         return (first + torch.where(reach >= config.views, distinct, repeated)).flatten()
 
-    def _clouds(self, row: Tensor, pick: Tensor, rotation: Tensor) -> tuple[Tensor, Tensor]:
-        """The scans resampled, turned, about their own centres; and the centres."""
+    def _clouds(self, row: Tensor, pick: Tensor, extra: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """The scans resampled, turned, about their own centres; the centres; the whole turns."""
         scans, config = self._scans, self.config
         drawn = scans.first_point[row, None] + integers(pick, scans.sizes[row, None])
-        centre = scans.centres[row]
-        clouds = (scans.points[drawn] - centre[:, None]) @ rotation.mT
-        turned = (rotation @ centre[..., None])[..., 0]
+        frame, centre = scans.frames.turn[row], scans.frames.centre[row]
+        turned = (extra @ centre[..., None])[..., 0]
+        clouds = (scans.points[drawn] @ frame.mT - centre[:, None]) @ extra.mT
         if centre_turns_along(config):
-            return clouds, turned
+            return clouds, turned, extra @ frame
         spread = _spread(scans.first_point[row], scans.sizes[row], self._centre_points)
-        middle = scan_centre(scans.points[spread] @ rotation.mT, config.sensor)
-        return clouds + (turned - middle)[:, None], middle
+        middle = scan_centre(scans.points[spread] @ extra.mT, config.sensor)
+        return clouds + (turned - middle)[:, None], middle, extra @ frame
 
 
 def _width(config: ViewConfig) -> int:
@@ -131,11 +138,19 @@ def _width(config: ViewConfig) -> int:
     return max(config.window, config.views)
 
 
-def _turns(draws: Float[Tensor, "B 3"], turn: str) -> Float[Tensor, "B 3 3"]:
+def _turns(draws: Float[Tensor, "B 3"], config: ViewConfig) -> Float[Tensor, "B 3 3"]:
     """A random rotation for each scan, of the kind asked for."""
-    if turn == "none":
-        return torch.eye(3, device=draws.device).expand(len(draws), 3, 3)
-    return rotation_z(2 * torch.pi * draws[:, 0]) if turn == "yaw" else rotation_from_uniform(draws)
+    angle = 2 * torch.pi * draws[:, 0]
+    match config.turn:
+        case "none":
+            return torch.eye(3, device=draws.device).expand(len(draws), 3, 3)
+        case "yaw":
+            return rotation_z(angle)
+        case "so3":
+            return rotation_from_uniform(draws)
+        case "facing":
+            free, radius = draws[:, 1] < config.roll, (-2 * (1 - draws[:, 2]).log()).sqrt()
+            return roll(torch.where(free, angle, ROLL_RAD * radius * angle.cos()))
 
 
 def _spread(first: Int64[Tensor, "B"], sizes: Int64[Tensor, "B"], count: int) -> Tensor:
@@ -173,19 +188,28 @@ def _load(sampler: ViewSampler, device: torch.device) -> _Scans:
     first_point, held, reached, numbers, first, begin = (
         torch.from_numpy(column.astype(np.int64)).to(device) for column in columns
     )
-    centres = _centres(points, first_point, sizes, sampler.config.sensor)
-    return _Scans(points, first_point, held, centres, reached, numbers, first, begin)
+    frames = _frames(points, first_point, sizes, sampler.config)
+    return _Scans(points, first_point, held, frames, reached, numbers, first, begin)
 
 
-def _centres(
-    points: Float[Tensor, "P 3"], first: Int64[Tensor, "U"], sizes: np.ndarray, sensor: str
-) -> Float[Tensor, "U 3"]:
-    """The exact centre of every scan, many at a time."""
+def _frames(
+    points: Float[Tensor, "P 3"], first: Int64[Tensor, "U"], sizes: np.ndarray, config: ViewConfig
+) -> Facing:
+    """The exact frame of every scan, many at a time."""
     rows = max(1, _POINTS_AT_ONCE // int(sizes.max()))
     found = []
     for start in range(0, len(sizes), rows):
         part = slice(start, start + rows)
-        counts = torch.from_numpy(sizes[part]).to(points.device)
-        spread = _spread(first[part], counts, int(sizes[part].max()))
-        found.append(scan_centre(points[spread], sensor))
-    return torch.cat(found)
+        counts = torch.from_numpy(sizes[part]).to(points.device)[:, None]
+        place = torch.arange(int(sizes[part].max()), device=points.device)
+        scans = points[first[part, None] + place.minimum(counts - 1)]
+        found.append(_frame(scans, place < counts, config))
+    return Facing(*(torch.cat(columns) for columns in zip(*found)))
+
+
+def _frame(scans: Float[Tensor, "B n 3"], counted: Tensor, config: ViewConfig) -> Facing:
+    """Turned towards the object, or as recorded and about the scan's centre."""
+    if config.turn == "facing":
+        return face(scans, counted)
+    as_recorded = torch.eye(3, device=scans.device).expand(len(scans), 3, 3)
+    return Facing(as_recorded, scan_centre(scans, config.sensor))

@@ -18,7 +18,7 @@ from wildshape.io.store import Store
 from wildshape.records import SensorKind
 
 Turn = Literal["none", "yaw", "so3", "facing"]
-_ROLL_RAD = 0.1
+ROLL_RAD = 0.1
 
 
 @dataclass(frozen=True)
@@ -194,16 +194,18 @@ class ViewSampler:
 def centre_turns_along(config: ViewConfig) -> bool:
     """Whether the centre of a turned scan is its centre, turned.
 
-    A frustum about the vertical axis turns along in yaw; a box and any other turn need the centre
-    to be found again, as it will be of any scan posed later.
+    A frustum about the vertical axis turns along in yaw, and a centre on the line of sight rolls
+    into itself; a box and any other turn need the centre to be found again, as it will be of any
+    scan posed later.
     """
-    return config.turn == "none" or (config.turn == "yaw" and config.sensor == "lidar")
+    in_yaw = config.turn == "yaw" and config.sensor == "lidar"
+    return config.turn in ("none", "facing") or in_yaw
 
 
 def _rolls(count: int, share: float, rng: np.random.Generator) -> Float[Tensor, "B 3 3"]:
     """Turns about the line of sight: any for a share of the scans, a few degrees for the others."""
     free = rng.random(count) < share
-    angle = np.where(free, rng.uniform(-np.pi, np.pi, count), rng.normal(0.0, _ROLL_RAD, count))
+    angle = np.where(free, rng.uniform(-np.pi, np.pi, count), rng.normal(0.0, ROLL_RAD, count))
     return roll(torch.from_numpy(angle.astype(np.float32)))
 
 

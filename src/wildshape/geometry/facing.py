@@ -10,7 +10,7 @@ become the same scan, and of a free rotation nothing is left but the roll about 
 from typing import NamedTuple
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from wildshape.geometry.visibility import facing_rotation
@@ -26,21 +26,30 @@ class Facing(NamedTuple):
         centre: on that line of sight, at the middle of the ranges; turned frame, metres.
     """
 
-    turn: Float[Tensor, "3 3"]
-    centre: Float[Tensor, "3"]
+    turn: Float[Tensor, "*batch 3 3"]
+    centre: Float[Tensor, "*batch 3"]
 
 
-def face(points: Float[Tensor, "n 3"]) -> Facing:
+def face(
+    points: Float[Tensor, "*batch n 3"], counted: Bool[Tensor, "*batch n"] | None = None
+) -> Facing:
     """The facing frame of a scan, sensor frame, none of its points at the sensor itself.
 
     Turns of the sensor change the roll of the frame about the line of sight, and nothing else.
+
+    Args:
+        points: of one scan or of many.
+        counted: which of them the scan has; others repeat one of those. All by default.
     """
     exact = points.double()
     distance = exact.norm(dim=-1)
-    direction = (exact / distance[:, None].clamp_min(_SMALLEST_M)).mean(0)
-    middle = (distance.amin() + distance.amax()) / 2
-    turn = facing_rotation(direction[None])[0]
-    return Facing(turn.to(points.dtype), (middle * exact.new_tensor(_AHEAD)).to(points.dtype))
+    unit = exact / distance[..., None].clamp_min(_SMALLEST_M)
+    if counted is not None:
+        unit = unit * counted[..., None]
+    middle = (distance.amin(-1) + distance.amax(-1)) / 2
+    turn = facing_rotation(unit.mean(-2).reshape(-1, 3)).view(*middle.shape, 3, 3)
+    centre = middle[..., None] * exact.new_tensor(_AHEAD)
+    return Facing(turn.to(points.dtype), centre.to(points.dtype))
 
 
 def roll(angle: Float[Tensor, "B"]) -> Float[Tensor, "B 3 3"]:

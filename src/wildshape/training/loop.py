@@ -131,9 +131,9 @@ def checkpoint(run: Run) -> dict[str, Any]:
     found = validate(run.state.mean, run.held_out, run.recipe.loss, _VALIDATION_BATCHES, device)
     refuse_not_finite(found.observation, run.state.step)
     settings = model_settings(run, found)
-    truth = truth_figures(
-        run.state.mean, settings, run.sampler.store, run.held_tracks, run.recipe.views.turn
-    )
+    turn = run.recipe.views.turn
+    protocol = "yaw" if turn == "facing" else turn  # scans that face their object bear any yaw
+    truth = truth_figures(run.state.mean, settings, run.sampler.store, run.held_tracks, protocol)
     settings = replace(settings, metrics=settings.metrics | truth)
     save_checkpoint(run.folder / MODEL, run.state.mean, settings)
     save_state(run.folder, run.state, run.identity)
