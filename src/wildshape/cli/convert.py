@@ -3,9 +3,9 @@
 """`wildshape convert`: data sets as they lie on disk become tracks."""
 
 import time
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from tyro.conf import Positional, arg
 
@@ -162,12 +162,10 @@ def _truth(settings: Settings) -> "TruthBuilder | None":
 
 def _identity(settings: Settings, source: "Source") -> dict[str, Any]:
     """The reader with all its options, those included that the user did not give."""
-    own = {f.name: getattr(source, f.name) for f in fields(source) if f.init}  # pyright: ignore[reportArgumentType]
-    options = {name: value for name, value in own.items() if name != "root"}
-    nested = {
-        name: asdict(options[name]) for name in ("selection", "crop", "cut") if name in options
-    }
-    return {"source": settings.source, "root": str(settings.root.resolve()), **options, **nested}
+    names = [f.name for f in fields(cast("Any", source)) if f.init and f.name != "root"]
+    options = {name: getattr(source, name) for name in names}
+    values = {n: asdict(cast("Any", v)) if is_dataclass(v) else v for n, v in options.items()}
+    return {"source": settings.source, "root": str(settings.root.resolve()), **values}
 
 
 def _check(settings: Settings) -> None:

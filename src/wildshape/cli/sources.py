@@ -62,6 +62,8 @@ def open_source(name: str, root: Path, options: dict[str, Any]) -> "Source":
 def _with(source: Any, name: str, option: str, value: object) -> Any:
     """The reader with one option set, wherever among its records the option belongs."""
     own = _settable(source)
+    if option == "keep_ground" and "crop" in own:
+        return replace(source, crop=replace(source.crop, ground=-source.crop.margin))
     if option in own:
         return replace(source, **{option: _checked(source, option, value)})
     for group in own & set(_NESTED):
