@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """KISS-Matcher (Lim et al., ICRA 2025): features and a robust solver, no start needed."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from importlib.metadata import version
 from types import ModuleType
@@ -77,6 +79,7 @@ class KissMatcher:
     def align(self, source: Points, target: Points) -> SE3:
         """`T_target_source`; centroids aligned, no rotation, where nothing matches."""
         library = load_kiss_matcher()
+        _settle_on_one_thread()
         clouds = [voxel_thin(points, self.voxel) for points in (source, target)]
         # Without features on either side the library ends the whole process (measured).
         if min(_featured(cloud, _NORMAL_RADIUS * self.voxel) for cloud in clouds) >= _ENOUGH:
@@ -85,6 +88,26 @@ class KissMatcher:
             if found.valid:
                 return _transform(found.rotation, found.translation)
         return about_centroids(source, target, lambda *_: SE3.identity())
+
+
+@cache
+def _settle_on_one_thread() -> None:
+    """Make the library's pool as large as the cores that it sees when it first runs: one.
+
+    Several of its threads write the same entries of a table of matches, and once in about a
+    thousand pairs another match came out (measured). Where the system has no such setting its
+    pool stays as it is.
+    """
+    if not hasattr(os, "sched_setaffinity"):
+        return
+    library = load_kiss_matcher()
+    cloud = list(np.random.default_rng(0).random((100, 3)).astype(np.float32))
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(cores)})
+    try:
+        library.KISSMatcher(library.KISSMatcherConfig(voxel_size=0.2)).match(cloud, cloud)
+    finally:
+        os.sched_setaffinity(0, cores)
 
 
 def _featured(cloud: Points, radius: float) -> int:

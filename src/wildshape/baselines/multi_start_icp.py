@@ -59,8 +59,8 @@ class MultiStartIcp:
         return about_centroids(source, target, partial(self._solve, kind=kind))
 
     def _solve(self, source: Cloud, target: Cloud, kind: SensorKind) -> SE3:
-        few = [voxel_thin(cloud, self.voxel) for cloud in (source, target)]
-        fits = [self._fit(*few, start) for start in headings(self.starts, kind)]
+        thin_source, thin_target = voxel_thin(source, self.voxel), voxel_thin(target, self.voxel)
+        fits = [self._fit(thin_source, thin_target, start) for start in headings(self.starts, kind)]
         best = min(fits, key=lambda fit: fit.cost)
         return self._fit(source, target, best.T).T
 
