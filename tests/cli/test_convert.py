@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import signal
+import sys
 import time
 from dataclasses import fields
 
@@ -199,6 +200,13 @@ def test_truth(wildshape, drives, tmp_path):
 )
 def test_options_that_make_no_sense(refused, drives, tmp_path, options, said):
     assert said in refused("convert", "kitti-raw", drives, tmp_path / "out", *options)
+    assert not (tmp_path / "out").exists()
+
+
+def test_ray_is_named_where_it_is_missing(refused, drives, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    said = refused("convert", "kitti-raw", drives, tmp_path / "out", "--ray", "local")
+    assert "wildshape[ray]" in said
     assert not (tmp_path / "out").exists()
 
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Work spread over a Ray cluster, as `io.crew` spreads it over the processes of one machine."""
 
+import os
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 from typing import Any, TypeVar
@@ -74,6 +75,7 @@ def _fetched(ray: Any, done: Any, item: object) -> Any:
 
 
 def _connect(ray: Any, address: str, workers: int | None) -> None:
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # Ray would tell its makers
     how: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
     if address == "local":
         how |= {"num_cpus": workers, "include_dashboard": False}
