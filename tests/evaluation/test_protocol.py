@@ -210,6 +210,8 @@ def test_truth_is_accumulated_where_no_shape_is_given():
     score = row.completions[0]
     assert score.truth == "mirrored"
     assert score.error_partial is not None
+    assert score.partial_points is not None
+    assert score.partial_points < score.truth_points
     # The far side is not in the scan: more is missing of the mirrored truth.
     assert score.error.coverage > score.error_partial.coverage
     assert run({"scan": OneScan()}, [drive_by(scans=2)])["scan"].completions[0].truth == "shape"

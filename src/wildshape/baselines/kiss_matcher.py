@@ -94,8 +94,8 @@ class KissMatcher:
 def _settle_on_one_thread() -> None:
     """Make the library's pool as large as the cores that it sees when it first runs: one.
 
-    Several of its threads write the same entries of a table of matches, and once in about a
-    thousand pairs another match came out (measured). Where the system has no such setting its
+    Several of its threads write the same entries of a table of matches, and once in about
+    three thousand pairs another match came out (measured). Where the system has no such setting its
     pool stays as it is.
     """
     if not hasattr(os, "sched_setaffinity"):

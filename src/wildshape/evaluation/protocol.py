@@ -173,6 +173,7 @@ def _score_completion(
             points=len(local),
             truth_points=len(truth.shape),
             cd_floor=floor,
+            partial_points=None if truth.partial is None else len(truth.partial),
         )
     )
 

@@ -34,6 +34,7 @@ NAMES = (
     "cd_floor",
     "points",
     "truth_points",
+    "partial_points",
 )
 UNITS = {
     "cd, precision, coverage, *_partial, cd_floor, trans_median_m": "metres",
@@ -56,6 +57,7 @@ class CompletionScore:
         points: of the prediction.
         truth_points: of the truth.
         cd_floor: CD of perfect points as many as these, metres (METHOD 8).
+        partial_points: of the accumulation as it is; None where the shape is known.
     """
 
     track: str
@@ -66,6 +68,7 @@ class CompletionScore:
     points: int
     truth_points: int
     cd_floor: float
+    partial_points: int | None = None
 
 
 @dataclass(frozen=True)
@@ -153,7 +156,13 @@ def _completion_figures(scores: MethodScores) -> Figures:
         "cd_floor": float(np.mean([row.cd_floor for row in rows])),
         "points": float(np.median([row.points for row in rows])),
         "truth_points": float(np.median([row.truth_points for row in rows])),
+        "partial_points": _median([row.partial_points for row in rows]),
     }
+
+
+def _median(counts: Sequence[int | None]) -> float | None:
+    known = [count for count in counts if count is not None]
+    return float(np.median(known)) if known else None
 
 
 def _errors(errors: Sequence[CompletionError], suffix: str) -> Figures:

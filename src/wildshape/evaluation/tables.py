@@ -96,7 +96,7 @@ def _notes(summaries: Sequence[Summary]) -> str:
     counts = ", ".join(f"{count:.0f}" for count in sorted(p for p in points if p is not None))
     lines = []
     if truths:
-        lines.append(f"Truth: {', '.join(truths)}, {counts} points (median).")
+        lines.append(f"Truth: {', '.join(truths)}, {counts} points (median){_partial(summaries)}.")
         lines.append("CD floor: 0.5 sqrt(area / count), both sides; compare CD at like counts.")
     if "mirrored" in truths:
         lines.append("Mirrored truth is made of the scans; clouds of them can be under the floor.")
@@ -107,6 +107,12 @@ def _notes(summaries: Sequence[Summary]) -> str:
         for reason, count in summary.skipped.items()
     ]
     return "\n".join(f"- {line}" for line in lines)
+
+
+def _partial(summaries: Sequence[Summary]) -> str:
+    counts = [summary.mean["partial_points"] for summary in summaries]
+    known = [count for count in counts if count is not None]
+    return f"; partial, {max(known):.0f} points" if known else ""
 
 
 def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
