@@ -9,8 +9,8 @@ _PER_DECADE = 2400
 _FEWEST_BARS = 7
 LENGTHS = np.logspace(-4, 9, 13 * _PER_DECADE + 1)
 """Bins for what is positive and spans decades: points, metres, scans; 0.1 % wide."""
-ANGLES = np.linspace(-180.0, 180.0, 721)
-"""Bins for degrees, half a degree wide."""
+ANGLES = np.linspace(-180.0, 180.0, 7201)
+"""Bins for degrees, a twentieth wide."""
 
 
 class Tally:
@@ -39,8 +39,8 @@ class Tally:
         values = values[np.isfinite(values)]
         if not len(values):
             return
-        inside = np.clip(values, self.edges[0], self.edges[-1])
-        self.counts += np.histogram(inside, self.edges)[0]
+        bins = np.clip(np.searchsorted(self.edges, values, "right") - 1, 0, len(self.counts) - 1)
+        self.counts += np.bincount(bins, minlength=len(self.counts))
         self.count += len(values)
         self.least = min(self.least, float(values.min()))
         self.most = max(self.most, float(values.max()))

@@ -21,7 +21,7 @@ from wildshape.report.thumbnails import PANELS, draw_track
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-_COLUMNS = 4
+_COLUMNS = 5
 _SHARES = (0.05, 0.5, 0.95)
 _IN_3D = 4
 
