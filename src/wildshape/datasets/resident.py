@@ -123,14 +123,14 @@ class ResidentViews:
         """The scans resampled, turned, about their own centres; the centres; the whole turns."""
         scans, config = self._scans, self.config
         drawn = scans.first_point[row, None] + integers(pick, scans.sizes[row, None])
-        frame, centre = scans.frames.turn[row], scans.frames.centre[row]
-        turned = (extra @ centre[..., None])[..., 0]
-        clouds = (scans.points[drawn] @ frame.mT - centre[:, None]) @ extra.mT
+        turn = extra @ scans.frames.turn[row]
+        clouds = scans.points[drawn] @ turn.mT
         if centre_turns_along(config):
-            return clouds, turned, extra @ frame
-        spread = _spread(scans.first_point[row], scans.sizes[row], self._centre_points)
-        middle = scan_centre(scans.points[spread] @ extra.mT, config.sensor)
-        return clouds + (turned - middle)[:, None], middle, extra @ frame
+            centre = (extra @ scans.frames.centre[row][..., None])[..., 0]
+        else:
+            spread = _spread(scans.first_point[row], scans.sizes[row], self._centre_points)
+            centre = scan_centre(scans.points[spread] @ turn.mT, config.sensor)
+        return clouds - centre[:, None], centre, turn
 
 
 def _width(config: ViewConfig) -> int:

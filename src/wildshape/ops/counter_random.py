@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random numbers as a pure function of (seed, process, step, lane), drawn where the step lies.
 
-There is no state to keep, save or capture: the step is a tensor, so a CUDA graph that is replayed
-with another step draws other numbers. Integer arithmetic alone: the same bits on every device.
+One SplitMix64 sequence a run and process, of which each step reads a stretch of its own. There is
+no state to keep, save or capture: the step is a tensor, so a CUDA graph that is replayed with
+another step draws other numbers. Integer arithmetic alone: the same bits on every device.
 """
 
 import torch
@@ -23,13 +24,12 @@ def random_bits(
     Args:
         seed: of the run.
         process: number of the process.
-        step: scalar on the device where the numbers are drawn.
-        count: lanes; a lane's number does not depend on it.
+        step: scalar on the device where the numbers are drawn, from 0 to 2^31.
+        count: lanes, fewer than 2^32; a lane's number does not depend on it.
     """
     key = _mixed(_mixed(seed + _STRIDE) + process)
-    state = _mix(step * _signed(_STRIDE) + _signed(key))
-    lanes = torch.arange(1, count + 1, device=step.device)
-    return _mix(lanes * _signed(_STRIDE) + state) >> 32 & 0xFFFFFFFF
+    place = (step << 32) + torch.arange(1, count + 1, device=step.device)
+    return _mix(place * _signed(_STRIDE) + _signed(key)) >> 32 & 0xFFFFFFFF
 
 
 def uniform(bits: Int64[Tensor, "*any"]) -> Float32[Tensor, "*any"]:

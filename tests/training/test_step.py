@@ -1,0 +1,196 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The step of the GPU, run on the CPU: it never waits, and it is the plain step."""
+
+import copy
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from benchmarks.plain import plain_loss, twin_of  # pyright: ignore
+from tests.training.no_wait import NoWait, WaitError
+from tests.training.worker import SMALLEST
+
+from wildshape.datasets.resident import ResidentViews
+from wildshape.datasets.views import ViewSampler
+from wildshape.models.shapepose import Encoding, ShapePoseNet
+from wildshape.training.meter import Meter
+from wildshape.training.objectives import WeaklySupervised
+from wildshape.training.recipes import default, paper_lidar, paper_views
+from wildshape.training.schedule import learning_rate, template_weight
+from wildshape.training.state import TrainState
+from wildshape.training.step import Step, average_one_by_one, average_together
+
+CPU = torch.device("cpu")
+SEED = 3
+
+
+def in_small(recipe):
+    """The recipe with the sizes of the smallest, its losses and rules as they are."""
+    network = replace(
+        recipe.network, encoder=(16, 16, 32, 32), decoder=(32, 32), pose=(16, 16), points=64
+    )
+    return replace(
+        recipe, network=network, views=replace(recipe.views, tracks=2, views=2, points=48)
+    )
+
+
+RECIPES = [in_small(r) for r in (paper_lidar(), paper_views(), default())]
+
+
+def step_of(recipe, store, encoding: Encoding = "static"):
+    """A step whose scans are resident, its encoder of fixed shapes."""
+    torch.manual_seed(SEED)
+    network = ShapePoseNet(recipe.network)
+    rate = torch.tensor(recipe.optim.lr)
+    optimiser = torch.optim.Adam(network.parameters(), lr=rate, fused=True)
+    state = TrainState(network, copy.deepcopy(network), optimiser)
+    sampler = ViewSampler(store, np.arange(len(store)), recipe.views)
+    views = ResidentViews(sampler, SEED, 0, CPU)
+    objective = WeaklySupervised(network, recipe.loss, encoding)
+    meter = Meter(recipe.network.branches, 0, CPU)
+    return Step(state, objective, views, meter, recipe.optim.clip)
+
+
+def take(step, recipe, count, first=0):
+    for number in range(first, first + count):
+        step.prepare(number, recipe)
+        step.advance()
+    return step.meter.losses(first, first + count)
+
+
+def batch_of(step, number):
+    assert isinstance(step.views, ResidentViews)
+    return step.views.batch(torch.tensor(number))
+
+
+def weights(step):
+    return [p.detach().clone() for p in step.state.network.parameters()]
+
+
+@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)
+def test_nothing_in_a_step_waits(car_store, recipe):
+    """Before and after headings are agreed, which changes no operation."""
+    step = step_of(recipe, car_store)
+    take(step, recipe, 1)  # the optimiser makes its state
+    counted = []
+    for number in (1, 2):
+        if number == 2:
+            step.views.hold(torch.eye(3).expand(len(car_store.scan_sizes), 3, 3))
+        step.prepare(number, recipe)
+        with NoWait() as watch:
+            step.advance()
+        counted.append(watch.launched)
+    assert counted[0] == counted[1]
+    assert 100 < counted[0].total() < 440  # some 20 less on a GPU, where the mean is one pass
+
+
+@pytest.mark.parametrize("turn", ["so3", "facing"])
+def test_no_way_of_drawing_waits(car_store, turn):
+    recipe = replace(SMALLEST, views=replace(SMALLEST.views, turn=turn))
+    views, number = step_of(recipe, car_store).views, torch.tensor(4)
+    with NoWait():
+        views.batch(number)
+
+
+def test_the_watch_sees_what_waits():
+    x = torch.arange(4.0)
+    for wrong in (
+        lambda: x.sum().item(),
+        lambda: bool(x.sum() > 1),
+        lambda: x[x > 1],
+        lambda: x.nonzero(),
+        lambda: x.unique(),
+        lambda: x.long().bincount(),
+        lambda: torch.tensor([1.0]),
+    ):
+        with pytest.raises(WaitError), NoWait():
+            wrong()
+
+
+def test_the_cpus_step_does_wait(car_store):
+    """The winners' encoder gathers as many points as there are: good on a CPU, not in a graph."""
+    step = step_of(SMALLEST, car_store, encoding="winners")
+    step.prepare(0, SMALLEST)
+    with pytest.raises(WaitError), NoWait():
+        step.advance()
+
+
+@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)
+def test_equal_batches_give_equal_losses(car_store, recipe):
+    """Resident scans and static encoder against the CPU's own objective on the same batch."""
+    step = step_of(recipe, car_store)
+    network = copy.deepcopy(step.state.network)
+    found = take(step, recipe, 1)
+    batch = batch_of(step, 0)
+    weight = template_weight(0, recipe.optim.steps, recipe.loss)
+    expected = WeaklySupervised(network, recipe.loss)(batch, weight).loss
+    torch.testing.assert_close(found[0], expected.detach(), rtol=1e-5, atol=0)
+
+
+def test_a_hundred_steps_are_the_plain_ones(car_store):
+    """Conv1d, cdist, Adam in a loop: every loss within a thousandth."""
+    recipe = replace(SMALLEST, optim=replace(SMALLEST.optim, steps=100))
+    step = step_of(recipe, car_store)
+    plain = twin_of(step.state.network)
+    adam = torch.optim.Adam(plain.parameters(), lr=1.0)
+    expected = []
+    for number in range(100):
+        batch = batch_of(step, number)
+        loss = plain_loss(plain, batch, recipe.loss, template_weight(number, 100, recipe.loss))
+        adam.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(plain.parameters(), recipe.optim.clip)
+        adam.param_groups[0]["lr"] = learning_rate(number, recipe.optim)
+        adam.step()
+        expected.append(loss.item())
+    found = take(step, recipe, 100)
+    torch.testing.assert_close(found, torch.tensor(expected), rtol=1e-3, atol=0)
+    assert found[-10:].mean() < 0.8 * found[:10].mean()
+
+
+def test_a_step_depends_on_its_number_and_the_weights_alone(car_store):
+    once, twice = step_of(SMALLEST, car_store), step_of(SMALLEST, car_store)
+    take(once, SMALLEST, 3)
+    take(twice, SMALLEST, 2)
+    twice.views.batch(torch.tensor(77))
+    take(twice, SMALLEST, 1, first=2)
+    assert all(torch.equal(a, b) for a, b in zip(weights(once), weights(twice)))
+
+
+def test_what_the_meter_reads_are_the_means_of_the_steps(car_store):
+    step = step_of(SMALLEST, car_store)
+    losses = take(step, SMALLEST, 5)
+    read = step.meter.read(5)
+    assert read["loss"] == pytest.approx(float(losses.mean()))
+    assert sum(read["branch_shares"]) == pytest.approx(1.0, abs=1e-3)
+    later = take(step, SMALLEST, 2, first=5)
+    assert step.meter.read(7)["loss"] == pytest.approx(float(later.mean()))
+
+
+def test_the_meters_ring_goes_round():
+    meter = Meter(2, 0, CPU)
+    meter.ring[:, 0] = torch.arange(Meter.ROWS).float()
+    assert meter.losses(Meter.ROWS - 1, Meter.ROWS + 2).tolist() == [255.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize("average", [average_one_by_one, average_together])
+def test_either_average_moves_a_share_of_the_way(average):
+    mean, now = [torch.zeros(3), torch.ones(2, 2)], [torch.ones(3), torch.full((2, 2), 5.0)]
+    average(mean, now, torch.tensor(0.25))
+    torch.testing.assert_close(mean[0], torch.full((3,), 0.25))
+    torch.testing.assert_close(mean[1], torch.full((2, 2), 2.0))
+
+
+def test_the_dials_hold_the_schedule(car_store):
+    recipe = replace(SMALLEST, optim=replace(SMALLEST.optim, average=0.99))
+    dials = step_of(recipe, car_store).dials
+    for number in (0, 3, 40):
+        dials.turn(number, recipe)
+        assert float(dials.rate) == pytest.approx(learning_rate(number, recipe.optim))
+        weight = template_weight(number, recipe.optim.steps, recipe.loss)
+        assert float(dials.template) == pytest.approx(weight)
+        assert float(dials.fresh) == pytest.approx(1 - min(0.99, (1 + number) / (10 + number)))
+        assert math.isclose(int(dials.step), number)
