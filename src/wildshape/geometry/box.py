@@ -30,11 +30,11 @@ class FittedBox(NamedTuple):
 def fit_box(points: Float[Tensor, "n 3"]) -> FittedBox:
     """The upright rectangle of least area around all but the outermost 0.2 % at each side."""
     angles = torch.arange(_ANGLES, dtype=points.dtype) * (torch.pi / 2 / _ANGLES)
-    turned = points @ rotation_z(angles)
-    low, high = _trimmed_range(turned)
-    size = high - low
-    best = int((size[:, 0] * size[:, 1]).argmin())
-    angle, centre, size = angles[best], (low[best] + high[best]) / 2, size[best]
+    low, high = _trimmed_range(_along_axes(points, angles))
+    across = (high - low)[:-1].view(2, _ANGLES)
+    best = int((across[0] * across[1]).argmin())
+    axes = torch.tensor((best, _ANGLES + best, 2 * _ANGLES))
+    angle, centre, size = angles[best], (low + high)[axes] / 2, (high - low)[axes]
     rotation = rotation_z(angle)
     position = rotation @ centre
     if size[1] > size[0]:
@@ -45,7 +45,14 @@ def fit_box(points: Float[Tensor, "n 3"]) -> FittedBox:
     return FittedBox(position, size, rotation)
 
 
-def _trimmed_range(points: Float[Tensor, "a n 3"]) -> tuple[Tensor, Tensor]:
-    outermost = int(_TRIM * points.shape[1]) + 1
-    low = points.topk(outermost, dim=1, largest=False).values[:, -1]
-    return low, points.topk(outermost, dim=1).values[:, -1]
+def _along_axes(points: Float[Tensor, "n 3"], angles: Float[Tensor, "a"]) -> Tensor:
+    """`(2 a + 1, n)`: along x at each angle, along y at each, and along z, which is the same."""
+    cos, sin = angles.cos(), angles.sin()
+    x_axes, y_axes = torch.stack((cos, sin), dim=1), torch.stack((-sin, cos), dim=1)
+    return torch.cat((torch.cat((x_axes, y_axes)) @ points[:, :2].T, points[:, 2][None]))
+
+
+def _trimmed_range(rows: Float[Tensor, "k n"]) -> tuple[Tensor, Tensor]:
+    outermost = int(_TRIM * rows.shape[1]) + 1
+    low = rows.topk(outermost, dim=1, largest=False).values[:, -1]
+    return low, rows.topk(outermost, dim=1).values[:, -1]
