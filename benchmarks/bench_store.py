@@ -1,0 +1,124 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The packed store at size: writing, opening, and drawing training scans from it at random.
+
+`python benchmarks/bench_store.py [--full] [--keep FOLDER]`; 20,000 scans, or a million with
+`--full` (2 GB of disk). Bars: a million scans open in under a second in a fresh process, 10,000 scans a
+second are drawn on 2 cores. What the scans are: `many_scans.py`.
+"""
+
+import argparse
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+from machine import header, median, peak_mib, verdict
+from many_scans import ManyScans
+
+from wildshape.cli.conversion import Order, convert
+from wildshape.io.store import open_store
+
+_OPENING = """
+import sys, time
+began = time.perf_counter()
+from wildshape.io.store import open_store
+imported = time.perf_counter()
+store = open_store(sys.argv[1])
+print(imported - began, time.perf_counter() - imported, store.scan_count)
+"""
+_SECONDS = 10.0
+
+
+def write(path: Path, scans: int) -> None:
+    began, cpu = time.perf_counter(), cpu_seconds()
+    convert(Order("copies", ManyScans(scans), path, "packed", None, {"scans": scans}))
+    wall, cpu = time.perf_counter() - began, cpu_seconds() - cpu
+    size = sum(file.stat().st_size for file in path.iterdir())
+    workers = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+    print(
+        f"writing  {scans:,} scans, {size / 1e9:.2f} GB: {wall:.1f} s, {scans / wall:,.0f} scans/s"
+        f" ({scans / cpu:,.0f} per CPU second); peak memory {peak_mib():.0f} MiB here,"
+        f" {workers:.0f} MiB the largest worker"
+    )
+
+
+def opening(path: Path) -> None:
+    """In fresh processes, the files' pages dropped from memory before each."""
+    seconds = []
+    for _ in range(5):
+        forget(path)
+        said = subprocess.run(
+            [sys.executable, "-c", _OPENING, str(path)], capture_output=True, text=True, check=True
+        ).stdout.split()
+        seconds.append((float(said[0]), float(said[1])))
+    imports, opens = (median(list(values)) for values in zip(*seconds))
+    print(
+        f"opening  {1000 * opens:.1f} ms, median of 5 cold processes"
+        f" (importing torch and wildshape before that: {imports:.1f} s)"
+    )
+    print(verdict("seconds to open", opens, 1.0))
+
+
+def forget(path: Path) -> None:
+    for file in path.iterdir():
+        descriptor = os.open(file, os.O_RDONLY)
+        os.posix_fadvise(descriptor, 0, 0, os.POSIX_FADV_DONTNEED)
+        os.close(descriptor)
+
+
+def sampling(path: Path, workers: int) -> None:
+    """Batches of 512-point scans by the trainer's own reader, each process on its own seeds."""
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        found = list(pool.map(draw, [path] * workers, range(workers)))
+    rate = sum(a_second for a_second, _ in found)
+    alone = sum(a_cpu_second for _, a_cpu_second in found) / workers
+    print(
+        f"sampling {rate:,.0f} scans/s of 512 points, random tracks, {workers} processes"
+        f" ({alone:,.0f} per CPU second)"
+    )
+    print(verdict("scans a second", rate, 10_000, least=True))
+
+
+def draw(path: Path, seed: int) -> tuple[float, float]:
+    """Scans a second, and a CPU second, of one process."""
+    import torch
+
+    from wildshape.datasets.views import ViewConfig, ViewSampler
+
+    torch.set_num_threads(1)
+    store = open_store(path)
+    sampler = ViewSampler(store, np.arange(len(store)), ViewConfig(tracks=64, points=512))
+    count, began, cpu = 0, time.perf_counter(), time.process_time()
+    while time.perf_counter() - began < _SECONDS:
+        count += len(sampler.draw(seed, count).scans)
+    return count / (time.perf_counter() - began), count / (time.process_time() - cpu)
+
+
+def cpu_seconds() -> float:
+    both = (resource.getrusage(w) for w in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(used.ru_utime + used.ru_stime for used in both)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--full", action="store_true", help="a million scans")
+    parser.add_argument("--keep", type=Path, help="write the store here, or use the one there")
+    settings = parser.parse_args()
+    print(header("bench_store.py"))
+    with tempfile.TemporaryDirectory() as folder:
+        path = settings.keep or Path(folder) / "store"
+        if not path.exists():
+            write(path, 1_000_000 if settings.full else 20_000)
+        opening(path)
+        sampling(path, min(os.cpu_count() or 1, 2))
+
+
+if __name__ == "__main__":
+    main()
