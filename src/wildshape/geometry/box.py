@@ -47,9 +47,10 @@ def fit_box(points: Float[Tensor, "n 3"]) -> FittedBox:
 
 def _along_axes(points: Float[Tensor, "n 3"], angles: Float[Tensor, "a"]) -> Tensor:
     """`(2 a + 1, n)`: along x at each angle, along y at each, and along z, which is the same."""
-    cos, sin = angles.cos(), angles.sin()
-    x_axes, y_axes = torch.stack((cos, sin), dim=1), torch.stack((-sin, cos), dim=1)
-    return torch.cat((torch.cat((x_axes, y_axes)) @ points[:, :2].T, points[:, 2][None]))
+    cos, sin = angles.cos()[:, None], angles.sin()[:, None]
+    x, y, z = points.T.contiguous()
+    # No matrix product: its rounding depends on a point's place in the order.
+    return torch.cat((x * cos + y * sin, y * cos - x * sin, z[None]))
 
 
 def _trimmed_range(rows: Float[Tensor, "k n"]) -> tuple[Tensor, Tensor]:
