@@ -2,18 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Make the data and train the weights that the package ships.
 
-    python experiments/default_weights.py --cad CAD_FOLDER --out runs/default --steps 22000
+    python experiments/default_weights.py --cad CAD_FOLDER --teacher TEACHER --out runs/default
 
 CAD_FOLDER holds `manifest.csv` (columns category, file, split) and the meshes it names; vehicles of
-split `train` are used, besides our own procedural ones. Without --cad only the latter.
+split `train` are used, as they are and stretched, besides our own procedural ones. Without --cad
+only the latter. TEACHER is a checkpoint trained as the paper has it (`wildshape train DATA`, no
+teacher); it poses and fuses the tracks that the shipped weights are then trained on.
 """
 
 import csv
-import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
 import tyro
 
 from wildshape.io.provenance import provenance
@@ -25,6 +27,7 @@ from wildshape.training.loop import fit, setup
 from wildshape.training.recipes import PRESETS
 
 STEPS = 22_000
+_COPIES, _STRETCH, _SCANS = 5, np.array((0.12, 0.08, 0.08)), 20
 _VEHICLES = ("car", "truck", "bus")
 _SENSORS = ("hdl64", "hdl64", "hdl32", "os1-128")
 
@@ -36,6 +39,7 @@ class Settings:
     Attributes:
         out: folder of the run.
         cad: folder of CAD meshes with a manifest.
+        teacher: checkpoint that fuses the tracks; without one, training begins from nothing.
         tracks: simulated tracks, an eighth for each pair of sensor and source.
         steps: gradient steps.
         preset: of `wildshape train`.
@@ -45,6 +49,7 @@ class Settings:
 
     out: Path
     cad: Path | None = None
+    teacher: Path | None = None
     tracks: int = 1600
     steps: int = STEPS
     preset: str = "default"
@@ -52,13 +57,21 @@ class Settings:
     resume: bool = False
 
 
-def train_meshes(cad: Path, into: Path, split: str = "train") -> Path:
-    """Copy the vehicles of a split to one folder."""
+def train_meshes(cad: Path, into: Path, seed: int) -> Path:
+    """The vehicles of the train split, each as it is and in four stretched copies, shuffled."""
+    import trimesh
+
     with (cad / "manifest.csv").open(encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["split"] == split]
-    for row in rows:
-        if row["category"] in _VEHICLES:
-            shutil.copy(cad / row["file"], into / row["file"].replace("/", "_"))
+        rows = [row for row in csv.DictReader(file) if row["split"] == "train"]
+    files = [cad / row["file"] for row in rows if row["category"] in _VEHICLES]
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(len(files) * _COPIES)
+    for place, number in zip(order, range(len(order))):
+        copy, index = divmod(number, len(files))
+        mesh = trimesh.load(files[index], force="mesh", process=False)
+        factors = np.ones(3) if copy == 0 else rng.uniform(1 - _STRETCH, 1 + _STRETCH)
+        mesh.vertices = np.asarray(mesh.vertices) * factors
+        mesh.export(into / f"{place:04d}_{files[index].stem}.ply")
     return into
 
 
@@ -72,11 +85,15 @@ def make_data(settings: Settings, path: Path, meshes: Path | None) -> None:
             for source in sources:
                 seed = settings.seed + 100 * index + (50 if source else 0)
                 config = SimulationConfig(
-                    tracks=share, sensor=sensor, meshes=source, ground=index == 1, shape_points=512
+                    tracks=share,
+                    scans=_SCANS,
+                    sensor=sensor,
+                    meshes=source,
+                    ground=index == 1,
+                    shape_points=512,
                 )
                 for track in simulate_tracks(config, seed):
-                    name = f"{sensor}-{seed}-{track.name}"
-                    store.add(replace(track, name=name))
+                    store.add(replace(track, name=f"{sensor}-{seed}-{track.name}"))
 
 
 def main(settings: Settings) -> None:
@@ -85,7 +102,8 @@ def main(settings: Settings) -> None:
     settings.out.mkdir(parents=True, exist_ok=True)
     if not data.exists():
         with TemporaryDirectory() as folder:
-            meshes = train_meshes(settings.cad, Path(folder)) if settings.cad else None
+            seed, into = settings.seed, Path(folder)
+            meshes = train_meshes(settings.cad, into, seed) if settings.cad else None
             make_data(settings, data, meshes)
     recipe = PRESETS[settings.preset]()
     recipe = replace(recipe, optim=replace(recipe.optim, steps=settings.steps))
@@ -95,6 +113,10 @@ def main(settings: Settings) -> None:
         settings.out,
         seed=settings.seed,
         resume=settings.resume,
+        teacher=settings.teacher,
+        taught=lambda done, total: (
+            print(f"fused {done} of {total}", flush=True) if done % 100 == 0 else None
+        ),
         provenance=provenance(f"python experiments/default_weights.py {settings}"),
     )
     model = fit(run, lambda step, values: print(step, values, flush=True))
@@ -104,7 +126,7 @@ def main(settings: Settings) -> None:
 def ship(model: Path, out: Path) -> None:
     """The same checkpoint in half precision, as the package carries it."""
     network, found = load_checkpoint(model)
-    command = f"python experiments/default_weights.py --cad CAD --out RUN --steps {STEPS}"
+    command = "python experiments/default_weights.py --cad CAD --teacher TEACHER --out RUN"
     described = replace(found, provenance=found.provenance | {"command": command})
     save_checkpoint(out, network, described, half=True)
 

@@ -76,7 +76,8 @@ def test_resampling_keeps_to_the_scan_and_does_not_see_its_order(count):
 )
 def test_network_input_is_centred_and_the_centres_bring_it_back(sensor, centre_of):
     scans = [scan(40), scan(300)]
-    inputs, centres = network_input(scans, 64, sensor)
+    inputs, centres, turn = network_input(scans, 64, sensor)
+    assert torch.equal(turn, torch.eye(3).expand(len(scans), 3, 3))
     for i, points in enumerate(scans):
         torch.testing.assert_close(centres[i], centre_of(torch.from_numpy(points)))
         back = (inputs[i] + centres[i]).numpy()

@@ -50,6 +50,8 @@ class Settings:
         resume: go on with RUN; a finished one is left as it is.
         profile: write where a step's time goes to RUN/profile.txt; the weights are the same.
         start: fine-tune these weights, a checkpoint of the same preset or `shipped`.
+        teacher: train on the poses and fused shapes that this checkpoint (or `shipped`) finds
+            for whole tracks, instead of from nothing; `truth` is the oracle.
     """
 
     data: Data
@@ -59,6 +61,7 @@ class Settings:
     seed: Annotated[int, arg(metavar="S")] = 0
     resume: bool = False
     start: Annotated[str | None, arg(metavar="M")] = None
+    teacher: Annotated[str | None, arg(metavar="M")] = None
     device: Device = "auto"
     unit: Unit = "m"
     overwrite: Overwrite = False
@@ -75,7 +78,7 @@ def run(settings: Settings) -> None:
     """
     from wildshape.cli.models import choose_device
     from wildshape.cli.output import command_line
-    from wildshape.cli.terminal import say
+    from wildshape.cli.terminal import progress, say
     from wildshape.io.provenance import provenance
     from wildshape.training.loop import setup
     from wildshape.training.profile import PROFILE
@@ -92,17 +95,20 @@ def run(settings: Settings) -> None:
             output.abandon()
         raise
     made = {**provenance(command_line()), "data": str(settings.data)}
-    prepared = setup(
-        recipe,
-        store,
-        settings.out,
-        seed=settings.seed,
-        device=device,
-        resume=settings.resume,
-        start=_start(settings.start),
-        provenance=made,
-        say=say,
-    )
+    with progress("fusing tracks", 0, silent=settings.teacher in (None, "truth")) as bar:
+        prepared = setup(
+            recipe,
+            store,
+            settings.out,
+            seed=settings.seed,
+            device=device,
+            resume=settings.resume,
+            start=_checkpoint(settings.start),
+            teacher="truth" if settings.teacher == "truth" else _checkpoint(settings.teacher),
+            provenance=made,
+            taught=lambda done, total: bar.at(done, total=total),
+            say=say,
+        )
     if settings.profile and prepared.processes.leads:
         prepared.profile = settings.out / PROFILE
     began, first = time.monotonic(), prepared.state.step
@@ -115,8 +121,8 @@ def run(settings: Settings) -> None:
     assert model.is_file() or not prepared.processes.leads
 
 
-def _start(model: str | None) -> Path | None:
-    """The checkpoint to fine-tune."""
+def _checkpoint(model: str | None) -> Path | None:
+    """The checkpoint that a user names."""
     from wildshape.cli.models import model_file
 
     if model is None:

@@ -14,6 +14,9 @@ from torch import Tensor
 
 from wildshape.datasets.views import ViewSampler
 
+_PLACES = 2
+_LARGER, _AXIS = 0.2, 0.08
+
 
 class FusedTargets(NamedTuple):
     """What every scan of a training set is to give.
@@ -41,7 +44,7 @@ class FusedBatch(NamedTuple):
         rotation: `R_scan_canonical`, in the scan's turned and centred frame.
         translation: of the same, metres.
         shapes: target shapes, canonical frame.
-        sensors: places from which the track was seen, canonical frame.
+        sensors: some places from which the track was seen, canonical frame.
     """
 
     scans: Float[Tensor, "B N 3"]
@@ -56,7 +59,11 @@ class FusedBatch(NamedTuple):
 
 
 class FusedSampler:
-    """Draws batches of single scans; a batch depends on its seeds alone."""
+    """Draws batches of single scans; a batch depends on its seeds alone.
+
+    Every scan is stretched with its object (see `stretching`), turned as scans to be posed are, and
+    rolled as configured.
+    """
 
     def __init__(self, views: ViewSampler, targets: FusedTargets) -> None:
         self.views, self.targets = views, targets
@@ -64,14 +71,35 @@ class FusedSampler:
     def draw(self, *seed: int) -> FusedBatch:
         """The batch of these seeds: as many scans as a batch of views has."""
         rng = np.random.default_rng(seed)
-        config = self.views.config
+        config, targets = self.views.config, self.targets
         scans_of = self.views.scans_of
         tracks = rng.integers(len(scans_of), size=config.tracks * config.views)
         rows = np.asarray([rng.choice(scans_of[track]) for track in tracks])
-        scans, centres, turn = self.views.turned(rows, rng)
-        at = torch.from_numpy(rows)
-        rotation = turn @ self.targets.rotation[at]
-        translation = (turn @ self.targets.translation[at][..., None])[..., 0] - centres
-        chosen = torch.from_numpy(tracks)
-        shapes, sensors = self.targets.shapes[chosen], self.targets.sensors[chosen]
-        return FusedBatch(scans, rotation, translation, shapes, sensors)
+        points = torch.stack([self.views.picked(int(scan), rng) for scan in rows])
+        at, chosen = torch.from_numpy(rows), torch.from_numpy(tracks)
+        rotation, factors = targets.rotation[at], _factors(len(rows), rng)
+        stretch = stretching(rotation, factors)
+        scans, centres, turn = self.views.turned_points(points @ stretch.mT, rng)
+        translation = (turn @ stretch @ targets.translation[at][..., None])[..., 0] - centres
+        some = torch.from_numpy(rng.integers(targets.sensors.shape[1], size=(len(rows), _PLACES)))
+        sensors = targets.sensors[chosen[:, None], some] * factors[:, None]
+        shapes = targets.shapes[chosen] * factors[:, None]
+        return FusedBatch(scans, turn @ rotation, translation, shapes, sensors)
+
+
+def stretching(
+    R_sensor_canonical: Float[Tensor, "B 3 3"], factors: Float[Tensor, "B 3"]
+) -> Float[Tensor, "B 3 3"]:
+    """The linear maps of the sensor frame that stretch objects along their own axes.
+
+    Stretched together with the place of the sensor, an object shows the sensor the same points as
+    before: what hides what does not change under an affine map. So the stretched scan is what a
+    sensor would see of an object of that size.
+    """
+    return (R_sensor_canonical * factors[:, None]) @ R_sensor_canonical.mT
+
+
+def _factors(count: int, rng: np.random.Generator) -> Float[Tensor, "B 3"]:
+    """Lengths of the stretched axes: larger or smaller as a whole, and a little out of shape."""
+    whole = np.exp(rng.uniform(-_LARGER, _LARGER, (count, 1)))
+    return torch.from_numpy((whole * rng.uniform(1 - _AXIS, 1 + _AXIS, (count, 3))).astype("f4"))

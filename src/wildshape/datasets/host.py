@@ -6,11 +6,12 @@ import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
+from wildshape.datasets.fused import FusedBatch, FusedSampler
 from wildshape.datasets.views import Batch, ViewSampler
 
 
 class HostViews:
-    """A `ViewSampler` for a training step: on a GPU its batches are copied to fixed tensors.
+    """A sampler for a training step: on a GPU its batches are copied to fixed tensors.
 
     The copies come from pinned memory and wait for nothing; their tensors stay the same from step
     to step, so that a recorded step finds each batch at its place.
@@ -22,9 +23,11 @@ class HostViews:
         device: where the step runs.
     """
 
-    def __init__(self, sampler: ViewSampler, seed: int, process: int, device: torch.device) -> None:
+    def __init__(
+        self, sampler: ViewSampler | FusedSampler, seed: int, process: int, device: torch.device
+    ) -> None:
         self.sampler, self.seed, self.process, self.device = sampler, seed, process, device
-        self._held: Batch | None = None
+        self._held: Batch | FusedBatch | None = None
 
     def prepare(self, step: int) -> None:
         """Draw the step's batch."""
@@ -37,11 +40,12 @@ class HostViews:
             for held, part in zip(self._held, batch):
                 held.copy_(part.pin_memory(), non_blocking=True)
 
-    def batch(self, step: Int64[Tensor, ""]) -> Batch:  # noqa: ARG002
+    def batch(self, step: Int64[Tensor, ""]) -> Batch | FusedBatch:  # noqa: ARG002
         """What `prepare` drew."""
         assert self._held is not None
         return self._held
 
     def hold(self, anchors: Float[Tensor, "S 3 3"]) -> None:
         """From now on scans are held to these headings."""
-        self.sampler.anchors = anchors
+        if isinstance(self.sampler, ViewSampler):
+            self.sampler.anchors = anchors

@@ -127,6 +127,22 @@ class ViewSampler:
             scans, turned = scans + (turned - middle)[:, None], middle
         return scans, turned, rotation
 
+    def turned_points(
+        self, points: Float[Tensor, "B n 3"], rng: np.random.Generator
+    ) -> tuple[Float[Tensor, "B n 3"], Float[Tensor, "B 3"], Float[Tensor, "B 3 3"]]:
+        """As `turned`, of scans `(B, n, 3)` that are not the store's; sensor frames."""
+        config = self.config
+        if config.turn == "facing":
+            frames = [face(scan) for scan in points]
+            turn = _rolls(len(points), config.roll, rng)
+            turn = turn @ torch.stack([frame.turn for frame in frames])
+            centres = torch.stack([frame.centre for frame in frames])
+        else:
+            turn = _turns(len(points), config.turn, int(rng.integers(2**62)))
+            turned = points @ turn.mT
+            centres = torch.stack([scan_centre(scan, config.sensor) for scan in turned])
+        return points @ turn.mT - centres[:, None], centres, turn
+
     def gather_as_posed(
         self, scans: list[int], rng: np.random.Generator
     ) -> tuple[Float[Tensor, "B n 3"], Float[Tensor, "B 3"], Float[Tensor, "B 3 3"]]:
@@ -136,7 +152,7 @@ class ViewSampler:
         faced = [self._facing(scan) for scan in scans]
         turn = torch.stack([found.turn for found in faced])
         centres = torch.stack([found.centre for found in faced])
-        clouds = torch.stack([self._picked(scan, rng) for scan in scans])
+        clouds = torch.stack([self.picked(scan, rng) for scan in scans])
         return clouds @ turn.mT - centres[:, None], centres, turn
 
     def gather(
@@ -164,9 +180,10 @@ class ViewSampler:
         return rng.choice(near, size=config.views, replace=len(near) < config.views)
 
     def _resampled(self, scan: int, rng: np.random.Generator) -> Tensor:
-        return self._picked(scan, rng) - self._centre(scan)
+        return self.picked(scan, rng) - self._centre(scan)
 
-    def _picked(self, scan: int, rng: np.random.Generator) -> Tensor:
+    def picked(self, scan: int, rng: np.random.Generator) -> Float[Tensor, "n 3"]:
+        """A scan of the store resampled with replacement, sensor frame, metres."""
         points = self.store.scan_points(scan)
         return torch.from_numpy(points[rng.integers(len(points), size=self.config.points)])
 

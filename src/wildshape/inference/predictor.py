@@ -6,15 +6,17 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from wildshape.geometry.box import fit_box
+from wildshape.geometry.facing import roll_angle
 from wildshape.geometry.rotation import quaternion_from_rotation
 from wildshape.geometry.se3 import SE3, stack
-from wildshape.inference.prepare import as_points, extent, network_input
+from wildshape.inference.prepare import NetworkInput, as_points, extent, network_input
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.models.checkpoint import ModelSettings, load_checkpoint
 from wildshape.models.shapepose import Poses, ShapePoseNet
@@ -23,6 +25,17 @@ from wildshape.records import Box, Completion, Points, Registration, Sensor
 
 SHIPPED = Path(__file__).parent.parent / "weights" / "default.safetensors"
 _BATCH, _INLIER_M, _INLIER_SHARE = 32, 0.2, 0.05
+_UPRIGHT_RAD = 0.1
+
+
+class _Found(NamedTuple):
+    """What one look at scans gives: shapes, `T_sensor_canonical`, cost and branch."""
+
+    shapes: Tensor
+    rotation: Tensor
+    translation: Tensor
+    cost: Tensor
+    branch: Tensor
 
 
 def load(model: str | Path | None = None, device: str = "cpu") -> "Predictor":
@@ -95,19 +108,41 @@ class Predictor:
     @torch.inference_mode()
     def _complete_batch(self, scans: list[Points], sensor: Sensor | None) -> list[Completion]:
         settings = self.settings
-        inputs, centres = network_input(scans, settings.input_points, settings.sensor)
-        inputs, centres = inputs.to(self.device), centres.to(self.device)
-        code = self.network.encode(inputs)
-        shapes, poses = self.network.canonical(code), self.network.poses(code)
-        cost, branch = self._choose(inputs, centres, shapes, poses)
-        chosen = poses.choose(branch)
-        T_sensor_can = SE3(chosen.rotation[:, 0], chosen.translation[:, 0] + centres)
-        shapes, T_sensor_can = shapes.cpu(), SE3(*(t.cpu() for t in _parts(T_sensor_can)))
+        given = network_input(scans, settings.input_points, settings.sensor, settings.facing)
+        given = given.to(self.device)
+        found = self._look(given)
+        if settings.facing:
+            found = self._look_again(given, found)
+        shapes, rotation, translation, cost, branch = (part.cpu() for part in found)
+        T_sensor_can = SE3(rotation, translation)
         warnings = [self._warning(scan, sensor) for scan in scans]
         return [
             self._completion(shapes[i], T_sensor_can[i], int(branch[i]), float(cost[i]), warning)
             for i, warning in enumerate(warnings)
         ]
+
+    def _look(self, given: NetworkInput) -> _Found:
+        """Shapes, and the poses of the branches that speak, from prepared scans."""
+        code = self.network.encode(given.scans)
+        shapes, poses = self.network.canonical(code), self.network.poses(code)
+        cost, branch = self._choose(given.scans, given.centres, shapes, poses)
+        chosen = poses.choose(branch)
+        back = given.turn.mT
+        translation = back @ (chosen.translation[:, 0] + given.centres)[..., None]
+        return _Found(shapes, back @ chosen.rotation[:, 0], translation[..., 0], cost, branch)
+
+    def _look_again(self, given: NetworkInput, found: _Found) -> _Found:
+        """Scans that turn out to be tilted are rolled upright and seen once more.
+
+        Turned towards its object, nothing of a scan's rotation is unknown but the roll about the
+        line of sight, and upright is what the network knows best.
+        """
+        angle = roll_angle(given.turn @ found.rotation)
+        rows = torch.nonzero(angle.abs() > _UPRIGHT_RAD)[:, 0]
+        if len(rows) == 0:
+            return found
+        again = self._look(given.part(rows).rolled(angle[rows]))
+        return _Found(*(old.index_copy(0, rows, new) for old, new in zip(found, again)))
 
     def _choose(
         self, inputs: Tensor, centres: Tensor, shapes: Tensor, poses: Poses
@@ -150,10 +185,6 @@ class Predictor:
                 " check the unit, or train on such objects"
             )
         return ""
-
-
-def _parts(transform: SE3) -> tuple[Tensor, Tensor]:
-    return transform.rotation, transform.translation
 
 
 def box_of(shape: Tensor, T_sensor_canonical: SE3) -> Box:

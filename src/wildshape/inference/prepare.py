@@ -2,13 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a user's scan to the network's input (METHOD 2), without chance."""
 
+from typing import NamedTuple
+
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int64
 from torch import Tensor
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.centring import scan_centre
+from wildshape.geometry.facing import face, roll
 from wildshape.records import Points, SensorKind
 
 MIN_POINTS = 16
@@ -59,14 +62,47 @@ def _choose(ordered: Points, count: int) -> Points:
     return ordered[np.arange(count) % len(ordered)]
 
 
+class NetworkInput(NamedTuple):
+    """What a network sees of scans.
+
+    Attributes:
+        scans: turned, centred and resampled.
+        centres: in the turned sensor frames.
+        turn: `R_turned_sensor`; the identity unless scans are turned towards their object.
+    """
+
+    scans: Float[Tensor, "B N 3"]
+    centres: Float[Tensor, "B 3"]
+    turn: Float[Tensor, "B 3 3"]
+
+    def to(self, device: torch.device) -> "NetworkInput":
+        """The same on a device."""
+        return NetworkInput(*(part.to(device) for part in self))
+
+    def part(self, rows: Int64[Tensor, "b"]) -> "NetworkInput":
+        """Some of the scans."""
+        return NetworkInput(*(part[rows] for part in self))
+
+    def rolled(self, angle: Float[Tensor, "B"]) -> "NetworkInput":
+        """Rolled about the line of sight, on which the centres lie."""
+        by = roll(angle)
+        return NetworkInput(self.scans @ by.mT, self.centres, by @ self.turn)
+
+
 def network_input(
-    scans: list[Points], count: int, sensor: SensorKind
-) -> tuple[Float[Tensor, "B N 3"], Float[Tensor, "B 3"]]:
-    """Centred, resampled scans, and the centres in their sensor frames."""
-    ordered = [_in_order(scan) for scan in scans]
-    centres = torch.stack([scan_centre(torch.from_numpy(scan), sensor) for scan in ordered])
-    sampled = torch.stack([torch.from_numpy(_choose(scan, count)) for scan in ordered])
-    return sampled - centres[:, None], centres
+    scans: list[Points], count: int, sensor: SensorKind, facing: bool = False
+) -> NetworkInput:
+    """Scans as a network is given them; `facing` turns them towards their object."""
+    ordered = [torch.from_numpy(_in_order(scan)) for scan in scans]
+    sampled = torch.stack([torch.from_numpy(_choose(scan.numpy(), count)) for scan in ordered])
+    if facing:
+        frames = [face(scan) for scan in ordered]
+        turn = torch.stack([frame.turn for frame in frames])
+        centres = torch.stack([frame.centre for frame in frames])
+        return NetworkInput(sampled @ turn.mT - centres[:, None], centres, turn)
+    centres = torch.stack([scan_centre(scan, sensor) for scan in ordered])
+    turn = torch.eye(3).repeat(len(scans), 1, 1)
+    return NetworkInput(sampled - centres[:, None], centres, turn)
 
 
 def extent(points: Points) -> float:

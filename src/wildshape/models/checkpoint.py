@@ -31,6 +31,7 @@ class ModelSettings:
         input_points: n, points a scan is resampled to.
         projection: binning of the projection term.
         beta: its weight in the label-free cost.
+        facing: scans are turned towards their object first (`geometry/facing.py`).
         belief: metres of cost that a nat of the selector's belief is worth.
         extent_m: smallest and largest extent of the scans trained on, metres.
         cost_m: median and 90th percentile of the label-free cost on held-out scans, metres.
@@ -43,6 +44,7 @@ class ModelSettings:
     input_points: int
     projection: Projection
     beta: float
+    facing: bool = False
     belief: float = 0.0
     extent_m: tuple[float, float] = (0.0, float("inf"))
     cost_m: tuple[float, float] = (0.1, 0.2)

@@ -9,6 +9,9 @@ are more alike when turned the same way. Each is a problem of signs (Z2 synchron
 a leading eigenvector. Which of the two ways is called front stays open: nobody defines it.
 """
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 import torch
 from jaxtyping import Float
@@ -30,39 +33,62 @@ _BINS, _FEWEST, _TOP = 16, 20, 0.95
 _HALF_TURN = torch.diag(torch.tensor((-1.0, -1.0, 1.0)))
 
 
+class AgreedPoses(NamedTuple):
+    """`T_sensor_canonical` of every scan of a store, as recorded, headings agreed on.
+
+    Attributes:
+        rotation: zero for unused scans.
+        translation: metres; zero for unused scans.
+    """
+
+    rotation: Float[Tensor, "S 3 3"]
+    translation: Float[Tensor, "S 3"]
+
+
 @torch.no_grad()
-def agree_on_headings(
-    network: ShapePoseNet, sampler: ViewSampler, config: LossConfig
-) -> Float[Tensor, "S 3 3"]:
-    """`R_sensor_canonical` of every scan, as recorded, its heading agreed; zero for unused scans.
+def agreed_poses(
+    network: ShapePoseNet,
+    sampler: ViewSampler,
+    config: LossConfig,
+    refined: Callable[[np.ndarray, SE3], SE3] = lambda _, pose: pose,
+    progress: Callable[[int, int], None] = lambda *_: None,
+) -> AgreedPoses:
+    """Pose all scans, refine each track, and let all tracks look one way.
 
     Args:
         network: poses the scans.
         sampler: of the tracks trained on.
         config: decides which branch speaks.
+        refined: from a track's scans and their poses to better poses.
+        progress: called with the tracks done, and their number.
 
     Raises:
         BadInputError: the network's weights are no longer finite.
     """
     if not all(bool(torch.isfinite(p).all()) for p in network.parameters()):
         raise BadInputError(NOT_FINITE)
-    anchors = torch.zeros(len(sampler.store.scan_sizes), 3, 3)
+    count = len(sampler.store.scan_sizes)
+    agreed = AgreedPoses(torch.zeros(count, 3, 3), torch.zeros(count, 3))
     outlines, kept = [], []
-    for scans in sampler.scans_of:
+    for done, scans in enumerate(sampler.scans_of):
         T_sensor_can = _poses(network, sampler, config, scans)
         steady = steady_signs(T_sensor_can.rotation)
         T_steady_can = SE3(_turn(T_sensor_can.rotation, steady), T_sensor_can.translation)
-        anchors[torch.from_numpy(scans)] = T_steady_can.rotation
+        T_steady_can = refined(scans, T_steady_can)
+        rows = torch.from_numpy(scans)
+        agreed.rotation[rows] = T_steady_can.rotation
+        agreed.translation[rows] = T_steady_can.translation
         outlines.append(outline(_fused(sampler, scans, T_steady_can)))
         kept.append(steady)
+        progress(done + 1, len(sampler.scans_of))
     signs = agreed_signs(torch.stack(outlines))
     # Of the two ways that all may look, take the one that most scans look already.
     looks = torch.stack([(s * sign).sum() for s, sign in zip(kept, signs)]).sum()
     way = torch.where(looks < 0, -1.0, 1.0)
     for scans, sign in zip(sampler.scans_of, signs * way):
         rows = torch.from_numpy(scans)
-        anchors[rows] = _turn(anchors[rows], sign.expand(len(rows)))
-    return anchors
+        agreed.rotation[rows] = _turn(agreed.rotation[rows], sign.expand(len(rows)))
+    return agreed
 
 
 def _turn(rotation: Float[Tensor, "V 3 3"], sign: Float[Tensor, "V"]) -> Float[Tensor, "V 3 3"]:
@@ -121,15 +147,15 @@ def _poses(
     device = next(network.parameters()).device
     found = []
     for start in range(0, len(scans), _BATCH):
-        inputs, centres = sampler.gather([int(s) for s in scans[start : start + _BATCH]], rng)
-        inputs, centres = inputs.to(device), centres.to(device)
+        rows = [int(s) for s in scans[start : start + _BATCH]]
+        inputs, centres, turn = (t.to(device) for t in sampler.gather_as_posed(rows, rng))
         code = network.encode(inputs)
         poses = network.poses(code)
         posed = poses.apply(network.canonical(code))
         cost = score_hypotheses(inputs, centres, posed, config.projection).cost(config.beta)
         chosen = poses.choose((cost - config.belief * poses.log_belief).argmin(-1))
-        translation = chosen.translation[:, 0] + centres
-        found.append((chosen.rotation[:, 0].cpu(), translation.cpu()))
+        translation = (turn.mT @ (chosen.translation[:, 0] + centres)[..., None])[..., 0]
+        found.append(((turn.mT @ chosen.rotation[:, 0]).cpu(), translation.cpu()))
     rotations, translations = zip(*found)
     return SE3(torch.cat(rotations), torch.cat(translations))
 

@@ -10,7 +10,7 @@ from typing import Any
 from torch.profiler import record_function
 
 from wildshape.models.checkpoint import ModelSettings, save_checkpoint
-from wildshape.training.headings import agree_on_headings
+from wildshape.training.headings import agreed_poses
 from wildshape.training.log import RunLog
 from wildshape.training.meter import Meter, refuse_not_finite
 from wildshape.training.profile import steps_profiled
@@ -112,9 +112,9 @@ def _agree_if_due(run: Run) -> None:
     """At the recipe's shares of the run, let all tracks agree on which way is front."""
     state, loss = run.state, run.recipe.loss
     due = {int(share * run.recipe.optim.steps) for share in loss.agree_at}
-    if state.step in due:
+    if state.step in due and run.targets is None:
         with record_function("wildshape: headings"):
-            state.anchors = agree_on_headings(state.mean, run.sampler, loss)
+            state.anchors = agreed_poses(state.mean, run.sampler, loss).rotation
         run.views.hold(state.anchors)
 
 
@@ -150,6 +150,7 @@ def model_settings(run: Run, found: Validation) -> ModelSettings:
         input_points=recipe.views.points,
         projection=recipe.loss.projection,
         beta=recipe.loss.beta,
+        facing=recipe.views.turn == "facing",
         belief=recipe.loss.belief,
         extent_m=run.sampler.extent_range(),
         cost_m=(found.cost_median, found.cost_p90),

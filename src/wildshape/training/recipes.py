@@ -79,8 +79,9 @@ def default() -> Recipe:
     return replace(
         base,
         name="default",
-        network=replace(base.network, points=2048),
+        network=replace(base.network, points=4096),
         loss=replace(base.loss, projection=FacingBins(0.3), template=1.0, agree_at=(0.07, 0.3)),
+        views=replace(base.views, turn="facing", roll=0.5),
         optim=replace(base.optim, steps=30_000, average=0.999),
         validate_every=1000,
     )

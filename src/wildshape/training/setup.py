@@ -8,30 +8,34 @@ import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import torch
 
+from wildshape.datasets.fused import FusedSampler, FusedTargets
 from wildshape.datasets.host import HostViews
 from wildshape.datasets.resident import ResidentViews
 from wildshape.datasets.views import ViewSampler
 from wildshape.errors import BadInputError
 from wildshape.io.store import Store
 from wildshape.models.checkpoint import load_checkpoint
-from wildshape.models.shapepose import ShapePoseNet
+from wildshape.models.shapepose import Encoding, ShapePoseNet
 from wildshape.ops.allocator import keep_memory
 from wildshape.training.capture import Captured
 from wildshape.training.config import Recipe
+from wildshape.training.fusing import fused_targets, load_targets, save_targets, true_targets
 from wildshape.training.meter import Meter
 from wildshape.training.objectives import WeaklySupervised
 from wildshape.training.processes import Processes, join
+from wildshape.training.selftaught import SelfTaught
 from wildshape.training.state import STATE, TrainState, load_state
 from wildshape.training.step import Step, Views
 
 _HELD_OUT = 20
 _RESIDENT_SHARE = 0.5
 Say = Callable[[str], None]
+Taught = Callable[[int, int], None]
 
 
 def _silent(_: str) -> None:
@@ -46,6 +50,7 @@ class Run:
         sampler: draws from the tracks that are fitted.
         held_out: draws from those that are not.
         views: give the steps their batches, drawn by `sampler` or as it does.
+        targets: what a teacher says of the scans; None trains as the paper does.
         say: is told what a user should know.
     """
 
@@ -58,6 +63,7 @@ class Run:
     held_out: ViewSampler
     held_tracks: np.ndarray
     views: Views
+    targets: FusedTargets | None
     identity: dict[str, str]
     provenance: dict[str, Any]
     say: Say
@@ -73,7 +79,9 @@ def setup(
     device: str = "cpu",
     resume: bool = False,
     start: Path | None = None,
+    teacher: Path | Literal["truth"] | None = None,
     provenance: dict[str, Any] | None = None,
+    taught: Taught = lambda *_: None,
     say: Say = _silent,
 ) -> Run:
     """Build the network, the optimiser and the samplers; load the state if resuming.
@@ -86,7 +94,10 @@ def setup(
         device: cpu or cuda.
         resume: go on from the folder's state, if it has one.
         start: checkpoint whose weights are fine-tuned, instead of random ones.
+        teacher: checkpoint that poses and fuses the tracks to train on (`training/fusing.py`);
+            `truth` takes true poses and shapes (the oracle); by default nothing teaches.
         provenance: written into the run and its checkpoint.
+        taught: called with the tracks that the teacher has fused, and their number.
         say: is told what a user should know, a sentence each.
 
     Raises:
@@ -99,19 +110,20 @@ def setup(
     _use_exact_products(processes.device)
     state = _new_state(recipe, start, seed, processes.device)
     fit_tracks, held_tracks = split_tracks(len(store))
-    identity = _identity(recipe, store, seed, processes, start)
+    identity = _identity(recipe, store, seed, processes, start, teacher)
     folder.mkdir(parents=True, exist_ok=True)
     if resume and (folder / STATE).exists():
         load_state(folder, state, identity)
     sampler = ViewSampler(store, fit_tracks, recipe.views)
     held_out = ViewSampler(store, held_tracks, recipe.views)
-    views = _views(sampler, seed, processes, say)
+    targets = _targets(teacher, sampler, folder, identity, taught)
+    views = _views(sampler, targets, seed, processes, say)
     if state.anchors is not None:
         views.hold(state.anchors)
     described = {"recipe": asdict(recipe), "identity": identity, **(provenance or {})}
     if processes.leads:
         (folder / "run.json").write_text(json.dumps(described, indent=1, default=str))
-    parts = (state, sampler, held_out, held_tracks, views, identity, described, say)
+    parts = (state, sampler, held_out, held_tracks, views, targets, identity, described, say)
     return Run(recipe, seed, folder, processes, *parts)
 
 
@@ -133,7 +145,12 @@ def _new_state(recipe: Recipe, start: Path | None, seed: int, device: torch.devi
 
 
 def _identity(
-    recipe: Recipe, store: Store, seed: int, processes: Processes, start: Path | None
+    recipe: Recipe,
+    store: Store,
+    seed: int,
+    processes: Processes,
+    start: Path | None,
+    teacher: Path | Literal["truth"] | None,
 ) -> dict[str, str]:
     """What a state must share with a run that resumes it."""
     return {
@@ -142,12 +159,43 @@ def _identity(
         "seed": str(seed),
         "processes": str(processes.count),
         "start": _short_hash(start.read_bytes()) if start else "",
+        "teacher": _short_hash(teacher.read_bytes())
+        if isinstance(teacher, Path)
+        else teacher or "",
     }
 
 
-def _views(sampler: ViewSampler, seed: int, processes: Processes, say: Say) -> Views:
+def _targets(
+    teacher: Path | Literal["truth"] | None,
+    sampler: ViewSampler,
+    folder: Path,
+    identity: dict[str, str],
+    taught: Taught,
+) -> FusedTargets | None:
+    """Made once a run, and kept beside it."""
+    if teacher is None:
+        return None
+    if teacher == "truth":
+        return true_targets(sampler)
+    kept = {key: identity[key] for key in ("data", "teacher")}
+    found = load_targets(folder, kept)
+    if found is None:
+        found = fused_targets(teacher, sampler, taught)
+        save_targets(folder, found, kept)
+    return found
+
+
+def _views(
+    sampler: ViewSampler,
+    targets: FusedTargets | None,
+    seed: int,
+    processes: Processes,
+    say: Say,
+) -> Views:
     """On a GPU the scans lie there, if they fit; on a CPU they stay in the mapped store."""
     device = processes.device
+    if targets is not None:
+        return HostViews(FusedSampler(sampler, targets), seed, processes.rank, device)
     if device.type != "cuda":
         return HostViews(sampler, seed, processes.rank, device)
     most = int(_RESIDENT_SHARE * torch.cuda.mem_get_info(device)[1])
@@ -160,10 +208,14 @@ def _views(sampler: ViewSampler, seed: int, processes: Processes, say: Say) -> V
 
 def step_of(run: Run, meter: Meter) -> tuple[Step, Callable[[], None]]:
     """The run's step, and how its device's part is called: as it is, or recorded and replayed."""
-    encoding = None
+    encoding: Encoding | None = None
     if run.processes.device.type == "cuda":
         encoding = "bf16" if run.recipe.optim.precision == "bf16" else "static"
-    objective = WeaklySupervised(run.state.network, run.recipe.loss, encoding)
+    network, loss = run.state.network, run.recipe.loss
+    if run.targets is None:
+        objective = WeaklySupervised(network, loss, encoding)
+    else:
+        objective = SelfTaught(network, loss, run.targets.complete, encoding)
     wrapped = run.processes.wrap(objective)
     step = Step(run.state, wrapped, run.views, meter, run.recipe.optim.clip)
     return step, Captured(step.advance, run.say) if _records(run) else step.advance

@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Self-training: what a trained network and the scans of a whole track teach the next network.
+
+Beyond the paper (METHOD 11.3). A network trained as the paper has it poses every scan; the scans of
+a track are then made to fit each other (`inference/joint.py`), headings agreed on
+(`training/headings.py`), and fused. The fused, reflected cloud and the refined poses are targets
+that a network can be taught from ONE scan of the track. No label enters.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Float, Float32
+from safetensors.torch import load_file, save
+from torch import Tensor
+
+from wildshape.datasets.fused import FusedTargets
+from wildshape.datasets.views import ViewSampler
+from wildshape.errors import BadInputError
+from wildshape.geometry.outliers import statistical_inliers
+from wildshape.geometry.se3 import SE3
+from wildshape.inference.joint import refine_jointly
+from wildshape.io.atomic import atomic_write
+from wildshape.losses.multiview import LossConfig
+from wildshape.models.checkpoint import load_checkpoint
+from wildshape.training.headings import AgreedPoses, agreed_poses
+
+TARGETS = "targets.safetensors"
+_POINTS, _SENSORS, _SCAN_POINTS = 2048, 8, 640
+_VOXEL_M = 0.08
+Progress = Callable[[int, int], None]
+
+
+def fused_targets(
+    teacher: Path, sampler: ViewSampler, progress: Progress = lambda *_: None
+) -> FusedTargets:
+    """Targets for all scans of a sampler, from a checkpoint and the scans alone.
+
+    Args:
+        teacher: poses the scans.
+        sampler: of the tracks trained on.
+        progress: called with the tracks done, and their number.
+
+    Raises:
+        BadInputError: the checkpoint cannot be used.
+    """
+    network, settings = load_checkpoint(teacher)
+    views = replace(
+        sampler.config,
+        points=settings.input_points,
+        turn="facing" if settings.facing else "none",
+        sensor=settings.sensor,
+    )
+    asked = ViewSampler(sampler.store, np.arange(len(sampler.store)), views)
+    asked.scans_of = sampler.scans_of
+    loss = LossConfig(beta=settings.beta, projection=settings.projection, belief=settings.belief)
+    mirror = settings.network.mirror
+
+    def refined(scans: np.ndarray, T_sensor_can: SE3) -> SE3:
+        clouds = [sampler.store.scan_points(int(scan)) for scan in scans]
+        return refine_jointly(clouds, T_sensor_can, mirror=mirror)
+
+    poses = agreed_poses(network, asked, loss, refined, progress)
+    shapes = [_shape(sampler, scans, poses, mirror) for scans in sampler.scans_of]
+    return _targets(sampler, poses, shapes, complete=False)
+
+
+def true_targets(sampler: ViewSampler) -> FusedTargets:
+    """The truth as targets: the oracle, the upper bound of METHOD 9.
+
+    Raises:
+        BadInputError: a track has no true poses or no true shape.
+    """
+    store = sampler.store
+    count = len(store.scan_sizes)
+    poses = AgreedPoses(torch.zeros(count, 3, 3), torch.zeros(count, 3))
+    starts = np.asarray(store.track_starts)
+    shapes = []
+    for scans in sampler.scans_of:
+        track = int(np.searchsorted(starts, scans[0], side="right")) - 1
+        known, shape = store.poses_of(track), store.shape_of(track)
+        if known is None or shape is None:
+            raise BadInputError(
+                f"{store.path}: track {store.names[track]} has no true poses or shape; the oracle"
+                " needs both."
+            )
+        own = known[torch.from_numpy(scans - starts[track])]
+        rows = torch.from_numpy(scans)
+        poses.rotation[rows], poses.translation[rows] = (
+            own.rotation.float(),
+            own.translation.float(),
+        )
+        shapes.append(_exactly(np.asarray(shape)))
+    return _targets(sampler, poses, shapes, complete=True)
+
+
+def _targets(
+    sampler: ViewSampler, poses: AgreedPoses, shapes: list[np.ndarray], *, complete: bool
+) -> FusedTargets:
+    sensors = [_sensors(poses, scans) for scans in sampler.scans_of]
+    found = torch.from_numpy(np.stack(shapes))
+    return FusedTargets(poses.rotation, poses.translation, found, torch.stack(sensors), complete)
+
+
+def _sensors(poses: AgreedPoses, scans: np.ndarray) -> Float[Tensor, "O 3"]:
+    """Where the sensor stood, seen from the object, at times spread over the track."""
+    rows = torch.from_numpy(scans[np.linspace(0, len(scans) - 1, _SENSORS).round().astype(int)])
+    return -(poses.rotation[rows].mT @ poses.translation[rows][..., None])[..., 0]
+
+
+def _shape(
+    sampler: ViewSampler, scans: np.ndarray, poses: AgreedPoses, mirror: bool
+) -> Float32[np.ndarray, "G 3"]:
+    """A track's scans in the canonical frame, reflected, thinned and without strays."""
+    rng = np.random.default_rng(0)
+    clouds = []
+    for scan in scans:
+        points = sampler.store.scan_points(int(scan))
+        picked = points[rng.permutation(len(points))[:_SCAN_POINTS]]
+        clouds.append((picked - poses.translation[scan].numpy()) @ poses.rotation[scan].numpy())
+    fused = np.concatenate(clouds)
+    if mirror:
+        fused = np.concatenate((fused, fused * np.asarray((1, -1, 1), np.float32)))
+    thinned = _voxel_means(fused)
+    return _exactly(thinned[statistical_inliers(thinned)])
+
+
+def _voxel_means(points: Float32[np.ndarray, "n 3"]) -> Float32[np.ndarray, "m 3"]:
+    """The mean of the points in each 8 cm cube: even density, and less noise than its points."""
+    cell = np.floor(points / _VOXEL_M).astype(np.int64)
+    _, place = np.unique(cell, axis=0, return_inverse=True)
+    place = place.reshape(-1)
+    count = np.bincount(place)
+    sums = [np.bincount(place, points[:, axis], len(count)) for axis in range(3)]
+    return (np.stack(sums, axis=1) / count[:, None]).astype(np.float32)
+
+
+def _exactly(points: np.ndarray) -> Float32[np.ndarray, "G 3"]:
+    """A seeded choice of as many points as every target has, repeated if there are fewer."""
+    order = np.random.default_rng(0).permutation(len(points))
+    return np.ascontiguousarray(points[order[np.arange(_POINTS) % len(points)]], np.float32)
+
+
+def save_targets(folder: Path, targets: FusedTargets, identity: dict[str, str]) -> None:
+    """Keep the targets beside a run, so that it can be resumed without making them again."""
+    tensors = {k: v.contiguous() for k, v in targets._asdict().items() if isinstance(v, Tensor)}
+    with atomic_write(folder / TARGETS) as file:
+        file.write(save(tensors, {**identity, "complete": str(targets.complete)}))
+
+
+def load_targets(folder: Path, identity: dict[str, str]) -> FusedTargets | None:
+    """The targets kept beside a run of the same identity; None if there are none."""
+    from safetensors import SafetensorError, safe_open
+
+    path = folder / TARGETS
+    if not path.exists():
+        return None
+    try:
+        with safe_open(path, framework="pt") as file:
+            found = file.metadata() or {}
+        if any(found.get(key) != value for key, value in identity.items()):
+            return None
+        return FusedTargets(**load_file(path), complete=found.get("complete") == "True")
+    except (SafetensorError, OSError, TypeError):
+        return None

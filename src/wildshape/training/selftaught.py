@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is minimised when poses and shapes are known: from fused tracks, or from truth (oracle)."""
+
+from torch import Tensor, nn
+from torch.profiler import record_function
+
+from wildshape.datasets.fused import FusedBatch
+from wildshape.losses.fused import pose_terms, seen_from, shape_terms
+from wildshape.losses.multiview import LossConfig
+from wildshape.losses.template import template_deviation
+from wildshape.models.shapepose import Encoding, ShapePoseNet
+from wildshape.training.objectives import Objective
+
+_BELIEF = 0.1
+
+
+class SelfTaught(nn.Module):
+    """Each scan is taught its pose and its track's shape; hindsight chooses the branch.
+
+    Args:
+        network: is taught.
+        config: `template_end` is the weight of the template.
+        complete: the target shapes are whole; else only what the sensors saw is taught.
+        encoding: how the network encodes (see there).
+    """
+
+    def __init__(
+        self,
+        network: ShapePoseNet,
+        config: LossConfig,
+        complete: bool,
+        encoding: Encoding | None = None,
+    ) -> None:
+        super().__init__()
+        self.network, self.config = network, config
+        self.complete = complete
+        self.encoding: Encoding | None = encoding
+
+    def forward(self, batch: FusedBatch, template: float | Tensor) -> Objective:  # noqa: ARG002
+        """Loss of one batch; the weight of the template does not change from step to step."""
+        code = self.network.encode(batch.scans, self.encoding)
+        with record_function("wildshape: heads"):
+            poses, shapes = self.network.poses(code), self.network.canonical(code)
+        pose = pose_terms(
+            poses.rotation, poses.translation, batch.rotation, batch.translation, batch.shapes
+        )
+        belief = poses.log_belief.gather(1, pose.winner[:, None]).mean()
+        shape = shape_terms(shapes, batch.shapes, self._known(shapes, batch))
+        deviation = template_deviation(shapes)
+        precision, coverage, distance = (
+            part.mean() for part in (shape.precision, shape.coverage, pose.distance)
+        )
+        loss = distance + precision + coverage - _BELIEF * belief
+        loss = loss + self.config.template_end * deviation
+        shown = (coverage.detach(), precision.detach(), deviation.detach())
+        return Objective(loss, *shown, pose.winner)
+
+    def _known(self, shapes: Tensor, batch: FusedBatch) -> Tensor | None:
+        """The points that some of the track's views would see; others may be as they like."""
+        if self.complete:
+            return None
+        return seen_from(shapes.detach(), batch.sensors, self.network.config.mirror)
