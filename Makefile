@@ -3,7 +3,7 @@
 #
 #   make demo [DATA=folder]   the whole way in five minutes, ending in demo/report.html
 #   make test                 lint, types, import floors, tests
-#   make bench                our kernels and simulator beside the alternatives
+#   make bench                everything timed beside the alternatives, in five minutes; all bars
 #
 # Each sets up .venv by itself and needs python >= 3.11 with venv; a C compiler makes it faster.
 # No GPU in a Linux machine? PyPI's torch may bring 2 GB of CUDA along; this takes the CPU build:
@@ -40,9 +40,7 @@ test: $(TESTED)
 	$(BIN)/python -m pytest -n 2
 
 bench: $(BENCHED)
-	@for file in benchmarks/bench_*.py; do \
-		echo "== $$file"; $(BIN)/python "$$file" || exit 1; \
-	done
+	@$(BIN)/python benchmarks/run.py
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { \

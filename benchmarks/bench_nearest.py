@@ -1,46 +1,49 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Chamfer step on the CPU: search both ways, gather, backward; against what else there is.
+"""Nearest neighbours on the CPU: search both ways, gather, backward; against what else there is.
 
-python benchmarks/bench_nearest.py [--small] [--threads N]
+    python benchmarks/bench_nearest.py            # two minutes
+    python benchmarks/bench_nearest.py --small    # half a minute
 
-Competitors are measured if installed: pip install pykdtree small_gicp scipy. Read the ratios;
-the times depend on the machine and on its neighbours.
+Competitors are measured if installed (`pip install -e .[bench]`); pykeops too, which wants a C++
+compiler when it is first used. All methods take turns. Read the ratios: times depend on the machine
+and on its neighbours.
 """
 
-import argparse
-import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 
 import torch
+from machine import header
+from outcome import Outcome
 from torch import Tensor
+from turns import options, take_turns
 
 from wildshape.ops.library import library
 from wildshape.ops.nearest import Neighbours, nearest_distance
-from wildshape.ops.nearest_native import nearest_native
+from wildshape.ops.nearest_native import nearest_both_native
 from wildshape.ops.nearest_torch import nearest_blocked, nearest_reference
 
 Index = Callable[[Tensor, Tensor], Tensor]
 Step = Callable[[Tensor, Tensor], Tensor]
 
-SHAPES = [(32, 1024, 1024), (32, 1024, 2048), (1, 3096, 8192)]
-SMALL = [(4, 512, 512), (1, 1024, 2048)]
-BARS = {  # ratio of the second's time to the first's, at (B, N, M)
-    ("native", "pykdtree"): {SHAPES[0]: 2.5, SHAPES[1]: 2.0, SHAPES[2]: 1.5},
-    ("native", "torch.cdist"): {SHAPES[0]: 20.0},
-    ("torch", "torch.cdist"): {SHAPES[0]: 4.0},
-}
+BARRED = [(32, 1024, 1024), (32, 1024, 2048), (1, 3096, 8192)]
+MORE = [(128, 512, 1024), (1, 20000, 30000)]
+BARS = [  # shape, ours, theirs, times faster
+    (BARRED[0], "native", "pykdtree", 2.5),
+    (BARRED[0], "native", "torch.cdist", 20.0),
+    (BARRED[1], "native", "pykdtree", 2.0),
+    (BARRED[2], "native", "pykdtree", 1.5),
+    (BARRED[0], "torch", "torch.cdist", 4.0),
+]
+COMPETITORS = ("scipy", "pykdtree", "small_gicp", "pykeops")
 
 
-def ours(search: Callable[[Tensor, Tensor], Neighbours]) -> Step:
+def ours(a: Tensor, b: Tensor) -> Tensor:
     """Search and distance through the door's own differentiable form."""
-
-    def step(a: Tensor, b: Tensor) -> Tensor:
-        there, back = search(a.detach(), b.detach()), search(b.detach(), a.detach())
-        return nearest_distance(a, b, there).mean() + nearest_distance(b, a, back).mean()
-
-    return step
+    there, back = nearest_both_native(a.detach(), b.detach())
+    return nearest_distance(a, b, there).mean() + nearest_distance(b, a, back).mean()
 
 
 def ours_plain(search: Callable[[Tensor, Tensor], Neighbours]) -> Step:
@@ -93,40 +96,55 @@ def per_cloud(query: Callable) -> Index:
     )
 
 
-def candidates(threads: int) -> dict[str, Step]:
-    found = {"torch": ours_plain(nearest_blocked), "reference": ours_plain(nearest_reference)}
+def keops(outcome: Outcome) -> dict[str, Step]:
+    """pykeops, once it has compiled its formula; nothing where it cannot."""
+    try:
+        import pykeops
+        from pykeops.torch import LazyTensor
+
+        pykeops.set_verbose(False)
+
+        def index(a: Tensor, b: Tensor) -> Tensor:
+            apart = LazyTensor(a[:, :, None].contiguous()) - LazyTensor(b[:, None].contiguous())
+            return (apart**2).sum(-1).argmin(2)[..., 0]
+
+        index(torch.zeros(1, 2, 3), torch.zeros(1, 2, 3))
+    except ImportError:
+        return {}
+    except Exception as error:  # noqa: BLE001, its compilers fail in ways of their own
+        outcome.note(f"pykeops is installed but does not run here ({type(error).__name__})")
+        return {}
+    return {"pykeops": gathered(index)}
+
+
+def candidates(threads: int, outcome: Outcome, *, slow: bool) -> dict[str, Step]:
+    found = {"torch": ours_plain(nearest_blocked), "torch.cdist": cdist}
+    if slow:
+        found["reference"] = ours_plain(nearest_reference)
     if library():
-        found = {"native": ours(nearest_native)} | found
-    return found | {"torch.cdist": cdist} | trees(threads)
+        found = {"native": ours} | found
+    return found | trees(threads) | keops(outcome)
 
 
-def measure(
-    methods: dict[str, Step], shape: tuple[int, int, int], seconds: float
-) -> dict[str, tuple[float, float]]:
-    """Milliseconds of forward and backward, and the loss, for each method.
-
-    All methods take turns, so that busy neighbours hit them alike; the best turn counts.
-    """
-    B, N, M = shape
+def measure(outcome: Outcome, methods: dict[str, Step], shape: tuple, seconds: float) -> None:
+    """One table: forward and backward of each method, and how far its loss is off the first's."""
     generator = torch.Generator().manual_seed(0)
+    B, N, M = shape
     a, b = (shell(B, n, generator).requires_grad_() for n in (N, M))
-    results = dict.fromkeys(methods, (float("inf"), 0.0))
-    end, rounds = time.perf_counter() + seconds, 0
-    while rounds < 3 or time.perf_counter() < end:
-        rounds += 1
-        for name, step in methods.items():
-            for _ in range(5 if name == "native" else 1):
-                ms, loss = turn(step, a, b)
-                results[name] = (min(results[name][0], ms), loss)
-    return results
+    losses = {name: step(a, b).item() for name, step in methods.items()}
+    first = next(iter(losses.values()))
+    off = {name: abs(loss - first) / first for name, loss in losses.items()}
+    times = take_turns({name: partial(turn, step, a, b) for name, step in methods.items()}, seconds)
+    outcome.add(case(shape), times, loss_off=off)
 
 
-def turn(step: Step, a: Tensor, b: Tensor) -> tuple[float, float]:
+def case(shape: tuple[int, int, int]) -> str:
+    return f"{shape[0]} x ({shape[1]} and {shape[2]} points)"
+
+
+def turn(step: Step, a: Tensor, b: Tensor) -> None:
     a.grad = b.grad = None
-    start = time.perf_counter()
-    loss = step(a, b)
-    loss.backward()
-    return 1e3 * (time.perf_counter() - start), loss.item()
+    step(a, b).backward()
 
 
 def shell(B: int, n: int, generator: torch.Generator) -> Tensor:
@@ -135,32 +153,24 @@ def shell(B: int, n: int, generator: torch.Generator) -> Tensor:
     return points * torch.tensor([2.2, 0.9, 0.7]) + 0.01 * torch.randn(B, n, 3, generator=generator)
 
 
-def report(shape: tuple[int, int, int], results: dict[str, tuple[float, float]]) -> None:
-    first = next(iter(results.values()))
-    print(f"\nB, N, M = {shape}: search both ways + gather + backward")
-    print(f"{'method':<14}{'ms':>10}{'x ' + next(iter(results)):>12}")
-    for name, (ms, loss) in results.items():
-        drift = abs(loss - first[1]) / first[1]
-        note = f"   loss off by {drift:.0e}" if drift > 1e-5 else ""
-        print(f"{name:<14}{ms:>10.2f}{ms / first[0]:>12.1f}{note}")
-    for (fast, slow), bars in BARS.items():
-        if shape in bars and fast in results and slow in results:
-            ratio = results[slow][0] / results[fast][0]
-            verdict = "met" if ratio >= bars[shape] else "MISSED"
-            print(f"bar: {fast} >= {bars[shape]} x {slow}: {ratio:.1f} {verdict}")
-
-
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--small", action="store_true", help="a few seconds")
-    parser.add_argument("--threads", type=int, default=torch.get_num_threads())
-    arguments = parser.parse_args()
+    arguments = options(__doc__).parse_args()
     torch.set_num_threads(arguments.threads)
-    methods = candidates(arguments.threads)
-    absent = {"native", "scipy", "pykdtree", "small_gicp"} - set(methods)
-    print(f"threads {arguments.threads}; not installed: {', '.join(sorted(absent)) or 'none'}")
-    for shape in SMALL if arguments.small else SHAPES:
-        report(shape, measure(methods, shape, 0.3 if arguments.small else 15.0))
+    print(header("bench_nearest.py"))
+    outcome = Outcome("nearest")
+    methods = candidates(arguments.threads, outcome, slow=not arguments.small)
+    if "native" not in methods:
+        outcome.note("native: not built (a C compiler was missing when Wildshape was installed)")
+    for name in COMPETITORS:
+        if name not in methods:
+            outcome.note(f"{name}: not installed, not measured")
+    for shape in BARRED + ([] if arguments.small else MORE):
+        # All distances of the largest clouds at once would take gigabytes.
+        fitting = {k: v for k, v in methods.items() if shape[1] < 10_000 or k != "torch.cdist"}
+        measure(outcome, fitting, shape, 5.0 if arguments.small else 20.0)
+    for shape, fast, slow, times in BARS:
+        outcome.at_least(case(shape), fast, slow, times)
+    outcome.publish(arguments.out, small=arguments.small)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 """A whole training step on the CPU: ours against its plain twin, equal weights and batch.
 
     python benchmarks/bench_step.py            # six minutes
-    python benchmarks/bench_step.py --small    # seconds, `tiny` alone
+    python benchmarks/bench_step.py --small    # a minute and a half
 
 A step draws its batch of 8 tracks x 4 scans, and ends with the optimiser and the mean weights.
 `plain` is the twin of `plain.py` as one runs it; `plain, kept` has our allocator's setting too.
@@ -15,7 +15,6 @@ gradients are compared with the encoders (all else is as trained) in float64; th
 those of float32.
 """
 
-import argparse
 import copy
 import multiprocessing
 import time
@@ -28,8 +27,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from machine import header, median, peak_mib, verdict
+from machine import header, median, peak_mib
+from outcome import Outcome
 from plain import gradients_as_ours, plain_loss, twin_of
+from turns import options
 
 from wildshape.datasets.views import Batch, ViewSampler
 from wildshape.io.store import open_store
@@ -46,6 +47,8 @@ VARIANTS = ("ours", "plain", "plain, kept")
 LOSS_BAR, GRADIENT_BAR = 1e-5, 1e-4
 STEPS_BARS = {"small": 9.0, "tiny": 22.0}
 RATIO_BAR, MEMORY_BAR_MIB = 5.5, 2048.0
+PRESETS_MEASURED = ("paper-lidar", "small", "tiny")
+SMALL_SECONDS = {"paper-lidar": 25.0, "small": 10.0}
 _SEED, _WARM_UP = 0, 2
 
 
@@ -194,26 +197,30 @@ def gradient_difference(found: dict[str, np.ndarray], expected: dict[str, np.nda
     return (apart / size) ** 0.5
 
 
-def report(preset: str, rows: dict[str, Row]) -> None:
+def report(outcome: Outcome, preset: str, rows: dict[str, Row]) -> None:
     recipe, ours = PRESETS[preset](), rows["ours"]
-    print(
-        f"\n{preset}: {recipe.views.tracks} x {recipe.views.views} scans, n {recipe.views.points},"
-        f" m {recipe.network.points}, K {recipe.network.branches}; {len(ours.times)} steps each"
+    case = (
+        f"{preset}: {recipe.views.tracks} x {recipe.views.views} scans, n {recipe.views.points},"
+        f" m {recipe.network.points}, K {recipe.network.branches}"
     )
-    print(
-        f"{'step':<14}{'ms':>9}{'best':>9}{'steps/s':>9}{'x ours':>8}{'peak MiB':>10}"
-        f"{'loss off':>10}{'gradient off':>14}{'in float32':>12}"
+    off = {name: differences(ours, row) for name, row in rows.items()}
+    outcome.add(
+        case,
+        {name: row.times for name, row in rows.items()},
+        peak_mib={name: row.peak_mib for name, row in rows.items()},
+        loss_off={name: found[0] for name, found in off.items()},
+        gradient_off={name: found[1] for name, found in off.items()},
+        in_float32={name: found[2] for name, found in off.items()},
     )
-    for name, row in rows.items():
-        ms, ratio = median(row.times), median(row.times) / median(ours.times)
-        line = f"{name:<14}{ms:>9.1f}{min(row.times):>9.1f}{1e3 / ms:>9.2f}{ratio:>8.2f}"
-        line += f"{row.peak_mib:>10.0f}"
-        if row is not ours:
-            loss, gradient, float32 = differences(ours, row)
-            line += f"{loss:>10.0e}{gradient:>14.0e}{float32:>12.0e}"
-        print(line)
-    for line in bars(preset, rows):
-        print(line)
+    loss, gradient, _ = off["plain"]
+    outcome.bar(f"{preset}: loss off plain", loss, LOSS_BAR)
+    outcome.bar(f"{preset}: gradient off plain", gradient, GRADIENT_BAR)
+    if preset in STEPS_BARS:
+        rate = 1e3 / median(ours.times)
+        outcome.bar(f"{preset}: steps a second", rate, STEPS_BARS[preset], least=True)
+    if preset == "paper-lidar":
+        outcome.at_least(case, "ours", "plain", RATIO_BAR)
+        outcome.bar(f"{preset}: peak MiB", ours.peak_mib, MEMORY_BAR_MIB)
 
 
 def differences(ours: Row, twin: Row) -> tuple[float, float, float]:
@@ -223,20 +230,6 @@ def differences(ours: Row, twin: Row) -> tuple[float, float, float]:
     return loss, gradient, gradient_difference(ours.float32[1], twin.float32[1])
 
 
-def bars(preset: str, rows: dict[str, Row]) -> list[str]:
-    ours, plain = rows["ours"], rows["plain"]
-    loss, gradient, _ = differences(ours, plain)
-    lines = [verdict("loss off", loss, LOSS_BAR), verdict("gradient off", gradient, GRADIENT_BAR)]
-    if preset in STEPS_BARS:
-        rate = 1e3 / median(ours.times)
-        lines.append(verdict("steps a second", rate, STEPS_BARS[preset], least=True))
-    if preset == "paper-lidar":
-        ratio = median(plain.times) / median(ours.times)
-        lines.append(verdict("plain / ours", ratio, RATIO_BAR, least=True))
-        lines.append(verdict("peak MiB", ours.peak_mib, MEMORY_BAR_MIB))
-    return lines
-
-
 def write_cars(store: Path, tracks: int) -> None:
     with StoreWriter(store, {}) as writer:
         for track in simulate_tracks(SimulationConfig(tracks=tracks), seed=_SEED, workers=1):
@@ -244,21 +237,20 @@ def write_cars(store: Path, tracks: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--small", action="store_true", help="a few seconds: `tiny` alone")
-    parser.add_argument("--threads", type=int, default=torch.get_num_threads())
+    parser = options(__doc__)
     parser.add_argument("--preset", choices=sorted(PRESETS), action="append")
     parser.add_argument("--seconds", type=float, default=60.0, help="for each preset")
     arguments = parser.parse_args()
     torch.set_num_threads(arguments.threads)
     print(header("bench_step.py"))
-    presets = ["tiny"] if arguments.small else ["paper-lidar", "small", "tiny"]
+    outcome = Outcome("step")
     with TemporaryDirectory() as folder:
         store = Path(folder) / "cars"
         write_cars(store, tracks=8 if arguments.small else 64)
-        for preset in arguments.preset or presets:
-            seconds = 2.0 if arguments.small else arguments.seconds
-            report(preset, measure(preset, store, arguments.threads, seconds))
+        for preset in arguments.preset or PRESETS_MEASURED:
+            seconds = SMALL_SECONDS.get(preset, 5.0) if arguments.small else arguments.seconds
+            report(outcome, preset, measure(preset, store, arguments.threads, seconds))
+    outcome.publish(arguments.out, small=arguments.small)
 
 
 if __name__ == "__main__":
