@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A drive written here in KITTI's own layout, with known points."""
 
+import math
+import shutil
+
 import numpy as np
 import pytest
 from tests.cars import poses_of
@@ -128,3 +131,41 @@ def test_missing_and_corrupt_files_are_named(drive):
 def test_a_drive_without_scans_is_refused(tmp_path):
     drive = write_drive(tmp_path / "2011_09_26_drive_0001_sync", [("Car", 0, POSES)], {})
     refused(drive, r"velodyne_points.data: no \.bin scans")
+
+
+T_VELO_IMU = "R: 0.8 -0.6 0 0.6 0.8 0 0 0 1\nT: -0.8 0.3 -0.8\n"
+
+
+def write_world(drive, forward):
+    """The vehicle drives north by `forward` metres a frame; its IMU heads there (yaw pi/2)."""
+    (drive / "oxts" / "data").mkdir(parents=True)
+    (drive.parent / "calib_imu_to_velo.txt").write_text("calib_time: now\n" + T_VELO_IMU)
+    for frame in range(9):
+        latitude = math.degrees(frame * forward / 6378137.0)
+        record = [latitude, 0, 100, 0, 0, math.pi / 2] + [0] * 24
+        path = drive / "oxts" / "data" / f"{frame:010d}.txt"
+        path.write_text(" ".join(f"{value:.12f}" for value in record))
+
+
+def moving(drive, motion):
+    return len(list(all_tracks(KittiRaw(drive, Selection(motion=motion)))))
+
+
+def test_moving_and_parked_are_told_in_the_world(drive):
+    """The boxes recede by 1 m a frame along -x of the velodyne."""
+    refused_motion = KittiRaw(drive, Selection(motion="parked"))
+    with pytest.raises(BadInputError, match=r"oxts.data: no records"):
+        list(all_tracks(refused_motion))
+    write_world(drive, forward=0.0)
+    assert (moving(drive, "moving"), moving(drive, "parked")) == (1, 0)
+    # R takes the IMU's x to (0.8, 0.6, 0): a car that recedes along -x is none that stands still,
+    # but with a calibration that does not turn it is, where the vehicle goes as fast.
+    shutil.rmtree(drive / "oxts")
+    write_world(drive, forward=1.0)
+    assert moving(drive, "moving") == 1
+    calibration = drive.parent / "calib_imu_to_velo.txt"
+    calibration.write_text("R: 1 0 0 0 1 0 0 0 1\nT: -0.8 0.3 -0.8\n")
+    assert (moving(drive, "moving"), moving(drive, "parked")) == (0, 1)
+    calibration.unlink()
+    with pytest.raises(BadInputError, match=r"calib_imu_to_velo\.txt: no such file"):
+        moving(drive, "parked")

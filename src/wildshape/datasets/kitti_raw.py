@@ -14,9 +14,11 @@ import numpy as np
 
 from wildshape.datasets.boxes import Crop, points_in_box
 from wildshape.datasets.gathering import Gathering
+from wildshape.datasets.kitti_raw_world import world_poses
 from wildshape.datasets.selection import Selection
 from wildshape.datasets.tracklets import Tracklet, read_tracklets
 from wildshape.errors import BadInputError
+from wildshape.geometry.se3 import SE3
 from wildshape.records import Points, Sensor, Track
 
 HDL64E = Sensor(kind="lidar", resolution_deg=(0.18, 0.42))
@@ -33,6 +35,7 @@ class KittiRaw:
     Attributes:
         root: a drive folder, a date folder or the folder above.
         selection: which objects and scans; its categories are `objectType`s, by default `VEHICLES`.
+            Whether an object moves is told by the drive's GPS/IMU records, read if it is asked.
         crop: how much around the labelled box belongs to the object.
         rejected: see `Source`.
     """
@@ -69,8 +72,9 @@ class KittiRaw:
         wanted = {f"{drive.name}_{i:04d}": t for i, t in enumerate(tracklets) if self._is_wanted(t)}
         gathering = Gathering(self.selection, HDL64E)
         files = scan_files(drive)
+        world = {} if self.selection.motion == "any" else world_poses(drive)
         for frame in range(max((t.frames.stop for t in wanted.values()), default=0)):
-            self._crop_frame(wanted, frame, files, gathering)
+            self._crop_frame(wanted, frame, files, world.get(frame), gathering)
             yield from gathering.finished(before=frame)
         yield from gathering.finished()
         for reason, count in gathering.rejected.items():
@@ -83,7 +87,12 @@ class KittiRaw:
         return True
 
     def _crop_frame(
-        self, tracklets: dict[str, Tracklet], frame: int, files: dict[int, Path], to: Gathering
+        self,
+        tracklets: dict[str, Tracklet],
+        frame: int,
+        files: dict[int, Path],
+        T_world_velo: SE3 | None,
+        to: Gathering,
     ) -> None:
         active = {
             name: t
@@ -100,7 +109,8 @@ class KittiRaw:
         for name, tracklet in active.items():
             T = tracklet.T_velo_object[frame - tracklet.first_frame]
             points = points_in_box(cloud, T, tracklet.size, self.crop)
-            to.add(name, f"{frame:010d}", points, T)
+            place = None if T_world_velo is None else (T_world_velo @ T).translation.numpy()
+            to.add(name, f"{frame:010d}", points, T, place)
 
 
 def find_drives(root: Path) -> list[Path]:
