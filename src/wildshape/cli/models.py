@@ -9,14 +9,15 @@ import torch
 
 from wildshape.errors import BadInputError
 from wildshape.inference.predictor import SHIPPED, Predictor, load
-from wildshape.training.loop import MODEL
 
 
 def model_file(model: Path | None) -> Path:
     """The checkpoint meant: a file, that of a run's folder, or the shipped one."""
-    if model is None:
-        return SHIPPED
-    return model / MODEL if model.is_dir() else model
+    if model is None or not model.is_dir():
+        return SHIPPED if model is None else model
+    from wildshape.training.loop import MODEL  # the trainer only where a run's folder is named
+
+    return model / MODEL
 
 
 def load_model(model: Path | None, device: str = "auto") -> Predictor:
