@@ -35,6 +35,7 @@ from wildshape.report.picture import write_picture
 from wildshape.report.thumbnails import PANELS, draw_track
 
 WRITERS = {
+    "folder": "tests.datasets.write_folder:picture_scene",
     "kitti-raw": "tests.datasets.write_kitti_raw:picture_scene",
     "kitti-tracking": "tests.datasets.write_kitti_tracking:picture_scene",
     "semantic-kitti": "tests.datasets.write_semantic_kitti:picture_scene",
