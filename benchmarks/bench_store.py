@@ -3,8 +3,8 @@
 """The packed store at size: writing, opening, and drawing training scans from it at random.
 
 `python benchmarks/bench_store.py [--full] [--keep FOLDER]`; 20,000 scans, or a million with
-`--full` (2 GB of disk). Bars: a million scans open in under a second in a fresh process, 10,000 scans a
-second are drawn on 2 cores. What the scans are: `many_scans.py`.
+`--full` (2 GB of disk). Bars: a million scans open in under a second in a fresh process, 10,000
+scans a second are drawn on 2 cores. What the scans are: `many_scans.py`.
 """
 
 import argparse
@@ -114,7 +114,7 @@ def main() -> None:
     print(header("bench_store.py"))
     with tempfile.TemporaryDirectory() as folder:
         path = settings.keep or Path(folder) / "store"
-        if not path.exists():
+        if not (path / "index.json").exists():
             write(path, 1_000_000 if settings.full else 20_000)
         opening(path)
         sampling(path, min(os.cpu_count() or 1, 2))

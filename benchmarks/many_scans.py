@@ -13,6 +13,7 @@ left out, which training never reads and which would fill the disk.
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 import torch
@@ -35,20 +36,19 @@ class ManyScans:
     scans: int
     seed: int = 0
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
-    _originals: list[Track] = field(default_factory=list, init=False, repr=False)
 
     def parts(self) -> list[str]:
         tracks = self.scans // SCANS_A_TRACK
         return [str(start) for start in range(0, tracks, _TRACKS_A_PART)]
 
     def tracks_of(self, part: str) -> Iterator[Track]:
-        self._originals = self._originals or originals(self.seed)
         last = min(int(part) + _TRACKS_A_PART, self.scans // SCANS_A_TRACK)
         for number in range(int(part), last):
             rng = np.random.default_rng([self.seed, number])
-            yield copied(self._originals[number % _ORIGINALS], number, rng)
+            yield copied(originals(self.seed)[number % _ORIGINALS], number, rng)
 
 
+@cache
 def originals(seed: int) -> list[Track]:
     config = SimulationConfig(tracks=_ORIGINALS, scans=SCANS_A_TRACK, vary_scans=False)
     return list(simulate_tracks(config, seed, workers=1))
