@@ -36,7 +36,7 @@ def paper_views() -> Recipe:
 def small() -> Recipe:
     """Learns on two CPU cores in minutes: half the widths and points, and what we add.
 
-    Beyond the paper: scans turned in yaw, mirror symmetry, a shared template, bins that face the
+    Beyond the paper: scans turned towards their object, mirror symmetry, a shared template, bins that face the
     object, a higher learning rate that falls along a cosine, averaged weights.
     """
     return Recipe(
@@ -61,7 +61,7 @@ def small() -> Recipe:
             steady=True,
             agree_at=(0.15, 0.4),
         ),
-        views=ViewConfig(points=512, window=40, turn="yaw"),
+        views=ViewConfig(points=512, window=40, turn="facing"),
         optim=OptimConfig(
             steps=12_000, lr=1e-3, decay_every=0, warmup=100, average=0.998, clip=5.0
         ),
@@ -81,7 +81,7 @@ def default() -> Recipe:
         name="default",
         network=replace(base.network, points=4096),
         loss=replace(base.loss, projection=FacingBins(0.3), template=1.0, agree_at=(0.07, 0.3)),
-        views=replace(base.views, turn="facing", roll=0.5),
+        views=replace(base.views, roll=0.5),
         optim=replace(base.optim, steps=30_000, average=0.999),
         validate_every=1000,
     )
@@ -110,7 +110,7 @@ def tiny() -> Recipe:
             steady=True,
             agree_at=(0.15, 0.4),
         ),
-        views=ViewConfig(points=256, window=40, turn="yaw"),
+        views=ViewConfig(points=256, window=40, turn="facing"),
         optim=OptimConfig(steps=500, lr=2e-3, decay_every=0, warmup=20, average=0.99, clip=5.0),
         validate_every=100,
     )
