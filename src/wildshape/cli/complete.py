@@ -4,6 +4,7 @@
 
 from dataclasses import dataclass
 
+from wildshape.cli.importing import uncollected
 from wildshape.cli.options import AsJson, Device, Input, Model, OutFolder, Overwrite, Unit
 
 EXAMPLE = "wildshape complete scan.ply --out completed"
@@ -33,7 +34,8 @@ def run(settings: Settings) -> None:
     Raises:
         BadInputError: input, model or output cannot be used.
     """
-    from wildshape.cli.results import Work, perform
+    with uncollected():
+        from wildshape.cli.results import Work, perform
 
     work = Work(
         command="complete",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
+from wildshape.cli.importing import uncollected
 from wildshape.cli.options import AsJson, Device, Model, Overwrite, Unit
 from wildshape.errors import BadInputError
 
@@ -63,7 +64,8 @@ def run(settings: Settings) -> None:
 
 
 def _tracks(settings: Settings, out: Path) -> None:
-    from wildshape.cli.results import Work, perform
+    with uncollected():
+        from wildshape.cli.results import Work, perform
 
     work = Work(
         command="register",

@@ -1,0 +1,20 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Collecting garbage is put off, and taken up again whatever happens."""
+
+import gc
+
+import pytest
+
+from wildshape.cli.importing import uncollected
+
+
+def test_collection_is_off_inside_and_on_afterwards():
+    assert gc.isenabled()
+    with uncollected():
+        assert not gc.isenabled()
+    assert gc.isenabled()
+    with pytest.raises(ImportError), uncollected():
+        raise ImportError
+    assert gc.isenabled()
+    gc.unfreeze()
