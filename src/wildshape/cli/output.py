@@ -138,7 +138,8 @@ def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: 
             " settings; repeat it as it was, pass --overwrite, or choose another --out."
         )
     for leftover in path.rglob(".*.part"):  # of a process that was killed while writing
-        leftover.unlink()
+        if leftover.is_file():
+            leftover.unlink()
     say(f"going on with the unfinished output in {path}")
     return True
 

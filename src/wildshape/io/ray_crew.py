@@ -4,6 +4,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator
+from importlib import import_module
 from itertools import islice
 from typing import Any, TypeVar
 
@@ -90,9 +91,8 @@ def _connect(ray: Any, address: str, workers: int | None) -> None:
 
 def _ray() -> Any:
     try:
-        import ray
+        return import_module("ray")
     except ImportError as error:
         raise MissingExtraError(
             "Ray is not installed; `pip install wildshape[ray]` brings it."
         ) from error
-    return ray
