@@ -17,4 +17,3 @@ def test_collection_is_off_inside_and_on_afterwards():
     with pytest.raises(ImportError), uncollected():
         raise ImportError
     assert gc.isenabled()
-    gc.unfreeze()

@@ -9,15 +9,11 @@ from contextlib import contextmanager
 
 @contextmanager
 def uncollected() -> Iterator[None]:
-    """No collection inside; what was made there is then left out of all later ones.
-
-    Modules live as long as the process, and torch's are a million objects to walk through.
-    """
+    """No collection inside: modules live as long as the process, and torch's are many to walk."""
     enabled = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
-        gc.freeze()
         if enabled:
             gc.enable()
