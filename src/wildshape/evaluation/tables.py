@@ -10,13 +10,13 @@ from wildshape.evaluation.results import Results, Summary, summarise
 from wildshape.evaluation.turning import Rotate
 from wildshape.io.atomic import write_text
 
-_ROTATE: dict[Rotate, str] = {
+ROTATE: dict[Rotate, str] = {
     "none": "scans as recorded",
     "yaw": "each scan turned by its own random yaw",
     "so3": "each scan turned by its own random rotation",
 }
 # heading, name of the figure, factor, decimals
-_COLUMNS = (
+COLUMNS = (
     ("CD, m", "cd", 1, 3),
     ("precision", "precision", 1, 3),
     ("coverage", "coverage", 1, 3),
@@ -29,7 +29,7 @@ _COLUMNS = (
     ("rot sym, deg", "rot_sym_median_deg", 1, 2),
 )
 _PARTIAL = ("CD partial", "cd_partial", 1, 3)
-_PAPER = tuple(column for column in _COLUMNS if column[1] in PaperRow.__dataclass_fields__)
+_PAPER = tuple(column for column in COLUMNS if column[1] in PaperRow.__dataclass_fields__)
 
 
 def markdown(runs: Sequence[Results]) -> str:
@@ -40,9 +40,9 @@ def markdown(runs: Sequence[Results]) -> str:
     heading = ["method", *(column[0] for column in columns), "scans: shape / pose"]
     seeds = f"{len(runs)} seed{'s' if len(runs) > 1 else ''}"
     parts = [
-        f"### {_ROTATE[runs[0].rotate].capitalize()} ({seeds})",
-        _table(heading, rows),
-        _notes(summaries),
+        f"### {ROTATE[runs[0].rotate].capitalize()} ({seeds})",
+        pipe_table(heading, rows),
+        notes(summaries),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
 
@@ -51,11 +51,11 @@ def paper_markdown(rows: Sequence[PaperRow] = LIDAR_ROWS) -> str:
     """The rows that the paper prints, under a heading that says that the data differ."""
     heading = ["data", "method", *(column[0] for column in _PAPER)]
     cells = [
-        [r.data, r.method, *(_number(getattr(r, name), f, d) for _, name, f, d in _PAPER)]
+        [r.data, r.method, *(number(getattr(r, name), f, d) for _, name, f, d in _PAPER)]
         for r in rows
     ]
     title = "### The paper's printed figures: other data, so no common benchmark"
-    return f"{title}\n\n{_table(heading, cells)}\n"
+    return f"{title}\n\n{pipe_table(heading, cells)}\n"
 
 
 def write_table(folder: Path, runs: Sequence[Results], *, views: bool = False) -> Path:
@@ -68,21 +68,23 @@ def write_table(folder: Path, runs: Sequence[Results], *, views: bool = False) -
 
 def _columns(summaries: Sequence[Summary]) -> list[tuple[str, str, int, int]]:
     partial = any(summary.mean["cd_partial"] is not None for summary in summaries)
-    return [*_COLUMNS[:3], *([_PARTIAL] if partial else []), *_COLUMNS[3:]]
+    return [*COLUMNS[:3], *([_PARTIAL] if partial else []), *COLUMNS[3:]]
 
 
 def _cells(summary: Summary, columns: Sequence[tuple[str, str, int, int]]) -> list[str]:
     return [
-        _number(summary.mean[name], factor, digits) + _spread(summary.std[name], factor, digits)
+        number(summary.mean[name], factor, digits) + spread(summary.std[name], factor, digits)
         for _, name, factor, digits in columns
     ]
 
 
-def _number(value: float | None, factor: int, digits: int) -> str:
+def number(value: float | None, factor: float, digits: int) -> str:
+    """A cell; a dash where there is no figure."""
     return "–" if value is None else f"{factor * value:.{digits}f}"  # noqa: RUF001
 
 
-def _spread(value: float | None, factor: int, digits: int) -> str:
+def spread(value: float | None, factor: float, digits: int) -> str:
+    """What follows a mean: the deviation, or nothing."""
     return "" if value is None or digits == 0 else f" ± {factor * value:.{digits}f}"
 
 
@@ -90,7 +92,8 @@ def _counted(summary: Summary) -> str:
     return f"{summary.completions} / {summary.registrations}"
 
 
-def _notes(summaries: Sequence[Summary]) -> str:
+def notes(summaries: Sequence[Summary]) -> str:
+    """The foot of a table: truth, engines, and what was left out."""
     truths = sorted({summary.truth for summary in summaries if summary.truth})
     points = {summary.mean["truth_points"] for summary in summaries} - {None}
     counts = ", ".join(f"{count:.0f}" for count in sorted(p for p in points if p is not None))
@@ -115,6 +118,7 @@ def _partial(summaries: Sequence[Summary]) -> str:
     return f"; partial, {max(known):.0f} points" if known else ""
 
 
-def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def pipe_table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A markdown table; the first column is text."""
     rule = ["---", *("---:" for _ in heading[1:])]
     return "\n".join("| " + " | ".join(cells) + " |" for cells in (heading, rule, *rows))
