@@ -1,0 +1,31 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`train --teacher`: a checkpoint, the run's folder, or the truth; and what it refuses."""
+
+import json
+
+from safetensors.torch import load_file
+
+
+def test_a_run_teaches_the_next_one_and_a_repeated_resume_leaves_it_alone(
+    wildshape, store, trained, tmp_path
+):
+    out = tmp_path / "taught"
+    order = ("train", store, "--out", out, "--preset", "tiny", "--steps", 6, "--device", "cpu")
+    done = wildshape(*order, "--teacher", trained, "--json")
+    assert done.code == 0, done.err
+    assert json.loads(done.out)["steps"] == 6
+    assert (out / "targets.safetensors").is_file()
+    weights = (out / "model.safetensors").read_bytes()
+    again = wildshape(*order, "--teacher", trained, "--resume")
+    assert again.code == 0, again.err
+    assert "finished already" in again.out
+    assert (out / "model.safetensors").read_bytes() == weights
+    assert set(load_file(out / "model.safetensors")) == set(
+        load_file(trained / "model.safetensors")
+    )
+
+
+def test_a_teacher_that_is_not_there(refused, store, tmp_path):
+    order = ("train", store, "--out", tmp_path / "out", "--preset", "tiny", "--steps", 6)
+    assert "nobody.safetensors" in refused(*order, "--teacher", tmp_path / "nobody.safetensors")
