@@ -33,8 +33,13 @@ def methods(network: ShapePoseNet) -> dict[str, Callable[[Tensor], Tensor]]:
     return {
         "winners": partial(encode_winners, network.encoder),
         "dense": network.encoder,
-        "literal": twin_of(network).to(next(network.parameters()).dtype).encode,
+        "literal": scaled(twin_of(network).encode, network.config.scale),
     }
+
+
+def scaled(encode: Callable[[Tensor], Tensor], scale: float) -> Callable[[Tensor], Tensor]:
+    """The plain network divides by its scale itself; here points come divided."""
+    return lambda points: encode(points * scale)
 
 
 def scans(count: int, points: int) -> Tensor:
@@ -55,7 +60,9 @@ def gradients(network: ShapePoseNet, points: Tensor) -> dict[str, Tensor]:
     network, points = copy.deepcopy(network).double(), points.double()
     plain = twin_of(network).double()
     found = {}
-    for name, encode in (methods(network) | {"literal": plain.encode}).items():
+    for name, encode in (
+        methods(network) | {"literal": scaled(plain.encode, network.config.scale)}
+    ).items():
         turn(network, encode, points)
         held = dict(network.named_parameters())
         grads = {key: p.grad for key, p in held.items() if p.grad is not None}
@@ -81,7 +88,7 @@ def measure(outcome: Outcome, preset: str, seconds: float) -> None:
     works = {
         name: partial(turn, network, encode, points) for name, encode in methods(network).items()
     }
-    found = gradients(network, points * recipe.network.scale)
+    found = gradients(network, points)
     size = found["dense"].norm()
     off = {name: float((g - found["dense"]).norm() / size) for name, g in found.items()}
     outcome.add(case, take_turns(works, seconds, at_least=3), gradient_off=off)

@@ -71,12 +71,18 @@ def all_differentiated(
 
 
 def plain(
-    batch: Batch, shapes: Tensor, rotation: Tensor, translation: Tensor, config: LossConfig
+    batch: Batch,
+    shapes: Tensor,
+    rotation: Tensor,
+    translation: Tensor,
+    config: LossConfig,
+    *,
+    exact: bool = False,
 ) -> Tensor:
     views = len(batch.scans) // len(shapes)
     shape = shapes.repeat_interleave(views, dim=0)
     terms = [
-        explain(batch, shape @ R.mT + t[:, None], config)
+        explain(batch, shape @ R.mT + t[:, None], config, exact=exact)
         for R, t in zip(rotation.unbind(1), translation.unbind(1))
     ]
     return torch.stack(terms, dim=1).amin(1).mean() * views
@@ -123,6 +129,7 @@ def measure(outcome: Outcome, preset: str, seconds: float) -> None:
         name: partial(differentiate, loss, batch, inputs, config) for name, loss in METHODS.items()
     }
     found = {name: work() for name, work in works.items()}
+    found["plain"] = differentiate(partial(plain, exact=True), batch, inputs, config)
     value, gradient = found["one pass"]
     off = {name: abs(v - value) / value for name, (v, _) in found.items()}
     apart_by = {

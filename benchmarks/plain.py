@@ -21,6 +21,7 @@ from wildshape.losses.template import template_deviation
 from wildshape.models.shapepose import NetworkConfig, ShapePoseNet
 
 _SMALLEST = 1e-12
+_MODES = {False: "use_mm_for_euclid_dist_if_necessary", True: "donot_use_mm_for_euclid_dist"}
 
 
 class PlainNet(nn.Module):
@@ -67,15 +68,21 @@ def mlp(size: int, widths: tuple[int, int], out: int) -> nn.Sequential:
     )
 
 
-def plain_loss(net: PlainNet, batch: Batch, config: LossConfig, template: float) -> Tensor:
-    """The same loss as `training.objectives.WeaklySupervised`."""
+def plain_loss(
+    net: PlainNet, batch: Batch, config: LossConfig, template: float, *, exact: bool = False
+) -> Tensor:
+    """The same loss as `training.objectives.WeaklySupervised`.
+
+    `exact` is for comparing, not for timing: torch.cdist goes by way of a matrix product, whose
+    rounding here and there makes another point the nearest.
+    """
     code = net.encode(batch.scans)
     rotation, translation, log_belief = net.poses(code)
     shapes = net.canonical(code[batch.reference])
     views = len(batch.scans) // len(shapes)
     shape = shapes.repeat_interleave(views, dim=0)
     terms = [
-        explain(batch, shape @ R.mT + t[:, None], config)
+        explain(batch, shape @ R.mT + t[:, None], config, exact=exact)
         for R, t in zip(rotation.unbind(1), translation.unbind(1))
     ]
     cost = torch.stack(terms, dim=1)
@@ -86,11 +93,11 @@ def plain_loss(net: PlainNet, batch: Batch, config: LossConfig, template: float)
     return loss - config.belief * log_belief.gather(1, winner[:, None]).mean()
 
 
-def explain(batch: Batch, posed: Tensor, config: LossConfig) -> Tensor:
+def explain(batch: Batch, posed: Tensor, config: LossConfig, *, exact: bool = False) -> Tensor:
     """`(B,)` label-free cost of one branch's posed shapes `(B, P, 3)` (paper eq. 2 and 3)."""
     scans = batch.scans
     with torch.no_grad():
-        distance = torch.cdist(scans, posed)
+        distance = torch.cdist(scans, posed, compute_mode=_MODES[exact])
         to_shape, to_scan = distance.argmin(2), distance.argmin(1)
         seen = in_front(posed, batch.centres, config.projection)
     observation = apart(scans, posed, to_shape).mean(1)
