@@ -27,11 +27,16 @@ def draw(path: Path, rows: list[dict[str, Any]], unit: str, caption: str) -> Non
     )
     for axis, case, panel in zip(axes[:, 0], cases, held):
         _panel(axis, case, panel, unit)
-    figure.text(0.01, 0.002, caption, fontsize=5, color="#777777")
+    figure.text(0.01, 0.002, caption, fontsize=6, color="#777777")
     figure.tight_layout()
     with atomic_write(path) as file:
         figure.savefig(file, format="svg", metadata={"Date": None})
     plt.close(figure)
+
+
+def number(value: float) -> str:
+    """Three digits, and no powers of ten."""
+    return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
 
 
 def _panel(axis, case: str, rows: list[dict[str, Any]], unit: str) -> None:
@@ -39,7 +44,7 @@ def _panel(axis, case: str, rows: list[dict[str, Any]], unit: str) -> None:
     colours = [_OURS] + [_OTHERS] * (len(rows) - 1)
     bars = axis.barh(range(len(rows)), values, color=colours, log=True)
     labels = [
-        f" {v:.3g} {unit}" + (f" ({v / values[0]:.1f} x)" if i else "")
+        f" {number(v)} {unit}" + (f" ({number(v / values[0])} x)" if i else "")
         for i, v in enumerate(values)
     ]
     axis.bar_label(bars, labels, fontsize=8)
@@ -47,7 +52,6 @@ def _panel(axis, case: str, rows: list[dict[str, Any]], unit: str) -> None:
     axis.set_ylim(len(rows) - 0.4, -0.6)
     axis.set_xlim(min(values) / 2, max(values) * 6)
     axis.set_title(case, fontsize=9, loc="left")
-    axis.tick_params(axis="x", labelsize=7)
-    axis.tick_params(axis="x", which="minor", labelbottom=False)
-    for side in ("top", "right"):
+    axis.tick_params(axis="x", which="both", bottom=False, labelbottom=False)
+    for side in ("top", "right", "bottom"):
         axis.spines[side].set_visible(False)
