@@ -78,12 +78,12 @@ def _cells(summary: Summary, columns: Sequence[tuple[str, str, int, int]]) -> li
     ]
 
 
-def number(value: float | None, factor: float, digits: int) -> str:
+def number(value: float | None, factor: int, digits: int) -> str:
     """A cell; a dash where there is no figure."""
     return "–" if value is None else f"{factor * value:.{digits}f}"  # noqa: RUF001
 
 
-def spread(value: float | None, factor: float, digits: int) -> str:
+def spread(value: float | None, factor: int, digits: int) -> str:
     """What follows a mean: the deviation, or nothing."""
     return "" if value is None or digits == 0 else f" ± {factor * value:.{digits}f}"
 

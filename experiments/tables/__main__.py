@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Every table and figure of the paper as one command.
+
+python -m experiments.tables vehicle --size tiny --cad CAD
+"""
+
+import shlex
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+from experiments.tables import seeds, vehicle
+from experiments.tables.given import Given
+from experiments.tables.make import chosen_rows, make
+from experiments.tables.size import SIZES
+from experiments.tables.train import Workshop
+
+from wildshape.errors import BadInputError, MissingExtraError
+
+TABLES = {"vehicle": vehicle.table, "seeds": seeds.table}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Make a table or a figure of the paper: train, measure, print ours beside the paper's rows.
+
+    What is finished is found again below `out`, also by other tables; stopped at any instant, the
+    same command goes on.
+
+    Attributes:
+        table: which.
+        size: test (seconds), tiny (minutes on a CPU), small (hours) or full (a GPU).
+        out: folder of data, runs and scores.
+        results: folder of the page and its JSON; by default `out`.
+        cad: folder of CAD meshes with a manifest; else our procedural shapes.
+        kitti: KITTI raw, the folder above the dates.
+        device: of trainings and predictions.
+        rows: only rows whose names hold one of these, with commas.
+    """
+
+    table: Annotated[Literal["vehicle", "seeds"], tyro.conf.Positional]
+    size: Literal["test", "tiny", "small", "full"] = "tiny"
+    out: Path = Path("runs/tables")
+    results: Path | None = None
+    cad: Path | None = None
+    kitti: Path | None = None
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    rows: str = ""
+
+
+def main(settings: Settings, command: str) -> None:
+    """Make it and print the page."""
+    given = Given(SIZES[settings.size], settings.cad, settings.kitti)
+    shop = Workshop(settings.out, settings.device, command)
+    words = tuple(word.strip() for word in settings.rows.split(",") if word.strip())
+    table = chosen_rows(TABLES[settings.table](given), words)
+    name = f"{settings.table}-{settings.size}"
+    print(make(shop, given, table, name, settings.results or settings.out))
+
+
+if __name__ == "__main__":
+    arguments = sys.argv[1:]
+    try:
+        main(
+            tyro.cli(Settings, args=arguments),
+            shlex.join(["python", "-m", "experiments.tables", *arguments]),
+        )
+    except (BadInputError, MissingExtraError) as error:
+        print(error, file=sys.stderr)
+        sys.exit(2)

@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the user gives a table, and the data sets that are made of it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from experiments.tables.data import Cad, Kitti, Simulated, Split
+from experiments.tables.size import Size
+
+from wildshape.errors import BadInputError
+from wildshape.simulate.config import Category
+from wildshape.simulate.generate import SimulationConfig
+
+_SEEDS: dict[Split, int] = {"train": 1, "test": 9002}
+TRUCKS = 14
+
+
+@dataclass(frozen=True)
+class Given:
+    """Size, and folders that are not part of the project.
+
+    Attributes:
+        size: of the table.
+        cad: meshes with a manifest, split by model; None: our procedural shapes.
+        kitti: KITTI raw, the folder above the dates.
+    """
+
+    size: Size
+    cad: Path | None = None
+    kitti: Path | None = None
+
+    def drives(self, split: Split) -> Simulated:
+        """Cars driven past, as recorded by a 64-beam LiDAR."""
+        count = self.size.train if split == "train" else self.size.test
+        config = SimulationConfig(tracks=count)
+        return Simulated(f"cars-{split}", config, _SEEDS[split], self._cad(("car",), split))
+
+    def views(self, category: Category, split: Split) -> Simulated:
+        """Depth views of unit-sized objects, five each."""
+        count = self.size.train if split == "train" else self.size.test
+        config = SimulationConfig(tracks=count, sensor="depth-camera", category=category)
+        cad = self._cad((category,), split)
+        return Simulated(f"{category}-views-{split}", config, _SEEDS[split], cad)
+
+    def trucks(self) -> Simulated:
+        """As many trucks as the paper had.
+
+        Raises:
+            BadInputError: no CAD folder given.
+        """
+        if self.cad is None:
+            raise BadInputError("the trucks of this table are CAD meshes: give --cad FOLDER.")
+        config = SimulationConfig(tracks=min(TRUCKS, 4 * self.size.test))
+        return Simulated("trucks", config, 9003, self._cad(("truck",), "test"))
+
+    def real_cars(self) -> Kitti:
+        """Cars of KITTI raw.
+
+        Raises:
+            BadInputError: no folder given.
+        """
+        if self.kitti is None:
+            raise BadInputError("this table measures real cars: give --kitti FOLDER (KITTI raw).")
+        return Kitti("kitti", self.kitti)
+
+    def _cad(self, categories: tuple[str, ...], split: Split) -> Cad | None:
+        return None if self.cad is None else Cad(self.cad, categories, split)

@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Making a table: every row trained and measured, the seed selected without labels beside it."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from experiments.tables.data import as_values
+from experiments.tables.given import Given
+from experiments.tables.measure import Measured, measure, seeds_of
+from experiments.tables.show import Part, markdown, record
+from experiments.tables.table import Block, Row, Table, Trained
+from experiments.tables.train import Workshop
+
+from wildshape.errors import BadInputError
+from wildshape.evaluation.turning import Rotate
+from wildshape.io.atomic import write_json, write_text
+from wildshape.io.provenance import provenance
+from wildshape.models.checkpoint import load_checkpoint
+
+
+@dataclass(frozen=True)
+class Making:
+    """One table being made."""
+
+    shop: Workshop
+    given: Given
+    table: Table
+
+    def parts(self) -> list[Part]:
+        """All blocks under all their protocols."""
+        return [self._part(block, rotate) for block in self.table.blocks for rotate in block.rotate]
+
+    def _part(self, block: Block, rotate: Rotate) -> Part:
+        found = [(row, self._measured(row, block, rotate)) for row in block.rows]
+        rows = tuple((row, measured) for row, measured in found if measured)
+        chosen = {
+            row.name: _selected(row.name, measured)
+            for row, measured in rows
+            if _pooled(row, measured)
+        }
+        return Part(block, rotate, rows, chosen)
+
+    def _measured(self, row: Row, block: Block, rotate: Rotate) -> tuple[Measured, ...]:
+        seeds = seeds_of(row, rotate, self.table.seeds)
+        most = self.given.size.max_scans
+        found = (measure(self.shop, row, block, rotate, seed, most) for seed in seeds)
+        return tuple(one for one in found if one is not None)
+
+
+def _pooled(row: Row, measured: tuple[Measured, ...]) -> bool:
+    return isinstance(row, Trained) and len(measured) > 1
+
+
+def _selected(name: str, measured: tuple[Measured, ...]) -> Measured:
+    """The seed whose label-free cost on held-out tracks is lowest; never the best by the truth."""
+    best = min((one for one in measured if one.model), key=_cost)
+    title = f"{name}, seed {best.results.seed}, selected without labels"
+    methods = tuple(replace(scores, name=title) for scores in best.results.methods)
+    return replace(best, results=replace(best.results, methods=methods))
+
+
+def _cost(measured: Measured) -> float:
+    assert measured.model is not None
+    return load_checkpoint(measured.model.path)[1].cost_m[0]
+
+
+def chosen_rows(table: Table, words: tuple[str, ...]) -> Table:
+    """The table with those rows only whose names hold one of the words.
+
+    Raises:
+        BadInputError: no row is left.
+    """
+    if not words:
+        return table
+    blocks = [
+        replace(block, rows=tuple(r for r in block.rows if any(w in r.name for w in words)))
+        for block in table.blocks
+    ]
+    kept = tuple(block for block in blocks if block.rows)
+    if not kept:
+        raise BadInputError(f"--rows {','.join(words)}: no row of this table is called so.")
+    note = f"Only rows with {' or '.join(words)} were made."
+    return replace(table, blocks=kept, notes=(*table.notes, note))
+
+
+def make(shop: Workshop, given: Given, table: Table, name: str, results: Path) -> str:
+    """Make a table and write NAME.md and NAME.json; returns the markdown."""
+    parts = Making(shop, given, table).parts()
+    made = provenance(shop.command)
+    text = markdown(table, parts, shop.command, made)
+    size = as_values(given.size)
+    write_json(results / f"{name}.json", {"size": size, **record(table, parts, made)})
+    write_text(results / f"{name}.md", text)
+    return text

@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Rows measured by the protocol of METHOD 8: once a seed, found again when finished."""
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from experiments.tables.data import key, store_of
+from experiments.tables.table import Baseline, Block, Row, Shipped, Trained
+from experiments.tables.train import Model, Workshop, model_of
+
+from wildshape.baselines.named import baseline
+from wildshape.cli.evaluate import evaluate_once
+from wildshape.cli.models import fingerprint, load_model
+from wildshape.cli.reading import Reading
+from wildshape.cli.terminal import say
+from wildshape.errors import MissingExtraError
+from wildshape.evaluation.method import Method
+from wildshape.evaluation.metrics import CompletionError
+from wildshape.evaluation.results import (
+    CompletionScore,
+    MethodScores,
+    RegistrationScore,
+    Results,
+)
+from wildshape.evaluation.skipped import Skipped
+from wildshape.evaluation.turning import Rotate
+from wildshape.inference.method import Learned
+from wildshape.io.atomic import write_json
+from wildshape.io.provenance import provenance
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One row under one seed.
+
+    Attributes:
+        results: of the protocol.
+        made: command, commit, hardware, model.
+        model: if the row is trained.
+    """
+
+    results: Results
+    made: dict[str, Any]
+    model: Model | None
+
+
+def measure(
+    shop: Workshop, row: Row, block: Block, rotate: Rotate, seed: int, max_scans: int | None
+) -> Measured | None:
+    """Scores of a row; None where a library that it needs is not installed."""
+    model = model_of(shop, row, seed) if isinstance(row, Trained) else None
+    mark = _mark(row, model)
+    name = f"{key(row.name, mark, block.test, rotate, seed, max_scans)}.json"
+    path = shop.folder / "scores" / name
+    if not path.is_file():
+        method = _method(shop, row, model)
+        if method is None:
+            return None
+        reading = Reading(store_of(shop.folder, block.test))
+        found = evaluate_once(reading, {row.name: method}, rotate, seed, max_scans)
+        made = {**provenance(shop.command), "model": mark}
+        write_json(path, {"results": asdict(found), "made": made})
+    kept = json.loads(path.read_text("utf-8"))
+    return Measured(as_results(kept["results"]), kept["made"], model)
+
+
+def seeds_of(row: Row, rotate: Rotate, seeds: int) -> range:
+    """What is not trained has nothing left to chance on scans as recorded."""
+    return range(1) if rotate == "none" and not isinstance(row, Trained) else range(seeds)
+
+
+def _mark(row: Row, model: Model | None) -> str:
+    """Fingerprint of the weights; nothing for baselines."""
+    if isinstance(row, Baseline):
+        return ""
+    return fingerprint(None if model is None else model.path)
+
+
+def _method(shop: Workshop, row: Row, model: Model | None) -> Method | None:
+    if isinstance(row, Shipped) or model is not None:
+        return Learned(load_model(None if model is None else model.path, shop.device))
+    try:
+        return baseline(row.name)
+    except MissingExtraError as error:
+        say(f"row {row.name} left out: {error}")
+        return None
+
+
+def as_results(kept: dict[str, Any]) -> Results:
+    """What `asdict` made of results, as they were."""
+    methods = tuple(_scores(method) for method in kept["methods"])
+    return Results(kept["rotate"], kept["seed"], methods)
+
+
+def _scores(kept: dict[str, Any]) -> MethodScores:
+    return MethodScores(
+        name=kept["name"],
+        completions=tuple(_completion(row) for row in kept["completions"]),
+        registrations=tuple(RegistrationScore(**row) for row in kept["registrations"]),
+        skipped=tuple(Skipped(**row) for row in kept["skipped"]),
+        about=kept["about"],
+    )
+
+
+def _completion(row: dict[str, Any]) -> CompletionScore:
+    partial = row["error_partial"]
+    errors = {
+        "error": CompletionError(**row["error"]),
+        "error_partial": None if partial is None else CompletionError(**partial),
+    }
+    return CompletionScore(**{**row, **errors})
