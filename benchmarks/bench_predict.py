@@ -62,7 +62,7 @@ def scored(made: Predictor, inputs: Tensor) -> None:
     network, settings = made.network, made.settings
     code = network.encode(inputs)
     posed = network.poses(code).apply(network.canonical(code))
-    centres = torch.tensor([[10.0, 2.0, -1.0]]).expand(len(inputs), 3)
+    centres = inputs.new_tensor([[10.0, 2.0, -1.0]]).expand(len(inputs), 3)
     score_hypotheses(inputs, centres, posed, settings.projection).cost(settings.beta)
 
 

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from benchmarks.no_wait import NoWait, WaitError  # pyright: ignore
 from benchmarks.plain import plain_loss, twin_of  # pyright: ignore
-from tests.training.no_wait import NoWait, WaitError
 from tests.training.worker import SMALLEST
 
 from wildshape.datasets.resident import ResidentViews
