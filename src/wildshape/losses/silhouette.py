@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""DPC's losses: images compared, the best of several poses taught, and a student of the winners."""
+
+from typing import NamedTuple
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from wildshape.geometry.viewing_volume import RangeImage, Volume, to_volume
+from wildshape.losses.occupancy import project
+
+_PIXELS = 64**2  # of the authors' images, over which they sum
+
+
+class Rendering(NamedTuple):
+    """How shapes are turned into images.
+
+    Attributes:
+        volume: of the sensor.
+        size: voxels along an edge, and pixels of an image.
+        sigma: of the smoothing, voxels.
+        depth: weight of the depth image beside the silhouette.
+    """
+
+    volume: Volume
+    size: int
+    sigma: float
+    depth: float
+
+
+class Hindsight(NamedTuple):
+    """The best candidate of each view.
+
+    Attributes:
+        loss: of the winners, with a graph; the mean over the views.
+        silhouette: its first part.
+        depth: its second part, weighted.
+        winner: row of the candidate.
+    """
+
+    loss: Tensor
+    silhouette: Tensor
+    depth: Tensor
+    winner: Int[Tensor, "B"]
+
+
+def image_costs(
+    made: RangeImage, seen: RangeImage, depth: float
+) -> tuple[Float[Tensor, "B"], Float[Tensor, "B"]]:
+    """Half the squared differences of silhouettes and, weighted, depths; as of 64 x 64 pixels."""
+    squared = [(a - b).square().flatten(1).mean(1) for a, b in zip(made, seen, strict=True)]
+    silhouette, away = (0.5 * _PIXELS * mean for mean in squared)
+    return silhouette, depth * away
+
+
+def hindsight(
+    posed: Float[Tensor, "B K n 3"],
+    offset: Float[Tensor, "B"],
+    seen: RangeImage,
+    rendering: Rendering,
+    strength: Float[Tensor, "B"],
+) -> Hindsight:
+    """Every candidate is projected, and the one whose image is nearest is differentiated.
+
+    Args:
+        posed: the shape under each candidate pose, sensor's frame, metres.
+        offset: distance of the cube's middle, metres.
+        seen: image of each view, `rendering.size` pixels wide.
+        rendering: how images are made.
+        strength: of each view's occupancy.
+    """
+    with torch.no_grad():
+        costs = [
+            sum(_costs(posed[:, k], offset, seen, rendering, strength))
+            for k in range(posed.shape[1])
+        ]
+        winner = torch.stack([torch.as_tensor(cost) for cost in costs], dim=1).argmin(1)
+    best = posed[torch.arange(len(posed), device=posed.device), winner]
+    silhouette, depth = _costs(best, offset, seen, rendering, strength)
+    silhouette, depth = silhouette.mean(), depth.mean()
+    return Hindsight(silhouette + depth, silhouette.detach(), depth.detach(), winner)
+
+
+def _costs(
+    posed: Tensor, offset: Tensor, seen: RangeImage, rendering: Rendering, strength: Tensor
+) -> tuple[Tensor, Tensor]:
+    points = to_volume(posed, offset, rendering.volume)
+    made = project(points, rendering.size, rendering.sigma, strength)
+    return image_costs(made, seen, rendering.depth)
+
+
+def student_loss(student: Float[Tensor, "B 4"], teacher: Float[Tensor, "B 4"]) -> Float[Tensor, ""]:
+    """Squared sine of half the angle between unit quaternions; the teacher gets no gradient."""
+    return (1 - (student * teacher.detach()).sum(-1).square()).mean()
