@@ -86,3 +86,17 @@ def test_network_input_is_centred_and_the_centres_bring_it_back(sensor, centre_o
 
 def test_extent_is_the_diagonal():
     assert extent(np.array([[0, 0, 0], [2, 3, 6], [1, 1, 1]], np.float32)) == pytest.approx(7)
+
+
+@pytest.mark.parametrize("ties", ["none", "z", "z and y", "signed zeros"])
+def test_points_are_ordered_by_z_then_y_then_x(ties):
+    points = scan(60) - np.array([8, 1, -1], np.float32)
+    if ties != "none":
+        points[::2, 2] = 0.5
+    if ties == "z and y":
+        points[::4, 1] = -0.25
+    if ties == "signed zeros":
+        points[::4, 2], points[1::4, 2] = 0.0, -0.0
+        points[:40, 1] = np.where(np.arange(40) % 3 == 0, np.float32(-0.0), np.float32(0.0))
+    expected = sorted(points.tolist(), key=lambda p: (p[2], p[1], p[0]))
+    assert resample(points, 60).tolist() == expected

@@ -52,8 +52,17 @@ def resample(points: Points, count: int) -> Points:
 
 
 def _in_order(points: Points) -> Points:
-    """The same points by z, y, x: sums over them then do not depend on the file's order."""
-    return points[np.lexsort(points.T)]
+    """The same points by z, y, x: sums over them then do not depend on the file's order.
+
+    z and y are sorted as one whole number; x is looked at only where both are equal somewhere.
+    """
+    bits = (points[:, 1:] + np.float32(0)).view(np.int32)  # no -0
+    y, z = (bits ^ ((bits >> 31) & 0x7FFFFFFF)).T.astype(np.int64)  # ordered as the floats are
+    key = (z << 32) + y
+    order = np.argsort(key)
+    ordered = key[order]
+    tied = bool((ordered[1:] == ordered[:-1]).any())
+    return points[np.lexsort(points.T)] if tied else points[order]
 
 
 def _choose(ordered: Points, count: int) -> Points:
