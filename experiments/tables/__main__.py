@@ -12,15 +12,45 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
-from experiments.tables import seeds, vehicle
+from experiments.tables import (
+    ablations,
+    codes,
+    encoders,
+    kitti,
+    objects,
+    seeds,
+    trucks,
+    vehicle,
+    views,
+)
 from experiments.tables.given import Given
-from experiments.tables.make import chosen_rows, make
+from experiments.tables.make import chosen_rows, draw, make
 from experiments.tables.size import SIZES
 from experiments.tables.train import Workshop
 
 from wildshape.errors import BadInputError, MissingExtraError
 
-TABLES = {"vehicle": vehicle.table, "seeds": seeds.table}
+TABLES = {
+    "views": views.table,
+    "vehicle": vehicle.table,
+    "kitti": kitti.table,
+    "ablations": ablations.table,
+    "seeds": seeds.table,
+    "trucks": trucks.table,
+    "encoders": encoders.table,
+}
+FIGURES = {"codes": codes.draw, "objects": objects.draw}
+Name = Literal[
+    "views",
+    "vehicle",
+    "kitti",
+    "ablations",
+    "seeds",
+    "trucks",
+    "encoders",
+    "codes",
+    "objects",
+]
 
 
 @dataclass(frozen=True)
@@ -31,7 +61,7 @@ class Settings:
     same command goes on.
 
     Attributes:
-        table: which.
+        table: which; codes and objects are figures.
         size: test (seconds), tiny (minutes on a CPU), small (hours) or full (a GPU).
         out: folder of data, runs and scores.
         results: folder of the page and its JSON; by default `out`.
@@ -41,7 +71,7 @@ class Settings:
         rows: only rows whose names hold one of these, with commas.
     """
 
-    table: Annotated[Literal["vehicle", "seeds"], tyro.conf.Positional]
+    table: Annotated[Name, tyro.conf.Positional]
     size: Literal["test", "tiny", "small", "full"] = "tiny"
     out: Path = Path("runs/tables")
     results: Path | None = None
@@ -55,10 +85,13 @@ def main(settings: Settings, command: str) -> None:
     """Make it and print the page."""
     given = Given(SIZES[settings.size], settings.cad, settings.kitti)
     shop = Workshop(settings.out, settings.device, command)
+    name, results = f"{settings.table}-{settings.size}", settings.results or settings.out
+    if settings.table in FIGURES:
+        print(draw(shop, given, FIGURES[settings.table], name, results))
+        return
     words = tuple(word.strip() for word in settings.rows.split(",") if word.strip())
     table = chosen_rows(TABLES[settings.table](given), words)
-    name = f"{settings.table}-{settings.size}"
-    print(make(shop, given, table, name, settings.results or settings.out))
+    print(make(shop, given, table, name, results))
 
 
 if __name__ == "__main__":

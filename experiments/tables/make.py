@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Making a table: every row trained and measured, the seed selected without labels beside it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,13 +11,16 @@ from experiments.tables.given import Given
 from experiments.tables.measure import Measured, measure, seeds_of
 from experiments.tables.show import Part, markdown, record
 from experiments.tables.table import Block, Row, Table, Trained
-from experiments.tables.train import Workshop
+from experiments.tables.train import Model, Workshop
 
 from wildshape.errors import BadInputError
 from wildshape.evaluation.turning import Rotate
 from wildshape.io.atomic import write_json, write_text
 from wildshape.io.provenance import provenance
 from wildshape.models.checkpoint import load_checkpoint
+
+# Writes a picture to a path, and says what is on it.
+Figure = Callable[[Workshop, Given, Path], dict[str, object]]
 
 
 @dataclass(frozen=True)
@@ -35,7 +39,7 @@ class Making:
         found = [(row, self._measured(row, block, rotate)) for row in block.rows]
         rows = tuple((row, measured) for row, measured in found if measured)
         chosen = {
-            row.name: _selected(row.name, measured)
+            row.name: selected(row.name, measured)
             for row, measured in rows
             if _pooled(row, measured)
         }
@@ -52,9 +56,9 @@ def _pooled(row: Row, measured: tuple[Measured, ...]) -> bool:
     return isinstance(row, Trained) and len(measured) > 1
 
 
-def _selected(name: str, measured: tuple[Measured, ...]) -> Measured:
+def selected(name: str, measured: tuple[Measured, ...]) -> Measured:
     """The seed whose label-free cost on held-out tracks is lowest; never the best by the truth."""
-    best = min((one for one in measured if one.model), key=_cost)
+    best = min(measured, key=_cost)
     title = f"{name}, seed {best.results.seed}, selected without labels"
     methods = tuple(replace(scores, name=title) for scores in best.results.methods)
     return replace(best, results=replace(best.results, methods=methods))
@@ -62,7 +66,12 @@ def _selected(name: str, measured: tuple[Measured, ...]) -> Measured:
 
 def _cost(measured: Measured) -> float:
     assert measured.model is not None
-    return load_checkpoint(measured.model.path)[1].cost_m[0]
+    return cost_of(measured.model)
+
+
+def cost_of(model: Model) -> float:
+    """Median label-free cost on tracks held out of its training, metres."""
+    return load_checkpoint(model.path)[1].cost_m[0]
 
 
 def chosen_rows(table: Table, words: tuple[str, ...]) -> Table:
@@ -93,3 +102,12 @@ def make(shop: Workshop, given: Given, table: Table, name: str, results: Path) -
     write_json(results / f"{name}.json", {"size": size, **record(table, parts, made)})
     write_text(results / f"{name}.md", text)
     return text
+
+
+def draw(shop: Workshop, given: Given, figure: Figure, name: str, results: Path) -> str:
+    """Make a figure and write NAME.png and NAME.json; returns where it is."""
+    picture = results / f"{name}.png"
+    drawn = figure(shop, given, picture)
+    made = {"provenance": provenance(shop.command), "size": as_values(given.size)}
+    write_json(results / f"{name}.json", {**made, **drawn})
+    return f"see {picture}"

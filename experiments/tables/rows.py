@@ -6,7 +6,7 @@ from experiments.tables.data import Data
 from experiments.tables.size import Size, sized
 from experiments.tables.table import Baseline, Trained
 
-from wildshape.training.recipes import PRESETS, default, paper_lidar
+from wildshape.training.recipes import PRESETS, default, paper_lidar, paper_views
 
 REGISTERING = (
     "identity",
@@ -36,6 +36,16 @@ def default_form(size: Size, data: Data) -> Trained:
 def oracle(size: Size, data: Data) -> Trained:
     """The paper's network, taught the truth."""
     return Trained("oracle", sized(paper_lidar(), size), data, teacher="truth")
+
+
+def views_form(size: Size, data: Data) -> Trained:
+    """The paper's method on depth views."""
+    return Trained("ours, paper's form", sized(paper_views(), size), data)
+
+
+def views_oracle(size: Size, data: Data) -> Trained:
+    """The paper's network on depth views, taught the truth."""
+    return Trained("oracle", sized(paper_views(), size), data, teacher="truth")
 
 
 def dpc_rows(size: Size, data: Data) -> tuple[Trained, ...]:

@@ -26,6 +26,7 @@ class Example:
         truth: `(g, 3)`.
         completed: `(m, 3)`, from the middle scan alone.
         fused: `(f, 3)`, all scans moved by the method; None if it does not register.
+        rival: `(f, 3)`, all scans moved by another method; None if none was asked for.
     """
 
     label: str
@@ -35,6 +36,7 @@ class Example:
     truth: Points
     completed: Points
     fused: Points | None
+    rival: Points | None = None
 
 
 def pick(scores: MethodScores) -> dict[str, tuple[str, float]]:
@@ -56,6 +58,7 @@ def gather(
     method: Method,
     *,
     max_scans: int | None = None,
+    rival: Registrar | None = None,
 ) -> list[Example]:
     """The three objects of a run, completed and fused once more for drawing.
 
@@ -65,6 +68,7 @@ def gather(
         name: the method's row; it must complete single scans.
         method: the same as in the run.
         max_scans: the same as in the run.
+        rival: fuses the same tracks, to be drawn beside the method.
     """
     chosen = pick(results[name])
     if not isinstance(method, Completer):
@@ -75,16 +79,19 @@ def gather(
         for track in tracks
         if track.name in wanted
     }
-    made = (_example(label, cd, cases[t], method) for label, (t, cd) in chosen.items())
+    made = (_example(label, cd, cases[t], method, rival) for label, (t, cd) in chosen.items())
     return [example for example in made if example is not None]
 
 
-def _example(label: str, cd: float, case: Case, method: Completer) -> Example | None:
+def _example(
+    label: str, cd: float, case: Case, method: Completer, rival: Registrar | None
+) -> Example | None:
     completed = complete_scans(method, case)[case.middle]
     if completed is None or case.truth is None or case.T_sensor_object is None:
         return None
     T_object_middle = case.T_sensor_object[case.middle].inverse()
     fused = _fuse(method, case) if isinstance(method, Registrar) else None
+    other = None if rival is None else _fuse(rival, case)
     return Example(
         label=label,
         track=case.name,
@@ -93,6 +100,7 @@ def _example(label: str, cd: float, case: Case, method: Completer) -> Example | 
         truth=case.truth.shape,
         completed=T_object_middle.apply_numpy(completed),
         fused=None if fused is None else T_object_middle.apply_numpy(fused),
+        rival=None if other is None else T_object_middle.apply_numpy(other),
     )
 
 

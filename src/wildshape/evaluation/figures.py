@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 # From the front left and above, in the object's frame: orthographic, so sizes compare.
 _AZIMUTH_DEG, _ELEVATION_DEG = 40.0, 22.0
 _PANELS = ("one scan", "truth", "completed", "fused")
+_WITH_RIVAL = ("one scan", "truth", "ICP, fused", "completed", "fused")
 _MAX_DRAWN = 6000
 
 
@@ -42,20 +43,22 @@ def project(points: Points) -> Float[np.ndarray, "n 3"]:
 
 
 def draw_examples(examples: Sequence[Example]) -> Figure:
-    """A row an object: the scan, the truth, the completion and the fused track."""
+    """A row an object: the scan, the truth, a rival's fused track, the completion, the fused."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(3.2 * len(_PANELS), 2.5 * len(examples)), layout="constrained")
-    axes = figure.subplots(len(examples), len(_PANELS), squeeze=False)
+    panels = _WITH_RIVAL if any(e.rival is not None for e in examples) else _PANELS
+    figure = Figure(figsize=(3.2 * len(panels), 2.5 * len(examples)), layout="constrained")
+    axes = figure.subplots(len(examples), len(panels), squeeze=False)
     for row, example in zip(axes, examples, strict=True):
         _draw_example(row, example)
-    for ax, title in zip(axes[0], _PANELS, strict=True):
+    for ax, title in zip(axes[0], panels, strict=True):
         ax.set_title(title)
     return figure
 
 
 def _draw_example(row: Sequence[Axes], example: Example) -> None:
-    clouds = (example.scan, example.truth, example.completed, example.fused)
+    rival = (example.rival,) if len(row) == len(_WITH_RIVAL) else ()
+    clouds = (example.scan, example.truth, *rival, example.completed, example.fused)
     low, high = project(example.truth).min(0)[:2], project(example.truth).max(0)[:2]
     heights = (float(example.truth[:, 2].min()), float(example.truth[:, 2].max()))
     margin = 0.12 * float((high - low).max())

@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What each part is good for (paper, supplement, tables 5 and 6), and what we add taken away."""
+
+from dataclasses import replace
+from typing import Any, Literal
+
+from experiments.tables.given import Given
+from experiments.tables.rows import default_form, paper_form, views_form
+from experiments.tables.table import Block, Table, Trained
+
+from wildshape.evaluation.paper import ABLATION_ROWS, VIEW_COUNT_ROWS
+from wildshape.evaluation.turning import Rotate
+from wildshape.simulate.config import Category
+
+_TURNS: tuple[Rotate, ...] = ("none", "yaw")
+
+
+def table(given: Given) -> Table:
+    """The paper's form and ours on drives; from size small on, the paper's form on depth views."""
+    blocks = [_paper_drives(given), _ours_drives(given)]
+    if given.size.name in ("small", "full"):
+        blocks += [_views(given, category) for category in ("airplane", "car", "chair")]
+    title = "Ablations (paper, supplement, tables 5 and 6)"
+    return Table(title, tuple(blocks), given.size.ablation_seeds)
+
+
+def changed(
+    row: Trained, name: str, part: Literal["network", "loss", "views"], **values: Any
+) -> Trained:
+    """The row with another value in one part of its recipe."""
+    recipe = row.recipe
+    new = replace(getattr(recipe, part), **values)
+    return replace(row, name=name, recipe=replace(recipe, **{part: new}))
+
+
+def _paper_drives(given: Given) -> Block:
+    base = paper_form(given.size, given.drives("train"))
+    rows = (
+        replace(base, name="full: beta 0.05, K 4, 4 views"),
+        changed(base, "w/o projection", "loss", beta=0.0),
+        changed(base, "w/o hindsight: K 1", "network", branches=1),
+        changed(base, "beta 0.25", "loss", beta=0.25),
+        changed(base, "K 2", "network", branches=2),
+        changed(base, "K 8", "network", branches=8),
+        changed(base, "2 views", "views", views=2),
+        changed(base, "8 views", "views", views=8),
+    )
+    title = "Simulated drives, the paper's form"
+    return Block(title, given.drives("test"), rows, VIEW_COUNT_ROWS, _TURNS)
+
+
+def _ours_drives(given: Given) -> Block:
+    base = default_form(given.size, given.drives("train"))
+    plain = changed(base, "default, w/o selector", "network", selector=False)
+    rows = (
+        replace(base, name="default, full"),
+        changed(base, "default, w/o facing: turned in yaw", "views", turn="yaw", roll=0.0),
+        changed(base, "default, w/o mirror", "network", mirror=False),
+        changed(base, "default, w/o template", "loss", template=0.0, template_end=0.0),
+        changed(base, "default, w/o agreed headings", "loss", steady=False, agree_at=()),
+        changed(plain, plain.name, "loss", belief=0.0),
+        replace(base, name="default, taught by the full one", teacher=base),
+    )
+    return Block("Simulated drives, default form", given.drives("test"), rows, (), _TURNS)
+
+
+def _views(given: Given, category: Category) -> Block:
+    base = views_form(given.size, given.views(category, "train"))
+    rows = (
+        replace(base, name=f"{category}, full"),
+        changed(base, f"{category}, w/o projection", "loss", beta=0.0),
+        changed(base, f"{category}, w/o hindsight: K 1", "network", branches=1),
+    )
+    paper = tuple(row for row in ABLATION_ROWS if f" {category}," in row.data)
+    title = f"Depth views, {category}, the paper's form"
+    return Block(title, given.views(category, "test"), rows, paper, percent=True)

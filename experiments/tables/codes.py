@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The codes of test objects in a plane, each drawn as its true shape (paper, t-SNE figure)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+from experiments.tables.data import store_of
+from experiments.tables.given import Given
+from experiments.tables.make import cost_of
+from experiments.tables.rows import default_form
+from experiments.tables.train import Workshop, model_of
+from experiments.tables.tsne import tsne
+
+from wildshape.evaluation.figures import project
+from wildshape.inference.predictor import Predictor, load
+from wildshape.inference.prepare import network_input
+from wildshape.io.atomic import atomic_write
+from wildshape.io.store import open_store
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_MOST, _DRAWN, _WIDTH = 200, 400, 0.07
+
+
+def draw(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
+    """Write the figure; returns what is drawn."""
+    row = default_form(given.size, given.drives("train"))
+    models = [model_of(shop, row, seed) for seed in range(given.size.seeds)]
+    chosen = min(models, key=cost_of)
+    store = open_store(store_of(shop.folder, given.drives("test")))
+    count = min(len(store), _MOST)
+    tracks = [store.track(index) for index in range(count)]
+    codes = _codes(load(chosen.path), [track.scans[track.middle] for track in tracks])
+    places = tsne(codes)
+    with atomic_write(path) as file:
+        _picture(places, [np.asarray(track.shape) for track in tracks]).savefig(
+            file, dpi=150, format="png"
+        )
+    kinds = [track.source for track in tracks]
+    return {"method": row.name, "objects": count, "places": places.tolist(), "sources": kinds}
+
+
+@torch.inference_mode()
+def _codes(model: Predictor, scans: list[np.ndarray]) -> np.ndarray:
+    settings = model.settings
+    given = network_input(scans, settings.input_points, settings.sensor, settings.facing)
+    return model.network.encode(given.scans).double().numpy()
+
+
+def _picture(places: np.ndarray, shapes: list[np.ndarray]) -> Figure:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 10))
+    ax = figure.add_axes((0, 0, 1, 1))
+    ax.set_axis_off()
+    low, high = places.min(0), places.max(0)
+    for place, shape in zip((places - low) / (high - low), shapes, strict=True):
+        _thumbnail(ax, place, shape)
+    ax.set_xlim(-0.06, 1.06)
+    ax.set_ylim(-0.06, 1.06)
+    return figure
+
+
+def _thumbnail(ax: Axes, place: np.ndarray, shape: np.ndarray) -> None:
+    """The true shape from the fixed viewpoint, the same width for every object."""
+    seen = project(shape[:: max(1, len(shape) // _DRAWN)])
+    seen = seen[np.argsort(seen[:, 2])]
+    x, y = (place + seen[:, :2] * _WIDTH / np.ptp(seen[:, 0])).T
+    ax.scatter(x, y, c=seen[:, 2], s=1.0, cmap="viridis", linewidths=0)

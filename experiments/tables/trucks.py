@@ -1,0 +1,29 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Another category at test time: trucks from 14 tracks, without labels (paper, supplement, 4)."""
+
+from experiments.tables.given import Given
+from experiments.tables.rows import baselines, default_form, paper_form
+from experiments.tables.table import Block, Table, Trained
+
+from wildshape.evaluation.paper import TRUCK_ROWS
+
+
+def table(given: Given) -> Table:
+    """A model of cars as it is, fine-tuned on the trucks it is measured on, and from nothing."""
+    size, trucks = given.size, given.trucks()
+    rows = []
+    for cars in (
+        paper_form(size, given.drives("train")),
+        default_form(size, given.drives("train")),
+    ):
+        rows += [
+            Trained(f"{cars.name}, cars only", cars.recipe, cars.data),
+            Trained(f"{cars.name}, fine-tuned (train --start)", cars.recipe, trucks, start=cars),
+            Trained(f"{cars.name}, these trucks only", cars.recipe, trucks),
+        ]
+    block = Block("Trucks", trucks, (*rows, *baselines("identity", "local-icp")), TRUCK_ROWS)
+    note = (
+        "Fine-tuned, as the paper has it, on the very tracks that are measured: no label is used."
+    )
+    return Table("Fine-tuning on trucks (paper, supplement)", (block,), size.seeds, (note,))
