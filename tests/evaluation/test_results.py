@@ -150,6 +150,10 @@ def test_examples_and_figures(tmp_path):
     paths = write_figures(tmp_path, results, examples)
     assert [p.name for p in paths] == ["errors.png", "examples.png"]
     assert all(p.read_bytes()[:4] == b"\x89PNG" for p in paths)
+    assert len(draw_examples(examples).axes) == 3 * 4
+    beside = gather(tracks, results, "m", Method(), rival=LocalIcp())
+    assert np.array_equal(beside[0].rival, examples[0].fused)  # the same ICP
+    assert len(draw_examples(beside).axes) == 3 * 5
 
 
 def test_drawing_keeps_aspect_and_survives_gaps():

@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The tables of the paper: made in their smallest size, found again, and as they are declared."""
+
+import json
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from experiments.tables import make, train  # pyright: ignore
+from experiments.tables.__main__ import TABLES, Settings, main  # pyright: ignore
+from experiments.tables.given import Given  # pyright: ignore
+from experiments.tables.measure import Measured, as_results  # pyright: ignore
+from experiments.tables.size import SIZES, sized  # pyright: ignore
+from experiments.tables.table import Trained  # pyright: ignore
+from experiments.tables.tsne import tsne  # pyright: ignore
+from tests.cars import drive_by
+
+from wildshape.baselines.identity import Identity, OneScan
+from wildshape.errors import BadInputError
+from wildshape.evaluation.protocol import run
+from wildshape.evaluation.results import Results, figures_of
+from wildshape.training.recipes import PRESETS, paper_lidar
+
+ROWS = "paper's form,identity"
+TWO = ("vehicle", "seeds")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("tables")
+
+
+def test_vehicle_table(folder):
+    main(Settings("vehicle", "test", folder, rows=ROWS), "the command")
+    page = (folder / "vehicle-test.md").read_text("utf-8")
+    assert "`the command`, commit " in page
+    assert "| ours, paper's form | 2 |" in page
+    assert "selected without labels" in page
+    assert "† 3D vehicle: oracle" in page
+    assert "Only rows with" in page
+    made = json.loads((folder / "vehicle-test.json").read_text("utf-8"))
+    assert [part["rotate"] for part in made["parts"]] == ["none", "yaw", "so3"]
+    ours = made["rows"]["ours, paper's form"]
+    assert ours["recipe"]["optim"]["steps"] == 10
+    assert len(ours["trained"]) == 2
+    assert all(one["provenance"]["code"] for one in ours["trained"])
+    figures = made["parts"][0]["methods"]
+    assert set(figures["ours, paper's form"]["per_seed"]) == {"0", "1"}
+    assert set(figures["identity"]["per_seed"]) == {"0"}
+    assert figures["identity"]["cd"] > figures["identity"]["cd_floor"] > 0
+
+
+def test_seeds_table_finds_what_is_trained_and_measured(folder, monkeypatch):
+    """It shares its rows with the table of vehicles, made before."""
+    if not (folder / "vehicle-test.json").exists():
+        main(Settings("vehicle", "test", folder, rows=ROWS), "the command")
+    monkeypatch.setattr(train, "setup", None)
+    scores = set((folder / "scores").iterdir())
+    main(Settings("seeds", "test", folder, rows=ROWS), "another command")
+    assert set((folder / "scores").iterdir()) == scores
+    first, second = (json.loads((folder / f"{n}-test.json").read_text("utf-8")) for n in TWO)
+    assert first["parts"][0]["methods"] == second["parts"][0]["methods"]
+
+
+@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES)
+@pytest.mark.parametrize("name", TABLES)
+def test_tables_as_declared(name, size):
+    """No two rows of a table are called alike or trained alike; every size and table exists."""
+    table = TABLES[name](Given(size, Path("cad"), Path("kitti")))
+    for block in table.blocks:
+        names = [row.name for row in block.rows]
+        keys = [row.key for row in block.rows if isinstance(row, Trained)]
+        assert len(set(names)) == len(names)
+        assert len(set(keys)) == len(keys)
+        assert block.paper or name in ("encoders", "ablations")
+
+
+def test_a_table_that_needs_a_folder_says_so():
+    for name, option in (("kitti", "--kitti"), ("trucks", "--cad")):
+        with pytest.raises(BadInputError, match=option):
+            TABLES[name](Given(SIZES["tiny"]))
+
+
+def test_rows_that_are_not_there():
+    table = TABLES["seeds"](Given(SIZES["tiny"]))
+    with pytest.raises(BadInputError, match="no row"):
+        make.chosen_rows(table, ("nothing",))
+
+
+def test_size_keeps_what_is_minimised():
+    recipe = paper_lidar()
+    tiny = sized(recipe, SIZES["tiny"])
+    assert tiny.loss == recipe.loss
+    assert tiny.network.branches == recipe.network.branches
+    assert tiny.optim.steps == SIZES["tiny"].steps
+    for preset in PRESETS.values():
+        assert sized(preset(), SIZES["full"]) == preset()
+
+
+def test_scores_are_read_as_they_were_written():
+    tracks = [drive_by(scans=3, points=60), replace(drive_by(scans=2, points=60), shape=None)]
+    found = run({"scan": OneScan(), "identity": Identity()}, tracks, "yaw", 3)
+    assert as_results(json.loads(json.dumps(asdict(found)))) == found
+
+
+def test_seed_is_selected_by_its_cost_and_not_by_the_truth(monkeypatch):
+    truth = [run({"m": OneScan()}, [drive_by(scans=2, points=n)], seed=n) for n in (60, 400)]
+    worst = min(truth, key=lambda r: -(figures_of(r["m"])["cd"] or 0.0))
+    measured = tuple(Measured(r, {}, None) for r in truth)
+    costs = {60: 0.1, 400: 0.2}
+    monkeypatch.setattr(make, "_cost", lambda one: costs[one.results.seed])
+    chosen = make.selected("ours", measured).results
+    assert isinstance(chosen, Results)
+    assert chosen.seed == worst.seed == 60
+    assert chosen.methods[0].name == "ours, seed 60, selected without labels"
+
+
+def test_tsne_keeps_neighbours_together():
+    rng = np.random.default_rng(0)
+    kind = np.repeat(np.arange(3), 15)
+    places = tsne(rng.normal(size=(3, 32))[kind] * 5 + rng.normal(size=(45, 32)), perplexity=8)
+    apart = np.linalg.norm(places[:, None] - places[None], axis=-1) + 1e9 * np.eye(45)
+    assert (kind[apart.argmin(1)] == kind).all()
+    middles = np.stack([places[kind == k].mean(0) for k in range(3)])
+    inside = max(np.linalg.norm(places[kind == k] - middles[k], axis=1).max() for k in range(3))
+    between = np.linalg.norm(middles[:, None] - middles[None], axis=-1)[np.triu_indices(3, 1)].min()
+    assert between > inside
