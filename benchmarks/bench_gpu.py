@@ -13,16 +13,15 @@ seeds, each on a stream of its own; its time is that of a step of any of them.
 
 import copy
 import time
-from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import torch
 from bench_predict import predictor, scored
 from bench_step import write_cars
+from device_time import laps, wait
 from machine import header
 from no_wait import NoWait
 from outcome import Outcome
@@ -92,12 +91,16 @@ class PlainTrainer:
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=run.recipe.optim.lr)
         self.losses: list[Tensor] = []
 
-    def __call__(self) -> None:
-        run, number, optim = self.run, len(self.losses), self.run.recipe.optim
+    def loss(self) -> Tensor:
+        """Of the next step's batch."""
+        run, number = self.run, len(self.losses)
         run.views.prepare(number)
         batch = run.views.batch(torch.tensor(number, device=run.processes.device))
-        weight = template_weight(number, optim.steps, run.recipe.loss)
-        loss = plain_loss(self.network, batch, run.recipe.loss, weight)
+        weight = template_weight(number, run.recipe.optim.steps, run.recipe.loss)
+        return plain_loss(self.network, batch, run.recipe.loss, weight)
+
+    def __call__(self) -> None:
+        number, optim, loss = len(self.losses), self.run.recipe.optim, self.loss()
         self.optimiser.zero_grad()
         loss.backward()
         if optim.clip > 0:
@@ -108,28 +111,6 @@ class PlainTrainer:
             for mean, now in zip(self.mean.parameters(), self.network.parameters()):
                 mean.lerp_(now, 1 - min(optim.average, (1 + number) / (10 + number)))
         self.losses.append(loss.detach())
-
-
-def wait(device: str) -> None:
-    if device == "cuda":
-        torch.cuda.synchronize()
-
-
-def laps(work: Callable[[], object], count: int, device: str) -> list[float]:
-    """Milliseconds of each call, the host running ahead as it does in training."""
-    if device != "cuda":
-        moments = [time.perf_counter() * 1e3]
-        for _ in range(count):
-            work()
-            moments.append(time.perf_counter() * 1e3)
-        return [b - a for a, b in pairwise(moments)]
-    events = [torch.cuda.Event(enable_timing=True) for _ in range(count + 1)]
-    events[0].record()
-    for event in events[1:]:
-        work()
-        event.record()
-    torch.cuda.synchronize()
-    return [a.elapsed_time(b) for a, b in pairwise(events)]
 
 
 def steps(outcome: Outcome, recipe: Recipe, store: Store, size: Size, device: str) -> None:
@@ -168,19 +149,28 @@ def launches(trainer: Trainer) -> str:
 
 
 def agreement(outcome: Outcome, recipe: Recipe, store: Store, count: int, device: str) -> None:
-    """Loss by loss, from the same weights on the same batches."""
-    plain = PlainTrainer(prepared(recipe, store, device))
-    for _ in range(count):
-        plain()
-    expected = torch.stack(plain.losses).cpu()
+    """Loss by loss on the same batches: at the same weights; and each going its own way.
+
+    On their own ways rounding alone, by the branch that wins a near tie, parts any two runs.
+    """
+    free, judge = (PlainTrainer(prepared(recipe, store, device)) for _ in range(2))
     for precision in ("bf16", "fp32"):
         held = replace(recipe, optim=replace(recipe.optim, precision=precision))
         fast = Trainer(prepared(held, store, device))
+        judge.losses = []
         for _ in range(count):
+            judge.network.load_state_dict(twin_of(fast.run.state.network).state_dict())
+            judge.losses.append(judge.loss().detach())
             fast()
-        apart = ((fast.meter.losses(0, count) - expected).abs() / expected).max()
-        name = f"{recipe.name}: losses of {count} steps off by, {precision}"
-        outcome.bar(name, float(apart), LOSS_BAR)
+        while len(free.losses) < count:
+            free()
+        found, name = fast.meter.losses(0, count), f"{recipe.name}: losses of {count} steps"
+        same, own = (
+            float(((found - torch.stack(t.losses).cpu()).abs() / found).max())
+            for t in (judge, free)
+        )
+        outcome.bar(f"{name} off by, {precision}", same, LOSS_BAR)
+        outcome.note(f"{name}, each going its own way, {precision}: off by {own:.1e}")
 
 
 def side_by_side(outcome: Outcome, recipe: Recipe, store: Store, size: Size, device: str) -> None:

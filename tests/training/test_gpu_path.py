@@ -28,16 +28,14 @@ from wildshape.ops import nearest
 from wildshape.ops.zbuffer_triton import visible_triton
 
 store = open_store(sys.argv[1])
-for recipe in RECIPES:
+for recipe, encoding, off in ((RECIPES[0], "bf16", 2e-2), (RECIPES[2], "static", 1e-4)):
     expected = take(step_of(recipe, store), recipe, 2)
     kept = nearest.backend, hindsight.visible
     nearest.backend = lambda device="cpu": "triton"
     hindsight.visible = visible_triton
-    found = take(step_of(recipe, store), recipe, 2)
-    half = take(step_of(recipe, store, "bf16"), recipe, 2)
+    found = take(step_of(recipe, store, encoding), recipe, 2)
     nearest.backend, hindsight.visible = kept
-    torch.testing.assert_close(found, expected, rtol=1e-4, atol=0)
-    torch.testing.assert_close(half, expected, rtol=2e-2, atol=0)
+    torch.testing.assert_close(found, expected, rtol=off, atol=0)
 """
 
 
