@@ -14,6 +14,7 @@ from wildshape.errors import BadInputError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from wildshape.baselines.dpc import Dpc
     from wildshape.cli.reading import Reading
     from wildshape.evaluation.method import Method
     from wildshape.evaluation.results import Results
@@ -112,8 +113,8 @@ def choose_baselines(names: str) -> "dict[str, Method]":
     return {name: baseline(name) for name in wanted if name not in ("", "none")}
 
 
-def load_models(models: "Sequence[Path]", device: str) -> "dict[str, Predictor]":
-    """Predictors by the name of their row; the shipped weights if none is named.
+def load_models(models: "Sequence[Path]", device: str) -> "dict[str, Predictor | Dpc]":
+    """Models by the name of their row, ours or DPC's; the shipped weights if none is named.
 
     Raises:
         BadInputError: a checkpoint that cannot be used, two of one name, or a baseline's name.
@@ -124,7 +125,7 @@ def load_models(models: "Sequence[Path]", device: str) -> "dict[str, Predictor]"
 
     if not models:
         return {OURS: load_model(None, device)}
-    found: dict[str, Predictor] = {}
+    found: dict[str, Predictor | Dpc] = {}
     for model in models:
         file = model_file(model)
         name = file.resolve().parent.name if file.name == MODEL else file.stem
@@ -132,8 +133,17 @@ def load_models(models: "Sequence[Path]", device: str) -> "dict[str, Predictor]"
             raise BadInputError(f"{model}: another --model is called {name} too; rename one.")
         if name in NAMES:
             raise BadInputError(f"{model}: {name} is the name of a baseline; rename the model.")
-        found[name] = load_model(model, device)
+        found[name] = _dpc(file, device) or load_model(model, device)
     return found
+
+
+def _dpc(file: Path, device: str) -> "Dpc | None":
+    """The trained DPC in a file, if it is one."""
+    from wildshape.baselines import dpc
+    from wildshape.cli.models import choose_device
+    from wildshape.models.dpc_checkpoint import is_dpc
+
+    return dpc.load(file, choose_device(device)) if is_dpc(file) else None
 
 
 def evaluate_once(
@@ -192,20 +202,34 @@ def _useful_seeds(settings: Settings) -> int:
     return settings.seeds
 
 
-def _rows(models: "dict[str, Predictor]") -> "dict[str, Method]":
+def _rows(models: "dict[str, Predictor | Dpc]") -> "dict[str, Method]":
+    from wildshape.baselines.dpc import Dpc
     from wildshape.inference.method import Learned
 
-    return {name: Learned(predictor) for name, predictor in models.items()}
+    return {
+        name: model if isinstance(model, Dpc) else Learned(model) for name, model in models.items()
+    }
 
 
-def _pooled(models: "dict[str, Predictor]") -> "list[dict[str, Method]]":
-    """Each model under our one name, in a run of its own."""
+def _pooled(models: "dict[str, Predictor | Dpc]") -> "list[dict[str, Method]]":
+    """Each model under our one name, in a run of its own.
+
+    Raises:
+        BadInputError: one of them is not ours.
+    """
+    from wildshape.baselines.dpc import Dpc
+
+    for name, model in models.items():
+        if isinstance(model, Dpc):
+            raise BadInputError(f"--as-seeds: {name} is a trained DPC; leave out --as-seeds.")
     return [{OURS: method} for method in _rows(models).values()]
 
 
-def _with_selected(runs: "list[Results]", models: "dict[str, Predictor]") -> "list[Results]":
+def _with_selected(runs: "list[Results]", models: "dict[str, Predictor | Dpc]") -> "list[Results]":
     """The run of the model with the lowest label-free cost gets a second row for it."""
-    costs = [predictor.settings.cost_m[0] for predictor in models.values()]
+    from wildshape.inference.predictor import Predictor
+
+    costs = [model.settings.cost_m[0] for model in models.values() if isinstance(model, Predictor)]
     best = costs.index(min(costs))
     name = f"{OURS}, seed selected without labels ({list(models)[best]})"
     chosen = replace(runs[best][OURS], name=name)

@@ -5,6 +5,7 @@
 import os
 import time
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
 
 EXAMPLE = "wildshape train cars.store --out runs/cars --preset small"
 
+Preset = Literal[
+    "paper-lidar", "paper-views", "default", "small", "tiny",
+    "dpc", "dpc-dagger", "dpc-lidar", "dpc-small", "dpc-dagger-small", "dpc-lidar-small",
+]  # fmt: skip
 OutRun = Annotated[Path, arg(metavar="RUN", help="folder of the run")]
 _PACKED = "data.store"
 _FILES = (
@@ -44,7 +49,8 @@ class Settings:
     processes train together.
 
     Attributes:
-        preset: sizes, losses and schedule.
+        preset: sizes, losses and schedule; dpc... is the learned baseline of the paper, for
+            `evaluate` to stand beside ours.
         steps: gradient steps instead of the preset's; the schedule is stretched to them.
         seed: of weights and batches.
         resume: go on with RUN; a finished one is left as it is.
@@ -56,7 +62,7 @@ class Settings:
 
     data: Data
     out: OutRun
-    preset: Literal["paper-lidar", "paper-views", "default", "small", "tiny"] = "default"
+    preset: Preset = "default"
     steps: Annotated[int | None, arg(metavar="N")] = None
     seed: Annotated[int, arg(metavar="S")] = 0
     resume: bool = False
@@ -87,6 +93,12 @@ def run(settings: Settings) -> None:
         raise BadInputError(f"--seed {settings.seed}: expected 0 or more.")
     device = choose_device(settings.device)
     output = _check_folder(settings)
+    if settings.preset.startswith("dpc"):
+        from wildshape.cli.train_dpc import DpcOrder, train_dpc
+
+        order = DpcOrder.of(vars(settings), device)
+        train_dpc(order, output, partial(open_data, settings))
+        return
     try:
         store = open_data(settings)
         recipe = recipe_for(store, settings.preset, settings.steps)

@@ -8,24 +8,26 @@ Batches depend on (seed, step) alone, so there is no random state to keep.
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Generic, TypeVar
 
 import torch
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save
+from torch import nn
 
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import atomic_write
-from wildshape.models.shapepose import ShapePoseNet
 
 STATE = "state.safetensors"
+Net = TypeVar("Net", bound=nn.Module)
 
 
 @dataclass
-class TrainState:
+class TrainState(Generic[Net]):
     """Network, its running mean, the optimiser, how many steps are done, and agreed headings."""
 
-    network: ShapePoseNet
-    mean: ShapePoseNet
+    network: Net
+    mean: Net
     optimiser: torch.optim.Adam
     step: int = 0
     anchors: torch.Tensor | None = None
