@@ -42,7 +42,7 @@ class DpcOrder:
             if settings[option]:
                 raise BadInputError(f"--{option} is not for preset {settings['preset']}; drop it.")
         own = ("preset", "steps", "seed", "data", "out", "resume", "json")
-        return cls(*(settings[name] for name in own), device)
+        return cls(**{name: settings[name] for name in own}, device=device)
 
 
 def train_dpc(order: DpcOrder, output: "Output | None", open_data: "Callable[[], Store]") -> None:

@@ -84,7 +84,8 @@ class DpcNet(nn.Module):
         for module in self.modules():
             if isinstance(module, nn.Conv2d | nn.Linear):
                 nn.init.kaiming_normal_(module.weight, a=_LEAK)
-                nn.init.zeros_(module.bias)
+                if module.bias is not None:
+                    nn.init.zeros_(module.bias)
         nn.init.trunc_normal_(self.shape.weight, std=0.025)
         nn.init.trunc_normal_(self.strength.weight, std=0.025)
         if self.translation is not None:

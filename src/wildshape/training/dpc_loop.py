@@ -131,8 +131,9 @@ def _take(run: DpcRun, objective: DpcObjective, meter: Meter) -> None:
     state.optimiser.zero_grad(set_to_none=True)
     result.loss.backward()
     state.optimiser.step()
-    parts = (list(state.mean.parameters()), list(state.network.parameters()))
-    average_one_by_one(*parts, torch.tensor(1 - optim.average, device=device))
+    mean: list[torch.Tensor] = list(state.mean.parameters())
+    now: list[torch.Tensor] = list(state.network.parameters())
+    average_one_by_one(mean, now, torch.tensor(1 - optim.average, device=device))
     meter.write(torch.tensor(state.step, device=device), result)
     state.step += 1
 
