@@ -83,7 +83,7 @@ def blocked(drives, number):
 
 
 def wait_for_parts(out, count, process):
-    until = time.monotonic() + 60
+    until = time.monotonic() + 300
     while len(list(out.glob(".parts/0*/part.json"))) < count:
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < until

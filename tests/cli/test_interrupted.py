@@ -31,7 +31,7 @@ def running(*arguments):
 
 
 def wait_for(condition, process):
-    until = time.monotonic() + 60
+    until = time.monotonic() + 300
     while not condition():
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < until

@@ -98,7 +98,9 @@ def _all_parts(task: Conversion, parts: list[Part], order: Order) -> list[PartRe
     with progress(f"converting {order.name}", len(parts), start=len(results)) as bar:
         for part, result in _shared_out(task, todo, order):
             results[part] = result
-            bar.at(len(results), _so_far(list(results.values())))
+            so_far = list(results.values())
+            if len(so_far) < len(parts) or any(r.tracks for r in so_far):  # else it is refused
+                bar.at(len(so_far), _so_far(so_far))
     return [results[part] for part in parts]
 
 
