@@ -19,7 +19,7 @@ from machine import header
 from outcome import Outcome
 from plain import gradients_as_ours, twin_of
 from torch import Tensor
-from turns import options, take_turns
+from turns import begin, options, take_turns
 
 from wildshape.models.pcn_winners import encode_winners
 from wildshape.models.shapepose import ShapePoseNet
@@ -96,8 +96,7 @@ def measure(outcome: Outcome, preset: str, seconds: float) -> None:
 
 
 def main() -> None:
-    arguments = options(__doc__).parse_args()
-    torch.set_num_threads(arguments.threads)
+    arguments = begin(options(__doc__))
     keep_memory()
     print(header("bench_encoder.py"))
     outcome = Outcome("encoder")

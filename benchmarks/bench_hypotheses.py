@@ -18,7 +18,7 @@ from machine import header
 from outcome import Outcome
 from plain import apart, explain
 from torch import Tensor
-from turns import options, take_turns
+from turns import begin, options, take_turns
 
 from wildshape.datasets.views import Batch
 from wildshape.geometry.rotation import rotation_from_6d
@@ -144,8 +144,7 @@ def measure(outcome: Outcome, preset: str, seconds: float) -> None:
 
 
 def main() -> None:
-    arguments = options(__doc__).parse_args()
-    torch.set_num_threads(arguments.threads)
+    arguments = begin(options(__doc__))
     keep_memory()
     print(header("bench_hypotheses.py"))
     outcome = Outcome("hypotheses")

@@ -18,7 +18,7 @@ import torch
 from machine import header
 from outcome import Outcome
 from torch import Tensor
-from turns import options, take_turns
+from turns import begin, options, take_turns
 
 from wildshape.ops.library import library
 from wildshape.ops.nearest import Neighbours, nearest_distance
@@ -154,8 +154,7 @@ def shell(B: int, n: int, generator: torch.Generator) -> Tensor:
 
 
 def main() -> None:
-    arguments = options(__doc__).parse_args()
-    torch.set_num_threads(arguments.threads)
+    arguments = begin(options(__doc__))
     print(header("bench_nearest.py"))
     outcome = Outcome("nearest")
     methods = candidates(arguments.threads, outcome, slow=not arguments.small)

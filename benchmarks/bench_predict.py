@@ -20,7 +20,7 @@ import torch
 from machine import header
 from outcome import Outcome
 from torch import Tensor
-from turns import options, take_turns, timed
+from turns import begin, options, set_clock, take_turns, timed
 
 from wildshape.inference.predictor import Predictor
 from wildshape.io.ply_writer import write_ply
@@ -123,8 +123,7 @@ def start(arguments: tuple[str, ...], folder: Path) -> None:
 
 
 def main() -> None:
-    arguments = options(__doc__).parse_args()
-    torch.set_num_threads(arguments.threads)
+    arguments = begin(options(__doc__))
     print(header("bench_predict.py"))
     outcome = Outcome("predict")
     tracks = simulate_tracks(SimulationConfig(tracks=4), seed=0, workers=1)
@@ -134,6 +133,7 @@ def main() -> None:
         one_scan(outcome, preset, scans[0], seconds)
     for preset in SIZES:
         many_scans(outcome, preset, scans[: 32 if arguments.small else 128], seconds)
+    set_clock(cpu=False)  # other processes' time is not ours
     starts(outcome, scans[0], 2 if arguments.small else 7)
     outcome.publish(arguments.out, small=arguments.small)
 

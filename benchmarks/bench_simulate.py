@@ -9,10 +9,9 @@ import os
 import resource
 import time
 
-import torch
 from machine import header
 from outcome import Outcome
-from turns import options
+from turns import begin, options
 
 from wildshape.simulate.config import SensorName
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
@@ -43,8 +42,7 @@ def measure(sensor: SensorName, tracks: int, workers: int) -> tuple[list[float],
 
 
 def main() -> None:
-    arguments = options(__doc__).parse_args()
-    torch.set_num_threads(arguments.threads)
+    arguments = begin(options(__doc__))
     print(header("bench_simulate.py"))
     outcome, tracks = Outcome("simulate", unit="ms a scan"), 120 if arguments.small else 240
     for sensor in _SENSORS[:1] if arguments.small else _SENSORS:

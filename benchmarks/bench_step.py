@@ -30,7 +30,7 @@ import torch
 from machine import header, median, peak_mib
 from outcome import Outcome
 from plain import gradients_as_ours, plain_loss, twin_of
-from turns import options
+from turns import begin, clock_name, now, options, set_clock
 
 from wildshape.datasets.views import Batch, ViewSampler
 from wildshape.io.store import open_store
@@ -91,9 +91,12 @@ def in_double(held: Trained) -> Trained:
     return held
 
 
-def serve(link: Connection, variant: str, preset: str, store: Path, threads: int) -> None:
+def serve(
+    link: Connection, variant: str, preset: str, store: Path, threads: int, clock: str
+) -> None:
     """A process of its own that answers: steps, its peak memory, loss and gradients."""
     torch.set_num_threads(threads)
+    set_clock(cpu=clock == "CPU time")
     if variant != "plain":
         keep_memory()
     recipe, opened = PRESETS[preset](), open_store(store)
@@ -128,7 +131,7 @@ class Stepper:
 
     def step(self) -> float:
         """Milliseconds of one step."""
-        began, optim, network = time.perf_counter(), self.recipe.optim, self.held.network
+        began, optim, network = now(), self.recipe.optim, self.held.network
         batch = self.sampler.draw(_SEED, self.done)
         weight = template_weight(self.done, optim.steps, self.recipe.loss)
         loss = self.held.loss(batch, weight)
@@ -139,13 +142,13 @@ class Stepper:
         self.optimiser.step()
         average(self.mean, network, optim.average)
         self.done += 1
-        return 1e3 * (time.perf_counter() - began)
+        return 1e3 * (now() - began)
 
 
 @torch.no_grad()
 def average(mean: torch.nn.Module, network: torch.nn.Module, decay: float) -> None:
-    for held, now in zip(mean.parameters(), network.parameters()):
-        held.lerp_(now, 1 - decay)
+    for held, new in zip(mean.parameters(), network.parameters()):
+        held.lerp_(new, 1 - decay)
 
 
 @dataclass
@@ -164,7 +167,7 @@ def measure(preset: str, store: Path, threads: int, seconds: float) -> dict[str,
     context = multiprocessing.get_context("spawn")
     for variant in VARIANTS:
         links[variant], theirs = context.Pipe()
-        arguments = (theirs, variant, preset, store, threads)
+        arguments = (theirs, variant, preset, store, threads, clock_name())
         processes.append(context.Process(target=serve, args=arguments, daemon=True))
         processes[-1].start()
     rows = {name: Row() for name in links}
@@ -240,8 +243,7 @@ def main() -> None:
     parser = options(__doc__)
     parser.add_argument("--preset", choices=sorted(PRESETS), action="append")
     parser.add_argument("--seconds", type=float, default=60.0, help="for each preset")
-    arguments = parser.parse_args()
-    torch.set_num_threads(arguments.threads)
+    arguments = begin(parser)
     print(header("bench_step.py"))
     outcome = Outcome("step")
     with TemporaryDirectory() as folder:

@@ -11,7 +11,7 @@ import torch
 from machine import header
 from outcome import Outcome
 from torch import Tensor
-from turns import options, take_turns
+from turns import begin, options, take_turns
 
 from wildshape.ops.library import library
 from wildshape.ops.zbuffer_native import visible_native
@@ -45,8 +45,7 @@ def measure(outcome: Outcome, shape: tuple[int, int, int], seconds: float) -> No
 
 
 def main() -> None:
-    arguments = options(__doc__).parse_args()
-    torch.set_num_threads(arguments.threads)
+    arguments = begin(options(__doc__))
     print(header("bench_zbuffer.py"))
     outcome = Outcome("zbuffer")
     for shape in SMALL if arguments.small else SHAPES:

@@ -16,6 +16,7 @@ from typing import Any
 import torch
 from figure import draw
 from machine import header, p95, verdict
+from turns import clock_name
 
 from wildshape.io.atomic import write_json, write_text
 from wildshape.io.provenance import provenance
@@ -84,7 +85,12 @@ class Outcome:
         writer.writerows({k: rounded(v) for k, v in row.items()} for row in self.rows)
         write_text(folder / f"{self.name}.csv", text.getvalue())
         write_json(folder / f"{self.name}.json", self.record(small))
-        draw(folder / f"{self.name}.svg", self.rows, self.unit, header(self.name))
+        draw(
+            folder / f"{self.name}.svg",
+            self.rows,
+            self.unit,
+            f"{header(self.name)}; {clock_name()}",
+        )
 
     def record(self, small: bool) -> dict[str, Any]:
         """Where the numbers come from, and what they say of the bars."""
@@ -94,6 +100,7 @@ class Outcome:
         load = [round(value, 2) for value in os.getloadavg()] if hasattr(os, "getloadavg") else None
         return made | {
             "form": "small" if small else "full",
+            "clock": clock_name(),
             "threads": torch.get_num_threads(),
             "nearest_backend": backend(),
             "load_at_the_end": load,

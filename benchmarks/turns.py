@@ -3,6 +3,7 @@
 """Timing by turns: all methods of a comparison in one run, busy neighbours hit them alike."""
 
 import argparse
+import os
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import torch
 
 _MOST_IN_A_ROUND = 5
+_state: dict[str, Callable[[], float]] = {"clock": time.perf_counter}
 
 
 def options(doc: str | None) -> argparse.ArgumentParser:
@@ -19,8 +21,37 @@ def options(doc: str | None) -> argparse.ArgumentParser:
     )
     parser.add_argument("--small", action="store_true", help="the form that `make bench` runs")
     parser.add_argument("--threads", type=int, default=torch.get_num_threads())
+    parser.add_argument(
+        "--cpu-time", action="store_true", help="where others use the machine too; one thread"
+    )
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
     return parser
+
+
+def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
+    """Read the command line and set threads and clock by it."""
+    arguments = parser.parse_args()
+    if arguments.cpu_time:
+        arguments.threads = 1
+    torch.set_num_threads(arguments.threads)
+    # Competitors with an OpenMP runtime of their own are imported after this.
+    os.environ["OMP_NUM_THREADS"] = str(arguments.threads)
+    set_clock(cpu=arguments.cpu_time)
+    return arguments
+
+
+def set_clock(*, cpu: bool) -> None:
+    """Time by this process's own CPU seconds, all its threads together, or by the wall's."""
+    _state["clock"] = time.process_time if cpu else time.perf_counter
+
+
+def clock_name() -> str:
+    return "CPU time" if _state["clock"] is time.process_time else "wall clock"
+
+
+def now() -> float:
+    """Seconds on the clock that is set."""
+    return _state["clock"]()
 
 
 def take_turns(
@@ -47,6 +78,6 @@ def _calls_a_round(first: dict[str, float]) -> dict[str, int]:
 
 def timed(work: Callable[[], object]) -> float:
     """Milliseconds of one call."""
-    began = time.perf_counter()
+    began = now()
     work()
-    return 1e3 * (time.perf_counter() - began)
+    return 1e3 * (now() - began)
