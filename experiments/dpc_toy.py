@@ -30,7 +30,7 @@ from wildshape.training.dpc import PRESETS, DpcRecipe
 from wildshape.training.dpc_loop import DpcRun, fit_dpc, setup_dpc
 
 TRAINED, TESTED, BATCH = 250, 50, 16
-CLOSE_DEG, EVERY = 15.0, 250
+CLOSE_DEG, EVERY = 15.0, 100
 
 
 def views_of_an_airplane(seed: int) -> tuple[Track, Track]:
@@ -86,7 +86,7 @@ def right_share(method: Dpc, track: Track) -> dict[str, float]:
 
 def train(run: DpcRun, tested: Track) -> dict[str, Any]:
     """Train to the end, with a look at the poses now and then."""
-    method = Dpc(run.state.mean, DpcSettings(run.recipe.network, depth=run.recipe.loss.depth))
+    method = Dpc(run.state.mean.eval(), DpcSettings(run.recipe.network, depth=run.recipe.loss.depth))
 
     def report(step: int, values: dict[str, Any]) -> None:
         if step % EVERY == 0:

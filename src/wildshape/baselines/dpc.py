@@ -72,7 +72,7 @@ class Dpc:
             BadInputError: another sensor than trained on, or an object out of the image.
         """
         cloud, T_sensor_can = self._look(points, sensor)
-        return T_sensor_can.apply(cloud).numpy()
+        return T_sensor_can.apply(cloud).float().numpy()
 
     def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:
         """`T_middle_scan`, one a scan: takes each scan to the frame of the middle scan.
@@ -93,7 +93,7 @@ class Dpc:
 
     @torch.inference_mode()
     def _look(self, points: Points, sensor: Sensor) -> tuple[Float[Tensor, "n 3"], SE3]:
-        """Canonical points in metres, and `T_sensor_canonical`."""
+        """Canonical points in metres, and `T_sensor_canonical`; float64."""
         volume = self.settings.network.volume
         _refuse_other(sensor, volume)
         device = next(self.network.parameters()).device
@@ -106,7 +106,8 @@ class Dpc:
         poses = self.network.poses(code)
         rotation = turn.mT @ rotation_from_quaternion(poses.student)[0]
         middle = turn.mT @ (volume.scale * poses.translation + ahead(offset, volume))[0]
-        return (volume.scale * cloud[0]).cpu(), SE3(rotation.cpu(), middle.cpu())
+        pose = SE3(rotation.cpu().double(), middle.cpu().double())
+        return (volume.scale * cloud[0]).cpu().double(), pose
 
 
 def _before(

@@ -92,13 +92,13 @@ def run(settings: Settings) -> None:
     if settings.seed < 0:
         raise BadInputError(f"--seed {settings.seed}: expected 0 or more.")
     device = choose_device(settings.device)
-    output = _check_folder(settings)
     if settings.preset.startswith("dpc"):
         from wildshape.cli.train_dpc import DpcOrder, train_dpc
 
         order = DpcOrder.of(vars(settings), device)
-        train_dpc(order, output, partial(open_data, settings))
+        train_dpc(order, _check_folder(settings), partial(open_data, settings))
         return
+    output = _check_folder(settings)
     try:
         store = open_data(settings)
         recipe = recipe_for(store, settings.preset, settings.steps)

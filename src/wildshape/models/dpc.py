@@ -72,6 +72,7 @@ class DpcNet(nn.Module):
         code = config.code
         self.dense = nn.Linear(widths[-1] * _SMALLEST_MAP**2, code)
         self.shape_code, self.pose_code = nn.Linear(code, code), nn.Linear(code, code)
+        self.apart = nn.BatchNorm1d(code, affine=False)
         self.shape = nn.Linear(code, 3 * config.points)
         self.strength = nn.Linear(code, 1)
         self.branches = nn.ModuleList(_branch(code) for _ in range(config.candidates + 1))
@@ -107,7 +108,7 @@ class DpcNet(nn.Module):
 
     def poses(self, code: Tensor) -> DpcPoses:
         """The candidates, their student, and the translation."""
-        hidden = leaky_relu(self.pose_code(code), _LEAK)
+        hidden = leaky_relu(self.pose_code(self.apart(code)), _LEAK)
         spoken = torch.stack([branch(hidden) for branch in self.branches], dim=1)
         unit = normalize(spoken, dim=-1)
         shift = torch.zeros_like(unit[:, 0, :3])

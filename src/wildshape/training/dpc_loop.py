@@ -134,6 +134,8 @@ def _take(run: DpcRun, objective: DpcObjective, meter: Meter) -> None:
     mean: list[torch.Tensor] = list(state.mean.parameters())
     now: list[torch.Tensor] = list(state.network.parameters())
     average_one_by_one(mean, now, torch.tensor(1 - optim.average, device=device))
+    for held, new in zip(state.mean.buffers(), state.network.buffers()):
+        held.copy_(new)
     meter.write(torch.tensor(state.step, device=device), result)
     state.step += 1
 
