@@ -5,14 +5,14 @@
 from dataclasses import dataclass
 
 from wildshape.cli.importing import uncollected
-from wildshape.cli.options import AsJson, Device, Input, Model, OutFolder, Overwrite, Unit
+from wildshape.cli.options import AsJson, Device, Input, Model, OutFolder, Overwrite, Together, Unit
 
 EXAMPLE = "wildshape complete scan.ply --out completed"
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Complete the object of each scan, each scan on its own.
+    """Complete the object of each scan, each scan on its own; with --track from all together.
 
     Writes DIR/TRACK/completed/SCAN.ply (the shape in that scan's sensor frame, metres), poses.txt
     (T_sensor_canonical) and objects.json (box, confidence). An interrupted run goes on where it
@@ -24,6 +24,7 @@ class Settings:
     model: Model = None
     unit: Unit = "m"
     device: Device = "auto"
+    together: Together = False
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -44,5 +45,6 @@ def run(settings: Settings) -> None:
         model=settings.model,
         unit=settings.unit,
         device=settings.device,
+        track=settings.together,
     )
     perform(work, overwrite=settings.overwrite, as_json=settings.json)

@@ -46,6 +46,7 @@ class Settings:
         max_scans: take this many scans of a longer track, evenly.
         as_seeds: the models are training seeds of one method: one row with mean and deviation,
             and a second for the one whose label-free validation cost is lowest.
+        track: a second row for each model, which uses all scans of a track together.
     """
 
     data: Data
@@ -56,6 +57,7 @@ class Settings:
     seeds: Annotated[int, arg(metavar="N")] = 1
     max_scans: Annotated[int | None, arg(metavar="N")] = None
     as_seeds: bool = False
+    track: bool = False
     unit: Unit = "m"
     device: Device = "auto"
     overwrite: Overwrite = False
@@ -85,7 +87,10 @@ def run(settings: Settings) -> None:
         settings.out, "evaluate", _identity(settings), FILES, overwrite=settings.overwrite
     )
     pooled = settings.as_seeds and len(models) > 1
-    evaluated = _pooled(models) if pooled else [_rows(models)] * _useful_seeds(settings)
+    together = settings.track
+    evaluated = (
+        _pooled(models, together) if pooled else [_rows(models, together)] * _useful_seeds(settings)
+    )
     runs = [
         evaluate_once(reading, {**baselines, **rows}, settings.rotate, seed, settings.max_scans)
         for seed, rows in enumerate(evaluated)
@@ -202,16 +207,20 @@ def _useful_seeds(settings: Settings) -> int:
     return settings.seeds
 
 
-def _rows(models: "dict[str, Predictor | Dpc]") -> "dict[str, Method]":
+def _rows(models: "dict[str, Predictor | Dpc]", together: bool) -> "dict[str, Method]":
+    """A row a model; where asked, one more for whole tracks used together."""
     from wildshape.baselines.dpc import Dpc
-    from wildshape.inference.method import Learned
+    from wildshape.inference.method import Learned, LearnedTrack
 
-    return {
-        name: model if isinstance(model, Dpc) else Learned(model) for name, model in models.items()
-    }
+    rows: dict[str, Method] = {}
+    for name, model in models.items():
+        rows[name] = model if isinstance(model, Dpc) else Learned(model)
+        if together and not isinstance(model, Dpc):
+            rows[f"{name}, track"] = LearnedTrack(model)
+    return rows
 
 
-def _pooled(models: "dict[str, Predictor | Dpc]") -> "list[dict[str, Method]]":
+def _pooled(models: "dict[str, Predictor | Dpc]", together: bool) -> "list[dict[str, Method]]":
     """Each model under our one name, in a run of its own.
 
     Raises:
@@ -222,7 +231,7 @@ def _pooled(models: "dict[str, Predictor | Dpc]") -> "list[dict[str, Method]]":
     for name, model in models.items():
         if isinstance(model, Dpc):
             raise BadInputError(f"--as-seeds: {name} is a trained DPC; leave out --as-seeds.")
-    return [{OURS: method} for method in _rows(models).values()]
+    return [_rows({OURS: model}, together) for model in models.values()]
 
 
 def _with_selected(runs: "list[Results]", models: "dict[str, Predictor | Dpc]") -> "list[Results]":
@@ -255,7 +264,7 @@ def _views(reading: "Reading") -> bool:
 def _identity(settings: Settings) -> dict[str, Any]:
     from wildshape.cli.models import fingerprint
 
-    names = ("baselines", "rotate", "seeds", "max_scans", "as_seeds", "unit")
+    names = ("baselines", "rotate", "seeds", "max_scans", "as_seeds", "track", "unit")
     models = [fingerprint(model) for model in settings.model] or [fingerprint(None)]
     chosen = {name: getattr(settings, name) for name in names}
     return {**chosen, "data": str(settings.data.resolve()), "models": models}

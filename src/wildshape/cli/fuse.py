@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
-from wildshape.cli.options import AsJson, Device, Model, Overwrite, Unit
+from wildshape.cli.options import AsJson, Device, Model, Overwrite, Together, Unit
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ class Settings:
     model: Model = None
     unit: Unit = "m"
     device: Device = "auto"
+    together: Together = False
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -53,7 +54,8 @@ def run(settings: Settings) -> None:
     reading = Reading(settings.track, settings.unit)
     track = reading.single("fuse")
     predictor = load_model(settings.model, settings.device)
-    done = list(predictor.complete_many(track.scans, track.sensor))
+    complete = predictor.complete_track if settings.together else predictor.complete_many
+    done = list(complete(track.scans, track.sensor))
     fused = fuse_scans(track.scans, to_middle(stack([scan.pose for scan in done])))
     write_cloud(settings.out, fused)
     say_skipped(reading.skipped)
@@ -66,7 +68,7 @@ def run(settings: Settings) -> None:
         f" see {settings.out}"
     )
     data = {"out": str(settings.out), "points": len(fused), "scans": len(track.scans)}
-    data |= {"flagged": len(warnings)}
+    data |= {"flagged": len(warnings), "uses": "track" if settings.together else "scan"}
     answer(text, {**data, "middle_scan": middle}, as_json=settings.json)
 
 

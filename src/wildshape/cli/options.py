@@ -35,3 +35,6 @@ Layout = Annotated[
     Literal["packed", "folders"],
     arg(help="one packed store, or track folders with a file a scan"),
 ]
+Together = Annotated[
+    bool, arg(name="track", help="use all scans of a track together: one shape, posed in each")
+]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, arg
 
 from wildshape.cli.importing import uncollected
-from wildshape.cli.options import AsJson, Device, Model, Overwrite, Unit
+from wildshape.cli.options import AsJson, Device, Model, Overwrite, Together, Unit
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ class Settings:
     model: Model = None
     unit: Unit = "m"
     device: Device = "auto"
+    together: Together = False
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -55,6 +56,8 @@ def run(settings: Settings) -> None:
         raise BadInputError(
             "register SOURCE TARGET prints its result; leave --out away, or name one TRACK alone."
         )
+    if settings.target is not None and settings.together:
+        raise BadInputError("--track poses the scans of a TRACK together; a pair has no track.")
     if settings.target is not None:
         _pair(settings, settings.target)
     elif settings.out is not None:
@@ -74,6 +77,7 @@ def _tracks(settings: Settings, out: Path) -> None:
         model=settings.model,
         unit=settings.unit,
         device=settings.device,
+        track=settings.together,
     )
     perform(work, overwrite=settings.overwrite, as_json=settings.json)
 

@@ -41,6 +41,7 @@ class Work:
         model: checkpoint, None for the shipped one.
         unit: of the files.
         device: `auto`, `cpu` or `cuda`.
+        track: use all scans of a track together.
     """
 
     command: Literal["complete", "register"]
@@ -49,11 +50,13 @@ class Work:
     model: Path | None
     unit: Unit
     device: Device
+    track: bool = False
 
     def identity(self) -> dict[str, Any]:
         """What decides the output's content."""
         source = str(self.input.resolve())
-        return {"input": source, "unit": self.unit, "model": fingerprint(self.model)}
+        found = {"input": source, "unit": self.unit, "model": fingerprint(self.model)}
+        return {**found, "uses": "track"} if self.track else found
 
 
 @dataclass
@@ -104,7 +107,9 @@ def perform(work: Work, *, overwrite: bool, as_json: bool) -> None:
     keep_apart(work.input, work.out)
     output = begin(work.out, work.command, work.identity(), FILES, overwrite=overwrite)
     try:
-        tally = write_results(reading, predictor, output, registers=work.command == "register")
+        tally = write_results(
+            reading, predictor, output, registers=work.command == "register", together=work.track
+        )
     except BadInputError:
         output.abandon()
         raise
@@ -137,7 +142,12 @@ def _conclude(work: Work, tally: Tally, reading: Reading, seconds: float, as_jso
 
 
 def write_results(
-    reading: Reading, predictor: Predictor, output: Output, *, registers: bool = False
+    reading: Reading,
+    predictor: Predictor,
+    output: Output,
+    *,
+    registers: bool = False,
+    together: bool = False,
 ) -> Tally:
     """Complete every scan of every track and write the results, track after track.
 
@@ -146,6 +156,7 @@ def write_results(
         predictor: does the work.
         output: the folder, begun.
         registers: write `T_middle_scan` instead of the completed shapes.
+        together: complete from all scans of a track, not from each on its own.
 
     Raises:
         BadInputError: nothing can be used, or a name cannot be that of a file.
@@ -168,8 +179,11 @@ def write_results(
         for index, track in reading.tracks(done):
             at = lambda text, index=index: bar.at(index, text)  # noqa: E731
             folder = output.path / file_name(track.name)
-            scans = complete_track(track, predictor, folder, at, registers=registers)
-            write_json(folder / OBJECTS, _objects(track, scans, reading, predictor))
+            scans = complete_track(
+                track, predictor, folder, at, registers=registers, together=together
+            )
+            described = _objects(track, scans, reading, predictor, together=together)
+            write_json(folder / OBJECTS, described)
             tally.add(track, scans)
             bar.at(index + 1, track.name)
     tally.skipped = [*earlier, *reading.skipped]
@@ -183,10 +197,12 @@ def complete_track(
     at: Callable[[str], None] = lambda _: None,
     *,
     registers: bool = False,
+    together: bool = False,
 ) -> list[Completion]:
     """Complete the scans of a track, writing each into its folder; all but `objects.json`."""
     found: list[Completion] = []
-    for done in predictor.complete_many(track.scans, track.sensor):
+    complete = predictor.complete_track if together else predictor.complete_many
+    for done in complete(track.scans, track.sensor):
         name = file_name(track.scan_names[len(found)])
         if not registers:
             write_ply(folder / COMPLETED / f"{name}.ply", done.points)
@@ -211,7 +227,7 @@ def file_name(name: str) -> str:
 
 
 def _objects(
-    track: Track, scans: list[Completion], reading: Reading, predictor: Predictor
+    track: Track, scans: list[Completion], reading: Reading, predictor: Predictor, *, together: bool
 ) -> dict[str, Any]:
     prefix = f"{track.name}/"
     skipped = {
@@ -223,7 +239,8 @@ def _objects(
         "format": 1,
         "track": track.name,
         "input": str(reading.source.path.resolve()),
-        "together": False,
+        "uses": "track" if together else "scan",
+        "together": together,
         "model": _model(predictor),
         "scans": [describe(name, done) for name, done in zip(track.scan_names, scans)],
         "skipped": [{"scan": scan, "reason": reason} for scan, reason in skipped.items()],

@@ -19,10 +19,33 @@ from wildshape.geometry.se3 import SE3
 from wildshape.ops.nearest import nearest
 from wildshape.records import Points
 
-_ROUNDS, _POINTS = 10, 128
-_WIDEST_M, _NARROWER, _NARROWEST_M = 0.5, 0.75, 0.06
+_NARROWER = 0.75
 _POINT_SHARE, _STEP, _RIDGE = 0.1, 0.8, 1e-3
 _NORMAL_M, _AWAY_M = 0.35, 1e4
+
+
+class Schedule(NamedTuple):
+    """How the poses are refined.
+
+    Attributes:
+        rounds: each moves every scan once.
+        points: of each scan that are used.
+        most: points of all scans together that are used.
+        widest_m: width of the robust kernel at first; it narrows by a quarter a round.
+        narrowest_m: at last.
+        normal_m: radius of the neighbourhood that a normal is taken from.
+    """
+
+    rounds: int = 10
+    points: int = 128
+    most: int = 65_536
+    widest_m: float = 0.5
+    narrowest_m: float = 0.06
+    normal_m: float = _NORMAL_M
+
+
+COARSE = Schedule()
+FINE = Schedule(rounds=10, points=512, most=4096, widest_m=0.2, normal_m=0.2)
 
 
 class _Surface(NamedTuple):
@@ -34,7 +57,7 @@ class _Surface(NamedTuple):
 
 @torch.no_grad()
 def refine_jointly(
-    scans: list[Points], T_sensor_object: SE3, *, mirror: bool, rounds: int = _ROUNDS
+    scans: list[Points], T_sensor_object: SE3, *, mirror: bool, schedule: Schedule = COARSE
 ) -> SE3:
     """Poses near the given ones under which the scans lie on one surface.
 
@@ -45,36 +68,39 @@ def refine_jointly(
         scans: of one rigid object, sensor frames, metres.
         T_sensor_object: one pose a scan, good to about a metre and 30 degrees.
         mirror: the object is symmetric in the plane y = 0 of its frame.
-        rounds: each moves every scan once.
+        schedule: `FINE` goes on where `COARSE` has come to its end.
     """
     if len(scans) < 2:
         return T_sensor_object
-    points = torch.from_numpy(_sampled(scans))
+    points = torch.from_numpy(_sampled(scans, min(schedule.points, schedule.most // len(scans))))
     start = T_sensor_object.to(torch.float32).inverse()
     T_object_sensor = start
     normals = torch.zeros_like(points)
+    rounds = schedule.rounds
     for step in range(rounds):
         moved = T_object_sensor.apply(points)
         if step % 3 == 0 or step >= rounds - 2:
-            normals = surface_normals(moved.flatten(0, 1)).view_as(moved)
-        width = max(_WIDEST_M * _NARROWER**step, _NARROWEST_M)
+            normals = surface_normals(moved.flatten(0, 1), schedule.normal_m).view_as(moved)
+        width = max(schedule.widest_m * _NARROWER**step, schedule.narrowest_m)
         T_object_sensor = _moved(T_object_sensor, _Surface(moved, normals), width, mirror)
     T_object_sensor = _as_a_whole(start, T_object_sensor, points, mirror) @ T_object_sensor
     return T_object_sensor.inverse().to(T_sensor_object.rotation.dtype)
 
 
-def _sampled(scans: list[Points]) -> Float[np.ndarray, "V n 3"]:
+def _sampled(scans: list[Points], count: int) -> Float[np.ndarray, "V n 3"]:
     """As many points of every scan, chosen by a fixed seed."""
     rng = np.random.default_rng(0)
-    rows = [rng.permutation(len(scan))[np.arange(_POINTS) % len(scan)] for scan in scans]
+    rows = [rng.permutation(len(scan))[np.arange(count) % len(scan)] for scan in scans]
     return np.stack([scan[row] for scan, row in zip(scans, rows)])
 
 
-def surface_normals(points: Float[Tensor, "n 3"]) -> Float[Tensor, "n 3"]:
-    """Unit normals: the direction in which the neighbourhood (within 35 cm) is thinnest."""
+def surface_normals(
+    points: Float[Tensor, "n 3"], radius: float = _NORMAL_M
+) -> Float[Tensor, "n 3"]:
+    """Unit normals: the direction in which the neighbourhood, `radius` metres, is thinnest."""
     squared = points.square().sum(-1)
     distance = torch.addmm(squared[:, None] + squared, points, points.T, alpha=-2)
-    weight = distance.div_(-(_NORMAL_M**2)).add_(1).relu_().square_()
+    weight = distance.div_(-(radius**2)).add_(1).relu_().square_()
     products = (points[:, :, None] * points[:, None]).flatten(1)
     ones = torch.ones_like(points[:, :1])
     sums = weight @ torch.cat((ones, points, products), dim=1)

@@ -43,3 +43,43 @@ class Learned:
             BadInputError: a scan has fewer than 16 finite points.
         """
         return self.predictor.register_track(scans, sensor)
+
+
+@dataclass(frozen=True)
+class LearnedTrack:
+    """Our row that uses all scans of a track together; each scan still gets a shape of its own.
+
+    Attributes:
+        predictor: does the work.
+    """
+
+    predictor: Predictor
+
+    @property
+    def about(self) -> str:
+        """What sets this row apart."""
+        return "poses and shape from all scans of the track together"
+
+    def complete(self, points: Points, sensor: Sensor) -> Points:
+        """One scan is a track of one.
+
+        Raises:
+            BadInputError: fewer than 16 finite points.
+        """
+        return self.predictor.complete(points, sensor).points
+
+    def complete_many(self, scans: list[Points], sensor: Sensor) -> list[Points]:
+        """The track's shape in the frame of each of its scans.
+
+        Raises:
+            BadInputError: one of them has fewer than 16 finite points.
+        """
+        return [done.points for done in self.predictor.complete_track(scans, sensor)]
+
+    def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:
+        """`T_middle_scan`, one a scan.
+
+        Raises:
+            BadInputError: a scan has fewer than 16 finite points.
+        """
+        return self.predictor.register_track(scans, sensor, track=True)

@@ -12,16 +12,16 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from wildshape.geometry.box import fit_box
 from wildshape.geometry.facing import roll_angle
-from wildshape.geometry.rotation import quaternion_from_rotation
 from wildshape.geometry.se3 import SE3, stack
+from wildshape.inference.boxes import box_of
 from wildshape.inference.prepare import NetworkInput, as_points, extent, network_input
+from wildshape.inference.track import complete_together
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.models.checkpoint import ModelSettings, load_checkpoint
 from wildshape.models.shapepose import Poses, ShapePoseNet
 from wildshape.ops.nearest import nearest
-from wildshape.records import Box, Completion, Points, Registration, Sensor
+from wildshape.records import Completion, Points, Registration, Sensor
 
 SHIPPED = Path(__file__).parent.parent / "weights" / "default.safetensors"
 _BATCH, _INLIER_M, _INLIER_SHARE = 32, 0.2, 0.05
@@ -79,6 +79,23 @@ class Predictor:
             seconds = (time.perf_counter() - began) / len(batch)
             yield from (replace(item, seconds=seconds) for item in done)
 
+    def complete_track(
+        self, scans: Sequence[object], sensor: Sensor | None = None
+    ) -> list[Completion]:
+        """One shape from all scans of a track, in time order, posed in each of them.
+
+        Headings are voted, poses refined against each other (`Completion.refined`), and the shape
+        is drawn to what the scans saw (`inference/track.py`).
+
+        Raises:
+            BadInputError: a scan is not `(n, 3)`, or has fewer than 16 finite points.
+        """
+        clouds = [as_points(scan, f"scan {i}") for i, scan in enumerate(scans)]
+        began = time.perf_counter()
+        done = complete_together(list(self.complete_many(clouds, sensor)), clouds, self.settings)
+        seconds = (time.perf_counter() - began) / max(len(done), 1)
+        return [replace(item, seconds=seconds) for item in done]
+
     def register(
         self, source: object, target: object, sensor: Sensor | None = None
     ) -> Registration:
@@ -91,19 +108,34 @@ class Predictor:
         warning = done_source.warning or done_target.warning
         return Registration(T_target_source, ratio, confidence, warning)
 
-    def register_track(self, scans: Sequence[object], sensor: Sensor | None = None) -> SE3:
-        """`T_middle_scan`: every scan to the frame of the track's middle scan."""
-        return to_middle(self.poses(scans, sensor))
+    def register_track(
+        self, scans: Sequence[object], sensor: Sensor | None = None, *, track: bool = False
+    ) -> SE3:
+        """`T_middle_scan`: every scan to the frame of the track's middle scan.
 
-    def poses(self, scans: Sequence[object], sensor: Sensor | None = None) -> SE3:
-        """`T_sensor_canonical` of each scan."""
-        return stack([done.pose for done in self.complete_many(scans, sensor)])
+        Args:
+            scans: of one object, in time order.
+            sensor: how they were taken.
+            track: pose the scans together (`complete_track`) and not each on its own.
+        """
+        return to_middle(self.poses(scans, sensor, track=track))
 
-    def fuse(self, scans: Sequence[object], sensor: Sensor | None = None) -> Points:
-        """All points of a track's scans in the middle scan's sensor frame, metres."""
+    def poses(
+        self, scans: Sequence[object], sensor: Sensor | None = None, *, track: bool = False
+    ) -> SE3:
+        """`T_sensor_canonical` of each scan; `track` as in `register_track`."""
+        complete = self.complete_track if track else self.complete_many
+        return stack([done.pose for done in complete(scans, sensor)])
+
+    def fuse(
+        self, scans: Sequence[object], sensor: Sensor | None = None, *, track: bool = False
+    ) -> Points:
+        """All points of a track's scans in the middle scan's sensor frame, metres.
+
+        `track` as in `register_track`.
+        """
         clouds = [as_points(scan, f"scan {i}") for i, scan in enumerate(scans)]
-        T_middle_scan = self.register_track(clouds, sensor)
-        return fuse_scans(clouds, T_middle_scan)
+        return fuse_scans(clouds, self.register_track(clouds, sensor, track=track))
 
     @torch.inference_mode()
     def _complete_batch(self, scans: list[Points], sensor: Sensor | None) -> list[Completion]:
@@ -185,21 +217,6 @@ class Predictor:
                 " check the unit, or train on such objects"
             )
         return ""
-
-
-def box_of(shape: Tensor, T_sensor_canonical: SE3) -> Box:
-    """The box fitted to the canonical shape, carried to the sensor frame."""
-    fitted = fit_box(shape)
-    centre = T_sensor_canonical.apply(fitted.centre[None])[0]
-    quaternion = quaternion_from_rotation(T_sensor_canonical.rotation @ fitted.rotation)
-    x, y, z = _rounded(centre)
-    length, width, height = _rounded(fitted.size)
-    qw, qx, qy, qz = _rounded(quaternion)
-    return Box((x, y, z), (length, width, height), (qw, qx, qy, qz))
-
-
-def _rounded(values: Tensor) -> list[float]:
-    return [round(value, 6) for value in values.tolist()]
 
 
 def to_middle(T_sensor_canonical: SE3) -> SE3:

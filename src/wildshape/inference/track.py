@@ -1,0 +1,178 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""One object from all scans of its track: headings voted, poses refined, one shape (METHOD 11).
+
+Beyond the paper. Each scan was completed on its own first; here they are held against each other.
+Nothing but the scans and what the network said of each is used.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from wildshape.geometry.outliers import voxel_thin
+from wildshape.geometry.se3 import SE3, stack
+from wildshape.inference.boxes import box_of
+from wildshape.inference.joint import FINE, refine_jointly
+from wildshape.inference.prepare import network_input
+from wildshape.inference.voting import half_turn, voted_signs
+from wildshape.losses.hindsight import score_hypotheses
+from wildshape.models.checkpoint import ModelSettings
+from wildshape.ops.nearest import nearest
+from wildshape.records import Completion, Points
+
+_BATCH, _MOST_POINTS = 32, 4096
+_VOXEL_M, _REACH_M, _STIFFNESS = 0.08, 0.12, 0.2
+_WITHIN_M, _WITHIN_RAD = 1.5, 0.6
+
+
+class TrackFit(NamedTuple):
+    """Poses of one object in a track's scans.
+
+    Attributes:
+        T_sensor_object: of every scan.
+        refined: whether they were made to fit each other.
+    """
+
+    T_sensor_object: SE3
+    refined: bool
+
+
+@torch.inference_mode()
+def complete_together(
+    done: list[Completion], scans: list[Points], settings: ModelSettings
+) -> list[Completion]:
+    """Completions of a track's single scans made those of one object.
+
+    Args:
+        done: each scan on its own.
+        scans: of one rigid object, in time order, sensor frames.
+        settings: of the network that completed them.
+    """
+    if len(done) < 2:
+        return done
+    weights = torch.tensor([max(item.confidence, 1e-3) for item in done], dtype=torch.float64)
+    shape = _mean_shape(done, weights)
+    voted = _voted(stack([item.pose for item in done]), shape, weights, scans, settings)
+    fit = refine_checked(scans, voted, mirror=settings.network.mirror)
+    shape = drawn_to(shape, _seen(scans, fit.T_sensor_object, settings.network.mirror))
+    cost = track_cost(shape, fit.T_sensor_object, scans, settings)
+    confidence = float(np.mean([item.confidence for item in done]))
+    return [
+        replace(
+            item,
+            points=fit.T_sensor_object[i].apply(shape).float().numpy(),
+            pose=fit.T_sensor_object[i],
+            box=box_of(shape, fit.T_sensor_object[i]),
+            confidence=0.0 if item.warning else confidence,
+            cost=float(cost[i]),
+            refined=fit.refined,
+        )
+        for i, item in enumerate(done)
+    ]
+
+
+def _mean_shape(done: list[Completion], weights: Float[Tensor, "V"]) -> Float[Tensor, "P 3"]:
+    """The mean of the canonical shapes: points of one index are the same place of the object."""
+    shapes = [item.pose.inverse().apply(torch.from_numpy(item.points).double()) for item in done]
+    return (torch.stack(shapes) * weights[:, None, None]).sum(0) / weights.sum()
+
+
+def _voted(
+    T_sensor_can: SE3,
+    shape: Float[Tensor, "P 3"],
+    weights: Float[Tensor, "V"],
+    scans: list[Points],
+    settings: ModelSettings,
+) -> SE3:
+    """The same poses, all looking one way."""
+    middle = float(shape[:, 0].amin() + shape[:, 0].amax()) / 2
+    turned = T_sensor_can @ half_turn(middle)
+    stands = track_cost(shape, T_sensor_can, scans, settings)
+    gain = track_cost(shape, turned, scans, settings) - stands
+    signs = voted_signs(T_sensor_can.rotation, gain, weights)
+    back = signs < 0
+    return SE3(
+        torch.where(back[:, None, None], turned.rotation, T_sensor_can.rotation),
+        torch.where(back[:, None], turned.translation, T_sensor_can.translation),
+    )
+
+
+def track_cost(
+    shape: Float[Tensor, "P 3"], T_sensor_object: SE3, scans: list[Points], settings: ModelSettings
+) -> Float[Tensor, "V"]:
+    """The label-free cost of one shape in every scan, metres (METHOD 6)."""
+    found = []
+    for start in range(0, len(scans), _BATCH):
+        part = slice(start, start + _BATCH)
+        given = network_input(scans[part], settings.input_points, settings.sensor, settings.facing)
+        posed = T_sensor_object[part].apply(shape.expand(len(given.scans), -1, -1)).float()
+        posed = posed @ given.turn.mT - given.centres[:, None]
+        scores = score_hypotheses(given.scans, given.centres, posed[:, None], settings.projection)
+        found.append(scores.cost(settings.beta)[:, 0])
+    return torch.cat(found).double()
+
+
+def refine_checked(scans: list[Points], voted: SE3, *, mirror: bool) -> TrackFit:
+    """Joint refinement, kept only if the scans then lie nearer to each other, and near the vote."""
+    refined = refine_jointly(scans, voted, mirror=mirror)
+    refined = refine_jointly(scans, refined, mirror=mirror, schedule=FINE)
+    moved = voted.inverse() @ refined
+    near = bool((moved.angle() < _WITHIN_RAD).all())
+    near = near and bool((moved.translation.norm(dim=-1) < _WITHIN_M).all())
+    if near and _disagreement(scans, refined, mirror) < _disagreement(scans, voted, mirror):
+        return TrackFit(refined, refined=True)
+    return TrackFit(voted, refined=False)
+
+
+def _disagreement(scans: list[Points], T_sensor_object: SE3, mirror: bool) -> float:
+    """Mean distance of every other scan to those between them, metres, each at most 40 cm."""
+    halves = [
+        _fused(scans, T_sensor_object, part) for part in (slice(0, None, 2), slice(1, None, 2))
+    ]
+    bank = _with_mirror(halves[1]) if mirror else halves[1]
+    found = nearest(halves[0][None], bank[None])
+    return float(found.distance_squared.sqrt().clamp_max(0.4).mean())
+
+
+def _fused(scans: list[Points], T_sensor_object: SE3, part: slice) -> Float[Tensor, "n 3"]:
+    """Points of some of the scans in the object frame, at most a few thousand."""
+    rng = np.random.default_rng(0)
+    chosen = range(len(scans))[part]
+    most = max(1, _MOST_POINTS // len(chosen))
+    clouds = []
+    for i in chosen:
+        points = torch.from_numpy(scans[i][rng.permutation(len(scans[i]))[:most]]).double()
+        clouds.append(T_sensor_object[i].inverse().apply(points))
+    return torch.cat(clouds).float()
+
+
+def _with_mirror(points: Float[Tensor, "n 3"]) -> Float[Tensor, "m 3"]:
+    return torch.cat((points, points * points.new_tensor((1.0, -1.0, 1.0))))
+
+
+def _seen(scans: list[Points], T_sensor_object: SE3, mirror: bool) -> Float[Tensor, "n 3"]:
+    """The surface that the scans saw, reflected and thinned to an even density, object frame."""
+    fused = _fused(scans, T_sensor_object, slice(None))
+    fused = _with_mirror(fused) if mirror else fused
+    return torch.from_numpy(voxel_thin(fused.numpy(), _VOXEL_M))
+
+
+def drawn_to(shape: Float[Tensor, "P 3"], seen: Float[Tensor, "n 3"]) -> Float[Tensor, "P 3"]:
+    """The shape's points drawn to the mean of what was seen around them; the others stay.
+
+    Args:
+        shape: object frame.
+        seen: points of even density, the same frame.
+    """
+    moved = []
+    for part in shape.float().split(1024):
+        apart = torch.cdist(part, seen) / _REACH_M
+        weight = torch.exp(-apart.square())
+        total = weight.sum(1, keepdim=True) + _STIFFNESS
+        moved.append((weight @ seen + _STIFFNESS * part) / total)
+    return torch.cat(moved).to(shape.dtype)
