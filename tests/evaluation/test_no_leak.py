@@ -10,6 +10,7 @@ import pytest
 import torch
 from tests.cars import drive_by, poses_of
 
+from wildshape.baselines.dpc import Dpc
 from wildshape.baselines.named import NAMES, baseline
 from wildshape.errors import MissingExtraError
 from wildshape.evaluation.examples import gather
@@ -17,13 +18,16 @@ from wildshape.evaluation.protocol import run
 from wildshape.evaluation.results import figures_of
 from wildshape.geometry.rotation import random_rotation
 from wildshape.geometry.se3 import SE3
+from wildshape.geometry.viewing_volume import PolarVolume
 from wildshape.geometry.visibility import FacingBins
 from wildshape.inference.method import Learned
 from wildshape.inference.predictor import Predictor
 from wildshape.models.checkpoint import ModelSettings
+from wildshape.models.dpc import DpcConfig, DpcNet
+from wildshape.models.dpc_checkpoint import DpcSettings
 from wildshape.models.shapepose import NetworkConfig, ShapePoseNet
 
-LEARNED = "learned"
+LEARNED, DPC = "learned", "dpc-lidar"
 
 
 def learned():
@@ -49,9 +53,17 @@ def learned():
     return Learned(Predictor(ShapePoseNet(network).eval(), settings))
 
 
+def dpc():
+    """A DPC-LIDAR that learned nothing."""
+    torch.manual_seed(0)
+    config = DpcConfig(volume=PolarVolume(), image=16, voxels=8, points=50, channels=4, code=16)
+    return Dpc(DpcNet(config).eval(), DpcSettings(config))
+
+
 def method_named(name):
+    made = {LEARNED: learned, DPC: dpc}
     try:
-        return learned() if name == LEARNED else baseline(name)
+        return made[name]() if name in made else baseline(name)
     except MissingExtraError as error:
         pytest.skip(str(error))
 
@@ -98,7 +110,7 @@ def other_truth(track):
 @pytest.mark.parametrize(
     ("rotate", "accumulated"), [("none", False), ("yaw", True), ("so3", False)]
 )
-@pytest.mark.parametrize("name", [*NAMES, LEARNED])
+@pytest.mark.parametrize("name", [*NAMES, LEARNED, DPC])
 def test_no_bit_of_an_answer_depends_on_the_truth(name, accumulated, rotate):
     track = drive_by(scans=3, points=150)
     track = replace(track, shape=None) if accumulated else track
