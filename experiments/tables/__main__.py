@@ -104,3 +104,6 @@ if __name__ == "__main__":
     except (BadInputError, MissingExtraError) as error:
         print(error, file=sys.stderr)
         sys.exit(2)
+    except KeyboardInterrupt as stopped:
+        print(stopped, file=sys.stderr)
+        sys.exit(130)

@@ -18,6 +18,7 @@ from wildshape.evaluation.turning import Rotate
 from wildshape.io.atomic import write_json, write_text
 from wildshape.io.provenance import provenance
 from wildshape.models.checkpoint import load_checkpoint
+from wildshape.training.config import Recipe
 
 # Writes a picture to a path, and says what is on it.
 Figure = Callable[[Workshop, Given, Path], dict[str, object]]
@@ -53,7 +54,9 @@ class Making:
 
 
 def _pooled(row: Row, measured: tuple[Measured, ...]) -> bool:
-    return isinstance(row, Trained) and len(measured) > 1
+    """Whether a seed can be selected: DPC's checkpoints know no label-free cost."""
+    ours = isinstance(row, Trained) and isinstance(row.recipe, Recipe)
+    return ours and len(measured) > 1
 
 
 def selected(name: str, measured: tuple[Measured, ...]) -> Measured:

@@ -10,9 +10,10 @@ from experiments.tables.data import key, store_of
 from experiments.tables.table import Baseline, Block, Row, Shipped, Trained
 from experiments.tables.train import Model, Workshop, model_of
 
+from wildshape.baselines import dpc
 from wildshape.baselines.named import baseline
 from wildshape.cli.evaluate import evaluate_once
-from wildshape.cli.models import fingerprint, load_model
+from wildshape.cli.models import choose_device, fingerprint, load_model
 from wildshape.cli.reading import Reading
 from wildshape.cli.terminal import say
 from wildshape.errors import MissingExtraError
@@ -29,6 +30,7 @@ from wildshape.evaluation.turning import Rotate
 from wildshape.inference.method import Learned
 from wildshape.io.atomic import write_json
 from wildshape.io.provenance import provenance
+from wildshape.models.dpc_checkpoint import is_dpc
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,8 @@ def _mark(row: Row, model: Model | None) -> str:
 
 
 def _method(shop: Workshop, row: Row, model: Model | None) -> Method | None:
+    if model is not None and is_dpc(model.path):
+        return dpc.load(model.path, choose_device(shop.device))
     if isinstance(row, Shipped) or model is not None:
         return Learned(load_model(None if model is None else model.path, shop.device))
     try:

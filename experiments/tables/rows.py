@@ -3,10 +3,11 @@
 """Rows that several tables share."""
 
 from experiments.tables.data import Data
-from experiments.tables.size import Size, sized
+from experiments.tables.size import Size, sized, sized_dpc
 from experiments.tables.table import Baseline, Trained
 
-from wildshape.training.recipes import PRESETS, default, paper_lidar, paper_views
+from wildshape.training.dpc import dpc, dpc_dagger, dpc_lidar
+from wildshape.training.recipes import default, paper_lidar, paper_views
 
 REGISTERING = (
     "identity",
@@ -48,7 +49,14 @@ def views_oracle(size: Size, data: Data) -> Trained:
     return Trained("oracle", sized(paper_views(), size), data, teacher="truth")
 
 
-def dpc_rows(size: Size, data: Data) -> tuple[Trained, ...]:
-    """DPC in the forms that are presets of `wildshape train`; none where there is none."""
-    names = [name for name in PRESETS if name.startswith("dpc")]
-    return tuple(Trained(name, sized(PRESETS[name](), size), data) for name in names)
+def dpc_views(size: Size, data: Data) -> tuple[Trained, Trained]:
+    """DPC, and DPC with a translation, on depth views."""
+    return (
+        Trained("DPC", sized_dpc(dpc(), size), data),
+        Trained("DPC-dagger", sized_dpc(dpc_dagger(), size), data),
+    )
+
+
+def dpc_drives(size: Size, data: Data) -> Trained:
+    """DPC as the paper adapts it to LiDAR."""
+    return Trained("DPC-LIDAR", sized_dpc(dpc_lidar(), size), data)

@@ -16,7 +16,8 @@ from wildshape.evaluation.tables import COLUMNS, ROTATE, notes, number, pipe_tab
 from wildshape.evaluation.turning import Rotate
 
 _LENGTHS = ("cd", "precision", "coverage", "cd_floor")
-Columns = tuple[tuple[str, str, int, int], ...]
+Column = tuple[str, str, int, int]
+Columns = tuple[Column, ...]
 
 
 @dataclass(frozen=True)
@@ -72,11 +73,15 @@ def _part(part: Part) -> str:
 def _columns(block: Block) -> Columns:
     if not block.percent:
         return COLUMNS
-    return tuple(
-        (f"{name.removesuffix(', m')} x 100", key, 100, 2)
-        if key in _LENGTHS
-        else (name, key, factor, digits)
-        for name, key, factor, digits in COLUMNS
+    return tuple(_of_unit_size(column) for column in COLUMNS)
+
+
+def _of_unit_size(column: Column) -> Column:
+    """Lengths have no unit there, and those of shapes are times 100."""
+    heading, name, factor, digits = column
+    heading = heading.removesuffix(", m")
+    return (
+        (f"{heading} x 100", name, 100, 2) if name in _LENGTHS else (heading, name, factor, digits)
     )
 
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from wildshape.training.config import Recipe
+from wildshape.training.dpc import DpcRecipe
+from wildshape.training.dpc import small as small_dpc
 from wildshape.training.recipes import small, tiny
 
 Like = Literal["tiny", "small"]
@@ -74,3 +76,11 @@ def sized(recipe: Recipe, size: Size) -> Recipe:
         optim=replace(base.optim, steps=size.steps),
         validate_every=min(1000, size.steps),
     )
+
+
+def sized_dpc(recipe: DpcRecipe, size: Size) -> DpcRecipe:
+    """DPC at a size: as its authors have it, or at its small resolution."""
+    if size.steps is None:
+        return recipe
+    base = small_dpc(recipe)
+    return replace(base, optim=replace(base.optim, steps=size.steps))

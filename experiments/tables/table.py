@@ -10,6 +10,7 @@ from experiments.tables.data import Data, key
 from wildshape.evaluation.paper import PaperRow
 from wildshape.evaluation.turning import Rotate
 from wildshape.training.config import Recipe
+from wildshape.training.dpc import DpcRecipe
 
 PROTOCOLS: tuple[Rotate, ...] = ("none", "yaw", "so3")
 
@@ -20,14 +21,14 @@ class Trained:
 
     Attributes:
         name: of the row.
-        recipe: of the training.
+        recipe: of the training; DPC's has neither teacher nor start.
         data: trained on, without labels unless the teacher is the truth.
         teacher: whose poses and shapes are taught (same seed); `truth`: the oracle.
         start: whose weights are fine-tuned (same seed).
     """
 
     name: str
-    recipe: Recipe
+    recipe: Recipe | DpcRecipe
     data: Data
     teacher: "Trained | Literal['truth'] | None" = None
     start: "Trained | None" = None

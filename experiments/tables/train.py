@@ -12,15 +12,21 @@ from typing import Any
 from experiments.tables.data import store_of
 from experiments.tables.table import Trained
 
+from wildshape.cli.interrupt import stop_flag
 from wildshape.cli.models import choose_device
 from wildshape.cli.terminal import progress, say
 from wildshape.cli.train import fit_with_progress
 from wildshape.io.atomic import write_json
 from wildshape.io.provenance import provenance
-from wildshape.io.store import open_store
+from wildshape.io.store import Store, open_store
+from wildshape.training.config import Recipe
+from wildshape.training.dpc import DpcRecipe
+from wildshape.training.dpc_loop import fit_dpc, setup_dpc
 from wildshape.training.loop import MODEL, setup
 
 _TRAINED = "trained.json"
+Made = dict[str, Any]
+Steps = tuple[int, int]  # done before, and now
 
 
 @dataclass(frozen=True)
@@ -61,17 +67,34 @@ def model_of(shop: Workshop, row: Trained, seed: int) -> Model:
 
 
 def _train(shop: Workshop, row: Trained, seed: int, folder: Path) -> None:
+    """Train, and say at the end what it cost."""
+    store = open_store(shop.data(row))
+    made = provenance(shop.command)
+    say(f"{row.name}, seed {seed}")
+    began, worked = time.monotonic(), time.process_time()
+    if isinstance(row.recipe, DpcRecipe):
+        first, steps = _train_dpc(shop, row.recipe, store, seed, folder, made)
+    else:
+        first, steps = _train_ours(shop, row, row.recipe, seed, folder, made)
+    spent = {
+        "steps": steps,
+        "from_step": first,
+        "seconds": round(time.monotonic() - began, 2),
+        "processor_seconds": round(time.process_time() - worked, 2),
+    }
+    write_json(folder / _TRAINED, {**spent, "data": store.fingerprint, "provenance": made})
+
+
+def _train_ours(
+    shop: Workshop, row: Trained, recipe: Recipe, seed: int, folder: Path, made: Made
+) -> Steps:
     teacher = row.teacher
     taught_by = model_of(shop, teacher, seed).path if isinstance(teacher, Trained) else teacher
     start = model_of(shop, row.start, seed).path if row.start else None
-    made = provenance(shop.command)
-    store = open_store(shop.data(row))
-    say(f"{row.name}, seed {seed}")
-    began = time.monotonic()
     with progress("fusing tracks", 0, silent=not isinstance(teacher, Trained)) as bar:
         run = setup(
-            row.recipe,
-            store,
+            recipe,
+            open_store(shop.data(row)),
             folder,
             seed=seed,
             device=choose_device(shop.device),
@@ -84,5 +107,16 @@ def _train(shop: Workshop, row: Trained, seed: int, folder: Path) -> None:
         )
     first = run.state.step
     fit_with_progress(run, resume=shop.command)
-    spent = {"steps": run.state.step, "from_step": first, "seconds": time.monotonic() - began}
-    write_json(folder / _TRAINED, {**spent, "data": store.fingerprint, "provenance": made})
+    return first, run.state.step
+
+
+def _train_dpc(
+    shop: Workshop, recipe: DpcRecipe, store: Store, seed: int, folder: Path, made: Made
+) -> Steps:
+    device = choose_device(shop.device)
+    run = setup_dpc(recipe, store, folder, seed=seed, device=device, resume=True, provenance=made)
+    first, steps = run.state.step, recipe.optim.steps
+    with stop_flag() as stopped, progress("training DPC", steps, start=first) as bar:
+        if not fit_dpc(run, lambda at, _: bar.at(at), stopped):
+            raise stopped.error(f"stopped after step {run.state.step}; go on with `{shop.command}`")
+    return first, run.state.step

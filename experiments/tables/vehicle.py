@@ -3,7 +3,14 @@
 """The paper's 3D vehicle data set as simulated drives: its tables 2a, 3a and 4 (last block)."""
 
 from experiments.tables.given import Given
-from experiments.tables.rows import REGISTERING, baselines, default_form, oracle, paper_form
+from experiments.tables.rows import (
+    REGISTERING,
+    baselines,
+    default_form,
+    dpc_drives,
+    oracle,
+    paper_form,
+)
 from experiments.tables.table import PROTOCOLS, Block, Table
 
 from wildshape.evaluation.paper import LIDAR_ROWS, VEHICLE
@@ -16,6 +23,7 @@ def table(given: Given) -> Table:
         paper_form(size, data),
         default_form(size, data),
         oracle(size, data),
+        dpc_drives(size, data),
         *baselines("one-scan", *REGISTERING),
     )
     paper = tuple(row for row in LIDAR_ROWS if row.data == VEHICLE)

@@ -152,7 +152,10 @@ def test_examples_and_figures(tmp_path):
     assert all(p.read_bytes()[:4] == b"\x89PNG" for p in paths)
     assert len(draw_examples(examples).axes) == 3 * 4
     beside = gather(tracks, results, "m", Method(), rival=LocalIcp())
-    assert np.array_equal(beside[0].rival, examples[0].fused)  # the same ICP
+    icp, ours = beside[0].rival, examples[0].fused
+    assert icp is not None
+    assert ours is not None
+    assert np.array_equal(icp, ours)  # the same ICP
     assert len(draw_examples(beside).axes) == 3 * 5
 
 
