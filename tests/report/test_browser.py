@@ -2,166 +2,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page in a real browser: drawn, turned by the mouse, silent, and nothing fetched."""
 
-import base64
-import fcntl
-import io
-import json
-import os
-import select
-import shutil
-import signal
 import time
-from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from tests.report.chromium import CHROMIUM, Page, browser, colourful, eventually, moved
 
 from wildshape.report.content import Cloud, Curve, Report, ReportObject
 from wildshape.report.page import write_report
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-sync",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-dev-shm-usage",
-    "--enable-unsafe-swiftshader",
-    "--remote-debugging-pipe",
-    "--window-size=1200,900",
-]
-SECONDS = 60.0
 
 pytestmark = pytest.mark.skipif(
     CHROMIUM is None, reason="did not run: no chromium on PATH to open the report with"
 )
 
 
-class Page:
-    """One tab, driven by the DevTools protocol over a pipe."""
-
-    def __init__(self, commands: int, answers: int):
-        self.commands, self.answers = commands, answers
-        self.buffer, self.count, self.session = b"", 0, ""
-        self.events: list[dict[str, Any]] = []
-
-    def open(self, url: str) -> None:
-        target = self.call("Target.createTarget", url="about:blank")["targetId"]
-        attached = self.call("Target.attachToTarget", targetId=target, flatten=True)
-        self.session = attached["sessionId"]
-        for domain in ("Runtime", "Network", "Log", "Page"):
-            self.call(f"{domain}.enable")
-        self.call("Page.navigate", url=url)
-
-    def call(self, method: str, **params: Any) -> dict[str, Any]:
-        self.count += 1
-        message = {"id": self.count, "method": method, "params": params}
-        if self.session:
-            message["sessionId"] = self.session
-        os.write(self.commands, json.dumps(message).encode() + b"\0")
-        while True:
-            answer = self._next()
-            if answer.get("id") == self.count:
-                assert "error" not in answer, answer
-                return answer["result"]
-            self.events.append(answer)
-
-    def ask(self, expression: str) -> Any:
-        return self.call("Runtime.evaluate", expression=expression, returnByValue=True)[
-            "result"
-        ].get("value")
-
-    def wait(self, expression: str) -> None:
-        deadline = time.monotonic() + SECONDS
-        while not self.ask(expression):
-            assert time.monotonic() < deadline, f"never became true: {expression}"
-            time.sleep(0.1)
-
-    def panel(self, index: int) -> dict[str, float]:
-        """Where a panel's drawing is, CSS pixels."""
-        return self.ask(
-            f"(({{x, y, width, height}}) => ({{x, y, width, height}}))"
-            f"(document.querySelectorAll('.plot')[{index}].getBoundingClientRect())"
-        )
-
-    def picture(self, index: int) -> np.ndarray:
-        from PIL import Image
-
-        clip = {**self.panel(index), "scale": 1}
-        shot = self.call("Page.captureScreenshot", clip=clip)["data"]
-        with Image.open(io.BytesIO(base64.b64decode(shot))) as image:
-            return np.asarray(image.convert("RGB"))
-
-    def drag(self, index: int, across: float) -> None:
-        box = self.panel(index)
-        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-        held: dict[str, Any] = {"button": "left", "buttons": 1, "clickCount": 1, "y": y}
-        self.call("Input.dispatchMouseEvent", type="mousePressed", x=x, **held)
-        for i in range(1, 5):
-            self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x + i * across / 4, **held)
-        self.call("Input.dispatchMouseEvent", type="mouseReleased", x=x + across, **held)
-
-    def complaints(self) -> list[str]:
-        """Uncaught errors, console errors, and everything a policy or a load refused."""
-        found = []
-        for event in self.events:
-            method, params = event.get("method"), event.get("params", {})
-            entry = params.get("entry", {})
-            if (
-                method == "Runtime.exceptionThrown"
-                or (method == "Runtime.consoleAPICalled" and params["type"] in ("error", "assert"))
-                or (method == "Log.entryAdded" and entry.get("level") == "error")
-            ):
-                found.append(json.dumps(params)[:400])
-        return found
-
-    def loads(self) -> list[str]:
-        wanted = (e for e in self.events if e.get("method") == "Network.requestWillBeSent")
-        return [event["params"]["request"]["url"] for event in wanted]
-
-    def _next(self) -> dict[str, Any]:
-        deadline = time.monotonic() + SECONDS
-        while b"\0" not in self.buffer:
-            ready, _, _ = select.select([self.answers], [], [], deadline - time.monotonic())
-            assert ready, "chromium does not answer"
-            self.buffer += os.read(self.answers, 1 << 16)
-        message, self.buffer = self.buffer.split(b"\0", 1)
-        return json.loads(message)
-
-
 @pytest.fixture
-def page(tmp_path: Path) -> Iterator[Page]:
-    assert CHROMIUM is not None
-    for_child, commands = os.pipe()
-    answers, from_child = os.pipe()
-    high = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 20) for end in (for_child, from_child)]
-    null = (os.POSIX_SPAWN_OPEN, 1, os.devnull, os.O_WRONLY, 0)
-    chromium = os.posix_spawn(  # the protocol speaks on descriptors 3 and 4
-        CHROMIUM,
-        [CHROMIUM, *FLAGS, f"--user-data-dir={tmp_path / 'profile'}"],
-        os.environ,
-        file_actions=[
-            null,
-            (os.POSIX_SPAWN_DUP2, 1, 2),
-            (os.POSIX_SPAWN_DUP2, high[0], 3),
-            (os.POSIX_SPAWN_DUP2, high[1], 4),
-        ],
-    )
-    for end in (for_child, from_child, *high):
-        os.close(end)
-    try:
-        yield Page(commands, answers)
-    finally:
-        os.kill(chromium, signal.SIGTERM)
-        os.waitpid(chromium, 0)
-        os.close(commands)
-        os.close(answers)
+def page(tmp_path: Path):
+    with browser(tmp_path / "profile") as opened:
+        yield opened
 
 
 def _report() -> Report:
@@ -177,35 +37,17 @@ def _report() -> Report:
     )
 
 
-def _colourful(picture: np.ndarray) -> int:
-    """Pixels that are no shade of grey: points, not grid or ground."""
-    return int((np.ptp(picture.astype(int), axis=-1) > 40).sum())
-
-
-def _moved(picture: np.ndarray, before: np.ndarray) -> float:
-    """Share of the pixels that changed."""
-    return float((np.abs(picture.astype(int) - before).max(-1) > 40).mean())
-
-
-def _eventually(page: Page, index: int, holds: Callable[[np.ndarray], bool], what: str) -> None:
-    """Drawing takes its time without a GPU."""
-    deadline = time.monotonic() + SECONDS
-    while not holds(page.picture(index)):
-        assert time.monotonic() < deadline, what
-        time.sleep(0.2)
-
-
 def _settled(page: Page, index: int) -> np.ndarray:
     """A panel's picture once it no longer changes by itself."""
     before = [page.picture(index).astype(int)]
 
     def unchanged(picture: np.ndarray) -> bool:
-        moved = _moved(picture, before[0])
+        share = moved(picture, before[0])
         before[0] = picture.astype(int)
-        return moved < 0.001
+        return share < 0.001
 
     time.sleep(0.5)
-    _eventually(page, index, unchanged, "turns by itself")
+    eventually(lambda: page.picture(index), unchanged, "turns by itself")
     return before[0]
 
 
@@ -215,15 +57,15 @@ def test_page_draws_turns_and_stays_silent(page: Page, tmp_path: Path) -> None:
     page.wait("document.querySelectorAll('.plot canvas').length >= 2")
     page.wait("document.querySelectorAll('.curve .main-svg').length >= 1")
     for panel in (0, 1):
-        _eventually(page, panel, lambda p: _colourful(p) > 300, f"panel {panel} is blank")
+        eventually(partial(page.picture, panel), lambda p: colourful(p) > 300, f"{panel} is blank")
 
     first = _settled(page, 0)
     page.drag(1, across=70)
-    _eventually(page, 0, lambda p: _moved(p, first) > 0.01, "panels are not linked")
+    eventually(lambda: page.picture(0), lambda p: moved(p, first) > 0.01, "panels are not linked")
 
     page.ask("document.querySelectorAll('#picker button')[1].click()")
     page.wait("document.querySelectorAll('.panel:not([hidden])').length == 1")
-    _eventually(page, 0, lambda p: _colourful(p) > 300, "the second object is blank")
+    eventually(lambda: page.picture(0), lambda p: colourful(p) > 300, "the second object is blank")
 
     assert page.complaints() == []
     assert [url for url in page.loads() if not url.startswith(("file:", "data:", "blob:"))] == []

@@ -22,6 +22,7 @@ COMMANDS = {
     "register": "align two scans of an object, or all scans of its track",
     "fuse": "join all scans of a track into one cloud",
     "evaluate": "measure models and baselines against known shapes and poses",
+    "view": "look at results or scans on an interactive page of this machine",
     "report": "draw what other commands wrote as one HTML page",
 }
 _HELP = ("-h", "--help")

@@ -67,6 +67,14 @@ class Reading:
         if last is not None and not count:
             raise last
 
+    def track(self, index: int) -> Track:
+        """A usable track by its number.
+
+        Raises:
+            BadInputError: it cannot be used.
+        """
+        return self._usable(self.source[index])
+
     def single(self, why: str) -> Track:
         """The only track.
 

@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What `complete` and `register` left of a track, read back: objects.json and what is beside."""
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from wildshape.errors import BadInputError
+from wildshape.geometry.se3 import SE3
+from wildshape.io.guard import reading
+from wildshape.io.inputs import TrackSource, open_tracks
+from wildshape.io.points import METRES, Unit, read_points
+from wildshape.io.poses import read_poses
+from wildshape.records import Box, Points, Track
+
+MARKER, OBJECTS, METRICS, SCORES = "wildshape.json", "objects.json", "metrics.json", "scores.json"
+
+
+@dataclass(frozen=True)
+class TrackResult:
+    """One track's folder.
+
+    Attributes:
+        folder: where it lies.
+        said: the content of its objects.json.
+        track: the scans it is about; None where they have moved, changed or were lost.
+    """
+
+    folder: Path
+    said: dict[str, Any]
+    track: Track | None
+
+    @property
+    def scans(self) -> tuple[str, ...]:
+        """Names of the scans that have a result, in their order in time."""
+        return tuple(str(scan["scan"]) for scan in self.said.get("scans") or ())
+
+    def entry(self, scan: str) -> dict[str, Any]:
+        """What objects.json says of a scan."""
+        entries = self.said.get("scans") or ()
+        return next((entry for entry in entries if entry.get("scan") == scan), {})
+
+    def completed(self, scan: str) -> Points | None:
+        """The completed shape, in that scan's sensor frame, metres."""
+        path = self.folder / "completed" / f"{scan}.ply"
+        return read_points(path) if path.exists() else None
+
+    def completed_scans(self) -> list[str]:
+        """Names of the scans that have a completed shape."""
+        return sorted(path.stem for path in (self.folder / "completed").glob("*.ply"))
+
+    def poses(self) -> SE3 | None:
+        """`T_sensor_canonical`, one a scan of objects.json (or of the track); None without."""
+        path = self.folder / "poses.txt"
+        return read_poses(path) if path.exists() else None
+
+
+@dataclass
+class Inputs:
+    """The scans that results are about, each place opened once.
+
+    Attributes:
+        place: where the scans are now; None goes by what objects.json says.
+    """
+
+    place: Path | None = None
+    opened: dict[tuple[Path, Unit], TrackSource] = field(default_factory=dict)
+
+    def track(self, folder: Path, said: dict[str, Any]) -> Track | None:
+        """The track that `folder` is about; None if the scans have moved, changed or lost it."""
+        named = self.place or (Path(said["input"]) if said.get("input") else None)
+        if named is None:
+            return None
+        try:
+            source = self._open(named, _unit(folder.parent / MARKER))
+            return source[source.names.index(str(said.get("track") or folder.name))]
+        except (BadInputError, ValueError):
+            return None
+
+    def _open(self, path: Path, unit: Unit) -> TrackSource:
+        if (path, unit) not in self.opened:
+            self.opened[path, unit] = open_tracks(path, unit)
+        return self.opened[path, unit]
+
+
+def find(folder: Path, name: str) -> list[Path]:
+    """Files of that name in a folder and two levels below."""
+    found = {path for depth in ("", "*/", "*/*/") for path in folder.glob(f"{depth}{name}")}
+    return sorted(found)
+
+
+def read_object(path: Path) -> dict[str, Any]:
+    """A JSON object.
+
+    Raises:
+        BadInputError: the file holds something else.
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        data = error
+    if isinstance(data, dict):
+        return data
+    raise BadInputError(
+        f"{path}: expected a JSON object, found {str(data)[:80]!r}; write it again with the "
+        "command that made it."
+    )
+
+
+def read_result(folder: Path, inputs: Inputs) -> TrackResult:
+    """A track's result, with its scans where they can be read.
+
+    Raises:
+        BadInputError: objects.json is damaged.
+    """
+    with reading(folder / OBJECTS, "what complete or register writes"):
+        said = read_object(folder / OBJECTS)
+        found = TrackResult(folder, said, inputs.track(folder, said))
+        for scan in found.scans:
+            box_of(found.entry(scan))
+    return found
+
+
+def box_of(entry: dict[str, Any]) -> Box | None:
+    """The box of an entry of objects.json, in the scan's sensor frame."""
+    if not entry.get("box"):
+        return None
+    x, y, z = (float(v) for v in entry["box"]["centre"])
+    length, width, height = (float(v) for v in entry["box"]["size"])
+    qw, qx, qy, qz = (float(v) for v in entry["box"]["quaternion_wxyz"])
+    return Box((x, y, z), (length, width, height), (qw, qx, qy, qz))
+
+
+def _unit(marker: Path) -> Unit:
+    settings = read_object(marker).get("settings") or {} if marker.exists() else {}
+    unit: Unit = settings.get("unit", "m")
+    return unit if unit in METRES else "m"

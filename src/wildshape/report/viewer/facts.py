@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the panel says of the scan shown: sizes, confidence, and errors where truth is known."""
+
+from html import escape
+
+import numpy as np
+
+from wildshape.evaluation.metrics import completion_error
+from wildshape.report.scene import thin
+from wildshape.report.viewer.colours import LEGENDS, css
+from wildshape.report.viewer.content import Made
+from wildshape.report.viewer.stage import POINTS_A_CLOUD, Stage, Wish
+
+_ROW = "<div style='display:flex;gap:.8em;justify-content:space-between'><span style='opacity:.65'>"
+
+
+def facts(stage: Stage, wish: Wish, status: str = "") -> str:
+    """A piece of HTML; every name is escaped."""
+    track = stage.track
+    about = ", ".join(part for part in (track.category, track.source) if part)
+    parts = [
+        f"<b style='overflow-wrap:anywhere'>{escape(track.name)}</b>",
+        f"<div style='opacity:.65;overflow-wrap:anywhere'>{escape(about)}</div>" if about else "",
+        *(_row(label, value) for label, value in _rows(stage, wish)),
+        _small(f"Completed shape: {LEGENDS[wish.colouring]}."),
+        _small(_warning(stage.made.get(wish.scan)), "color:#d55e00"),
+        _small(status),
+    ]
+    inside = "".join(part for part in parts if part)
+    return f"<div style='font-size:.85em;line-height:1.5;padding:0 .8em .5em'>{inside}</div>"
+
+
+def _rows(stage: Stage, wish: Wish) -> list[tuple[str, str]]:
+    scan = stage.track.scans[wish.scan]
+    rows = [
+        ("scan", escape(stage.track.scan_names[wish.scan])),
+        ("measured points", f"{len(scan):,}"),
+        ("distance to the sensor", f"{np.linalg.norm(stage.centres()[wish.scan]):.1f} m"),
+    ]
+    return rows + _made_rows(stage.made.get(wish.scan)) + _true_rows(stage, wish)
+
+
+def _made_rows(made: Made | None) -> list[tuple[str, str]]:
+    if made is None:
+        return [("completed shape", "not yet")]
+    rows = []
+    if made.confidence is not None:
+        dot = f"<span style='color:{css(made.confidence)}'>\N{BLACK CIRCLE}</span>"
+        rows.append(("confidence", f"{dot} {made.confidence:.2f}"))
+    if made.box is not None:
+        size = " \N{MULTIPLICATION SIGN} ".join(f"{side:.2f}" for side in made.box.size)
+        rows.append(("box", f"{size} m"))
+    if made.seconds:
+        rows.append(("time", f"{1000 * made.seconds:.0f} ms"))
+    return rows
+
+
+def _true_rows(stage: Stage, wish: Wish) -> list[tuple[str, str]]:
+    """Errors of this scan, and of the whole track by the way of fusing that is chosen."""
+    rows, made = [], stage.made.get(wish.scan)
+    truth = stage.truth_in(wish.scan) if stage.track.shape is not None else None
+    if truth is not None and made is not None and made.points is not None:
+        error = completion_error(made.points, thin(truth, 2 * POINTS_A_CLOUD))
+        rows.append(("Chamfer distance to truth", f"{error.cd:.3f} m"))
+    way = stage.moves(wish.way)
+    if way is not None and way.error is not None and len(stage.track.scans) > 1:
+        turned, moved = way.error.rotation_deg[wish.scan], way.error.translation_m[wish.scan]
+        rows.append(("pose error to the middle scan", f"{turned:.1f}°, {moved:.2f} m"))
+        rows.append((f"all scans, {wish.way}", way.verdict))
+    return rows
+
+
+def _row(label: str, value: str) -> str:
+    return f"{_ROW}{escape(label)}</span><span style='text-align:right'>{value}</span></div>"
+
+
+def _small(text: str, style: str = "opacity:.65") -> str:
+    return f"<div style='{style};margin-top:.4em'>{escape(text)}</div>" if text else ""
+
+
+def _warning(made: Made | None) -> str:
+    return made.warning if made is not None else ""

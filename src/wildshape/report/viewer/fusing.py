@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The ways to lay a track's scans over each other that the viewer compares."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import torch
+
+from wildshape.baselines.identity import Identity
+from wildshape.baselines.local_icp import LocalIcp
+from wildshape.evaluation.metrics import ACCURATE_DEG, RegistrationError, registration_error
+from wildshape.geometry.se3 import SE3, stack
+from wildshape.inference.predictor import to_middle
+from wildshape.records import Track
+from wildshape.report.viewer.content import Made
+
+BEFORE, AFTER, ICP, TRUTH = "before: only centred", "after: Wildshape", "local ICP", "true poses"
+WAYS = (AFTER, BEFORE, ICP, TRUTH)
+
+
+@dataclass(frozen=True)
+class Moves:
+    """One way.
+
+    Attributes:
+        T_middle_scan: one a scan.
+        error: one a scan; None without true poses.
+    """
+
+    T_middle_scan: SE3
+    error: RegistrationError | None
+
+    @property
+    def verdict(self) -> str:
+        """How well it does by the truth, or nothing."""
+        if self.error is None:
+            return ""
+        median = float(self.error.rotation_deg.median())
+        right = float((self.error.rotation_deg <= ACCURATE_DEG).double().mean())
+        metres = float(self.error.translation_m.median())
+        return f"{median:.1f}°, {metres:.2f} m median; {100 * right:.0f} % within 30°"
+
+
+def moves(way: str, track: Track, made: Mapping[int, Made]) -> Moves | None:
+    """A track's scans taken to its middle scan's frame; None where that cannot be done (yet)."""
+    if not all(len(scan) for scan in track.scans):
+        return None
+    T_middle_scan = _moves(way, track, made)
+    if T_middle_scan is None:
+        return None
+    truth = track.T_sensor_object
+    if truth is None:
+        return Moves(T_middle_scan, None)
+    return Moves(T_middle_scan, registration_error(T_middle_scan, truth, truth[track.middle]))
+
+
+def _moves(way: str, track: Track, made: Mapping[int, Made]) -> SE3 | None:
+    if way == BEFORE:
+        return Identity().register_track(track.scans, track.sensor)
+    if way == ICP:
+        return LocalIcp().register_track(track.scans, track.sensor)
+    if way == TRUTH:
+        return None if track.T_sensor_object is None else to_middle(track.T_sensor_object)
+    poses = [made[i].pose for i in range(len(track.scans)) if i in made]
+    known = [pose for pose in poses if pose is not None]
+    return to_middle(stack(known)) if len(known) == len(track.scans) else None
+
+
+def unmoved(count: int) -> SE3:
+    """Transforms that change nothing, for as long as no others are known."""
+    return SE3.identity(count, dtype=torch.float64)

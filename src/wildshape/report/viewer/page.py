@@ -1,0 +1,178 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The page: a server on this machine alone, a scene, a panel, and a thread that completes."""
+
+import contextlib
+import io
+import logging
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from html import escape
+from typing import TYPE_CHECKING
+
+from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.report.viewer.content import Source
+from wildshape.report.viewer.facts import facts
+from wildshape.report.viewer.panel import Panel
+from wildshape.report.viewer.stage import Stage
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+HOST = "127.0.0.1"
+_PLAY_SECONDS, _SPEAK_SECONDS = 0.12, 0.5
+
+
+class Page:
+    """What is on the page now. Controls call it from several threads: a lock keeps the order."""
+
+    def __init__(self, server: "ViserServer", source: Source) -> None:
+        """Lay the page out and begin with the first track."""
+        self.server, self.source = server, source
+        self.lock = threading.RLock()
+        self.stage: Stage | None = None
+        self.status = ""
+        self.turn = 0  # which choice of a track is the latest
+        self.panel = Panel(server, source.labels, self.refresh, self.choose)
+        self.choose(0)
+
+    @property
+    def url(self) -> str:
+        """Its address."""
+        return f"http://{HOST}:{self.server.get_port()}"
+
+    def choose(self, number: int) -> None:
+        """Show another track: its scans at once, what is made of them as it is made."""
+        with self.lock:
+            self.turn += 1
+            turn = self.turn
+        worker = threading.Thread(target=self._work, args=(number, turn), daemon=True)
+        worker.start()
+
+    def refresh(self) -> None:
+        """Show what the panel asks for."""
+        with self.lock:
+            if self.stage is not None:
+                wish = self.panel.wish()
+                self.stage.show(wish)
+                self.panel.said.content = facts(self.stage, wish, self.status or self.source.note)
+
+    def play(self) -> None:
+        """Go on by a scan, where that is asked for."""
+        with self.lock:
+            self.panel.step()
+
+    def _work(self, number: int, turn: int) -> None:
+        try:
+            track = self.source.track(number)
+            with self.lock:
+                if turn != self.turn:
+                    return
+                self._begin(Stage(self.server, track))
+            self._make(number, turn)
+        except (BadInputError, MissingExtraError) as error:
+            self._say(str(error), turn)
+        except Exception as error:
+            logging.getLogger(__name__).exception("the viewer cannot show this track")
+            self._say(f"{type(error).__name__}: {error}", turn)
+
+    def _begin(self, stage: Stage) -> None:
+        if self.stage is not None:
+            self.stage.clear()
+        self.stage = stage
+        self.status = "completing ..."
+        self.panel.fit(stage.track)
+        self._look()
+        self.refresh()
+
+    def _look(self) -> None:
+        """The camera at a distance that fits the object, for new pages and those open."""
+        if self.stage is None:
+            return
+        size = self.stage.extent()
+        place = (0.75 * size, -0.95 * size, 0.65 * size)
+        self.server.initial_camera.position = place
+        self.server.initial_camera.look_at = (0.0, 0.0, 0.0)
+        for client in self.server.get_clients().values():
+            client.camera.position, client.camera.look_at = place, (0.0, 0.0, 0.0)
+
+    def _make(self, number: int, turn: int) -> None:
+        """Whatever is made of the scans goes to the scene as it comes, the one shown first."""
+        stage = self.stage
+        if stage is None:
+            return
+        spoke = 0.0
+        total, shown = len(stage.track.scans), self.panel.wish().scan
+        for scan, made in self.source.make(number, stage.track, shown):
+            with self.lock:
+                if turn != self.turn:
+                    return
+                stage.add(scan, made)
+                self.status = f"completed {len(stage.made)} of {total} scans ..."
+                due = time.monotonic() - spoke > _SPEAK_SECONDS
+                if due or scan == self.panel.wish().scan:
+                    spoke = time.monotonic()
+                    self.refresh()
+        self._say("", turn)
+
+    def _say(self, text: str, turn: int) -> None:
+        with self.lock:
+            if turn != self.turn:
+                return
+            self.status = text
+            self.refresh()
+            if self.stage is None:
+                self.panel.said.content = f"<div style='padding:.8em'>{escape(text)}</div>"
+
+
+@contextmanager
+def serving(source: Source, port: int = 0) -> Iterator[Page]:
+    """The page for as long as the block runs.
+
+    Args:
+        source: what it shows.
+        port: taken, or the next free one; 0 takes any.
+
+    Raises:
+        MissingExtraError: viser is not installed.
+    """
+    server = _server(port)
+    try:
+        server.gui.configure_theme(
+            control_width="large",
+            show_logo=False,
+            show_share_button=False,
+        )
+        server.gui.main_panel.dock_right()
+        server.gui.set_panel_label(f"Wildshape: {source.title}")
+        server.scene.set_up_direction("+z")
+        yield Page(server, source)
+    finally:
+        with _quiet():
+            server.stop()
+
+
+def run_until_interrupted(page: Page) -> None:
+    """Serve, and turn the pages of what is played; Ctrl-C raises KeyboardInterrupt."""
+    while True:
+        time.sleep(_PLAY_SECONDS)
+        page.play()
+
+
+def _server(port: int) -> "ViserServer":
+    try:
+        import viser
+    except ImportError as error:
+        raise MissingExtraError(
+            "the viewer needs viser: pip install 'wildshape[view]' (`wildshape report` draws"
+            " results without it)."
+        ) from error
+    with _quiet():
+        return viser.ViserServer(host=HOST, port=port, verbose=False)
+
+
+def _quiet() -> contextlib.redirect_stdout:
+    """Viser announces its beginning and its end on stdout, which belongs to our answer."""
+    return contextlib.redirect_stdout(io.StringIO())

@@ -1,0 +1,161 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where the viewer's tracks come from: results that lie on disk, or scans and a model."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+import torch
+
+from wildshape.errors import BadInputError
+from wildshape.io.guard import reading
+from wildshape.records import Completion, Points, Sensor, Track
+from wildshape.report.results import OBJECTS, Inputs, TrackResult, box_of, find, read_result
+from wildshape.report.viewer.content import Made, Source
+
+
+@runtime_checkable
+class Completes(Protocol):
+    """What is asked of a model."""
+
+    def complete_many(self, scans: Sequence[object], sensor: Sensor | None) -> Iterator[Completion]:
+        """Each scan completed on its own, in order."""
+        ...
+
+
+def from_results(folder: Path, inputs: Path | None = None) -> Source:
+    """What `complete` or `register` left in a folder, or in one track's folder.
+
+    Args:
+        folder: with objects.json in it or one or two levels below.
+        inputs: where the scans are now, if they have moved.
+
+    Raises:
+        BadInputError: nothing of the kind is there.
+    """
+    folders = [path.parent for path in find(folder, OBJECTS)]
+    if not folders:
+        raise BadInputError(f"{folder}: holds no objects.json; name the --out of complete.")
+    names = [place.relative_to(folder).as_posix() for place in folders]
+    labels = [folder.resolve().name if name == "." else name for name in names]
+    where, kept = Inputs(inputs), {}
+
+    def result(number: int) -> TrackResult:
+        if number not in kept:
+            kept.clear()
+            kept[number] = read_result(folders[number], where)
+        return kept[number]
+
+    return Source(
+        title=folder.resolve().name,
+        labels=tuple(labels),
+        track=lambda number: _track(result(number)),
+        make=lambda number, track, first: _read(result(number), track, first),
+    )
+
+
+def from_model(
+    title: str,
+    labels: Sequence[str],
+    track: Callable[[int], Track],
+    model: Callable[[], Completes],
+    note: str = "",
+) -> Source:
+    """Scans, and a model that completes them when they are shown.
+
+    Args:
+        title: where the scans come from.
+        labels: names of the tracks.
+        track: reads one.
+        model: gives the model; called once, when the first scan is to be completed.
+        note: a sentence to show beside them.
+    """
+    loaded: list[Completes] = []
+
+    def make(_: int, shown: Track, first: int) -> Iterator[tuple[int, Made]]:
+        if not loaded:
+            loaded.append(model())
+        yield from _complete(loaded[0], shown, first)
+
+    return Source(title, tuple(labels), track, make, note)
+
+
+def worst_first(scores: Path, method: str) -> list[tuple[str, float]]:
+    """Tracks and their mean CD of one method's row in scores.json, the worst first.
+
+    Raises:
+        BadInputError: the file is damaged.
+    """
+    sums: dict[str, list[float]] = {}
+    with reading(scores, "what evaluate writes"):
+        for row in _completions(json.loads(scores.read_text("utf-8")), method):
+            error = row["error"]
+            sums.setdefault(row["track"], []).append(error["precision"] + error["coverage"])
+    return sorted(((t, float(np.mean(v))) for t, v in sums.items()), key=lambda pair: -pair[1])
+
+
+def _completions(scores: dict[str, Any], method: str) -> Iterator[dict[str, Any]]:
+    for run in scores["runs"]:
+        for row in run["methods"]:
+            if row["name"] == method:
+                yield from row["completions"]
+
+
+def _complete(model: Completes, track: Track, first: int) -> Iterator[tuple[int, Made]]:
+    """The scan that is looked at, then all others."""
+    order = [first, *(i for i in range(len(track.scans)) if i != first)]
+    for part in (order[:1], order[1:]):
+        done = model.complete_many([track.scans[i] for i in part], track.sensor)
+        for number, completion in zip(part, done):
+            yield number, _made(completion)
+
+
+def _made(done: Completion) -> Made:
+    return Made(done.points, done.box, done.pose, done.confidence, done.warning, done.seconds)
+
+
+def _read(result: TrackResult, track: Track, first: int) -> Iterator[tuple[int, Made]]:
+    poses = result.poses()
+    lines = {scan: line for line, scan in enumerate(result.scans)}
+    order = [first, *(i for i in range(len(track.scans)) if i != first)]
+    for number in order:
+        name = track.scan_names[number]
+        entry, line = result.entry(name), lines.get(name)
+        known = poses is not None and line is not None and line < len(poses)
+        yield (
+            number,
+            Made(
+                points=result.completed(name),
+                box=box_of(entry),
+                pose=poses[line] if poses is not None and line is not None and known else None,
+                confidence=entry.get("confidence"),
+                warning=str(entry.get("warning") or ""),
+                seconds=entry.get("seconds"),
+            ),
+        )
+
+
+def _track(result: TrackResult) -> Track:
+    """The scans that have a result; empty ones where the scans themselves cannot be read."""
+    names = result.scans or tuple(result.completed_scans())
+    if result.track is None:
+        empty: tuple[Points, ...] = tuple(np.zeros((0, 3), np.float32) for _ in names)
+        if not names:
+            raise BadInputError(f"{result.folder}: neither its scans nor shapes can be read.")
+        return Track(result.folder.name, empty, names, source="its scans cannot be read")
+    kept = [i for i, name in enumerate(result.track.scan_names) if name in set(names)]
+    return _select(result.track, kept or list(range(len(result.track.scans))))
+
+
+def _select(track: Track, kept: list[int]) -> Track:
+    poses = track.T_sensor_object
+    return replace(
+        track,
+        scans=tuple(track.scans[i] for i in kept),
+        scan_names=tuple(track.scan_names[i] for i in kept),
+        T_sensor_object=None if poses is None else poses[torch.tensor(kept, dtype=torch.long)],
+    )

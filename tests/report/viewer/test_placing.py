@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+import numpy as np
+import pytest
+import torch
+from tests.report.viewer.made import perfect, track
+
+from wildshape.inference.predictor import to_middle
+from wildshape.report.scene import upright as upright_points
+from wildshape.report.viewer.fusing import AFTER, BEFORE, TRUTH, WAYS, moves
+from wildshape.report.viewer.placing import draw_from_middle, draw_from_sensor, upright
+
+
+def test_a_camera_s_frame_is_turned_as_the_report_turns_it() -> None:
+    points = np.arange(12, dtype=np.float64).reshape(4, 3)
+    for kind in ("lidar", "camera"):
+        np.testing.assert_allclose(upright(kind).apply_numpy(points), upright_points(points, kind))
+
+
+@pytest.mark.parametrize("hold", ["sensor", "object"])
+def test_true_poses_lay_truth_scan_and_fused_scans_over_each_other(hold) -> None:
+    shown = track()
+    poses = shown.T_sensor_object
+    assert poses is not None
+    T_middle_scan = to_middle(poses)
+    centres = poses.translation.numpy()
+    for scan in range(len(shown.scans)):
+        T_draw = draw_from_sensor(scan, "lidar", centres, T_middle_scan, hold)
+        T_fused = draw_from_middle(T_draw, T_middle_scan, scan)
+        there = T_draw.apply_numpy(shown.scans[scan])
+        fused = T_fused.apply_numpy(T_middle_scan[scan].apply_numpy(shown.scans[scan]))
+        np.testing.assert_allclose(there, fused, atol=1e-5)
+        middle = T_draw.apply_numpy(centres[scan][None])
+        np.testing.assert_allclose(middle, 0, atol=1e-6)  # the object stays in view
+    if hold == "object":
+        turned = [
+            draw_from_sensor(i, "lidar", centres, T_middle_scan, hold) @ poses[i] for i in range(5)
+        ]
+        for T in turned:
+            torch.testing.assert_close(T.matrix, turned[0].matrix, atol=1e-9, rtol=0)
+
+
+def test_ways_to_fuse_wait_for_the_scans_and_know_their_error() -> None:
+    shown = track()
+    assert moves(AFTER, shown, {}) is None
+    made = {i: perfect(shown, i) for i in range(5)}
+    found = {way: moves(way, shown, made) for way in WAYS}
+    for way in (AFTER, TRUTH):
+        way_found = found[way]
+        assert way_found is not None
+        assert way_found.verdict == "0.0°, 0.00 m median; 100 % within 30°"
+    before = found[BEFORE]
+    assert before is not None
+    assert before.error is not None
+    assert float(before.error.translation_m.max()) > 0.01
