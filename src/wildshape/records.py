@@ -6,12 +6,15 @@ Points are numpy float32 `(n, 3)`; poses are `SE3` over float64 tensors on the C
 """
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from wildshape.geometry.se3 import SE3
+
+if TYPE_CHECKING:
+    import trimesh
 
 Points = Float[np.ndarray, "_ 3"]
 SensorKind = Literal["lidar", "camera"]
@@ -114,6 +117,13 @@ class Completion:
     refined: bool = False
     warning: str = ""
     seconds: float = 0.0
+
+    def mesh(self) -> "trimesh.Trimesh":
+        """A closed triangle mesh of the shape, sensor frame, metres; made when asked for."""
+        from wildshape.geometry.meshing import closed_mesh
+
+        mesh = closed_mesh(self.pose.inverse().apply_numpy(self.points))
+        return mesh.apply_transform(self.pose.matrix.numpy())
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,9 @@
 """`wildshape complete`: shape, pose, box and confidence of each scan."""
 
 from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from tyro.conf import arg
 
 from wildshape.cli.importing import uncollected
 from wildshape.cli.options import AsJson, Device, Input, Model, OutFolder, Overwrite, Together, Unit
@@ -15,8 +18,8 @@ class Settings:
     """Complete the object of each scan, each scan on its own; with --track from all together.
 
     Writes DIR/TRACK/completed/SCAN.ply (the shape in that scan's sensor frame, metres), poses.txt
-    (T_sensor_canonical) and objects.json (box, confidence). An interrupted run goes on where it
-    stopped when repeated.
+    (T_sensor_canonical) and objects.json (box, confidence); with --mesh a closed triangle mesh
+    DIR/TRACK/mesh/SCAN.ply, too. An interrupted run goes on where it stopped when repeated.
     """
 
     input: Input
@@ -25,6 +28,8 @@ class Settings:
     unit: Unit = "m"
     device: Device = "auto"
     together: Together = False
+    mesh: Annotated[bool, arg(help="also write a closed mesh of each shape")] = False
+    mesh_format: Annotated[Literal["ply", "obj", "glb"], arg(help="of the meshes")] = "ply"
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -46,5 +51,6 @@ def run(settings: Settings) -> None:
         unit=settings.unit,
         device=settings.device,
         track=settings.together,
+        mesh=settings.mesh_format if settings.mesh else None,
     )
     perform(work, overwrite=settings.overwrite, as_json=settings.json)

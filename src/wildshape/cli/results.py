@@ -22,12 +22,20 @@ from wildshape.geometry.se3 import stack
 from wildshape.inference.predictor import Predictor, to_middle
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import reading as reading_file
+from wildshape.io.mesh_writer import MESH_FORMATS, MeshFormat, write_mesh
 from wildshape.io.points import write_ply
 from wildshape.io.tracks import write_poses
 from wildshape.records import Completion, Track
 
 OBJECTS, POSES, COMPLETED, MIDDLE = "objects.json", "poses.txt", "completed", "T_middle_scan.txt"
-FILES = (f"*/{COMPLETED}/*.ply", f"*/{POSES}", f"*/{MIDDLE}", f"*/{OBJECTS}")
+MESH = "mesh"
+FILES = (
+    f"*/{COMPLETED}/*.ply",
+    *(f"*/{MESH}/*.{kind}" for kind in MESH_FORMATS),
+    f"*/{POSES}",
+    f"*/{MIDDLE}",
+    f"*/{OBJECTS}",
+)
 
 
 @dataclass(frozen=True)
@@ -42,6 +50,7 @@ class Work:
         unit: of the files.
         device: `auto`, `cpu` or `cuda`.
         track: use all scans of a track together.
+        mesh: also write a closed mesh of each shape, in this format.
     """
 
     command: Literal["complete", "register"]
@@ -51,12 +60,14 @@ class Work:
     unit: Unit
     device: Device
     track: bool = False
+    mesh: MeshFormat | None = None
 
     def identity(self) -> dict[str, Any]:
         """What decides the output's content."""
         source = str(self.input.resolve())
         found = {"input": source, "unit": self.unit, "model": fingerprint(self.model)}
-        return {**found, "uses": "track"} if self.track else found
+        uses = {"uses": "track"} if self.track else {}
+        return {**found, **uses, **({"mesh": self.mesh} if self.mesh else {})}
 
 
 @dataclass
@@ -108,7 +119,12 @@ def perform(work: Work, *, overwrite: bool, as_json: bool) -> None:
     output = begin(work.out, work.command, work.identity(), FILES, overwrite=overwrite)
     try:
         tally = write_results(
-            reading, predictor, output, registers=work.command == "register", together=work.track
+            reading,
+            predictor,
+            output,
+            registers=work.command == "register",
+            together=work.track,
+            mesh=work.mesh,
         )
     except BadInputError:
         output.abandon()
@@ -148,6 +164,7 @@ def write_results(
     *,
     registers: bool = False,
     together: bool = False,
+    mesh: MeshFormat | None = None,
 ) -> Tally:
     """Complete every scan of every track and write the results, track after track.
 
@@ -157,6 +174,7 @@ def write_results(
         output: the folder, begun.
         registers: write `T_middle_scan` instead of the completed shapes.
         together: complete from all scans of a track, not from each on its own.
+        mesh: also write a closed mesh of each shape, in this format.
 
     Raises:
         BadInputError: nothing can be used, or a name cannot be that of a file.
@@ -180,7 +198,7 @@ def write_results(
             at = lambda text, index=index: bar.at(index, text)  # noqa: E731
             folder = output.path / file_name(track.name)
             scans = complete_track(
-                track, predictor, folder, at, registers=registers, together=together
+                track, predictor, folder, at, registers=registers, together=together, mesh=mesh
             )
             described = _objects(track, scans, reading, predictor, together=together)
             write_json(folder / OBJECTS, described)
@@ -198,6 +216,7 @@ def complete_track(
     *,
     registers: bool = False,
     together: bool = False,
+    mesh: MeshFormat | None = None,
 ) -> list[Completion]:
     """Complete the scans of a track, writing each into its folder; all but `objects.json`."""
     found: list[Completion] = []
@@ -206,6 +225,8 @@ def complete_track(
         name = file_name(track.scan_names[len(found)])
         if not registers:
             write_ply(folder / COMPLETED / f"{name}.ply", done.points)
+        if mesh is not None:
+            write_mesh(folder / MESH / f"{name}.{mesh}", done.mesh())
         found.append(done)
         at(f"{track.name}, scan {len(found)} of {len(track.scans)}")
     poses = stack([done.pose for done in found])

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""All of `Predictor.complete` but the box, as one pure module: raw scans in, shapes out."""
+
+from typing import NamedTuple
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor, nn
+
+from wildshape.export.plain import cost_plain
+from wildshape.geometry.centring import scan_centre
+from wildshape.geometry.facing import face, roll, roll_angle
+from wildshape.models.checkpoint import ModelSettings
+from wildshape.models.shapepose import Poses, ShapePoseNet
+
+OUTPUTS = ("points", "rotation", "translation", "confidence", "cost", "branch")
+_UPRIGHT_RAD = 0.1
+
+
+class Completed(NamedTuple):
+    """What the graph gives; sensor frames, metres.
+
+    Attributes:
+        points: complete shapes.
+        rotation: of `T_sensor_canonical`.
+        translation: of the same.
+        confidence: 0 to 1.
+        cost: label-free cost.
+        branch: that spoke.
+    """
+
+    points: Float[Tensor, "B P 3"]
+    rotation: Float[Tensor, "B 3 3"]
+    translation: Float[Tensor, "B 3"]
+    confidence: Float[Tensor, "B"]
+    cost: Float[Tensor, "B"]
+    branch: Int[Tensor, "B"]
+
+
+# Canonical shape, rotation and translation in the sensor frame, cost, branch.
+_Look = tuple[Tensor, Tensor, Tensor, Tensor, Tensor]
+
+
+class CompletionGraph(nn.Module):
+    """A network with centring, turning, branch scoring and confidence around it."""
+
+    def __init__(self, network: ShapePoseNet, settings: ModelSettings) -> None:
+        super().__init__()
+        self.network, self.settings = network, settings
+
+    def forward(self, scans: Float[Tensor, "B N 3"]) -> Completed:
+        """Complete scans of the same number of points; all points are used, none are drawn."""
+        shape, rotation, translation, cost, branch = self._complete(scans)
+        points = shape @ rotation.mT + translation[:, None]
+        confidence = 1.0 / (1.0 + (cost / self.settings.cost_m[1]).square())
+        return Completed(points, rotation, translation, confidence, cost, branch)
+
+    def _complete(self, scans: Tensor) -> _Look:
+        if not self.settings.facing:
+            turn = torch.eye(3).expand(scans.shape[0], 3, 3)
+            return self._look(scans, scan_centre(scans, self.settings.sensor), turn)
+        turn, centre = face(scans)
+        first = self._look(scans @ turn.mT, centre, turn)
+        angle = roll_angle(turn @ first[1])
+        tilted = angle.abs() > _UPRIGHT_RAD
+        return torch.cond(
+            tilted.any(), self._look_again, _keep, (*first, scans, turn, centre, angle, tilted)
+        )
+
+    def _look_again(self, *given: Tensor) -> _Look:
+        """Tilted scans rolled upright and seen once more (`Predictor._look_again`)."""
+        scans, turn, centre, angle, tilted = given[5:]
+        upright = roll(angle) @ turn
+        again = self._look(scans @ upright.mT, centre, upright)
+        return tuple(
+            torch.where(tilted.view(-1, *(1,) * (old.ndim - 1)), new, old)
+            for old, new in zip(given[:5], again)
+        )
+
+    def _look(self, turned: Tensor, centre: Tensor, turn: Tensor) -> _Look:
+        """Shapes, and the poses of the branches that speak (`Predictor._look`)."""
+        settings, centred = self.settings, turned - centre[:, None]
+        shape, rotation, translation, belief = self.network(centred)
+        posed = Poses(rotation, translation, belief).apply(shape)
+        cost = cost_plain(centred, centre, posed, settings.projection, settings.beta)
+        branch = (cost - settings.belief * belief).argmin(-1, keepdim=True)
+        chosen_rotation = rotation.gather(1, branch[..., None, None].expand(-1, 1, 3, 3))[:, 0]
+        chosen = translation.gather(1, branch[..., None].expand(-1, 1, 3))[:, 0] + centre
+        back = turn.mT
+        moved = (back @ chosen[..., None])[..., 0]
+        return shape, back @ chosen_rotation, moved, cost.gather(1, branch)[:, 0], branch[:, 0]
+
+
+def _keep(*given: Tensor) -> _Look:
+    """Nothing is tilted: the first look stands."""
+    return tuple(part.clone() for part in given[:5])

@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Meshes are closed, lie on the points, and are solid where no sensor could look."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from wildshape.errors import BadInputError
+from wildshape.geometry.meshing import closed_mesh
+from wildshape.inference.predictor import load
+
+
+def ball(count, rng):
+    points = rng.normal(size=(count, 3))
+    return (points / np.linalg.norm(points, axis=1, keepdims=True)).astype(np.float32)
+
+
+def test_ball_has_the_volume_of_a_ball():
+    points = ball(4000, np.random.default_rng(0))
+    mesh = closed_mesh(points)
+    assert mesh.is_watertight
+    assert mesh.is_winding_consistent
+    assert mesh.volume == pytest.approx(4 / 3 * np.pi, rel=0.05)
+    off = np.abs(np.linalg.norm(mesh.vertices, axis=1) - 1)
+    assert np.quantile(off, 0.95) < 0.03
+
+
+def test_open_below_is_filled():
+    """Half a ball without its floor, as a car's shape is: solid all the same."""
+    points = ball(6000, np.random.default_rng(1))
+    mesh = closed_mesh(points[points[:, 2] > 0])
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(2 / 3 * np.pi, rel=0.1)
+
+
+def test_scale_changes_nothing_else():
+    points = ball(2000, np.random.default_rng(2))
+    small, large = closed_mesh(points), closed_mesh(points * 8)
+    assert large.volume == pytest.approx(512 * small.volume, rel=1e-3)
+
+
+def test_crumbs_are_left_out():
+    points = ball(3000, np.random.default_rng(3))
+    stray = points[:20] * 0.02 + np.float32([1.8, 0, 0])
+    mesh = closed_mesh(np.concatenate([points, stray]))
+    assert mesh.vertices[:, 0].max() < 1.2
+
+
+def test_one_place_is_no_shape():
+    with pytest.raises(BadInputError, match="all equal"):
+        closed_mesh(np.ones((20, 3), np.float32))
+
+
+def test_completions_close(cars):
+    done = load().complete(cars[0].scans[3])
+    mesh = done.mesh()
+    assert mesh.is_watertight
+    assert mesh.volume > 0
+    box = np.asarray(done.box.centre)
+    assert np.linalg.norm(mesh.bounds.mean(0) - box) < 0.5
+    apart, _ = cKDTree(mesh.vertices).query(done.points)
+    assert np.median(apart) < 0.05
