@@ -15,6 +15,11 @@ from wildshape.evaluation.results import Summary, as_json, summarise
 from wildshape.evaluation.tables import COLUMNS, ROTATE, notes, number, pipe_table, spread
 from wildshape.evaluation.turning import Rotate
 
+_PARTIAL = (
+    ("CD partial", "cd_partial", 1, 3),
+    ("precision partial", "precision_partial", 1, 3),
+    ("coverage partial", "coverage_partial", 1, 3),
+)
 _LENGTHS = ("cd", "precision", "coverage", "cd_floor")
 Column = tuple[str, str, int, int]
 Columns = tuple[Column, ...]
@@ -60,8 +65,8 @@ def markdown(table: Table, parts: Sequence[Part], command: str, made: dict[str, 
 
 
 def _part(part: Part) -> str:
-    columns = _columns(part.block)
     summaries = part.summaries()
+    columns = _columns(part.block, summaries)
     rows = [_ours(summary, columns) for summary in summaries]
     if part.rotate == "none":
         rows += [_paper(row, columns) for row in part.block.paper]
@@ -70,10 +75,12 @@ def _part(part: Part) -> str:
     return "\n\n".join([title, pipe_table(heading, rows), notes(summaries)])
 
 
-def _columns(block: Block) -> Columns:
+def _columns(block: Block, summaries: Sequence[Summary]) -> Columns:
+    partial = any(summary.mean["cd_partial"] is not None for summary in summaries)
+    columns = (*COLUMNS[:3], *(_PARTIAL if partial else ()), *COLUMNS[3:])
     if not block.percent:
-        return COLUMNS
-    return tuple(_of_unit_size(column) for column in COLUMNS)
+        return columns
+    return tuple(_of_unit_size(column) for column in columns)
 
 
 def _of_unit_size(column: Column) -> Column:
