@@ -10,7 +10,7 @@ import torch
 
 from wildshape.datasets.host import HostViews
 from wildshape.datasets.resident import ResidentViews
-from wildshape.datasets.views import ViewConfig, ViewSampler
+from wildshape.datasets.views import Batch, ViewConfig, ViewSampler
 from wildshape.errors import BadInputError
 from wildshape.geometry.centring import scan_centre
 from wildshape.geometry.facing import face
@@ -171,16 +171,22 @@ def test_a_batch_depends_on_seed_step_and_process_alone(store):
         assert not torch.equal(one.scans, other.scans)
 
 
+def held_batch(views):
+    batch = views.batch(torch.tensor(0))
+    assert isinstance(batch, Batch)
+    return batch
+
+
 def test_scans_are_held_to_their_own_headings(store):
     sampler, resident = both(store)
     host = HostViews(sampler, 0, 0, CPU)
     anchors = torch.arange(len(store.scan_sizes)).float()[:, None, None].expand(-1, 3, 3)
     for views in (resident, host):
         views.prepare(0)
-        assert not views.batch(torch.tensor(0)).anchor.any()
+        assert not held_batch(views).anchor.any()
         views.hold(anchors)
         views.prepare(0)
-        batch = views.batch(torch.tensor(0))
+        batch = held_batch(views)
         track, frame = marks(batch)
         expected = torch.from_numpy(store.track_starts)[track] + frame
         assert torch.equal(batch.anchor[:, 0, 0].long(), expected.flatten())
