@@ -93,7 +93,8 @@ class ViewSampler:
                 " nothing to train on."
             )
         self.anchors: Float[Tensor, "S 3 3"] | None = None
-        self._faced: dict[int, Facing] = {}
+        facing = config.turn == "facing"
+        self._frames = np.full((len(sizes) if facing else 0, 4, 3), np.nan, dtype=np.float32)
         self._centres = np.full((len(sizes), 3), np.nan, dtype=np.float32)
 
     def draw(self, *seed: int) -> Batch:
@@ -190,9 +191,11 @@ class ViewSampler:
 
     def _facing(self, scan: int) -> Facing:
         """The facing frame of a scan, found once."""
-        if scan not in self._faced:
-            self._faced[scan] = face(self._points(scan))
-        return self._faced[scan]
+        frame = self._frames[scan]
+        if np.isnan(frame[0, 0]):
+            turn, centre = face(self._points(scan))
+            frame[:3], frame[3] = turn.numpy(), centre.numpy()
+        return Facing(torch.from_numpy(frame[:3]), torch.from_numpy(frame[3]))
 
     def _centre(self, scan: int) -> Tensor:
         """The label-free centre of a scan, found once."""
