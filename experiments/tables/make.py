@@ -99,6 +99,7 @@ def chosen_rows(table: Table, words: tuple[str, ...]) -> Table:
 def make(shop: Workshop, given: Given, table: Table, name: str, results: Path) -> str:
     """Make a table and write NAME.md and NAME.json; returns the markdown."""
     parts = Making(shop, given, table).parts()
+    table = replace(table, notes=(given.size.said, *table.notes))
     made = provenance(shop.command)
     text = markdown(table, parts, shop.command, made)
     size = as_values(given.size)

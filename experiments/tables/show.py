@@ -69,7 +69,7 @@ def _part(part: Part) -> str:
     columns = _columns(part.block, summaries)
     rows = [_ours(summary, columns) for summary in summaries]
     if part.rotate == "none":
-        rows += [_paper(row, columns) for row in part.block.paper]
+        rows += [_paper(row, columns, part.block) for row in part.block.paper]
     heading = ["method", "seeds", *(column[0] for column in columns), "scans: shape / pose"]
     title = f"## {part.block.title}: {ROTATE[part.rotate]}"
     return "\n\n".join([title, pipe_table(heading, rows), notes(summaries)])
@@ -101,14 +101,22 @@ def _ours(summary: Summary, columns: Columns) -> list[str]:
     return [summary.name, str(len(summary.per_seed)), *cells, counted]
 
 
-def _paper(row: PaperRow, columns: Columns) -> list[str]:
+def _paper(row: PaperRow, columns: Columns, block: Block) -> list[str]:
     """The paper prints CD of views times 100 already, as our columns do."""
     cells = []
     for _, name, factor, digits in columns:
+        printed = _printed(name, block)
         scale = 1 if name in _LENGTHS else factor
-        value = getattr(row, name, None)
-        cells.append(number(value, scale, digits) + spread(row.std.get(name), scale, digits))
+        value = getattr(row, printed, None)
+        cells.append(number(value, scale, digits) + spread(row.std.get(printed), scale, digits))
     return [f"† {row.data}: {row.method}", "", *cells, ""]
+
+
+def _printed(name: str, block: Block) -> str:
+    """Which of the paper's figures belongs into a column; the empty name is none."""
+    if not block.paper_partial:
+        return name
+    return "" if name in _LENGTHS else name.removesuffix("_partial")
 
 
 def record(table: Table, parts: Sequence[Part], made: dict[str, Any]) -> dict[str, Any]:

@@ -20,9 +20,8 @@ class Size:
 
     Attributes:
         name: as on the command line.
-        train: tracks (a fifth as many objects are tested on, at most 141: the CAD cars of the test
-            split).
-        test: tracks measured.
+        train: tracks.
+        test: tracks measured; at most 141, the CAD cars of the test split.
         steps: of each training; None: the preset's own number, network and schedule.
         seeds: trainings of each method; ablations take one where this is under five.
         max_scans: of a tested track, evenly; None: all.
@@ -41,6 +40,17 @@ class Size:
     def ablation_seeds(self) -> int:
         """Ablations have many rows: one seed each but for the largest size."""
         return self.seeds if self.seeds >= 5 else 1
+
+    @property
+    def said(self) -> str:
+        """For the foot of a table: what the figures can be worth."""
+        drives = f"Size {self.name}: at most {self.train} tracks to train and {self.test} to test,"
+        if self.steps is None:
+            return f"{drives} the presets as they are."
+        worth = (
+            "" if self.like == "small" else "; the machinery works, a method is not judged by it"
+        )
+        return f"{drives} {self.steps} steps{worth}."
 
 
 SIZES = {

@@ -68,6 +68,7 @@ class Block:
         paper: printed by the paper; shown under scans as recorded.
         rotate: input protocols.
         percent: objects are of unit size, and CD is printed times 100.
+        paper_partial: the paper's shapes were measured against partial truth.
     """
 
     title: str
@@ -76,6 +77,7 @@ class Block:
     paper: tuple[PaperRow, ...] = ()
     rotate: tuple[Rotate, ...] = ("none",)
     percent: bool = False
+    paper_partial: bool = False
 
 
 @dataclass(frozen=True)
