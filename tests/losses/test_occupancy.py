@@ -12,6 +12,7 @@ from wildshape.geometry.viewing_volume import beyond, centres
 from wildshape.losses.occupancy import (
     gaussian,
     image_of,
+    let_by,
     occupancy,
     project,
     rays_through,
@@ -112,9 +113,18 @@ def test_the_nearer_of_two_planes_is_seen():
     torch.testing.assert_close(depth, torch.full_like(depth, near), atol=1e-3, rtol=0)
 
 
+def test_the_image_is_the_expectation_over_where_rays_end():
+    generator = torch.Generator().manual_seed(3)
+    volume = torch.rand(2, 9, 9, 9, dtype=torch.float64, generator=generator) ** 3
+    image, rays = image_of(let_by(volume)), rays_through(volume)
+    depth = torch.einsum("bkvu,k->bvu", rays.ends, centres(9, EXACT)) + beyond(9) * rays.escape
+    torch.testing.assert_close(image.depth, depth)
+    torch.testing.assert_close(image.silhouette, rays.ends.sum(1))
+
+
 def test_empty_rays_are_as_deep_as_the_background_of_a_scan_s_image():
     empty = torch.zeros(1, 8, 8, 8, dtype=torch.float64)
-    image = image_of(rays_through(empty))
+    image = image_of(let_by(empty))
     assert image.silhouette.abs().max() == 0
     torch.testing.assert_close(image.depth, torch.full_like(image.depth, beyond(8)))
 

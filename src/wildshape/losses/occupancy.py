@@ -14,7 +14,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from wildshape.geometry.viewing_volume import RangeImage, beyond, centres
+from wildshape.geometry.viewing_volume import RangeImage
 
 _FULL = 1 - 1e-5  # of an occupancy, so that its logarithm is finite
 _REACH = 3.5  # half width of the smoothing kernel, sigmas
@@ -100,18 +100,33 @@ def occupancy(
     return volume.clamp(0, 1)
 
 
+def let_by(volume: Float[Tensor, "*batch S S S"]) -> Float[Tensor, "*batch S S S"]:
+    """Probability that a ray along the first of the last three axes passes each voxel.
+
+    The product of all `1 - o` so far; its logarithm's sum is written as a matrix product, which is
+    several times faster than a running sum over this axis.
+    """
+    size = volume.shape[-1]
+    passed = torch.log1p(-volume.clamp(max=_FULL)).flatten(-2)
+    so_far = torch.ones(size, size, dtype=volume.dtype, device=volume.device).tril()
+    return (so_far @ passed).exp().view_as(volume)
+
+
 def rays_through(volume: Float[Tensor, "*batch S S S"]) -> Rays:
-    """Where rays along the first of the last three axes end: `o_k` times what `o_j < k` let by."""
-    through = torch.log1p(-volume.clamp(max=_FULL)).cumsum(-3).exp()
-    before = torch.cat((torch.ones_like(through[..., :1, :, :]), through[..., :-1, :, :]), dim=-3)
-    return Rays(before - through, through[..., -1, :, :])
+    """Where each ray ends: `o_k` times what `o_j < k` let by."""
+    passed = let_by(volume)
+    before = torch.cat((torch.ones_like(passed[..., :1, :, :]), passed[..., :-1, :, :]), dim=-3)
+    return Rays(before - passed, passed[..., -1, :, :])
 
 
-def image_of(rays: Rays) -> RangeImage:
-    """Probability that a ray ends at all, and where it is expected to."""
-    size = rays.ends.shape[-1]
-    depth = torch.einsum("...kvu,k->...vu", rays.ends, centres(size, rays.ends))
-    return RangeImage(1 - rays.escape, depth + beyond(size) * rays.escape)
+def image_of(passed: Float[Tensor, "*batch S S S"]) -> RangeImage:
+    """Probability that a ray ends at all, and where it is expected to; from `let_by`.
+
+    Summed by parts: each voxel that is passed puts the end off by one.
+    """
+    size = passed.shape[-1]
+    depth = (0.5 - size / 2) / size + passed.sum(-3) / size
+    return RangeImage(1 - passed[..., -1, :, :], depth)
 
 
 def project(
@@ -121,4 +136,4 @@ def project(
     strength: Float[Tensor, "B"] | None = None,
 ) -> RangeImage:
     """Silhouette and depth of points in the cube, as the sensor would see them."""
-    return image_of(rays_through(occupancy(points, size, sigma, strength)))
+    return image_of(let_by(occupancy(points, size, sigma, strength)))
