@@ -3,33 +3,49 @@
 """DPC where the answer is known: views of one airplane from a known distance; is the pose found?
 
     python experiments/dpc_toy.py [--preset dpc-small] [--steps 4000] [--seed 0] [--depth 1]
+    python experiments/dpc_toy.py --search | --true-shape
 
 Of views never trained on it prints the share whose rotation is right within 15 degrees: once the
 canonical frame is aligned with the truth's, by the one rotation for all views that suits most; and
-between all pairs of views, which needs no alignment.
+between all pairs of views, which needs no alignment. Where training fails, `--search` tells whether
+the images could have told the pose at all: the true shape is projected from a grid of viewpoints,
+and the one whose image costs least is taken. `--true-shape` trains the poses alone.
 """
 
 import argparse
+import sys
 import tempfile
 import time
 from dataclasses import asdict, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 
 from wildshape.baselines.dpc import Dpc
 from wildshape.geometry.rotation import rotation_angle
+from wildshape.geometry.viewing_volume import (
+    ahead,
+    coarser,
+    offsets,
+    place,
+    scan_image,
+    to_volume,
+)
 from wildshape.io.atomic import write_json
 from wildshape.io.provenance import provenance
 from wildshape.io.store import Store, StoreWriter, open_store
+from wildshape.losses.occupancy import project
+from wildshape.losses.silhouette import image_costs
 from wildshape.models.dpc_checkpoint import DpcSettings
-from wildshape.records import Track
+from wildshape.records import Points, Track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.dpc import PRESETS, DpcRecipe
 from wildshape.training.dpc_loop import DpcRun, fit_dpc, setup_dpc
 
-TRAINED, TESTED, BATCH = 250, 50, 16
+TRAINED, TESTED, BATCH, STRENGTH, SIGMA = 250, 50, 16, 0.5, 0.5
 CLOSE_DEG, EVERY = 15.0, 100
 
 
@@ -86,7 +102,9 @@ def right_share(method: Dpc, track: Track) -> dict[str, float]:
 
 def train(run: DpcRun, tested: Track) -> dict[str, Any]:
     """Train to the end, with a look at the poses now and then."""
-    method = Dpc(run.state.mean.eval(), DpcSettings(run.recipe.network, depth=run.recipe.loss.depth))
+    method = Dpc(
+        run.state.mean.eval(), DpcSettings(run.recipe.network, depth=run.recipe.loss.depth)
+    )
 
     def report(step: int, values: dict[str, Any]) -> None:
         if step % EVERY == 0:
@@ -110,6 +128,55 @@ def packed(track: Track, folder: Path) -> Store:
     return open_store(folder / "store")
 
 
+def searched(recipe: DpcRecipe, track: Track) -> dict[str, float]:
+    """How often the cheapest image of the true shape is that of the right pose; nothing learned."""
+    poses, shape = track.T_sensor_object, track.shape
+    assert poses is not None
+    assert shape is not None
+    volume, size = recipe.network.volume, recipe.network.voxels
+    grid = viewpoints()
+    offset = offsets(torch.zeros(len(grid), 3), volume)
+    cloud = some_of(shape, recipe.network.points)
+    cube = to_volume(place(cloud, grid, ahead(offset, volume), volume), offset, volume)
+    made = project(cube, size, SIGMA, torch.full((len(grid),), STRENGTH))
+    errors = []
+    for scan, R in zip(track.scans, poses.rotation, strict=True):
+        points = to_volume(torch.from_numpy(scan)[None], offset[:1], volume)
+        seen = coarser(scan_image(points, recipe.network.image), size)
+        cost = torch.stack(image_costs(made, seen, recipe.loss.depth)).sum(0)
+        errors.append(rotation_angle(grid[cost.argmin()].double() @ R.mT))
+    error = torch.rad2deg(torch.stack(errors))
+    within = {f"within_{n}": float((error < n).double().mean()) for n in (15, 30)}
+    return {**within, "median_deg": float(error.median())}
+
+
+def viewpoints() -> torch.Tensor:
+    """`R_camera_object` of upright cameras, 10 degrees apart."""
+    found = []
+    for azimuth, elevation in product(range(0, 360, 10), range(-20, 41, 10)):
+        a, e = np.radians(azimuth), np.radians(elevation)
+        forward = -np.array((np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)))
+        right = np.array((-forward[1], forward[0], 0.0)) * -1 / np.cos(e)
+        found.append(np.stack((right, np.cross(forward, right), forward)))
+    return torch.from_numpy(np.stack(found)).float()
+
+
+def some_of(shape: Points, count: int) -> torch.Tensor:
+    """A seeded choice of points."""
+    rows = torch.randperm(len(shape), generator=torch.Generator().manual_seed(0))
+    return torch.from_numpy(shape)[rows[:count]]
+
+
+def give_shape(run: DpcRun, shape: Points) -> None:
+    """Replace the decoder by the truth: what is left to find are the poses."""
+    cloud = some_of(shape, run.recipe.network.points)
+
+    def known(code: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        return cloud.expand(len(code), -1, -1), torch.full_like(code[:, 0], STRENGTH)
+
+    run.state.network.cloud = known
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--preset", choices=("dpc-small", "dpc-dagger-small"), default="dpc-small")
@@ -117,7 +184,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--depth", type=float, default=0.0)
     parser.add_argument("--voxels", type=int, default=32)
-    parser.add_argument("--rate", type=float, default=1e-3, help="learning rate")
+    parser.add_argument("--rate", type=float, default=3e-3, help="learning rate")
+    parser.add_argument("--true-shape", action="store_true", help="only the poses are learned")
+    parser.add_argument("--search", action="store_true", help="nothing is learned")
     parser.add_argument("--student", type=float, default=20.0)
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
@@ -129,12 +198,19 @@ def main() -> None:
         optim=replace(recipe.optim, lr=options.rate),
         loss=replace(recipe.loss, student=options.student),
     )
+    if options.search:
+        print(searched(recipe, tested))
+        return
     with tempfile.TemporaryDirectory() as name:
         store = packed(trained, Path(name))
-        found = train(setup_dpc(recipe, store, Path(name) / "run", seed=options.seed), tested)
+        run = setup_dpc(recipe, store, Path(name) / "run", seed=options.seed)
+        if options.true_shape:
+            assert trained.shape is not None
+            give_shape(run, trained.shape)
+        found = train(run, tested)
     print(found)
     if options.out:
-        made = provenance(f"python experiments/dpc_toy.py --seed {options.seed}")
+        made = provenance(" ".join(("python", *sys.argv)))
         record = {"found": found, "recipe": asdict(recipe), "provenance": made}
         write_json(options.out, record)
 
