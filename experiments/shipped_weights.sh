@@ -12,13 +12,13 @@ set -eu
 meshes=$1 kitti=$2 out=$3
 mkdir -p "$out"
 wildshape simulate "$out/procedural" --tracks 30 --seed 9001
-wildshape simulate "$out/cad" --tracks 30 --seed 9002 --meshes "$meshes"
+wildshape simulate "$out/cad" --tracks 168 --scans 12 --seed 9002 --meshes "$meshes"
 wildshape convert kitti-raw "$kitti" "$out/kitti" --every 2
 for data in procedural cad kitti; do
     for rotate in none yaw so3; do
         seeds=3
         [ "$rotate" = none ] && seeds=1
         wildshape evaluate "$out/$data" --out "$out/$data-$rotate" --rotate "$rotate" \
-            --seeds "$seeds" --max-scans 12 --baselines identity,one-scan,local-icp
+            --seeds "$seeds" --max-scans 8 --baselines identity,one-scan,local-icp
     done
 done
