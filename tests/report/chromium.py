@@ -85,7 +85,9 @@ class Page:
 
     def picture(self, index: int) -> np.ndarray:
         """A panel as pixels."""
-        return self.shot(clip={**self.panel(index), "scale": 1})
+        place = self.panel(index)
+        scrolled = self.ask("scrollY")  # a clip is placed on the page, not in the window
+        return self.shot(clip={**place, "y": place["y"] + scrolled, "scale": 1})
 
     def shot(self, **how: Any) -> np.ndarray:
         """What is seen, as pixels."""

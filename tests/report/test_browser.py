@@ -5,13 +5,15 @@
 import time
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from tests.report.chromium import CHROMIUM, Page, browser, colourful, eventually, moved
 
-from wildshape.report.content import Cloud, Curve, Report, ReportObject
+from wildshape.report.content import Cloud, Curve, Report, ReportObject, Table
 from wildshape.report.page import write_report
+from wildshape.report.parts import metrics_table
 
 pytestmark = pytest.mark.skipif(
     CHROMIUM is None, reason="did not run: no chromium on PATH to open the report with"
@@ -24,16 +26,37 @@ def page(tmp_path: Path):
         yield opened
 
 
+def _metrics() -> dict[str, Any]:
+    """Everything that evaluate can say, with deviations: the widest table there is."""
+    keys = ("cd", "precision", "coverage", "acc30", "rot_median_deg", "trans_median_m")
+    figures = dict.fromkeys((*keys, "acc30_sym", "rot_sym_median_deg"), 0.4444)
+    each = {**figures, "std": figures, "scans_counted": {"registration": 12345}}
+    names = ("multi-start-icp", "wildshape", "wildshape, seed selected without labels (cars-3)")
+    return {"rotate": "yaw", "seeds": [0, 1, 2], "methods": dict.fromkeys(names, each)}
+
+
+def _index() -> Table:
+    rows = tuple((f"car {i}", f"{i * 7 % 11}.5", "far" if i % 2 else "") for i in range(8))
+    objects = (0, 1, *[None] * 6)
+    return Table("All", ("object", "CD, m", "warning"), rows, sortable=True, objects=objects)
+
+
 def _report() -> Report:
     rng = np.random.default_rng(0)
     near = rng.uniform(-1, 1, (800, 3)) * (2.2, 0.9, 0.7) + (14, 5, -1)
     scan = near[near[:, 1] < 5].astype(np.float32)
     whole = near.astype(np.float32)
     both = (Cloud("input scan", scan), Cloud("completed", whole))
+    scans = Table("Scans", ("scan", "confidence"), (("0", "0.5"), ("1", "0.9")))
     return Report(
         title="In a browser",
+        tables=(metrics_table(_metrics()),),
+        index=(_index(),),
         curves=(Curve("Loss", "step", "metres", (("loss", [1, 2, 3], [1.0, 0.5, 0.2]),), True),),
-        objects=(ReportObject("a <b>", clouds=both), ReportObject("b", clouds=both[1:])),
+        objects=(
+            ReportObject("a <b>", clouds=both, scans=scans),
+            ReportObject("b", clouds=both[1:]),
+        ),
     )
 
 
@@ -56,6 +79,7 @@ def test_page_draws_turns_and_stays_silent(page: Page, tmp_path: Path) -> None:
     page.open((tmp_path / "report.html").as_uri())
     page.wait("document.querySelectorAll('.plot canvas').length >= 2")
     page.wait("document.querySelectorAll('.curve .main-svg').length >= 1")
+    page.ask("document.querySelector('#panels').scrollIntoView({ block: 'center' })")
     for panel in (0, 1):
         eventually(partial(page.picture, panel), lambda p: colourful(p) > 300, f"{panel} is blank")
 
@@ -67,8 +91,31 @@ def test_page_draws_turns_and_stays_silent(page: Page, tmp_path: Path) -> None:
     page.wait("document.querySelectorAll('.panel:not([hidden])').length == 1")
     eventually(lambda: page.picture(0), lambda p: colourful(p) > 300, "the second object is blank")
 
+    _check_tables(page)
     assert page.complaints() == []
     assert [url for url in page.loads() if not url.startswith(("file:", "data:", "blob:"))] == []
+
+
+def _check_tables(page: Page) -> None:
+    page.call(
+        "Emulation.setDeviceMetricsOverride",
+        width=1300, height=900, deviceScaleFactor=1, mobile=False,
+    )  # fmt: skip
+    wide = "[...document.querySelectorAll('main > section > .scroll')]"
+    page.wait("innerWidth == 1300")
+    assert page.ask(f"{wide}.every(e => e.scrollWidth <= e.clientWidth)")
+
+    first = "document.querySelector('table.sortable tbody tr:not([hidden])')"
+    page.ask("document.querySelectorAll('table.sortable th')[1].click()")
+    assert page.ask(f"{first}.cells[1].textContent") == "10.5"
+    page.ask("document.querySelectorAll('table.sortable th')[1].click()")
+    assert page.ask(f"{first}.cells[1].textContent") == "0.5"
+    field = "document.querySelector('.filter input')"
+    page.ask(f"{field}.value = 'FAR car'; {field}.dispatchEvent(new Event('input'))")
+    assert page.ask("document.querySelector('.filter span').textContent") == "4 of 8"
+    page.ask("document.querySelector('tr[data-object=\"0\"]').click()")
+    assert page.ask("document.querySelector('#name').textContent") == "a <b>"
+    assert page.ask("document.querySelector('#scans table').rows.length") == 3
 
 
 def test_empty_page_is_silent(page: Page, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,66 @@ def test_track_is_fused_in_its_middle_scan_s_frame(tmp_path: Path, moved: bool) 
     assert shown.box is not None
     assert shown.box.size == (4, 1.8, 1.4)
     assert ("confidence", "0.75") in shown.facts
+
+
+def test_objects_to_look_at_come_first(tmp_path: Path) -> None:
+    track = _track()
+    assert track.T_sensor_object is not None
+    for number, off in enumerate((0.0, 0.3, 0.1)):
+        name = f"car{number}"
+        write_track(tmp_path / "data" / name, replace(track, name=name))
+        objects = {"input": str(tmp_path / "data"), "scans": [_entry(n) for n in NAMES]}
+        _completed(tmp_path / "out" / name, track, objects)
+        write_ply(tmp_path / "out" / name / "completed" / "000001.ply", track.scans[1] + off)
+    report = report_from_folder(tmp_path / "out")
+    assert [shown.name for shown in report.objects] == ["car1", "car2", "car0"]
+    table = report.index[0]
+    assert table.columns == ("object", "scans", "CD, m", "rotation, °", "least confidence")
+    assert table.rows[2] == ("car0", 3, "0.000", "0.0", "0.75")
+    assert table.objects == (0, 1, 2)
+    assert ("CD to truth", "0.000 m") in report.objects[2].facts
+    scans = report.objects[0].scans
+    assert scans is not None
+    assert scans.rows[0] == ("000000", 200, "0.75", "4.00 × 1.80 × 1.40")  # noqa: RUF001
+    assert any("true shape of 3 objects" in line for line in report.findings)
+
+
+def test_without_truth_the_least_confident_come_first(tmp_path: Path) -> None:
+    for number, confidence in enumerate((0.9, 0.1, 0.4)):
+        entries = [{**_entry(name), "confidence": confidence} for name in NAMES]
+        _completed(tmp_path / f"car{number}", _track(), {"input": "", "scans": entries})
+    report = report_from_folder(tmp_path)
+    assert [row[0] for row in report.index[0].rows] == ["car1", "car2", "car0"]
+    assert "least confidence" in report.index[0].title
+    assert any("median confidence of 0.40; 6 of them" in line for line in report.findings)
+
+
+def test_an_evaluation_s_objects_by_our_error(tmp_path: Path) -> None:
+    def row(track: str, precision: float, degrees: float) -> dict[str, list]:
+        where = {"track": track, "scan": "0"}
+        error = {"precision": precision, "coverage": 0.1}
+        turned = {"rotation_deg": degrees, "rotation_sym_deg": degrees, "translation_m": 0.1}
+        return {"completions": [{**where, "error": error}], "registrations": [{**where, **turned}]}
+
+    def both(name: str, a: dict, b: dict) -> dict:
+        return {"name": name, **{key: a[key] + b[key] for key in a}}
+
+    ours = both("wildshape", row("a", 0.1, 3), row("b", 0.3, 90))
+    runs = [{"methods": [both("identity", row("a", 0.5, 1), row("b", 0.1, 1)), ours]}]
+    (tmp_path / "scores.json").write_text(json.dumps({"runs": runs}), encoding="utf-8")
+    methods = {"identity": {"acc30": 0.31}, "dpc-lidar": {"acc30": 0.5}, "wildshape": {}}
+    metrics = {"rotate": "yaw", "methods": methods}
+    methods["wildshape"] = {"acc30": 0.82, "rot_median_deg": 3.0, "trans_median_m": 0.1}
+    (tmp_path / "metrics.json").write_text(json.dumps(metrics), encoding="utf-8")
+    report = report_from_folder(tmp_path)
+    assert report.index[0].rows == (
+        ("b", 1, "0.400", "0.400", "90.0", "0.10"),
+        ("a", 1, "0.200", "0.200", "3.0", "0.10"),
+    )
+    assert report.tables[0].emphasis == (2,)
+    reading = report.findings[0]
+    assert "wildshape brings 82 % of them within 30°" in reading
+    assert "best of the others: dpc-lidar, 50 %" in reading
 
 
 def test_without_the_scans_only_the_completed_shape_is_shown(tmp_path: Path) -> None:

@@ -41,6 +41,8 @@ class Table:
 
     Attributes:
         emphasis: indices of the rows drawn bold (our own method).
+        sortable: headings sort, and a field above filters the rows.
+        objects: of each row the number of the report's object it leads to, None for none.
     """
 
     title: str
@@ -48,6 +50,8 @@ class Table:
     rows: tuple[tuple[Cell, ...], ...]
     caption: str = ""
     emphasis: tuple[int, ...] = ()
+    sortable: bool = False
+    objects: tuple[int | None, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,7 @@ class ReportObject:
         box: oriented box in the clouds' frame, drawn in each panel.
         facts: (label, value) pairs under the name.
         sensor: tells which way is up; the sensor stands at the origin.
+        scans: what is known of each scan of it.
     """
 
     name: str
@@ -100,6 +105,7 @@ class ReportObject:
     box: Box | None = None
     facts: tuple[tuple[str, str], ...] = ()
     sensor: SensorKind = "lidar"
+    scans: Table | None = None
 
 
 @dataclass(frozen=True)
@@ -120,7 +126,9 @@ class Report:
     """A whole page.
 
     Attributes:
+        findings: the main figures in plain language, a sentence each, under the summary.
         cost: (label, value) tiles: time, steps, points.
+        index: all objects, those to look at first on top.
         provenance: name -> anything; shown folded at the end.
     """
 
@@ -133,3 +141,5 @@ class Report:
     notes: tuple[str, ...] = ()
     provenance: dict = field(default_factory=dict)
     figures: tuple[Figure, ...] = ()
+    findings: tuple[str, ...] = ()
+    index: tuple[Table, ...] = ()

@@ -7,26 +7,46 @@ wildshape.json, and track folders with objects.json, completed/, poses.txt. What
 out.
 """
 
-import json
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.se3 import SE3
 from wildshape.io.guard import reading
-from wildshape.io.inputs import open_tracks
-from wildshape.io.points import METRES, Unit, read_points
-from wildshape.io.poses import read_poses
-from wildshape.records import Box, Track
+from wildshape.io.points import read_points
+from wildshape.records import Track
 from wildshape.report.content import Cloud, Figure, Report, ReportObject, Table
-from wildshape.report.parts import metrics_table, track_object, training_curves
+from wildshape.report.parts import is_ours, metrics_table, track_object, training_curves
+from wildshape.report.ranking import (
+    Judged,
+    index_of,
+    judge,
+    objects_of_scores,
+    scans_of,
+    worst_first,
+)
+from wildshape.report.readings import of_confidences, of_errors, of_metrics, of_run
+from wildshape.report.results import (
+    MARKER,
+    METRICS,
+    OBJECTS,
+    SCORES,
+    Inputs,
+    TrackResult,
+    box_of,
+    find,
+    read_object,
+    read_result,
+)
 
-MAX_OBJECTS = 24
-_MARKER, _OBJECTS = "wildshape.json", "objects.json"
+MAX_OBJECTS, MAX_JUDGED = 24, 1000
+Metrics = list[tuple[Path, dict[str, Any]]]
 
 
 def report_from_folder(folder: Path, inputs: Path | None = None) -> Report:
-    """What a folder holds, as a report.
+    """What a folder holds, as a report: the objects to worry about first.
 
     Args:
         folder: the `--out` of one or several commands.
@@ -39,42 +59,35 @@ def report_from_folder(folder: Path, inputs: Path | None = None) -> Report:
     folder = Path(folder)
     if not folder.is_dir():
         raise BadInputError(f"{folder}: no such folder; name the --out of an earlier command.")
-    metrics = [(path, _json(path)) for path in _find(folder, "metrics.json")]
-    curves = [curve for log in _find(folder, "log.jsonl") for curve in training_curves(log)]
-    tracks = [path.parent for path in _find(folder, _OBJECTS)]
+    metrics = [(path, read_object(path)) for path in find(folder, METRICS)]
+    curves = [curve for log in find(folder, "log.jsonl") for curve in training_curves(log)]
+    tracks = [path.parent for path in find(folder, OBJECTS)]
     if not (metrics or curves or tracks):
         raise BadInputError(
             f"{folder}: holds no objects.json, metrics.json or log.jsonl to report; run complete, "
             "evaluate or train with --out first."
         )
+    where = Inputs(inputs)
+    ranked = worst_first(_judged(track, where) for track in tracks[:MAX_JUDGED])
+    drawn = ranked[:MAX_OBJECTS]
     return Report(
         title=f"Wildshape report: {folder.resolve().name}",
-        summary=_summary(len(tracks), len(metrics), len(curves)),
+        summary=_summary(folder, metrics, len(tracks), len(curves)),
+        findings=tuple(_findings(metrics, ranked)),
         tables=tuple(_checked_table(*entry) for entry in metrics),
+        index=tuple(_index(ranked, len(drawn), metrics)),
         curves=tuple(curves),
-        objects=tuple(_checked_object(track, inputs) for track in tracks[:MAX_OBJECTS]),
-        notes=_notes(tracks),
+        objects=tuple(_checked_object(one, where) for one in drawn),
+        notes=tuple(_notes(len(tracks), len(drawn))),
         provenance=_provenance(folder, metrics),
         figures=tuple(_figure(file) for path, _ in metrics for file in _pictures(path)),
     )
 
 
-def _find(folder: Path, name: str) -> list[Path]:
-    found = {path for depth in ("", "*/", "*/*/") for path in folder.glob(f"{depth}{name}")}
-    return sorted(found)
-
-
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        data = error
-    if isinstance(data, dict):
-        return data
-    raise BadInputError(
-        f"{path}: expected a JSON object, found {str(data)[:80]!r}; write it again with the "
-        "command that made it."
-    )
+def _judged(folder: Path, where: Inputs) -> Judged:
+    """`judge`, a damaged objects.json named."""
+    with reading(folder / OBJECTS, "what complete or register writes"):
+        return judge(read_result(folder, where))
 
 
 def _pictures(metrics: Path) -> list[Path]:
@@ -85,20 +98,49 @@ def _figure(picture: Path) -> Figure:
     return Figure(picture.stem.replace("_", " "), picture.read_bytes())
 
 
-def _summary(tracks: int, metrics: int, curves: int) -> str:
-    counted = ((tracks, "track"), (metrics, "evaluation"), (curves, "training curve"))
+def _summary(folder: Path, metrics: Metrics, tracks: int, curves: int) -> str:
+    """What there is, and the commands that made it."""
+    counted = ((tracks, "track"), (len(metrics), "evaluation"), (curves, "training curve"))
     parts = [f"{n} {what}{'s' if n > 1 else ''}" for n, what in counted if n]
-    return f"Found here: {', '.join(parts)}."
+    records = [read_object(path) for path in find(folder, MARKER)] + [m for _, m in metrics]
+    runs = dict.fromkeys(line for record in records if (line := of_run(record)))
+    return "\n\n".join((f"Found here: {', '.join(parts)}.", *runs))
 
 
-def _notes(tracks: list[Path]) -> tuple[str, ...]:
-    more = len(tracks) - MAX_OBJECTS
-    return (f"{more} more tracks are in the folder and not drawn here.",) if more > 0 else ()
+def _findings(metrics: Metrics, ranked: Sequence[Judged]) -> Iterator[str]:
+    for path, found in metrics:
+        with reading(path, "what evaluate writes"):
+            yield from of_metrics(found)
+    yield from of_errors(
+        [one.cd for one in ranked if one.cd is not None],
+        [one.rotation_deg for one in ranked if one.rotation_deg is not None],
+    )
+    entries = [entry for one in ranked for entry in one.result.said.get("scans") or ()]
+    known = [float(e["confidence"]) for e in entries if e.get("confidence") is not None]
+    yield from of_confidences(known, sum(bool(entry.get("warning")) for entry in entries))
 
 
-def _provenance(folder: Path, metrics: list[tuple[Path, dict[str, Any]]]) -> dict[str, Any]:
+def _index(ranked: Sequence[Judged], drawn: int, metrics: Metrics) -> Iterator[Table]:
+    if ranked:
+        yield index_of(ranked, drawn)
+    for path, found in metrics:
+        scores = path.with_name(SCORES)
+        ours = next((name for name in found.get("methods") or () if is_ours(name)), None)
+        table = objects_of_scores(scores, ours) if ours and scores.is_file() else None
+        if table is not None:
+            yield table
+
+
+def _notes(tracks: int, drawn: int) -> Iterator[str]:
+    if tracks > MAX_JUDGED:
+        yield f"{tracks - MAX_JUDGED} more tracks are in the folder and were not looked at."
+    if min(tracks, MAX_JUDGED) > drawn:
+        yield f"Of {min(tracks, MAX_JUDGED)} objects the {drawn} to look at first are drawn."
+
+
+def _provenance(folder: Path, metrics: Metrics) -> dict[str, Any]:
     """Of each command's output, under its place in the folder."""
-    outputs = [(path, _json(path)) for path in _find(folder, _MARKER)] + metrics
+    outputs = [(path, read_object(path)) for path in find(folder, MARKER)] + metrics
     return {
         str(path.relative_to(folder)): found["provenance"]
         for path, found in outputs
@@ -112,84 +154,60 @@ def _checked_table(path: Path, metrics: dict[str, Any]) -> Table:
         return metrics_table(metrics)
 
 
-def _checked_object(folder: Path, inputs: Path | None) -> ReportObject:
+def _checked_object(judged: Judged, where: Inputs) -> ReportObject:
     """`_object`, a damaged objects.json named."""
-    with reading(folder / _OBJECTS, "what complete or register writes"):
-        return _object(folder, inputs)
+    folder = judged.result.folder
+    with reading(folder / OBJECTS, "what complete or register writes"):
+        return _object(judged, read_result(folder, where))
 
 
-def _object(folder: Path, inputs: Path | None) -> ReportObject:
+def _object(judged: Judged, result: TrackResult) -> ReportObject:
     """One track: its middle scan completed, and all scans fused where they can be read."""
-    found = _json(folder / _OBJECTS)
-    named = inputs or (Path(found["input"]) if found.get("input") else None)
-    track = _input_track(named, folder) if named is not None else None
+    track = result.track
     if track is None:
-        return _completed_only(folder, found)
+        return _completed_only(result)
     name = track.scan_names[track.middle]
-    completed = folder / "completed" / f"{name}.ply"
-    entry = _entry(found, name)
-    return track_object(
+    entry = result.entry(name)
+    shown = track_object(
         track,
-        completed=read_points(completed) if completed.exists() else None,
-        box=_box(entry),
-        T_middle_scan=_registered(folder / "poses.txt", track),
-        facts=_facts(entry),
+        completed=result.completed(name),
+        box=box_of(entry),
+        T_middle_scan=_registered(result, track),
+        facts=(*_errors(judged), *_facts(entry)),
     )
+    return replace(shown, scans=scans_of(result))
 
 
-def _completed_only(folder: Path, found: dict[str, Any]) -> ReportObject:
-    completed = sorted((folder / "completed").glob("*.ply"))
-    missing = "the input scans cannot be read"
+def _completed_only(result: TrackResult) -> ReportObject:
+    completed, missing = result.completed_scans(), "the input scans cannot be read"
     if not completed:
-        return ReportObject(folder.name, missing)
+        return ReportObject(result.folder.name, missing, scans=scans_of(result))
     scan = completed[len(completed) // 2]
-    entry = _entry(found, scan.stem)
+    entry = result.entry(scan)
     return ReportObject(
-        name=folder.name,
-        subtitle=f"scan {scan.stem}; {missing}",
-        clouds=(Cloud("completed", read_points(scan)),),
-        box=_box(entry),
+        name=result.folder.name,
+        subtitle=f"scan {scan}; {missing}",
+        clouds=(Cloud("completed", read_points(result.folder / "completed" / f"{scan}.ply")),),
+        box=box_of(entry),
         facts=_facts(entry),
+        scans=scans_of(result),
     )
 
 
-def _input_track(inputs: Path, folder: Path) -> Track | None:
-    """The track that `folder` is about; None if the scans have moved, changed or lost it."""
-    try:
-        source = open_tracks(inputs, _unit(folder.parent / _MARKER))
-        return source[source.names.index(folder.name)]
-    except (BadInputError, ValueError):
-        return None
-
-
-def _unit(marker: Path) -> Unit:
-    settings = _json(marker).get("settings") or {} if marker.exists() else {}
-    unit: Unit = settings.get("unit", "m")
-    return unit if unit in METRES else "m"
-
-
-def _registered(path: Path, track: Track) -> SE3 | None:
+def _registered(result: TrackResult, track: Track) -> SE3 | None:
     """`T_middle_scan = T_middle_can inv(T_scan_can)`, METHOD 7; None without a pose a scan."""
-    if not path.exists() or len(track.scans) < 2:
-        return None
-    T_sensor_can = read_poses(path)
-    if len(T_sensor_can) != len(track.scans):
+    T_sensor_can = result.poses() if len(track.scans) > 1 else None
+    if T_sensor_can is None or len(T_sensor_can) != len(track.scans):
         return None
     return T_sensor_can[track.middle] @ T_sensor_can.inverse()
 
 
-def _entry(found: dict[str, Any], name: str) -> dict[str, Any]:
-    """What objects.json says of a scan."""
-    return next((scan for scan in found.get("scans") or () if scan.get("scan") == name), {})
-
-
-def _box(entry: dict[str, Any]) -> Box | None:
-    if not entry.get("box"):
-        return None
-    x, y, z = (float(v) for v in entry["box"]["centre"])
-    length, width, height = (float(v) for v in entry["box"]["size"])
-    qw, qx, qy, qz = (float(v) for v in entry["box"]["quaternion_wxyz"])
-    return Box((x, y, z), (length, width, height), (qw, qx, qy, qz))
+def _errors(judged: Judged) -> tuple[tuple[str, str], ...]:
+    known = (
+        ("CD to truth", judged.cd, "{:.3f} m"),
+        ("median pose error", judged.rotation_deg, "{:.1f}°"),
+    )
+    return tuple((label, text.format(value)) for label, value, text in known if value is not None)
 
 
 def _facts(entry: dict[str, Any]) -> tuple[tuple[str, str], ...]:

@@ -10,6 +10,7 @@ import base64
 import json
 import math
 import os
+import re
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -18,13 +19,12 @@ from string import Template
 import numpy as np
 
 from wildshape.io.atomic import write_text
-from wildshape.report.content import SERIES_COLORS, Cell, Cloud, Curve, Numbers, Report, Table
+from wildshape.report.content import SERIES_COLORS, Cloud, Curve, Numbers, Report, ReportObject
 from wildshape.report.picture import still
 from wildshape.report.scene import AXES, Scene, scene_of
+from wildshape.report.table import html_table
 
 _MAX_CURVE_POINTS = 2000
-_DASH = "\N{EN DASH}"
-_NUMERIC = f"0123456789-+±{_DASH}"
 _STEPS = 65534  # int16 from -32767 to 32767 across the scene
 
 
@@ -51,7 +51,9 @@ def render(report: Report) -> str:
         stills=_stills(report, scenes),
         objects_hidden="" if report.objects else "hidden",
         cost=_cost(report),
-        tables="".join(_table(table) for table in report.tables),
+        findings=_findings(report.findings),
+        index="".join(_section(t.title, html_table(t)) for t in report.index),
+        tables="".join(_section(t.title, html_table(t)) for t in report.tables),
         curves=_curves(report.curves),
         figures=_figures(report),
         notes=_notes(report.notes),
@@ -139,11 +141,16 @@ def _json(data: dict) -> str:
 
 def _paragraphs(text: str) -> str:
     parts = (part.strip() for part in text.split("\n\n"))
-    return "".join(f"<p>{escape(part)}</p>" for part in parts if part)
+    return "".join(f"<p>{_prose(part)}</p>" for part in parts if part)
+
+
+def _prose(text: str) -> str:
+    """Text with its `commands` set apart."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))
 
 
 def _section(title: str, body: str) -> str:
-    return f"<section><h2>{title}</h2>{body}</section>" if body else ""
+    return f"<section><h2>{escape(title)}</h2>{body}</section>" if body else ""
 
 
 def _cost(report: Report) -> str:
@@ -152,36 +159,6 @@ def _cost(report: Report) -> str:
         for label, value in report.cost
     )
     return _section("Cost", f'<dl class="tiles">{tiles}</dl>' if tiles else "")
-
-
-def _table(table: Table) -> str:
-    right = [_numeric([row[i] for row in table.rows]) for i in range(len(table.columns))]
-    head = _cells("th scope=col", "th", table.columns, right)
-    rows = "".join(
-        f"<tr{' class=ours' if i in table.emphasis else ''}>{_cells('td', 'td', row, right)}</tr>"
-        for i, row in enumerate(table.rows)
-    )
-    caption = f"<p class=caption>{escape(table.caption)}</p>" if table.caption else ""
-    grid = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
-    return _section(escape(table.title), f"<div class=scroll>{grid}</div>{caption}")
-
-
-def _numeric(cells: list[Cell]) -> bool:
-    """Whether a column holds numbers, some perhaps written as `82.1 ± 1.3` or `–`."""
-    return all(not isinstance(cell, str) or cell[:1] in _NUMERIC for cell in cells)
-
-
-def _cells(start: str, end: str, cells: tuple[Cell, ...], right: list[bool]) -> str:
-    return "".join(
-        f"<{start}{' class=number' if number else ''}>{escape(_text(cell))}</{end}>"
-        for cell, number in zip(cells, right, strict=True)
-    )
-
-
-def _text(cell: Cell) -> str:
-    if cell is None or (isinstance(cell, float) and not math.isfinite(cell)):
-        return _DASH
-    return format(cell, ".3g") if isinstance(cell, float) else str(cell)
 
 
 def _curves(curves: tuple[Curve, ...]) -> str:
@@ -203,14 +180,28 @@ def _figures(report: Report) -> str:
     return _section("Figures", f"<div class=grid>{images}</div>" if images else "")
 
 
+def _findings(findings: tuple[str, ...]) -> str:
+    items = "".join(f"<li>{_prose(finding)}</li>" for finding in findings)
+    return f"<ul class=findings>{items}</ul>" if items else ""
+
+
 def _stills(report: Report, scenes: list[Scene]) -> str:
-    """One picture an object, shown on paper and where a browser has no WebGL."""
+    """A part for each object, shown on paper and where a browser has no WebGL.
+
+    On a screen with WebGL the page takes the table of the object chosen from here.
+    """
     return "".join(
         f"<figure><figcaption>{escape(shown.name)} <small>{escape(shown.subtitle)}</small>"
-        f'</figcaption><img alt="{escape(shown.name)}" src="{_png(still(scene))}"></figure>'
+        f"</figcaption>{_still(shown, scene)}</figure>"
         for shown, scene in zip(report.objects, scenes, strict=True)
-        if scene.clouds
     )
+
+
+def _still(shown: ReportObject, scene: Scene) -> str:
+    image = f'<img alt="{escape(shown.name)}" src="{_png(still(scene))}">' if scene.clouds else ""
+    facts = "; ".join(f"{label} {value}" for label, value in shown.facts)
+    table = f"<div class=scans>{html_table(shown.scans)}</div>" if shown.scans else ""
+    return f"{image}<p>{escape(facts)}</p>{table}"
 
 
 def _png(png: bytes) -> str:

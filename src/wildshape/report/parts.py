@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from wildshape.baselines.named import NAMES
 from wildshape.geometry.se3 import SE3
 from wildshape.records import Box, Points, Track
 from wildshape.report.content import Cell, Cloud, Curve, ReportObject, Table
@@ -30,7 +31,7 @@ _COLUMNS = (
     ("acc ≤ 30° sym, %", "acc30_sym", 100, 1),
     ("rotation sym, °", "rot_sym_median_deg", 1, 1),
 )
-_BASELINES = ("identity", "one-scan", "local-icp", "global-icp")
+_TRAINED_RIVALS = ("dpc", "oracle")  # and what their names begin, such as dpc-lidar
 _VALIDATION = "validation/"
 
 
@@ -92,8 +93,13 @@ def metrics_table(metrics: Mapping[str, Any]) -> Table:
         columns=("method", *(column[0] for column in _COLUMNS), "scans"),
         rows=tuple((name, *_figures(methods[name]), _counted(methods[name])) for name in names),
         caption=_caption(methods, seeds),
-        emphasis=tuple(i for i, name in enumerate(names) if name not in _BASELINES),
+        emphasis=tuple(i for i, name in enumerate(names) if is_ours(name)),
     )
+
+
+def is_ours(method: str) -> bool:
+    """Whether a row is a model of ours: none of the baselines, DPC's variants or the oracle."""
+    return method not in NAMES and not method.lower().startswith(_TRAINED_RIVALS)
 
 
 def training_curves(log: Path) -> tuple[Curve, ...]:

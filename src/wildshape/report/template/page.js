@@ -204,11 +204,72 @@
         Object.assign(document.createElement("dd"), { textContent: value }));
       return row;
     }));
+    scans(index);
+    for (const row of document.querySelectorAll("tr[data-object]")) row.classList.toggle("chosen", Number(row.dataset.object) === index);
     [...$("picker").children].forEach((b, i) => b.setAttribute("aria-pressed", i === index));
     $("step").textContent = Number(gridStep(object).toPrecision(2)) + " m";
     arrange(object.clouds.length);
     look("3/4");
     draw();
+  }
+
+  function scans(index) { // the table that is printed, shown here for the object chosen
+    const table = document.querySelectorAll(".stills figure")[index]?.querySelector(".scans");
+    $("scans").hidden = !table;
+    if (!table) return;
+    const copy = table.cloneNode(true);
+    $("scans").lastElementChild.replaceChildren(copy);
+    copy.querySelectorAll("table.sortable").forEach(sortable);
+  }
+
+  // what a cell is sorted by: its number, however it is written, else its text
+  const worth = (cell) => {
+    const text = cell.textContent.trim();
+    const number = parseFloat(text.replace(/,/g, ""));
+    return cell.classList.contains("number") ? (Number.isNaN(number) ? -Infinity : number) : text;
+  };
+  const compare = (a, b) => (typeof a === "number" && typeof b === "number" ? a - b : String(a).localeCompare(String(b), "en", { numeric: true }));
+
+  function sortable(table) {
+    const body = table.tBodies[0];
+    [...table.tHead.rows[0].cells].forEach((head, column) => {
+      head.tabIndex = 0;
+      const sort = () => {
+        const down = head.getAttribute("aria-sort") !== "descending";
+        for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
+        head.setAttribute("aria-sort", down ? "descending" : "ascending");
+        const rows = [...body.rows].sort((a, b) => compare(worth(a.cells[column]), worth(b.cells[column])) * (down ? -1 : 1));
+        body.append(...rows);
+      };
+      head.addEventListener("click", sort);
+      head.addEventListener("keydown", (e) => { if (e.key === "Enter") sort(); });
+    });
+  }
+
+  function filter(table) { // words that a row must hold; above tables that are worth it
+    if (table.tBodies[0].rows.length < 6) return;
+    const rows = [...table.tBodies[0].rows];
+    const bar = Object.assign(document.createElement("div"), { className: "filter" });
+    const field = Object.assign(document.createElement("input"), { type: "search", placeholder: "filter, for example a name" });
+    field.setAttribute("aria-label", "filter the rows");
+    const count = document.createElement("span");
+    const apply = () => {
+      const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
+      for (const row of rows) row.hidden = !words.every((w) => row.textContent.toLowerCase().includes(w));
+      count.textContent = rows.filter((r) => !r.hidden).length + " of " + rows.length;
+    };
+    field.addEventListener("input", apply);
+    bar.append(field, count);
+    const scroll = table.closest(".scroll");
+    scroll.before(bar);
+    if (rows.length > 14) scroll.classList.add("long");
+    apply();
+  }
+
+  function leads(row) { // to the object's pictures
+    const go = () => { select(Number(row.dataset.object)); $("objects").scrollIntoView({ behavior: "smooth" }); };
+    row.addEventListener("click", go);
+    row.addEventListener("keydown", (e) => { if (e.key === "Enter") go(); });
   }
 
   function button(parent, text, act) {
@@ -248,8 +309,12 @@
   }
 
   curves();
+  for (const table of document.querySelectorAll("main > section:not(#objects) table.sortable")) { sortable(table); filter(table); }
   const alive = webgl();
   if (!alive) document.body.classList.add("no-webgl");
-  if (alive && data.objects.length) start();
+  if (alive && data.objects.length) {
+    start();
+    document.querySelectorAll("tr[data-object]").forEach(leads);
+  }
   dark.addEventListener("change", () => { curves(); if (alive && data.objects.length) draw(); });
 })();

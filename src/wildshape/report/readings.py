@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Figures in plain language: what an evaluation or a folder of results says, a sentence each."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from wildshape.report.parts import is_ours
+
+_SURE = 0.5
+_HOW = {"none": "as recorded", "yaw": "turned in yaw", "so3": "turned at random"}
+
+
+def of_metrics(metrics: Mapping[str, Any]) -> list[str]:
+    """What metrics.json says of each of our rows, beside the best of the others."""
+    methods: dict[str, Mapping[str, Any]] = dict(metrics.get("methods") or {})
+    rivals = {name: figures for name, figures in methods.items() if not is_ours(name)}
+    turned = _HOW.get(str(metrics.get("rotate")), "")
+    lines = []
+    for name, figures in methods.items():
+        if is_ours(name):
+            lines += list(_ours(name, figures, rivals, turned))
+    return lines
+
+
+def _ours(
+    name: str, figures: Mapping[str, Any], rivals: Mapping[str, Mapping[str, Any]], turned: str
+) -> Iterator[str]:
+    if _known(figures, "acc30", "rot_median_deg", "trans_median_m"):
+        yield (
+            f"Registration, scans {turned}: {name} brings {_percent(figures['acc30'])} of them "
+            "within 30° of their true orientation to the track's middle scan, with a median error "
+            f"of {figures['rot_median_deg']:.1f}° and {figures['trans_median_m']:.2f} m"
+            f"{_beside(rivals, 'acc30', best=max, text=_percent)}."
+        )
+    if _known(figures, "cd", "precision", "coverage"):
+        floor = figures.get("cd_floor")
+        least = f"; so few points cannot get under {floor:.3f} m" if floor else ""
+        yield (
+            f"Shape: a completed point of {name} lies {figures['precision']:.3f} m from the true "
+            f"surface on average, a true point {figures['coverage']:.3f} m from the completed one: "
+            f"together a Chamfer distance of {figures['cd']:.3f} m"
+            f"{_beside(rivals, 'cd', best=min, text=_metres)}{least}."
+        )
+
+
+def _known(figures: Mapping[str, Any], *keys: str) -> bool:
+    return all(figures.get(key) is not None for key in keys)
+
+
+def _beside(rivals: Mapping[str, Mapping[str, Any]], key: str, best: Any, text: Any) -> str:
+    known = {name: f[key] for name, f in rivals.items() if f.get(key) is not None}
+    if not known:
+        return ""
+    winner = best(known, key=known.__getitem__)
+    return f" (best of the others: {winner}, {text(known[winner])})"
+
+
+def of_confidences(confidences: Sequence[float], flagged: int) -> list[str]:
+    """What the scans' confidences say, where nothing else is known."""
+    if not confidences:
+        return []
+    unsure = sum(value < _SURE for value in confidences)
+    lines = [
+        f"{len(confidences):,} scans were completed with a median confidence of "
+        f"{float(np.median(confidences)):.2f}; {unsure:,} of them "
+        f"({_percent(unsure / len(confidences))}) are below {_SURE}, as one in ten of the scans "
+        "held out in training were: look at these first."
+    ]
+    if flagged:
+        lines.append(
+            f"{flagged:,} scans carry a warning and confidence 0: the model was not made for them."
+        )
+    return lines
+
+
+def of_errors(cds: Sequence[float], rotations: Sequence[float]) -> list[str]:
+    """What the tracks' errors against their truth say."""
+    lines = []
+    if cds:
+        lines.append(
+            f"Against the true shape of {len(cds):,} objects: a median Chamfer distance of "
+            f"{float(np.median(cds)):.3f} m, {max(cds):.3f} m at worst."
+        )
+    if rotations:
+        share = sum(value <= 30 for value in rotations) / len(rotations)
+        lines.append(
+            f"Against the true poses of {len(rotations):,} objects: "
+            f"{_percent(share)} have a median error of 30° or less to their middle scan."
+        )
+    return lines
+
+
+def of_run(record: Mapping[str, Any]) -> str:
+    """Which command was run, on what and when, from wildshape.json or metrics.json."""
+    made = record.get("provenance") or {}
+    if not made.get("command"):
+        return ""
+    when = str(made.get("time_utc") or "")[:16].replace("T", " ")
+    parts = (f"Made by `{made['command']}`", f"on {when} UTC" if when else "")
+    return " ".join(part for part in parts if part) + "."
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"
+
+
+def _metres(value: float) -> str:
+    return f"{value:.3f} m"
