@@ -106,6 +106,7 @@ class Completion:
         refined: whether the pose was refined against the scan.
         warning: empty, or one sentence (for example a size outside the training range).
         seconds: time spent on this scan.
+        facts: what the confidence is made from (`models/confidence.py`).
     """
 
     points: Points
@@ -117,6 +118,7 @@ class Completion:
     refined: bool = False
     warning: str = ""
     seconds: float = 0.0
+    facts: tuple[float, ...] = ()
 
     def mesh(self) -> "trimesh.Trimesh":
         """A closed triangle mesh of the shape, sensor frame, metres; made when asked for."""

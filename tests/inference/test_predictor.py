@@ -16,6 +16,7 @@ from wildshape.geometry.se3 import SE3
 from wildshape.geometry.visibility import FacingBins
 from wildshape.inference.predictor import Predictor, inlier_ratio, load
 from wildshape.models.checkpoint import ModelSettings, save_checkpoint
+from wildshape.models.confidence import Facts
 from wildshape.models.shapepose import NetworkConfig, ShapePoseNet
 from wildshape.records import Sensor
 
@@ -227,8 +228,10 @@ def test_another_kind_of_sensor_is_flagged(predictor):
 
 
 def test_confidence_falls_with_the_cost(predictor):
-    values = [predictor.confidence(cost) for cost in (0.0, 0.1, 0.3, 1.0, 100.0)]
-    assert values[0] == 1
+    facts = Facts(*[0.0] * len(Facts._fields))
+    costs = (1e-4, 0.1, 0.3, 1.0, 100.0)
+    values = [predictor.confidence(facts._replace(log_cost=math.log(cost))) for cost in costs]
+    assert values[0] == pytest.approx(1, abs=1e-6)
     assert values[2] == pytest.approx(0.5)
     assert values == sorted(values, reverse=True)
     assert values[-1] < 1e-4

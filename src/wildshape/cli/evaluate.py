@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from wildshape.inference.predictor import Predictor
 
 EXAMPLE = "wildshape evaluate test.store --out evaluation --rotate yaw --model runs/cars"
-FILES = ("metrics.json", "scores.json", "table.md", "errors.png", "examples.png")
+FILES = ("metrics.json", "scores.json", "table.md", "errors.png", "confidence.png", "examples.png")
 OURS = "wildshape"
 
 Models = Annotated[

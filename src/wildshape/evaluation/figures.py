@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float
 
+from wildshape.evaluation.confidence import risk_coverage
 from wildshape.evaluation.examples import Example
 from wildshape.evaluation.metrics import ACCURATE_DEG
-from wildshape.evaluation.results import MethodScores, Results
+from wildshape.evaluation.results import MethodScores, Results, stated
 from wildshape.records import Points
 
 if TYPE_CHECKING:
@@ -126,10 +127,38 @@ def _finish(ax: Axes) -> None:
         ax.legend(fontsize=8, frameon=False, loc="best")
 
 
+def draw_confidence(results: Results) -> Figure | None:
+    """Mean CD of the surest scans; None where no method states a confidence."""
+    from matplotlib.figure import Figure
+
+    found = {s.name: stated(s.completions) for s in results.methods}
+    curves = {name: (risk_coverage(*pair), pair) for name, pair in found.items() if pair[0]}
+    if not curves:
+        return None
+    figure = Figure(figsize=(5.4, 3.8), layout="constrained")
+    ax = figure.subplots()
+    for i, (name, (curve, pair)) in enumerate(curves.items()):
+        assert curve is not None
+        shares = 100 * np.asarray(curve.coverage)
+        best = risk_coverage([-cd for cd in pair[1]], pair[1])
+        assert best is not None
+        ax.plot(shares, curve.risk, color=f"C{i}", label=name)
+        ax.plot(shares, best.risk, color=f"C{i}", linestyle=":", label=f"{name}, perfect order")
+    ax.set_xlabel("scans kept, the surest first, %")
+    ax.set_ylabel("their mean Chamfer distance, m")
+    ax.set_ylim(bottom=0)
+    ax.grid(alpha=0.3)
+    ax.legend(fontsize=8, frameon=False)
+    return figure
+
+
 def write_figures(folder: Path, results: Results, examples: Sequence[Example]) -> list[Path]:
-    """Write `errors.png` and, where there are examples, `examples.png`."""
+    """Write `errors.png`, and `confidence.png` and `examples.png` where there is what they show."""
     folder.mkdir(parents=True, exist_ok=True)
     drawn = {"errors.png": draw_errors(results)}
+    confidence = draw_confidence(results)
+    if confidence is not None:
+        drawn["confidence.png"] = confidence
     if examples:
         drawn["examples.png"] = draw_examples(examples)
     for name, figure in drawn.items():

@@ -31,6 +31,17 @@ class BatchCompleter(Completer, Protocol):
 
 
 @runtime_checkable
+class Confident(Completer, Protocol):
+    """Completes scans and says how far it trusts each."""
+
+    def complete_surely(
+        self, scans: list[Points], sensor: Sensor
+    ) -> Iterable[tuple[Points, float]]:
+        """`complete` of each scan, in order, and the confidence in it, 0 to 1."""
+        ...
+
+
+@runtime_checkable
 class TrackCompleter(Protocol):
     """Completes an object from all scans of its track together."""
 

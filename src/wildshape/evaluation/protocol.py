@@ -14,6 +14,7 @@ from wildshape.evaluation.cases import Case, Truth, prepare
 from wildshape.evaluation.method import (
     BatchCompleter,
     Completer,
+    Confident,
     Described,
     Method,
     Registrar,
@@ -115,8 +116,17 @@ def _score_scans(method: Completer, case: Case, ledger: _Ledger) -> None:
         for i in range(len(case.scans)):
             ledger.skip(case, i, "completion: no true shape")
         return
-    for i, predicted in enumerate(complete_scans(method, case)):
-        _score_completion(predicted, case, case.truth, case.T_sensor_object, i, ledger)
+    for i, (predicted, confidence) in enumerate(_complete_surely(method, case)):
+        sure = (case.truth, case.T_sensor_object, i, ledger, confidence)
+        _score_completion(predicted, case, *sure)
+
+
+def _complete_surely(method: Completer, case: Case) -> list[tuple[Points | None, float | None]]:
+    """As `complete_scans`, with the confidence of those that state one."""
+    if isinstance(method, Confident):
+        with suppress(BadInputError):
+            return list(method.complete_surely(case.inputs(), case.sensor))
+    return [(predicted, None) for predicted in complete_scans(method, case)]
 
 
 def complete_scans(method: Completer, case: Case) -> Sequence[Points | None]:
@@ -153,6 +163,7 @@ def _score_completion(
     T_sensor_object: SE3,
     i: int,
     ledger: _Ledger,
+    confidence: float | None = None,
 ) -> None:
     if predicted is None:
         ledger.skip(case, i, f"completion: {REFUSED}")
@@ -174,6 +185,7 @@ def _score_completion(
             truth_points=len(truth.shape),
             cd_floor=floor,
             partial_points=None if truth.partial is None else len(truth.partial),
+            confidence=confidence,
         )
     )
 

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from wildshape.evaluation.confidence import confidence_figures, risk_coverage_curves
 from wildshape.evaluation.metrics import ACCURATE_DEG, CompletionError
-from wildshape.evaluation.skipped import Skipped, by_reason
+from wildshape.evaluation.skipped import Skipped, by_reason, with_rows
 from wildshape.evaluation.turning import Rotate
 from wildshape.io.atomic import write_json
 
@@ -35,11 +36,15 @@ NAMES = (
     "points",
     "truth_points",
     "partial_points",
+    "confidence_rank_correlation",
+    "risk_coverage_area",
 )
 UNITS = {
     "cd, precision, coverage, *_partial, cd_floor, trans_median_m": "metres",
     "acc30, acc30_sym": "share, 0 to 1",
     "rot_median_deg, rot_sym_median_deg": "degrees",
+    "confidence_rank_correlation": "Spearman, doubt with cd: 1 orders perfectly, 0 by chance",
+    "risk_coverage_area, risk_coverage": "metres of cd, over the share of the surest scans",
     "std": "sample standard deviation over seeds; null for one seed",
 }
 
@@ -58,6 +63,7 @@ class CompletionScore:
         truth_points: of the truth.
         cd_floor: CD of perfect points as many as these, metres (METHOD 8).
         partial_points: of the accumulation as it is; None where the shape is known.
+        confidence: 0 to 1, as the method states it; None if it states none.
     """
 
     track: str
@@ -69,6 +75,7 @@ class CompletionScore:
     truth_points: int
     cd_floor: float
     partial_points: int | None = None
+    confidence: float | None = None
 
 
 @dataclass(frozen=True)
@@ -157,7 +164,14 @@ def _completion_figures(scores: MethodScores) -> Figures:
         "points": float(np.median([row.points for row in rows])),
         "truth_points": float(np.median([row.truth_points for row in rows])),
         "partial_points": _median([row.partial_points for row in rows]),
+        **confidence_figures(stated(rows)),
     }
+
+
+def stated(rows: Sequence[CompletionScore]) -> tuple[list[float], list[float]]:
+    """Confidences, where one is stated, and the Chamfer distances that belong to them, metres."""
+    pairs = [(row.confidence, row.error.cd) for row in rows if row.confidence is not None]
+    return [sure for sure, _ in pairs], [cd for _, cd in pairs]
 
 
 def _median(counts: Sequence[int | None]) -> float | None:
@@ -228,20 +242,11 @@ def as_json(runs: Sequence[Results], provenance: Mapping[str, object]) -> dict[s
         "units": UNITS,
         "provenance": {**_machine(), **provenance},
         "methods": {summary.name: _method_json(summary) for summary in summarise(runs)},
-        "skipped": _skipped_json(runs),
+        "risk_coverage": risk_coverage_curves(
+            (s.name, stated(s.completions)) for run in runs for s in run.methods
+        ),
+        "skipped": with_rows((s.name, one) for r in runs for s in r.methods for one in s.skipped),
     }
-
-
-def _skipped_json(runs: Sequence[Results]) -> list[dict[str, object]]:
-    """Every scan left out, once a reason, with the rows that it is missing from."""
-    rows: dict[Skipped, list[str]] = {}
-    for run in runs:
-        for scores in run.methods:
-            for one in scores.skipped:
-                names = rows.setdefault(one, [])
-                if scores.name not in names:
-                    names.append(scores.name)
-    return [{**asdict(one), "methods": names} for one, names in rows.items()]
 
 
 def _method_json(summary: Summary) -> dict[str, object]:

@@ -4,7 +4,7 @@
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 
 @dataclass(frozen=True)
@@ -25,3 +25,15 @@ class Skipped:
 def by_reason(skipped: Iterable[Skipped]) -> dict[str, int]:
     """How many, by reason."""
     return dict(Counter(one.reason for one in skipped))
+
+
+def with_rows(skipped: Iterable[tuple[str, Skipped]]) -> list[dict[str, object]]:
+    """Every scan left out, once a reason, with the rows of the table that it is missing from.
+
+    Args:
+        skipped: name of the row, and what is missing from it.
+    """
+    rows: dict[Skipped, dict[str, None]] = {}
+    for name, one in skipped:
+        rows.setdefault(one, {})[name] = None
+    return [{**asdict(one), "methods": list(names)} for one, names in rows.items()]

@@ -20,7 +20,7 @@ from wildshape.ops.nearest import nearest
 from wildshape.records import Points
 
 _NARROWER = 0.75
-_POINT_SHARE, _STEP, _RIDGE = 0.1, 0.8, 1e-3
+_STEP, _RIDGE = 0.8, 1e-3
 _NORMAL_M, _AWAY_M = 0.35, 1e4
 
 
@@ -34,6 +34,7 @@ class Schedule(NamedTuple):
         widest_m: width of the robust kernel at first; it narrows by a quarter a round.
         narrowest_m: at last.
         normal_m: radius of the neighbourhood that a normal is taken from.
+        holding: how much a point is held in every direction, against sliding; of its normal's 1.
     """
 
     rounds: int = 10
@@ -42,10 +43,11 @@ class Schedule(NamedTuple):
     widest_m: float = 0.5
     narrowest_m: float = 0.06
     normal_m: float = _NORMAL_M
+    holding: float = 0.1
 
 
 COARSE = Schedule()
-FINE = Schedule(rounds=10, points=512, most=4096, widest_m=0.2, normal_m=0.2)
+FINE = Schedule(rounds=15, points=512, most=4096, normal_m=0.3, holding=0.02)
 
 
 class _Surface(NamedTuple):
@@ -82,7 +84,9 @@ def refine_jointly(
         if step % 3 == 0 or step >= rounds - 2:
             normals = surface_normals(moved.flatten(0, 1), schedule.normal_m).view_as(moved)
         width = max(schedule.widest_m * _NARROWER**step, schedule.narrowest_m)
-        T_object_sensor = _moved(T_object_sensor, _Surface(moved, normals), width, mirror)
+        T_object_sensor = _moved(
+            T_object_sensor, _Surface(moved, normals), width, mirror, schedule.holding
+        )
     T_object_sensor = _as_a_whole(start, T_object_sensor, points, mirror) @ T_object_sensor
     return T_object_sensor.inverse().to(T_sensor_object.rotation.dtype)
 
@@ -109,7 +113,9 @@ def surface_normals(
     return torch.linalg.eigh(covariance).eigenvectors[:, :, 0]
 
 
-def _moved(T_object_sensor: SE3, surface: _Surface, width: float, mirror: bool) -> SE3:
+def _moved(
+    T_object_sensor: SE3, surface: _Surface, width: float, mirror: bool, holding: float
+) -> SE3:
     """One Gauss-Newton step of every scan onto the others."""
     points = surface.points
     at, normal = _counterparts(surface, mirror)
@@ -119,7 +125,7 @@ def _moved(T_object_sensor: SE3, surface: _Surface, width: float, mirror: bool) 
     axes = torch.eye(3).expand(*points.shape[:2], 3, 3)
     # Rows of the problem: along the normal, and weakly along each axis, against sliding.
     directions = torch.cat((normal[:, :, None], axes), dim=2)
-    share = torch.tensor((1.0, _POINT_SHARE, _POINT_SHARE, _POINT_SHARE))
+    share = torch.tensor((1.0, holding, holding, holding))
     lever = torch.linalg.cross((points - centre)[:, :, None].expand_as(directions), directions)
     rows = torch.cat((lever, directions), dim=-1)
     weight = kernel[:, :, None] * share

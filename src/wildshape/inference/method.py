@@ -36,6 +36,15 @@ class Learned:
         """
         return [done.points for done in self.predictor.complete_many(scans, sensor)]
 
+    def complete_surely(self, scans: list[Points], sensor: Sensor) -> list[tuple[Points, float]]:
+        """`complete_many`, with the confidence in each, 0 to 1.
+
+        Raises:
+            BadInputError: one of them has fewer than 16 finite points.
+        """
+        done = self.predictor.complete_many(scans, sensor)
+        return [(item.points, item.confidence) for item in done]
+
     def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:
         """`T_middle_scan`, one a scan: takes each scan to the frame of the middle scan.
 
@@ -75,6 +84,15 @@ class LearnedTrack:
             BadInputError: one of them has fewer than 16 finite points.
         """
         return [done.points for done in self.predictor.complete_track(scans, sensor)]
+
+    def complete_surely(self, scans: list[Points], sensor: Sensor) -> list[tuple[Points, float]]:
+        """`complete_many`, with the confidence in each, 0 to 1.
+
+        Raises:
+            BadInputError: one of them has fewer than 16 finite points.
+        """
+        done = self.predictor.complete_track(scans, sensor)
+        return [(item.points, item.confidence) for item in done]
 
     def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:
         """`T_middle_scan`, one a scan.

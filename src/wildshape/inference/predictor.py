@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Complete, register and fuse with a trained network (METHOD 7)."""
 
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -15,10 +16,12 @@ from torch import Tensor
 from wildshape.geometry.facing import roll_angle
 from wildshape.geometry.se3 import SE3, stack
 from wildshape.inference.boxes import box_of
+from wildshape.inference.facts import facts_of, seen_facts
 from wildshape.inference.prepare import NetworkInput, as_points, extent, network_input
 from wildshape.inference.track import complete_together
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.models.checkpoint import ModelSettings, load_checkpoint
+from wildshape.models.confidence import Facts
 from wildshape.models.shapepose import Poses, ShapePoseNet
 from wildshape.ops.nearest import nearest
 from wildshape.records import Completion, Points, Registration, Sensor
@@ -29,13 +32,14 @@ _UPRIGHT_RAD = 0.1
 
 
 class _Found(NamedTuple):
-    """What one look at scans gives: shapes, `T_sensor_canonical`, cost and branch."""
+    """What one look at scans gives: shapes, `T_sensor_canonical`, cost, branch, and facts."""
 
     shapes: Tensor
     rotation: Tensor
     translation: Tensor
     cost: Tensor
     branch: Tensor
+    facts: Tensor
 
 
 def load(model: str | Path | None = None, device: str = "cpu") -> "Predictor":
@@ -145,23 +149,19 @@ class Predictor:
         found = self._look(given)
         if settings.facing:
             found = self._look_again(given, found)
-        shapes, rotation, translation, cost, branch = (part.cpu() for part in found)
-        T_sensor_can = SE3(rotation, translation)
-        warnings = [self._warning(scan, sensor) for scan in scans]
-        return [
-            self._completion(shapes[i], T_sensor_can[i], int(branch[i]), float(cost[i]), warning)
-            for i, warning in enumerate(warnings)
-        ]
+        found = _Found(*(part.cpu() for part in found))
+        return [self._completion(scan, i, found, sensor) for i, scan in enumerate(scans)]
 
     def _look(self, given: NetworkInput) -> _Found:
         """Shapes, and the poses of the branches that speak, from prepared scans."""
         code = self.network.encode(given.scans)
         shapes, poses = self.network.canonical(code), self.network.poses(code)
-        cost, branch = self._choose(given.scans, given.centres, shapes, poses)
+        cost, branch, facts = self._choose(given.scans, given.centres, shapes, poses)
         chosen = poses.choose(branch)
         back = given.turn.mT
         translation = back @ (chosen.translation[:, 0] + given.centres)[..., None]
-        return _Found(shapes, back @ chosen.rotation[:, 0], translation[..., 0], cost, branch)
+        rotation = back @ chosen.rotation[:, 0]
+        return _Found(shapes, rotation, translation[..., 0], cost, branch, facts)
 
     def _look_again(self, given: NetworkInput, found: _Found) -> _Found:
         """Scans that turn out to be tilted are rolled upright and seen once more.
@@ -178,30 +178,43 @@ class Predictor:
 
     def _choose(
         self, inputs: Tensor, centres: Tensor, shapes: Tensor, poses: Poses
-    ) -> tuple[Tensor, Tensor]:
-        """Cost and index of the branch with the lowest label-free cost (METHOD 3).
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Cost and index of the branch with the lowest label-free cost (METHOD 3), and facts.
 
         A selector's belief counts too, `settings.belief` metres a nat.
         """
         posed = poses.apply(shapes)
         scores = score_hypotheses(inputs, centres, posed, self.settings.projection)
         cost = scores.cost(self.settings.beta)
-        branch = (cost - self.settings.belief * poses.log_belief).argmin(-1)
-        return cost.gather(1, branch[:, None])[:, 0], branch
+        believed = cost - self.settings.belief * poses.log_belief
+        branch = believed.argmin(-1)
+        facts = seen_facts(inputs, posed, scores, poses, believed)
+        return cost.gather(1, branch[:, None])[:, 0], branch, facts
 
-    def _completion(
-        self, shape: Tensor, T_sensor_can: SE3, branch: int, cost: float, warning: str
-    ) -> Completion:
-        points = T_sensor_can.apply(shape).numpy()
-        confidence = 0.0 if warning else self.confidence(cost)
-        pose = T_sensor_can.to(torch.float64)
+    def _completion(self, scan: Points, i: int, found: _Found, sensor: Sensor | None) -> Completion:
+        """Scan `i` of those found."""
+        T_sensor_can, cost = SE3(found.rotation[i], found.translation[i]), float(found.cost[i])
+        facts, warning = facts_of(scan, cost, found.facts[i]), self._warning(scan, sensor)
         return Completion(
-            points, pose, box_of(shape, T_sensor_can), confidence, branch, cost, warning=warning
+            points=T_sensor_can.apply(found.shapes[i]).numpy(),
+            pose=T_sensor_can.to(torch.float64),
+            box=box_of(found.shapes[i], T_sensor_can),
+            confidence=0.0 if warning else self.confidence(facts),
+            branch=int(found.branch[i]),
+            cost=cost,
+            warning=warning,
+            facts=facts,
         )
 
-    def confidence(self, cost: float) -> float:
-        """0 to 1, falling with the label-free cost; 1/2 at the held-out 90th percentile."""
-        return 1.0 / (1.0 + (cost / self.settings.cost_m[1]) ** 2)
+    def confidence(self, facts: Facts) -> float:
+        """0 to 1: as the weights are calibrated (`models/confidence.py`).
+
+        Without a calibration it falls with the label-free cost, and is 1/2 at the held-out 90th
+        percentile.
+        """
+        if self.settings.calibration is not None:
+            return self.settings.calibration.confidence(facts)
+        return 1.0 / (1.0 + (math.exp(facts.log_cost) / self.settings.cost_m[1]) ** 2)
 
     def _warning(self, scan: Points, sensor: Sensor | None) -> str:
         """One sentence where the model was not made for such a scan, else nothing."""

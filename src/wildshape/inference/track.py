@@ -120,7 +120,7 @@ def track_cost(
 def refine_checked(scans: list[Points], voted: SE3, *, mirror: bool) -> TrackFit:
     """Joint refinement, kept only if the scans then lie nearer to each other, and near the vote."""
     refined = refine_jointly(scans, voted, mirror=mirror)
-    refined = refine_jointly(scans, refined, mirror=mirror, schedule=FINE)
+    refined = refine_jointly(scans, refined, mirror=False, schedule=FINE)
     moved = voted.inverse() @ refined
     near = bool((moved.angle() < _WITHIN_RAD).all())
     near = near and bool((moved.translation.norm(dim=-1) < _WITHIN_M).all())

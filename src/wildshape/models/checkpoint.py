@@ -14,6 +14,7 @@ from safetensors.torch import save
 from wildshape.errors import BadInputError
 from wildshape.geometry.visibility import FacingBins, PixelBins, PolarBins, Projection
 from wildshape.io.atomic import atomic_write
+from wildshape.models.confidence import Calibration, Facts
 from wildshape.models.shapepose import NetworkConfig, ShapePoseNet
 from wildshape.records import SensorKind
 
@@ -35,6 +36,7 @@ class ModelSettings:
         belief: metres of cost that a nat of the selector's belief is worth.
         extent_m: smallest and largest extent of the scans trained on, metres.
         cost_m: median and 90th percentile of the label-free cost on held-out scans, metres.
+        calibration: of the confidence; None if truth never told (`models/confidence.py`).
         provenance: command, commit, data, hardware, seed, steps.
         metrics: held-out figures.
     """
@@ -48,6 +50,7 @@ class ModelSettings:
     belief: float = 0.0
     extent_m: tuple[float, float] = (0.0, float("inf"))
     cost_m: tuple[float, float] = (0.1, 0.2)
+    calibration: Calibration | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
     metrics: dict[str, Any] = field(default_factory=dict)
 
@@ -110,7 +113,17 @@ def settings_from_dict(values: dict[str, Any]) -> ModelSettings:
     }
     for name in ("extent_m", "cost_m"):
         values[name] = tuple(values[name])
+    values["calibration"] = _calibration(values.get("calibration"))
     return ModelSettings(network=NetworkConfig(**network), projection=kind(**projection), **values)
+
+
+def _calibration(values: dict[str, Any] | None) -> Calibration | None:
+    if values is None:
+        return None
+    found = Calibration(**{**values, "weights": tuple(values["weights"])})
+    if len(found.weights) != len(Facts._fields):
+        raise ValueError(f"{len(found.weights)} weights for {len(Facts._fields)} facts")
+    return found
 
 
 def _check_weights(path: Path, network: ShapePoseNet, weights: dict[str, torch.Tensor]) -> None:

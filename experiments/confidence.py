@@ -1,0 +1,214 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Calibrate the confidence of weights, and measure it on drives that it was not fitted to.
+
+    python experiments/confidence.py --cad CAD --out confidence --write calibrated.safetensors
+
+Drives are simulated twice: validation drives (procedural vehicles, and CAD vehicles of split
+`train`) give the calibration, test drives (another seed, CAD vehicles of split `test`) the figures.
+The truth of simulated drives is used, which training never sees; that is said in the checkpoint.
+Writes OUT/confidence.json and .png and, with --write, the weights with their calibration.
+"""
+
+import csv
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Literal, NamedTuple
+
+import numpy as np
+import torch
+import tyro
+from safetensors import safe_open
+
+from wildshape.evaluation.confidence import RiskCoverage, rank_correlation, risk_coverage
+from wildshape.evaluation.metrics import completion_error
+from wildshape.evaluation.turning import turn_track
+from wildshape.geometry.se3 import stack
+from wildshape.inference.predictor import SHIPPED, Predictor, load
+from wildshape.io.atomic import write_json
+from wildshape.io.provenance import provenance
+from wildshape.io.store import Store, open_store
+from wildshape.io.store_writer import StoreWriter
+from wildshape.models.checkpoint import load_checkpoint, save_checkpoint
+from wildshape.models.confidence import Calibration, Facts, fit_calibration
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+
+_VEHICLES, _SCANS = ("car", "truck", "bus"), 12
+_SENSORS: tuple[Literal["hdl64", "hdl32"], ...] = ("hdl64", "hdl32")
+_SEEDS = {"train": 7100, "test": 9300}
+_FITTED_ON = "simulated drives with their truth: procedural vehicles, CAD vehicles of split train"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What to calibrate.
+
+    Attributes:
+        out: folder to write; drives simulated by an earlier call are used again.
+        model: checkpoint; the shipped one by default.
+        cad: folder of CAD meshes with a manifest; without it procedural vehicles alone.
+        write: where to write the weights with their calibration.
+        tracks: for each of two sensors and each source.
+    """
+
+    out: Path
+    model: Path = SHIPPED
+    cad: Path | None = None
+    write: Path | None = None
+    tracks: int = 10
+
+
+class Measured(NamedTuple):
+    """Completions of single scans, each turned by its own yaw.
+
+    Attributes:
+        facts: known without labels.
+        plain: confidence that falls with the label-free cost alone.
+        cd: true Chamfer distance, metres.
+        rotation_deg: angle to the true pose, in the canonical frame that most scans agree on.
+    """
+
+    facts: list[Facts]
+    plain: list[float]
+    cd: list[float]
+    rotation_deg: list[float]
+
+
+def drives(settings: Settings, split: str) -> Store:
+    """The drives of a split, simulated once."""
+    path = settings.out / split
+    if not path.exists():
+        with TemporaryDirectory() as folder, StoreWriter(path, {}) as store:
+            meshes = _meshes(settings.cad, split, Path(folder)) if settings.cad else None
+            for i, sensor in enumerate(_SENSORS):
+                for source in (None, meshes) if meshes else (None,):
+                    seed = _SEEDS[split] + 7 * i + (50 if source else 0)
+                    config = SimulationConfig(
+                        tracks=settings.tracks, scans=_SCANS, sensor=sensor, meshes=source
+                    )
+                    for track in simulate_tracks(config, seed, workers=1):
+                        store.add(replace(track, name=f"{sensor}-{seed}-{track.name}"))
+    return open_store(path)
+
+
+def _meshes(cad: Path, split: str, into: Path) -> Path:
+    """The vehicles of a split, linked into one folder."""
+    with (cad / "manifest.csv").open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["split"] == split]
+    for row in rows:
+        if row["category"] in _VEHICLES:
+            file = (cad / row["file"]).resolve()
+            (into / f"{row['category']}_{file.name}").symlink_to(file)
+    return into
+
+
+def measure(predictor: Predictor, store: Store) -> Measured:
+    """Complete all scans and hold them against their truth."""
+    found, gauges = Measured([], [], [], []), []
+    for index in range(len(store)):
+        track = turn_track(store.track(index), "yaw", 0)
+        truth, shape = track.T_sensor_object, track.shape
+        assert truth is not None
+        assert shape is not None
+        done = list(predictor.complete_many(track.scans, track.sensor))
+        for i, item in enumerate(done):
+            local = truth[i].inverse().apply_numpy(item.points)
+            found.facts.append(Facts(*item.facts))
+            found.plain.append(1 / (1 + (item.cost / predictor.settings.cost_m[1]) ** 2))
+            found.cd.append(completion_error(local, shape).cd)
+        gauges.append(truth.rotation.mT @ stack([item.pose for item in done]).rotation)
+        print(f"{index + 1} of {len(store)}", flush=True)
+    found.rotation_deg.extend(_from_most(torch.cat(gauges)))
+    return found
+
+
+def _from_most(R_object_canonical: torch.Tensor) -> list[float]:
+    """Angles to the one of them that the others are nearest to, degrees."""
+    trace = torch.einsum("aij,bij->ab", R_object_canonical, R_object_canonical)
+    angle = torch.rad2deg(torch.acos(((trace - 1) / 2).clamp(-1, 1)))
+    return angle[angle.median(1).values.argmin()].tolist()
+
+
+def figures(confidence: list[float], found: Measured) -> dict[str, object]:
+    """Rank correlations, and the curve with its area."""
+    curve = risk_coverage(confidence, found.cd)
+    assert curve is not None
+    return {
+        "rank_correlation_cd": rank_correlation(confidence, found.cd),
+        "rank_correlation_rotation": rank_correlation(confidence, found.rotation_deg),
+        "risk_coverage_area_m": curve.area,
+        "best_area_m": curve.best_area,
+        "mean_cd_m": float(np.mean(found.cd)),
+        "coverage": curve.coverage,
+        "risk_m": curve.risk,
+    }
+
+
+def reliability(confidence: list[float], found: Measured, within: float) -> list[dict[str, float]]:
+    """Stated against true shares of good completions, in five parts of equal size."""
+    order = np.argsort(confidence)
+    good = np.asarray(found.cd) <= within
+    return [
+        {"stated": float(np.asarray(confidence)[part].mean()), "true": float(good[part].mean())}
+        for part in np.array_split(order, 5)
+    ]
+
+
+def draw(path: Path, curves: dict[str, RiskCoverage | None]) -> None:
+    """The risk-coverage curves."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(5.4, 3.8), layout="constrained")
+    ax = figure.subplots()
+    for name, curve in curves.items():
+        assert curve is not None
+        ax.plot(100 * np.asarray(curve.coverage), curve.risk, label=name)
+    ax.set_xlabel("scans kept, the surest first, %")
+    ax.set_ylabel("their mean Chamfer distance, m")
+    ax.set_ylim(bottom=0)
+    ax.grid(alpha=0.3)
+    ax.legend(frameon=False)
+    figure.savefig(path, dpi=130)
+
+
+def write(model: Path, out: Path, calibration: Calibration) -> None:
+    """The same weights, in the same precision, with the calibration."""
+    network, found = load_checkpoint(model)
+    with safe_open(model, framework="pt") as file:
+        half = all(file.get_tensor(name).dtype == torch.float16 for name in file.keys())  # noqa: SIM118
+    save_checkpoint(out, network, replace(found, calibration=calibration), half=half)
+
+
+def main(settings: Settings) -> None:
+    """Fit, measure, write."""
+    predictor = load(settings.model)
+    seen = measure(predictor, drives(settings, "train"))
+    calibration = fit_calibration(seen.facts, np.asarray(seen.cd), _FITTED_ON)
+    test = measure(predictor, drives(settings, "test"))
+    after = [calibration.confidence(facts) for facts in test.facts]
+    report = {
+        "before": figures(test.plain, test),
+        "after": figures(after, test),
+        "each_fact_alone": {
+            name: rank_correlation([-facts[i] for facts in test.facts], test.cd)
+            for i, name in enumerate(Facts._fields)
+        },
+        "reliability": reliability(after, test, calibration.within_m),
+        "calibration": vars(calibration),
+        "scans": len(test.cd),
+        "provenance": provenance("python experiments/confidence.py --cad CAD --out OUT"),
+    }
+    write_json(settings.out / "confidence.json", report)
+    orders = {"cost alone": test.plain, "calibrated": after, "true error": [-c for c in test.cd]}
+    curves = {name: risk_coverage(order, test.cd) for name, order in orders.items()}
+    draw(settings.out / "confidence.png", curves)
+    if settings.write is not None:
+        write(settings.model, settings.write, calibration)
+    for name in ("before", "after"):
+        print(name, report[name])
+
+
+if __name__ == "__main__":
+    torch.set_num_threads(1)
+    main(tyro.cli(Settings))
