@@ -4,7 +4,7 @@
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.meshing import closed_mesh
@@ -42,7 +42,7 @@ def test_scale_changes_nothing_else():
 
 def test_crumbs_are_left_out():
     points = ball(3000, np.random.default_rng(3))
-    stray = points[:20] * 0.02 + np.float32([1.8, 0, 0])
+    stray = points[:20] * 0.02 + np.array([1.8, 0, 0], np.float32)
     mesh = closed_mesh(np.concatenate([points, stray]))
     assert mesh.vertices[:, 0].max() < 1.2
 
@@ -59,5 +59,5 @@ def test_completions_close(cars):
     assert mesh.volume > 0
     box = np.asarray(done.box.centre)
     assert np.linalg.norm(mesh.bounds.mean(0) - box) < 0.5
-    apart, _ = cKDTree(mesh.vertices).query(done.points)
+    apart, _ = KDTree(mesh.vertices).query(done.points)
     assert np.median(apart) < 0.05

@@ -13,7 +13,7 @@ def test_written_mesh_reads_back(kind, tmp_path):
     path = tmp_path / "new" / f"ball.{kind}"
     ball = trimesh.creation.icosphere(subdivisions=2)
     write_mesh(path, ball)
-    found = trimesh.load(path, force="mesh")
+    found = trimesh.load_mesh(path)
     assert found.is_watertight
     assert found.volume == pytest.approx(ball.volume, rel=1e-4)
     assert [entry.name for entry in path.parent.iterdir()] == [path.name]

@@ -24,6 +24,7 @@ COMMANDS = {
     "evaluate": "measure models and baselines against known shapes and poses",
     "view": "look at results or scans on an interactive page of this machine",
     "report": "draw what other commands wrote as one HTML page",
+    "export": "write a model as one ONNX file, for runtimes without this library",
 }
 _HELP = ("-h", "--help")
 _BAD_INPUT, _FAILED, _INTERRUPTED, _TERMINATED = 2, 1, 130, 143

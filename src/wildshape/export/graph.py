@@ -14,7 +14,6 @@ from wildshape.geometry.facing import face, roll, roll_angle
 from wildshape.models.checkpoint import ModelSettings
 from wildshape.models.shapepose import Poses, ShapePoseNet
 
-OUTPUTS = ("points", "rotation", "translation", "confidence", "cost", "branch")
 _UPRIGHT_RAD = 0.1
 
 
@@ -38,8 +37,9 @@ class Completed(NamedTuple):
     branch: Int[Tensor, "B"]
 
 
+OUTPUTS = Completed._fields
 # Canonical shape, rotation and translation in the sensor frame, cost, branch.
-_Look = tuple[Tensor, Tensor, Tensor, Tensor, Tensor]
+_Look = tuple[Tensor, ...]
 
 
 class CompletionGraph(nn.Module):
@@ -49,12 +49,16 @@ class CompletionGraph(nn.Module):
         super().__init__()
         self.network, self.settings = network, settings
 
-    def forward(self, scans: Float[Tensor, "B N 3"]) -> Completed:
-        """Complete scans of the same number of points; all points are used, none are drawn."""
+    def forward(self, scans: Float[Tensor, "B N 3"]) -> Completed | tuple[Tensor, ...]:
+        """Complete scans of the same number of points; all points are used, none are drawn.
+
+        While it is traced the answer is a plain tuple, the only one that a file can hold.
+        """
         shape, rotation, translation, cost, branch = self._complete(scans)
         points = shape @ rotation.mT + translation[:, None]
         confidence = 1.0 / (1.0 + (cost / self.settings.cost_m[1]).square())
-        return Completed(points, rotation, translation, confidence, cost, branch)
+        found = (points, rotation, translation, confidence, cost, branch)
+        return found if torch.compiler.is_exporting() else Completed(*found)
 
     def _complete(self, scans: Tensor) -> _Look:
         if not self.settings.facing:
@@ -64,9 +68,10 @@ class CompletionGraph(nn.Module):
         first = self._look(scans @ turn.mT, centre, turn)
         angle = roll_angle(turn @ first[1])
         tilted = angle.abs() > _UPRIGHT_RAD
-        return torch.cond(
-            tilted.any(), self._look_again, _keep, (*first, scans, turn, centre, angle, tilted)
-        )
+        given = (*first, scans, turn, centre, angle, tilted)
+        if torch.compiler.is_exporting():
+            return torch.cond(tilted.any(), self._look_again, _keep, given)
+        return self._look_again(*given) if bool(tilted.any()) else first
 
     def _look_again(self, *given: Tensor) -> _Look:
         """Tilted scans rolled upright and seen once more (`Predictor._look_again`)."""

@@ -6,7 +6,7 @@ Same definitions as `losses/hindsight.py`, which the tests hold against these.
 """
 
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from wildshape.geometry.visibility import Bins, Projection, bin_points
@@ -56,22 +56,21 @@ def cost_plain(
     projection: Projection,
     beta: float,
 ) -> Float[Tensor, "B H"]:
-    """The label-free cost of each hypothesis, metres (METHOD 6), one hypothesis after another."""
-    costs = [
-        _one(scans, centres, shape, projection, beta)
-        for shape in posed.unbind(1)  # all at once would take several times the memory
-    ]
-    return torch.stack(costs, dim=1)
+    """The label-free cost of each hypothesis, metres (METHOD 6)."""
+    hypotheses = posed.shape[1]
+    flat = posed.flatten(0, 1)
+    repeated, middle = _repeat(scans, hypotheses), _repeat(centres, hypotheses)
+    to_shape, to_scan = nearest_both_plain(repeated, flat)
+    seen = visible_plain(bin_points(flat + middle[:, None], middle, projection))
+    cost = to_shape.mean(-1) + beta * _mean_of(to_scan, seen)
+    return cost.unflatten(0, (-1, hypotheses))
 
 
-def _one(
-    scans: Tensor, centres: Tensor, shape: Tensor, projection: Projection, beta: float
-) -> Float[Tensor, "B"]:
-    to_shape, to_scan = nearest_both_plain(scans, shape)
-    seen = visible_plain(bin_points(shape + centres[:, None], centres, projection))
-    return to_shape.mean(-1) + beta * _mean_of(to_scan, seen)
+def _repeat(rows: Tensor, times: int) -> Tensor:
+    """Each row so many times in a row."""
+    return rows[:, None].expand(-1, times, *rows.shape[1:]).flatten(0, 1)
 
 
 def _mean_of(values: Float[Tensor, "B N"], counted: Bool[Tensor, "B N"]) -> Float[Tensor, "B"]:
-    number: Int[Tensor, "B"] = counted.sum(-1).clamp_min(1)
+    number = counted.sum(-1).clamp_min(1)
     return torch.where(counted, values, 0.0).sum(-1) / number

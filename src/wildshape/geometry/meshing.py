@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import trimesh
 
 _CELLS = 96  # along the longest side
-_REACH = 0.04  # of the longest side: what lies closer than twice that is joined
+_REACH = 0.05  # of the longest side: what lies closer than twice that is joined
 _SIDES = 5
 _SMALLEST_BODY = 0.01  # of all cells inside
 _MARGIN, _BAND = 3, 4  # cells

@@ -16,6 +16,5 @@ MESH_FORMATS: tuple[MeshFormat, ...] = get_args(MeshFormat)
 
 def write_mesh(path: Path, mesh: "trimesh.Trimesh") -> None:
     """Write a mesh atomically, in the format that the suffix names."""
-    content = mesh.export(file_type=path.suffix[1:])
     with atomic_write(path) as file:
-        file.write(content.encode() if isinstance(content, str) else content)
+        mesh.export(file, file_type=path.suffix[1:])

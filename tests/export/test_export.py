@@ -1,0 +1,173 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The exported graph does what the predictor does: in plain torch, in ONNX, for any sizes."""
+
+import json
+import runpy
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from wildshape.export.graph import CompletionGraph
+from wildshape.export.onnx import describe, trace, write_torch
+from wildshape.export.plain import cost_plain, nearest_both_plain, visible_plain
+from wildshape.export.verify import compare, open_exported, rehearsal_scans
+from wildshape.geometry.visibility import Bins, FacingBins, PixelBins, PolarBins
+from wildshape.inference.predictor import Predictor
+from wildshape.inference.prepare import resample
+from wildshape.losses.hindsight import score_hypotheses
+from wildshape.models.checkpoint import ModelSettings, save_checkpoint
+from wildshape.models.shapepose import NetworkConfig, ShapePoseNet
+from wildshape.ops.nearest import nearest_both
+from wildshape.ops.zbuffer import visible
+
+ROOT = Path(__file__).parent.parent.parent
+CONFIG = NetworkConfig(
+    encoder=(16, 16, 32, 32), decoder=(32, 32), pose=(16, 16), points=300, mirror=True, scale=2.0
+)
+SETTINGS = ModelSettings(
+    network=replace(CONFIG, selector=True),
+    sensor="lidar",
+    input_points=96,
+    projection=FacingBins(0.3),
+    beta=0.25,
+    belief=0.05,
+    extent_m=(2.0, 6.0),
+)
+
+
+def predictor(**changes):
+    """Random weights; their poses are tilted, so scans that face their object are seen twice."""
+    torch.manual_seed(0)
+    settings = replace(SETTINGS, **changes)
+    network = ShapePoseNet(settings.network)
+    with torch.no_grad():
+        network.pose.bias3.add_(0.3 * torch.randn_like(network.pose.bias3))
+    return Predictor(network.eval(), settings)
+
+
+@pytest.fixture(scope="module")
+def facing():
+    return predictor(facing=True)
+
+
+@pytest.fixture(scope="module")
+def exported(facing, tmp_path_factory):
+    """What the command says and writes; in a process whose shapes are not checked.
+
+    The tracer cannot see through those checks.
+    """
+    folder = tmp_path_factory.mktemp("export")
+    save_checkpoint(folder / "model.safetensors", facing.network, facing.settings)
+    command = (sys.executable, "-m", "wildshape.cli", "export", "model.safetensors", "--json")
+    said = subprocess.run((*command, "--scans", "4"), cwd=folder, capture_output=True, check=True)
+    return folder, json.loads(said.stdout)
+
+
+@pytest.fixture(scope="module")
+def onnx_file(exported):
+    return exported[0] / "model.onnx"
+
+
+def test_neighbours_from_one_product():
+    a, b = torch.randn(3, 50, 3) * 2, torch.randn(3, 70, 3) * 2
+    for plain, found in zip(nearest_both_plain(a, b), nearest_both(a, b)):
+        torch.testing.assert_close(plain, found.distance_squared.sqrt(), atol=1e-4, rtol=0)
+
+
+def test_z_buffer_from_two_scatters():
+    """Ties to the smallest index, bins outside the image never seen."""
+    generator = torch.Generator().manual_seed(0)
+    index = torch.randint(-2, 12, (4, 200), generator=generator)
+    depth = torch.randint(1, 4, (4, 200), generator=generator).float()
+    assert torch.equal(visible_plain(Bins(index, depth, 10)), visible(index, depth, 10))
+
+
+@pytest.mark.parametrize("projection", [FacingBins(0.3), PolarBins(0.02, 0.03), PixelBins()])
+def test_costs_are_those_of_the_loss(projection):
+    generator = torch.Generator().manual_seed(1)
+    scans = torch.randn(2, 90, 3, generator=generator)
+    posed = torch.randn(2, 4, 150, 3, generator=generator)
+    centres = torch.tensor([[9.0, 1, -1], [3.0, 6, 8]])
+    exact = score_hypotheses(scans, centres, posed, projection).cost(0.25)
+    plain = cost_plain(scans, centres, posed, projection, 0.25)
+    torch.testing.assert_close(plain, exact, atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"facing": True}, {"sensor": "camera", "projection": PixelBins()}],
+    ids=["centred", "facing", "camera"],
+)
+def test_graph_is_the_predictor(changes):
+    made = predictor(**changes)
+    graph = CompletionGraph(made.network, made.settings)
+    for scan in rehearsal_scans(made.settings, 6):
+        drawn = resample(scan, 96)
+        with torch.inference_mode():
+            found = graph(torch.from_numpy(drawn)[None])
+        done = made.complete(drawn)
+        assert int(found.branch) == done.branch
+        np.testing.assert_allclose(found.points[0].numpy(), done.points, atol=1e-4)
+        torch.testing.assert_close(
+            found.rotation[0].double(), done.pose.rotation, atol=1e-5, rtol=0
+        )
+        assert float(found.cost) == pytest.approx(done.cost, abs=1e-5)
+        assert float(found.confidence) == pytest.approx(done.confidence, abs=1e-4)
+
+
+def test_onnx_is_torch(facing, onnx_file):
+    scans = rehearsal_scans(facing.settings, 32, seed=1)
+    found = compare(open_exported(onnx_file, threads=1), facing, scans)
+    assert found.largest_m < 1e-4
+    assert found.other_branch == 0
+
+
+def test_onnx_takes_any_batch_and_any_number_of_points(facing, onnx_file):
+    runner = open_exported(onnx_file, threads=1)
+    for batch, count in ((1, 16), (3, 33), (5, 200)):
+        drawn = [resample(s, count) for s in rehearsal_scans(facing.settings, batch)]
+        together = runner(np.stack(drawn))
+        for i, scan in enumerate(drawn):
+            np.testing.assert_allclose(together[0][i], runner(scan[None])[0][0], atol=1e-4)
+
+
+def test_torch_program_is_torch(tmp_path):
+    made = predictor()
+    write_torch(tmp_path / "model.pt2", trace(made), describe(made))
+    runner = open_exported(tmp_path / "model.pt2")
+    found = compare(runner, made, rehearsal_scans(made.settings, 4))
+    assert found.largest_m < 1e-4
+    assert found.other_branch == 0
+
+
+def test_command_says_how_far_from_torch(exported):
+    folder, said = exported
+    assert {path.name for path in folder.iterdir()} == {"model.safetensors", "model.onnx"}
+    assert said["largest_m"] < 1e-4
+    assert (said["scans"], said["other_branch"]) == (4, 0)
+    assert said["bytes"] == (folder / said["out"]).stat().st_size
+
+
+def test_example_needs_no_torch(onnx_file, tmp_path, monkeypatch, capsys):
+    source = (ROOT / "examples" / "onnx_inference.py").read_text(encoding="utf-8")
+    assert "torch" not in source
+    assert "import wildshape" not in source
+    scan, out = ROOT / "examples" / "scan.npy", tmp_path / "completed.npy"
+    monkeypatch.setattr("sys.argv", ["example", str(onnx_file), str(scan), str(out)])
+    runpy.run_path(str(ROOT / "examples" / "onnx_inference.py"), run_name="__main__")
+    assert np.load(out).shape == (300, 3)
+    assert "96 points in, 300 out" in capsys.readouterr().out
+
+
+def test_the_file_says_what_it_is(onnx_file):
+    import onnx
+
+    held = {entry.key: entry.value for entry in onnx.load(onnx_file).metadata_props}
+    assert held["input_points"] == "96"
+    assert json.loads(held["settings"])["projection"] == {"cell_m": 0.3, "kind": "FacingBins"}
