@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from tyro.conf import Positional, arg
+from tyro.conf import FlagCreatePairsOff, Positional, arg
 
 from wildshape.cli.options import AsJson, Device, Model, Unit
 
@@ -45,8 +45,8 @@ class Settings:
     model: Model = None
     inputs: Inputs = None
     port: Port = 8080
-    open: bool = False
-    no_open: bool = False
+    open: FlagCreatePairsOff[bool] = False
+    no_open: FlagCreatePairsOff[bool] = False
     unit: Unit = "m"
     device: Device = "auto"
     json: AsJson = False

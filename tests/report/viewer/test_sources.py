@@ -54,6 +54,8 @@ def test_results_come_back_scan_by_scan(tmp_path: Path, moved: bool) -> None:
         assert one.pose is not None
         assert truth.pose is not None
         np.testing.assert_allclose(one.pose.matrix, truth.pose.matrix, atol=1e-5)
+        assert one.points is not None
+        assert truth.points is not None
         np.testing.assert_allclose(one.points, truth.points, atol=1e-5)
         if not moved:
             np.testing.assert_allclose(found.scans[number], shown.scans[kept[number]], atol=1e-6)
