@@ -48,7 +48,7 @@ def test_the_order_of_errors_is_all_that_counts():
 def test_equal_to_scipy_with_ties(seed):
     rng = np.random.default_rng(seed)
     confidence, error = rng.integers(0, 6, 40) / 2, rng.integers(0, 9, 40) / 2
-    expected = -float(spearmanr(confidence, error)[0])
+    expected = -spearmanr(confidence, error).statistic  # pyright: ignore[reportAttributeAccessIssue]
     assert rank_correlation(confidence.tolist(), error.tolist()) == pytest.approx(expected)
 
 

@@ -139,9 +139,7 @@ def test_no_nan_where_the_shape_lies_exactly_on_the_scan(dtype):
     eye = torch.eye(3, dtype=dtype).expand(2, 2, 3, 3).clone().requires_grad_()
     zero = torch.zeros(2, 2, 3, dtype=dtype, requires_grad=True)
     shape = scans["scans"][:1].clone().requires_grad_()
-    exact = multiview_loss(
-        **scans, shapes=shape, rotation=eye, translation=zero, config=LossConfig(0.25)
-    )
+    exact = multiview_loss(scans["scans"], scans["centres"], shape, eye, zero, LossConfig(0.25))
     exact.total.backward()
     for leaf in (shape, eye, zero):
         assert leaf.grad is not None

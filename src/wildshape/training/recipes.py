@@ -36,8 +36,8 @@ def paper_views() -> Recipe:
 def small() -> Recipe:
     """Learns on two CPU cores in minutes: half the widths and points, and what we add.
 
-    Beyond the paper: scans turned towards their object, mirror symmetry, a shared template, bins that face the
-    object, a higher learning rate that falls along a cosine, averaged weights.
+    Beyond the paper: scans turned towards their object, mirror symmetry, a shared template, bins
+    that face the object, a higher learning rate that falls along a cosine, averaged weights.
     """
     return Recipe(
         name="small",
