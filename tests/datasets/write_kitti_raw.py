@@ -54,7 +54,8 @@ def picture_scene(root):
     """A simulated car, passed; what the documentation shows."""
     config = SimulationConfig(tracks=1, scans=11, occlusion=0.0)
     (track,) = simulate_tracks(config, seed=1, workers=1)
-    assert track.shape is not None and track.T_sensor_object is not None
+    assert track.shape is not None
+    assert track.T_sensor_object is not None
     low, high = track.shape.min(axis=0), track.shape.max(axis=0)
     labels = []
     for i in range(len(track.scans)):
