@@ -16,7 +16,7 @@ from wildshape.geometry.se3 import SE3, stack
 from wildshape.inference import track as whole
 from wildshape.inference.boxes import box_of
 from wildshape.inference.predictor import Predictor
-from wildshape.inference.voting import half_turn, slow, steady_signs, voted_signs
+from wildshape.inference.voting import half_turn, likeness_of_next, slow, steady_signs, voted_signs
 from wildshape.models.shapepose import ShapePoseNet
 from wildshape.records import Completion
 
@@ -110,11 +110,37 @@ def test_the_heavier_part_says_which_way():
     yaw = torch.linspace(0.0, 0.5, 6)
     back = torch.tensor([False, True, False, True, False, False])
     rotation = rotation_z(torch.where(back, yaw + torch.pi, yaw))
-    gain, equal = torch.zeros(6), torch.ones(6)
-    assert torch.equal(voted_signs(rotation, gain, equal) < 0, back)
+    nothing = (torch.zeros(6), torch.zeros(5))
+    assert torch.equal(voted_signs(rotation, *nothing, torch.ones(6)) < 0, back)
     heavy = torch.where(back, 5.0, 1.0)
-    assert torch.equal(voted_signs(rotation, gain, heavy) > 0, back)
+    assert torch.equal(voted_signs(rotation, *nothing, heavy) > 0, back)
     assert set(steady_signs(rotation).tolist()) == {-1.0, 1.0}
+
+
+def test_turned_each_on_their_own_the_shape_and_the_neighbours_vote():
+    """One scan that the shape is unsure of follows its neighbours; a sure shape is followed."""
+    generator = torch.Generator().manual_seed(1)
+    rotation = rotation_z(6.28 * torch.rand(5, generator=generator))
+    alike = torch.full((4,), 0.1)
+    unsure = torch.tensor((0.05, 0.05, -0.01, 0.05, 0.05))
+    assert voted_signs(rotation, unsure, alike, torch.ones(5)).tolist() == [1.0] * 5
+    opposed = torch.tensor((0.1, -0.1, -0.1, 0.1))
+    assert voted_signs(rotation, unsure, opposed, torch.ones(5)).tolist() == [1, 1, -1, 1, 1]
+    alone = torch.zeros(4)
+    assert voted_signs(rotation, unsure, alone, torch.ones(5)).tolist() == [1, 1, -1, 1, 1]
+
+
+def test_scans_posed_alike_lie_on_each_other():
+    true = poses_of(TRACK)
+    for poses, sign in ((true, 1), (turned_around(true, {1, 3, 5}), -1)):
+        clouds = torch.stack(
+            [
+                poses[i].inverse().apply(torch.from_numpy(scan[:300]).double())
+                for i, scan in enumerate(TRACK.scans)
+            ]
+        )
+        likeness = likeness_of_next(clouds.float(), 0.0, mirror=True)
+        assert bool((sign * likeness > 0.01).all())
 
 
 def test_drawn_to_what_was_seen_and_nowhere_else():

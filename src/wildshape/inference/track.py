@@ -19,13 +19,13 @@ from wildshape.geometry.se3 import SE3, stack
 from wildshape.inference.boxes import box_of
 from wildshape.inference.joint import FINE, refine_jointly
 from wildshape.inference.prepare import network_input
-from wildshape.inference.voting import half_turn, voted_signs
+from wildshape.inference.voting import half_turn, likeness_of_next, voted_signs
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.models.checkpoint import ModelSettings
 from wildshape.ops.nearest import nearest
 from wildshape.records import Completion, Points
 
-_BATCH, _MOST_POINTS = 32, 4096
+_BATCH, _MOST_POINTS, _VOTING_POINTS = 32, 4096, 192
 _VOXEL_M, _REACH_M, _STIFFNESS = 0.08, 0.12, 0.2
 _WITHIN_M, _WITHIN_RAD = 1.5, 0.6
 
@@ -94,12 +94,22 @@ def _voted(
     turned = T_sensor_can @ half_turn(middle)
     stands = track_cost(shape, T_sensor_can, scans, settings)
     gain = track_cost(shape, turned, scans, settings) - stands
-    signs = voted_signs(T_sensor_can.rotation, gain, weights)
+    clouds = _some_of_each(scans, T_sensor_can)
+    likeness = likeness_of_next(clouds, middle, mirror=settings.network.mirror)
+    signs = voted_signs(T_sensor_can.rotation, gain, likeness, weights)
     back = signs < 0
     return SE3(
         torch.where(back[:, None, None], turned.rotation, T_sensor_can.rotation),
         torch.where(back[:, None], turned.translation, T_sensor_can.translation),
     )
+
+
+def _some_of_each(scans: list[Points], T_sensor_object: SE3) -> Float[Tensor, "V n 3"]:
+    """As many points of each scan, object frame."""
+    rng = np.random.default_rng(0)
+    rows = [rng.permutation(len(s))[np.arange(_VOTING_POINTS) % len(s)] for s in scans]
+    picked = torch.stack([torch.from_numpy(s[row]) for s, row in zip(scans, rows)])
+    return T_sensor_object.inverse().apply(picked.double()).float()
 
 
 def track_cost(

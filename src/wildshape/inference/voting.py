@@ -4,8 +4,8 @@
 
 What fails in single scans of a near-symmetric object is the half turn. Where the scans of a track
 follow each other, the object does not turn around between them; that is seen from poses that turn
-slowly, half turns aside. Where each scan was turned on its own, the track's mean shape is asked:
-it knows front from back better than that of one scan.
+slowly, half turns aside. Where each scan was turned on its own, the track's mean shape is asked,
+which knows front from back better than that of one scan, and each scan of its neighbour.
 """
 
 import torch
@@ -13,8 +13,10 @@ from jaxtyping import Float
 from torch import Tensor
 
 from wildshape.geometry.se3 import SE3
+from wildshape.ops.nearest import nearest
 
 _NEIGHBOURS, _FEWEST, _SLOW_DEG = 5, 4, 15.0
+_FAR_M, _SHAPE_VOTES = 0.4, 2.0
 
 
 def half_turn(middle_x: float, dtype: torch.dtype = torch.float64) -> SE3:
@@ -53,16 +55,63 @@ def _trace(matrix: Float[Tensor, "V 3 3"]) -> Float[Tensor, "V"]:
 
 
 def voted_signs(
-    rotation: Float[Tensor, "V 3 3"], gain: Float[Tensor, "V"], weights: Float[Tensor, "V"]
+    rotation: Float[Tensor, "V 3 3"],
+    gain: Float[Tensor, "V"],
+    likeness: Float[Tensor, "W"],
+    weights: Float[Tensor, "V"],
 ) -> Float[Tensor, "V"]:
     """+1 or -1 for each scan: turn those of -1 around, and all are posed one way.
 
     Args:
         rotation: `R_sensor_object`, as each scan found it.
         gain: by how much the track's shape costs more in a scan when turned around, metres.
+        likeness: by how much each scan lies worse on the next one when one of them is turned
+            around, metres; one fewer than scans.
         weights: how much each scan is worth.
     """
     if not slow(rotation):
-        return torch.where(gain < 0, -torch.ones_like(gain), 1.0)
+        return _agreed(gain, likeness)
     signs = steady_signs(rotation)
     return signs if float((signs * weights).sum()) >= 0 else -signs
+
+
+def _agreed(gain: Float[Tensor, "V"], likeness: Float[Tensor, "W"]) -> Float[Tensor, "V"]:
+    """Signs by what the shape says of each scan, and each scan of the next one.
+
+    The shape is one more member of the vote, and is never turned.
+    """
+    count = len(gain)
+    votes = gain.new_zeros(count + 1, count + 1)
+    row = torch.arange(count)
+    votes[row, count] = _SHAPE_VOTES * gain + 1e-9
+    votes[row[:-1], row[1:]] = likeness
+    eigenvector = torch.linalg.eigh(votes + votes.T).eigenvectors[:, -1]
+    signs = eigenvector[:-1] * eigenvector[-1]
+    return torch.where(signs < 0, -torch.ones_like(signs), 1.0)
+
+
+def likeness_of_next(
+    clouds: Float[Tensor, "V n 3"], middle_x: float, *, mirror: bool
+) -> Float[Tensor, "W"]:
+    """By how much each scan lies worse on the next one when turned around, and the reverse.
+
+    Scans that follow each other see nearly the same side of the object, so that they lie on each
+    other if they are posed alike, and a bonnet on a boot if not.
+
+    Args:
+        clouds: the scans' points in the object frame, by the pose that each found for itself.
+        middle_x: of the object's length, object frame.
+        mirror: the object is symmetric in the plane y = 0.
+    """
+    turned = half_turn(middle_x, clouds.dtype).apply(clouds)
+    bank = clouds
+    if mirror:
+        bank = torch.cat((clouds, clouds * clouds.new_tensor((1.0, -1.0, 1.0))), dim=1)
+    there = _misfit(turned[:-1], bank[1:]) - _misfit(clouds[:-1], bank[1:])
+    back = _misfit(turned[1:], bank[:-1]) - _misfit(clouds[1:], bank[:-1])
+    return (there + back).double()
+
+
+def _misfit(points: Float[Tensor, "P n 3"], bank: Float[Tensor, "P m 3"]) -> Float[Tensor, "P"]:
+    """Mean distance of points to their cloud, metres; beyond 0.4 m it says nothing more."""
+    return nearest(points, bank).distance_squared.sqrt().clamp_max(_FAR_M).mean(-1)
