@@ -3,6 +3,7 @@
 """Processes that are killed: finished work stays, and the same command goes on."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +15,8 @@ from safetensors.torch import load_file
 
 from wildshape.io.points import read_points
 from wildshape.io.tracks import read_poses
+
+_COPIES = 60
 
 PROGRAM = "import torch; torch.set_num_threads(1); from wildshape.cli.main import main; main()"
 
@@ -81,8 +84,12 @@ def test_a_terminated_training_resumes_to_the_same_weights(wildshape, short_run,
 
 
 def test_ctrl_c_ends_with_one_sentence(dataset, trained, tmp_path):
-    out = tmp_path / "c"
-    with running("complete", dataset, "--out", out, "--model", trained) as process:
+    out, many = tmp_path / "c", tmp_path / "many"
+    for copy in range(_COPIES):  # more than is completed before the signal comes
+        for track in sorted(dataset.iterdir()):
+            if (track / "scans").is_dir():
+                shutil.copytree(track, many / f"{copy:02d}-{track.name}")
+    with running("complete", many, "--out", out, "--model", trained) as process:
         wait_for(lambda: any(out.glob("*/objects.json")), process)
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=60)
