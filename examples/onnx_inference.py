@@ -12,29 +12,31 @@ import numpy as np
 import onnxruntime
 
 
-def prepare(points: np.ndarray, count: int) -> np.ndarray:
-    """At most `count` finite points, chosen as `wildshape complete` chooses them."""
+def prepare(points: np.ndarray, count: int) -> dict[str, np.ndarray]:
+    """Finite points in a fixed order, and which `count` of them the network sees."""
     points = np.asarray(points, np.float32)
     points = points[np.isfinite(points).all(axis=1)]
     if len(points) < 16:
         raise SystemExit(f"{len(points)} finite points; at least 16 are needed")
-    points = points[np.lexsort(points.T)]
+    drawn = np.arange(count) % len(points)
     if len(points) > count:
-        points = points[np.random.default_rng(0).choice(len(points), count, replace=False)]
-    return points
+        drawn = np.random.default_rng(0).choice(len(points), count, replace=False)
+    return {"scans": points[np.lexsort(points.T)][None], "drawn": drawn[None]}
 
 
 def main(model: str, scan: str, out: str) -> None:
     session = onnxruntime.InferenceSession(model, providers=["CPUExecutionProvider"])
     about = session.get_modelmeta().custom_metadata_map
-    points = prepare(np.load(scan), int(about["input_points"]))
+    given = prepare(np.load(scan), int(about["input_points"]))
     names = [output.name for output in session.get_outputs()]
-    found = dict(zip(names, session.run(None, {"scans": points[None]}), strict=True))
+    found = dict(zip(names, session.run(None, given), strict=True))
     np.save(out, found["points"][0])  # (m, 3), the scan's sensor frame, metres
     T_sensor_canonical = np.eye(4)
     T_sensor_canonical[:3, :3] = found["rotation"][0]
     T_sensor_canonical[:3, 3] = found["translation"][0]
-    print(f"{len(points)} points in, {found['points'].shape[1]} out, confidence", end=" ")
+    print(
+        f"{given['scans'].shape[1]} points in, {found['points'].shape[1]} out, confidence", end=" "
+    )
     print(f"{found['confidence'][0]:.2f}, pose\n{T_sensor_canonical.round(3)}")
 
 

@@ -15,13 +15,14 @@ import torch
 
 from wildshape.export.graph import CompletionGraph
 from wildshape.export.onnx import describe, trace, write_torch
-from wildshape.export.plain import cost_plain, nearest_both_plain, visible_plain
-from wildshape.export.verify import compare, open_exported, rehearsal_scans
+from wildshape.export.plain import nearest_both_plain, score_plain, visible_plain
+from wildshape.export.verify import compare, open_exported, prepared, rehearsal_scans
 from wildshape.geometry.visibility import Bins, FacingBins, PixelBins, PolarBins
 from wildshape.inference.predictor import Predictor
 from wildshape.inference.prepare import resample
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.models.checkpoint import ModelSettings, save_checkpoint
+from wildshape.models.confidence import Calibration
 from wildshape.models.shapepose import NetworkConfig, ShapePoseNet
 from wildshape.ops.nearest import nearest_both
 from wildshape.ops.zbuffer import visible
@@ -41,6 +42,14 @@ SETTINGS = ModelSettings(
 )
 
 
+CALIBRATION = Calibration(
+    weights=(0.3, 0.2, 0.1, 0.2, -0.5, 0.1, -0.2, 0.1, 0.05, -0.4),
+    bias=0.2,
+    sigma=2.0,
+    within_m=0.3,
+)
+
+
 def predictor(**changes):
     """Random weights; their poses are tilted, so scans that face their object are seen twice."""
     torch.manual_seed(0)
@@ -53,7 +62,7 @@ def predictor(**changes):
 
 @pytest.fixture(scope="module")
 def facing():
-    return predictor(facing=True)
+    return predictor(facing=True, calibration=CALIBRATION, extent_m=(2.0, 12.0))
 
 
 @pytest.fixture(scope="module")
@@ -94,24 +103,28 @@ def test_costs_are_those_of_the_loss(projection):
     scans = torch.randn(2, 90, 3, generator=generator)
     posed = torch.randn(2, 4, 150, 3, generator=generator)
     centres = torch.tensor([[9.0, 1, -1], [3.0, 6, 8]])
-    exact = score_hypotheses(scans, centres, posed, projection).cost(0.25)
-    plain = cost_plain(scans, centres, posed, projection, 0.25)
-    torch.testing.assert_close(plain, exact, atol=1e-5, rtol=0)
+    exact = score_hypotheses(scans, centres, posed, projection)
+    plain = score_plain(scans, centres, posed, projection)
+    torch.testing.assert_close(plain.observation, exact.observation, atol=1e-5, rtol=0)
+    torch.testing.assert_close(plain.projection, exact.projection, atol=1e-5, rtol=0)
 
 
 @pytest.mark.parametrize(
     "changes",
-    [{}, {"facing": True}, {"sensor": "camera", "projection": PixelBins()}],
+    [
+        {},
+        {"facing": True, "calibration": CALIBRATION},
+        {"sensor": "camera", "projection": PixelBins()},
+    ],
     ids=["centred", "facing", "camera"],
 )
 def test_graph_is_the_predictor(changes):
     made = predictor(**changes)
     graph = CompletionGraph(made.network, made.settings)
     for scan in rehearsal_scans(made.settings, 6):
-        drawn = resample(scan, 96)
         with torch.inference_mode():
-            found = graph(torch.from_numpy(drawn)[None])
-        done = made.complete(drawn)
+            found = graph(*map(torch.from_numpy, prepared(scan, 96)))
+        done = made.complete(scan)
         assert int(found.branch) == done.branch
         np.testing.assert_allclose(found.points[0].numpy(), done.points, atol=1e-4)
         torch.testing.assert_close(
@@ -130,11 +143,13 @@ def test_onnx_is_torch(facing, onnx_file):
 
 def test_onnx_takes_any_batch_and_any_number_of_points(facing, onnx_file):
     runner = open_exported(onnx_file, threads=1)
-    for batch, count in ((1, 16), (3, 33), (5, 200)):
-        drawn = [resample(s, count) for s in rehearsal_scans(facing.settings, batch)]
-        together = runner(np.stack(drawn))
-        for i, scan in enumerate(drawn):
-            np.testing.assert_allclose(together[0][i], runner(scan[None])[0][0], atol=1e-4)
+    for batch, count, seen in ((1, 16, 16), (3, 33, 40), (5, 200, 96)):
+        scans = np.stack([resample(s, count) for s in rehearsal_scans(facing.settings, batch)])
+        drawn = np.arange(seen)[None].repeat(batch, axis=0) % count
+        together = runner(scans, drawn)
+        for i in range(batch):
+            alone = runner(scans[i : i + 1], drawn[i : i + 1])
+            np.testing.assert_allclose(together[0][i], alone[0][0], atol=1e-4)
 
 
 def test_torch_program_is_torch(tmp_path):
@@ -154,15 +169,16 @@ def test_command_says_how_far_from_torch(exported):
     assert said["bytes"] == (folder / said["out"]).stat().st_size
 
 
-def test_example_needs_no_torch(onnx_file, tmp_path, monkeypatch, capsys):
+def test_example_needs_no_torch(facing, onnx_file, tmp_path, monkeypatch, capsys):
     source = (ROOT / "examples" / "onnx_inference.py").read_text(encoding="utf-8")
     assert "torch" not in source
     assert "import wildshape" not in source
     scan, out = ROOT / "examples" / "scan.npy", tmp_path / "completed.npy"
     monkeypatch.setattr("sys.argv", ["example", str(onnx_file), str(scan), str(out)])
     runpy.run_path(str(ROOT / "examples" / "onnx_inference.py"), run_name="__main__")
-    assert np.load(out).shape == (300, 3)
-    assert "96 points in, 300 out" in capsys.readouterr().out
+    done = facing.complete(np.load(scan))
+    np.testing.assert_allclose(np.load(out), done.points, atol=1e-4)
+    assert f"300 out, confidence {done.confidence:.2f}" in capsys.readouterr().out
 
 
 def test_the_file_says_what_it_is(onnx_file):

@@ -23,9 +23,10 @@ _SUFFIXES, _ALLOWED_M = (".onnx", ".pt2"), 1e-4
 class Settings:
     """Write a model as ONNX (.onnx) or for torch.export.load (.pt2), and compare it with torch.
 
-    The file takes raw scans (B, N, 3), sensor frame, metres, any B and N, and gives completed
-    points, poses (rotation, translation), confidence, cost and branch, all in the sensor frame:
-    centring and the choice among poses are inside. The largest difference to torch is said.
+    The file takes raw scans (B, N, 3), sensor frame, metres, any B and N, and which of their points
+    the network sees (B, M), see examples/onnx_inference.py. It gives completed points, poses
+    (rotation, translation), confidence, cost and branch, all in the sensor frame: centring and the
+    choice among poses are inside. The largest difference to torch is said.
     """
 
     model: Annotated[

@@ -8,11 +8,12 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
-from wildshape.export.plain import cost_plain
+from wildshape.export.plain import score_plain
+from wildshape.export.trust import confidence_plain, seen_plain
 from wildshape.geometry.centring import scan_centre
 from wildshape.geometry.facing import face, roll, roll_angle
 from wildshape.models.checkpoint import ModelSettings
-from wildshape.models.shapepose import Poses, ShapePoseNet
+from wildshape.models.shapepose import ShapePoseNet
 
 _UPRIGHT_RAD = 0.1
 
@@ -38,8 +39,9 @@ class Completed(NamedTuple):
 
 
 OUTPUTS = Completed._fields
-# Canonical shape, rotation and translation in the sensor frame, cost, branch.
+# Canonical shape, rotation and translation in the sensor frame, cost, branch, facts.
 _Look = tuple[Tensor, ...]
+_PARTS = 6
 
 
 class CompletionGraph(nn.Module):
@@ -49,54 +51,64 @@ class CompletionGraph(nn.Module):
         super().__init__()
         self.network, self.settings = network, settings
 
-    def forward(self, scans: Float[Tensor, "B N 3"]) -> Completed | tuple[Tensor, ...]:
-        """Complete scans of the same number of points; all points are used, none are drawn.
+    def forward(
+        self, scans: Float[Tensor, "B N 3"], drawn: Int[Tensor, "B M"]
+    ) -> Completed | tuple[Tensor, ...]:
+        """Complete scans of the same number of points.
 
         While it is traced the answer is a plain tuple, the only one that a file can hold.
+
+        Args:
+            scans: sensor frame, metres.
+            drawn: which of its points the network sees; all count where a scan is centred.
         """
-        shape, rotation, translation, cost, branch = self._complete(scans)
+        shape, rotation, translation, cost, branch, facts = self._complete(scans, drawn)
         points = shape @ rotation.mT + translation[:, None]
-        confidence = 1.0 / (1.0 + (cost / self.settings.cost_m[1]).square())
+        confidence = confidence_plain(scans, cost, facts, self.settings)
         found = (points, rotation, translation, confidence, cost, branch)
         return found if torch.compiler.is_exporting() else Completed(*found)
 
-    def _complete(self, scans: Tensor) -> _Look:
+    def _complete(self, scans: Tensor, drawn: Tensor) -> _Look:
+        sampled = scans.gather(1, drawn[..., None].expand(-1, -1, 3))
         if not self.settings.facing:
             turn = torch.eye(3).expand(scans.shape[0], 3, 3)
-            return self._look(scans, scan_centre(scans, self.settings.sensor), turn)
+            return self._look(sampled, scan_centre(scans, self.settings.sensor), turn)
         turn, centre = face(scans)
-        first = self._look(scans @ turn.mT, centre, turn)
+        first = self._look(sampled @ turn.mT, centre, turn)
         angle = roll_angle(turn @ first[1])
         tilted = angle.abs() > _UPRIGHT_RAD
-        given = (*first, scans, turn, centre, angle, tilted)
+        given = (*first, sampled, turn, centre, angle, tilted)
         if torch.compiler.is_exporting():
             return torch.cond(tilted.any(), self._look_again, _keep, given)
         return self._look_again(*given) if bool(tilted.any()) else first
 
     def _look_again(self, *given: Tensor) -> _Look:
         """Tilted scans rolled upright and seen once more (`Predictor._look_again`)."""
-        scans, turn, centre, angle, tilted = given[5:]
+        sampled, turn, centre, angle, tilted = given[_PARTS:]
         upright = roll(angle) @ turn
-        again = self._look(scans @ upright.mT, centre, upright)
+        again = self._look(sampled @ upright.mT, centre, upright)
         return tuple(
             torch.where(tilted.view(-1, *(1,) * (old.ndim - 1)), new, old)
-            for old, new in zip(given[:5], again)
+            for old, new in zip(given[:_PARTS], again)
         )
 
     def _look(self, turned: Tensor, centre: Tensor, turn: Tensor) -> _Look:
         """Shapes, and the poses of the branches that speak (`Predictor._look`)."""
         settings, centred = self.settings, turned - centre[:, None]
         shape, rotation, translation, belief = self.network(centred)
-        posed = Poses(rotation, translation, belief).apply(shape)
-        cost = cost_plain(centred, centre, posed, settings.projection, settings.beta)
-        branch = (cost - settings.belief * belief).argmin(-1, keepdim=True)
+        posed = shape[:, None] @ rotation.mT + translation[:, :, None]
+        scores = score_plain(centred, centre, posed, settings.projection)
+        costs = scores.observation + settings.beta * scores.projection
+        believed = costs - settings.belief * belief
+        branch = believed.argmin(-1, keepdim=True)
         chosen_rotation = rotation.gather(1, branch[..., None, None].expand(-1, 1, 3, 3))[:, 0]
         chosen = translation.gather(1, branch[..., None].expand(-1, 1, 3))[:, 0] + centre
         back = turn.mT
-        moved = (back @ chosen[..., None])[..., 0]
-        return shape, back @ chosen_rotation, moved, cost.gather(1, branch)[:, 0], branch[:, 0]
+        moved, cost = (back @ chosen[..., None])[..., 0], costs.gather(1, branch)[:, 0]
+        facts = seen_plain(posed, scores, belief, believed)
+        return shape, back @ chosen_rotation, moved, cost, branch[:, 0], facts
 
 
 def _keep(*given: Tensor) -> _Look:
     """Nothing is tilted: the first look stands."""
-    return tuple(part.clone() for part in given[:5])
+    return tuple(part.clone() for part in given[:_PARTS])

@@ -22,7 +22,7 @@ from wildshape.inference.predictor import Predictor
 from wildshape.io.atomic import atomic_write
 from wildshape.io.provenance import provenance
 
-INPUT, OPSET = "scans", 18
+INPUTS, OPSET = ("scans", "drawn"), 18
 _EXTRA = ("onnx", "onnxscript", "onnxruntime")
 
 
@@ -30,11 +30,12 @@ def trace(predictor: Predictor) -> ExportedProgram:
     """The graph of a predictor, batch and number of points left open."""
     network = deepcopy(predictor.network).requires_grad_(False)
     graph = CompletionGraph(network, predictor.settings).eval()
-    sizes = ({0: Dim.DYNAMIC, 1: Dim.DYNAMIC},)
+    sizes = ({0: Dim.DYNAMIC, 1: Dim.DYNAMIC}, {0: Dim.DYNAMIC, 1: Dim.DYNAMIC})
     ahead = torch.tensor((10.0, 0.0, 0.0))
-    example = torch.randn(2, 64, 3, generator=torch.Generator().manual_seed(0)) + ahead
+    scans = torch.randn(2, 64, 3, generator=torch.Generator().manual_seed(0)) + ahead
+    drawn = torch.arange(48).repeat(2, 1)
     with torch.no_grad(), _quiet():
-        return torch.export.export(graph, (example,), dynamic_shapes=sizes, strict=False)
+        return torch.export.export(graph, (scans, drawn), dynamic_shapes=sizes, strict=False)
 
 
 def write_onnx(path: Path, program: ExportedProgram, metadata: dict[str, str]) -> None:
@@ -49,7 +50,7 @@ def write_onnx(path: Path, program: ExportedProgram, metadata: dict[str, str]) -
     with _quiet():
         made = torch.onnx.export(
             program,
-            input_names=[INPUT],
+            input_names=list(INPUTS),
             output_names=list(OUTPUTS),
             opset_version=OPSET,
             dynamo=True,

@@ -5,6 +5,8 @@
 Same definitions as `losses/hindsight.py`, which the tests hold against these.
 """
 
+from typing import NamedTuple
+
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
@@ -49,21 +51,34 @@ def visible_plain(bins: Bins) -> Bool[Tensor, "B N"]:
     return inside & (order == first)
 
 
-def cost_plain(
+class PlainScores(NamedTuple):
+    """Both terms of the loss for every hypothesis, and the distances behind the second.
+
+    Attributes:
+        observation: `CD(X -> Y)`, metres (paper eq. 2).
+        projection: `CD(visible(Y) -> X)`, metres (paper eq. 3).
+        to_scan: of every posed point, metres.
+    """
+
+    observation: Float[Tensor, "B H"]
+    projection: Float[Tensor, "B H"]
+    to_scan: Float[Tensor, "B H P"]
+
+
+def score_plain(
     scans: Float[Tensor, "B N 3"],
     centres: Float[Tensor, "B 3"],
     posed: Float[Tensor, "B H P 3"],
     projection: Projection,
-    beta: float,
-) -> Float[Tensor, "B H"]:
-    """The label-free cost of each hypothesis, metres (METHOD 6)."""
+) -> PlainScores:
+    """`score_hypotheses`, all pairs of points in memory: 4 H N P bytes a scan."""
     hypotheses = posed.shape[1]
     flat = posed.flatten(0, 1)
     repeated, middle = _repeat(scans, hypotheses), _repeat(centres, hypotheses)
     to_shape, to_scan = nearest_both_plain(repeated, flat)
     seen = visible_plain(bin_points(flat + middle[:, None], middle, projection))
-    cost = to_shape.mean(-1) + beta * _mean_of(to_scan, seen)
-    return cost.unflatten(0, (-1, hypotheses))
+    found = (to_shape.mean(-1), _mean_of(to_scan, seen), to_scan)
+    return PlainScores(*(part.unflatten(0, (-1, hypotheses)) for part in found))
 
 
 def _repeat(rows: Tensor, times: int) -> Tensor:

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from wildshape.export.onnx import INPUT
+from wildshape.export.onnx import INPUTS
 from wildshape.inference.predictor import Predictor
-from wildshape.inference.prepare import resample
+from wildshape.inference.prepare import drawn, in_order
 from wildshape.models.checkpoint import ModelSettings
 from wildshape.records import Points
 
-Runner = Callable[[np.ndarray], list[np.ndarray]]
+Runner = Callable[[np.ndarray, np.ndarray], list[np.ndarray]]
 
 
 class Difference(NamedTuple):
@@ -36,26 +36,32 @@ def open_exported(path: Path, threads: int = 0) -> Runner:
     """What runs a file: onnxruntime for `.onnx`, torch for `.pt2`; `threads` 0 takes all cores."""
     if path.suffix == ".pt2":
         module = torch.export.load(path).module()
-        return lambda scans: [part.numpy() for part in module(torch.from_numpy(scans))]
+        return lambda *given: [part.numpy() for part in module(*map(torch.from_numpy, given))]
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
-    return lambda scans: [np.asarray(part) for part in session.run(None, {INPUT: scans})]
+    return lambda *given: [
+        np.asarray(part) for part in session.run(None, dict(zip(INPUTS, given, strict=True)))
+    ]
 
 
 def compare(runner: Runner, predictor: Predictor, scans: Sequence[Points]) -> Difference:
-    """Both complete the same scans, drawn to as many points as the network was trained on."""
-    drawn = [resample(scan, predictor.settings.input_points) for scan in scans]
+    """Both complete the same scans."""
     largest, other = 0.0, 0
-    for scan, done in zip(drawn, predictor.complete_many(drawn)):
-        points, *_, branch = runner(scan[None])
+    for scan, done in zip(scans, predictor.complete_many(scans)):
+        points, *_, branch = runner(*prepared(scan, predictor.settings.input_points))
         if int(branch[0]) == done.branch:
             largest = max(largest, float(np.abs(points[0] - done.points).max()))
         else:
             other += 1
-    return Difference(largest, other, len(drawn))
+    return Difference(largest, other, len(scans))
+
+
+def prepared(scan: Points, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """What an exported file takes of one scan."""
+    return in_order(scan)[None], drawn(len(scan), count)[None]
 
 
 def rehearsal_scans(settings: ModelSettings, count: int, seed: int = 0) -> list[Points]:

@@ -48,10 +48,11 @@ def resample(points: Points, count: int) -> Points:
 
     Too many: a seeded choice without replacement; too few: all of them, over and over.
     """
-    return _choose(_in_order(points), count)
+    ordered = in_order(points)
+    return ordered[drawn(len(ordered), count)]
 
 
-def _in_order(points: Points) -> Points:
+def in_order(points: Points) -> Points:
     """The same points by z, y, x: sums over them then do not depend on the file's order.
 
     z and y are sorted as one whole number; x is looked at only where both are equal somewhere.
@@ -65,10 +66,11 @@ def _in_order(points: Points) -> Points:
     return points[np.lexsort(points.T)] if tied else points[order]
 
 
-def _choose(ordered: Points, count: int) -> Points:
-    if len(ordered) > count:
-        return ordered[np.random.default_rng(0).choice(len(ordered), count, replace=False)]
-    return ordered[np.arange(count) % len(ordered)]
+def drawn(size: int, count: int) -> Int64[np.ndarray, "count"]:
+    """Which of `size` ordered points a network sees: some of them, or all over and over."""
+    if size > count:
+        return np.random.default_rng(0).choice(size, count, replace=False)
+    return np.arange(count) % size
 
 
 class NetworkInput(NamedTuple):
@@ -102,8 +104,8 @@ def network_input(
     scans: list[Points], count: int, sensor: SensorKind, facing: bool = False
 ) -> NetworkInput:
     """Scans as a network is given them; `facing` turns them towards their object."""
-    ordered = [torch.from_numpy(_in_order(scan)) for scan in scans]
-    sampled = torch.stack([torch.from_numpy(_choose(scan.numpy(), count)) for scan in ordered])
+    ordered = [torch.from_numpy(in_order(scan)) for scan in scans]
+    sampled = torch.stack([scan[torch.from_numpy(drawn(len(scan), count))] for scan in ordered])
     if facing:
         frames = [face(scan) for scan in ordered]
         turn = torch.stack([frame.turn for frame in frames])
