@@ -36,7 +36,7 @@ def _rows(stage: Stage, wish: Wish) -> list[tuple[str, str]]:
     rows = [
         ("scan", escape(stage.track.scan_names[wish.scan])),
         ("measured points", f"{len(scan):,}"),
-        ("distance to the sensor", f"{np.linalg.norm(stage.centres()[wish.scan]):.1f} m"),
+        ("distance to the sensor", f"{np.linalg.norm(stage.centre(wish.scan)):.1f} m"),
     ]
     return rows + _made_rows(stage.made.get(wish.scan)) + _true_rows(stage, wish)
 

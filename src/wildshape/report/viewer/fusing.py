@@ -5,8 +5,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import torch
-
 from wildshape.baselines.identity import Identity
 from wildshape.baselines.local_icp import LocalIcp
 from wildshape.evaluation.metrics import ACCURATE_DEG, RegistrationError, registration_error
@@ -65,8 +63,3 @@ def _moves(way: str, track: Track, made: Mapping[int, Made]) -> SE3 | None:
     poses = [made[i].pose for i in range(len(track.scans)) if i in made]
     known = [pose for pose in poses if pose is not None]
     return to_middle(stack(known)) if len(known) == len(track.scans) else None
-
-
-def unmoved(count: int) -> SE3:
-    """Transforms that change nothing, for as long as no others are known."""
-    return SE3.identity(count, dtype=torch.float64)

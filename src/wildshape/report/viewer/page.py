@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from viser import ViserServer
 
 HOST = "127.0.0.1"
-_PLAY_SECONDS, _SPEAK_SECONDS = 0.12, 0.5
+_PLAY_SECONDS, _SPEAK_SECONDS, _STOP_SECONDS = 0.12, 0.5, 5.0
 
 
 class Page:
@@ -50,6 +50,12 @@ class Page:
             turn = self.turn
         worker = threading.Thread(target=self._work, args=(number, turn), daemon=True)
         worker.start()
+
+    def close(self) -> None:
+        """Whatever is being made is no longer sent."""
+        with self.lock:
+            self.turn += 1
+            self.stage = None
 
     def refresh(self) -> None:
         """Show what the panel asks for."""
@@ -138,7 +144,10 @@ def serving(source: Source, port: int = 0) -> Iterator[Page]:
     Raises:
         MissingExtraError: viser is not installed.
     """
+    others = set(threading.enumerate())
     server = _server(port)
+    own = set(threading.enumerate()) - others
+    page = None
     try:
         server.gui.configure_theme(
             control_width="large",
@@ -148,10 +157,15 @@ def serving(source: Source, port: int = 0) -> Iterator[Page]:
         server.gui.main_panel.dock_right()
         server.gui.set_panel_label(f"Wildshape: {source.title}")
         server.scene.set_up_direction("+z")
-        yield Page(server, source)
+        page = Page(server, source)
+        yield page
     finally:
+        if page is not None:
+            page.close()
         with _quiet():
             server.stop()
+            for thread in own:
+                thread.join(_STOP_SECONDS)
 
 
 def run_until_interrupted(page: Page) -> None:

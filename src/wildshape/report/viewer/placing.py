@@ -35,25 +35,25 @@ def upright(kind: SensorKind) -> SE3:
 
 
 def draw_from_sensor(
-    scan: int, kind: SensorKind, centres: np.ndarray, T_middle_scan: SE3, hold: Hold
+    kind: SensorKind, centre: np.ndarray, middle: np.ndarray, T_middle_scan: SE3, hold: Hold
 ) -> SE3:
     """`T_draw_sensor` of a scan.
 
     Args:
-        scan: its number.
         kind: of the sensor.
-        centres: `(n, 3)` the object's middle in each sensor frame, metres.
-        T_middle_scan: one a scan: what holds the object still.
+        centre: `(3,)` the object's middle in the scan's sensor frame, metres.
+        middle: `(3,)` the same in the track's middle scan.
+        T_middle_scan: of this scan: what holds the object still.
         hold: whether the sensor's axes or the object stand still.
     """
     if hold == "sensor":
-        return upright(kind) @ moved_by(-centres[scan])
-    return upright(kind) @ moved_by(-centres[len(centres) // 2]) @ T_middle_scan[scan]
+        return upright(kind) @ moved_by(-centre)
+    return upright(kind) @ moved_by(-middle) @ T_middle_scan
 
 
-def draw_from_middle(T_draw_sensor: SE3, T_middle_scan: SE3, scan: int) -> SE3:
-    """`T_draw_middle`: of what is fused in the middle scan's frame, when `scan` is shown."""
-    return T_draw_sensor @ T_middle_scan[scan].inverse()
+def draw_from_middle(T_draw_sensor: SE3, T_middle_scan: SE3) -> SE3:
+    """`T_draw_middle`: of what is fused in the middle scan's frame, when a scan is shown."""
+    return T_draw_sensor @ T_middle_scan.inverse()
 
 
 def as_node(T: SE3) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -17,7 +17,7 @@ from wildshape.report.parts import fuse
 from wildshape.report.scene import box_segments, thin
 from wildshape.report.viewer.colours import PLAIN, WRONG, Rgb, by_height, completed_colours, rgb
 from wildshape.report.viewer.content import Made
-from wildshape.report.viewer.fusing import AFTER, BEFORE, Moves, moves, unmoved
+from wildshape.report.viewer.fusing import AFTER, BEFORE, Moves, moves
 from wildshape.report.viewer.placing import (
     Hold,
     as_node,
@@ -117,21 +117,27 @@ class Stage:
     def show(self, wish: Wish) -> None:
         """Make the scene what the panel asks for."""
         still = self.moves(wish.way) or self.moves(BEFORE)
-        T_middle_scan = still.T_middle_scan if still else unmoved(len(self.track.scans))
-        centres, kind = self.centres(), self.track.sensor.kind
-        T_draw_sensor = draw_from_sensor(wish.scan, kind, centres, T_middle_scan, wish.hold)
+        T_middle_scan = still.T_middle_scan[wish.scan] if still else SE3.identity()
+        centre, middle = self.centre(wish.scan), self.centre(self.track.middle)
+        kind = self.track.sensor.kind
+        T_draw_sensor = draw_from_sensor(kind, centre, middle, T_middle_scan, wish.hold)
         with self.server.atomic():
             self._hide_others(wish)
             self._show_scan(wish, T_draw_sensor)
             self._show_lines(wish, T_draw_sensor)
-            T_draw_middle = draw_from_middle(T_draw_sensor, T_middle_scan, wish.scan)
+            T_draw_middle = draw_from_middle(T_draw_sensor, T_middle_scan)
             self._show_fused(wish, T_draw_middle)
             self._show_truth(wish, T_draw_sensor)
         self.seen = wish.scan
 
-    def centres(self) -> np.ndarray:
-        """`(n, 3)` the object's middle in each sensor frame, metres: of its box, if known."""
-        return np.stack([self._centre(i) for i in range(len(self.track.scans))])
+    def centre(self, scan: int) -> np.ndarray:
+        """`(3,)` the object's middle in a sensor frame, metres: of its box, if known."""
+        made, points = self.made.get(scan), self.track.scans[scan]
+        if made is not None and made.box is not None:
+            return np.asarray(made.box.centre, np.float64)
+        if made is not None and made.points is not None and not len(points):
+            return made.points.mean(0, dtype=np.float64)
+        return points.mean(0, dtype=np.float64) if len(points) else np.zeros(3)
 
     def extent(self) -> float:
         """The object's longest side, metres, roughly."""
@@ -146,14 +152,6 @@ class Stage:
         """The object as it is, in a scan's sensor frame, metres."""
         poses, shape = self.track.T_sensor_object, self.truth
         return None if poses is None or shape is None else poses[scan].apply_numpy(shape)
-
-    def _centre(self, scan: int) -> np.ndarray:
-        made, points = self.made.get(scan), self.track.scans[scan]
-        if made is not None and made.box is not None:
-            return np.asarray(made.box.centre, np.float64)
-        if made is not None and made.points is not None and not len(points):
-            return made.points.mean(0, dtype=np.float64)
-        return points.mean(0, dtype=np.float64) if len(points) else np.zeros(3)
 
     def _hide_others(self, wish: Wish) -> None:
         for kind in ("scan", "completed"):
