@@ -206,7 +206,9 @@ def main(settings: Settings) -> None:
     if settings.write is not None:
         write(settings.model, settings.write, calibration)
     for name in ("before", "after"):
-        print(name, report[name])
+        found = report[name]
+        assert isinstance(found, dict)
+        print(name, {key: value for key, value in found.items() if isinstance(value, float)})
 
 
 if __name__ == "__main__":
