@@ -44,14 +44,14 @@ def _panel(axis, case: str, rows: list[dict[str, Any]], unit: str) -> None:
     colours = [_OURS] + [_OTHERS] * (len(rows) - 1)
     bars = axis.barh(range(len(rows)), values, color=colours, log=True)
     labels = [
-        f" {number(v)} {unit}" + (f" ({number(v / values[0])} x)" if i else "")
+        f" {number(v)}" + (f" ({number(v / values[0])} x)" if i else "")
         for i, v in enumerate(values)
     ]
     axis.bar_label(bars, labels, fontsize=8)
     axis.set_yticks(range(len(rows)), names, fontsize=8)
     axis.set_ylim(len(rows) - 0.4, -0.6)
     axis.set_xlim(min(values) / 2, max(values) * 6)
-    axis.set_title(case, fontsize=9, loc="left")
+    axis.set_title(f"{case}: {unit}, {rows[0]['clock']}", fontsize=9, loc="left")
     axis.tick_params(axis="x", which="both", bottom=False, labelbottom=False)
     for side in ("top", "right", "bottom"):
         axis.spines[side].set_visible(False)

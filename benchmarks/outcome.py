@@ -49,7 +49,7 @@ class Outcome:
         first = median(next(iter(times.values())))
         rows = [
             {"case": case, "method": name, "median": median(t), "best": min(t), "p95": p95(t)}
-            | {"calls": len(t), "ratio": median(t) / first}
+            | {"calls": len(t), "ratio": median(t) / first, "clock": clock_name()}
             | {column: held.get(name, "") for column, held in more.items()}
             for name, t in times.items()
         ]
@@ -100,7 +100,6 @@ class Outcome:
         load = [round(value, 2) for value in os.getloadavg()] if hasattr(os, "getloadavg") else None
         return made | {
             "form": "small" if small else "full",
-            "clock": clock_name(),
             "threads": torch.get_num_threads(),
             "nearest_backend": backend(),
             "load_at_the_end": load,
@@ -113,7 +112,7 @@ class Outcome:
 
 def table(rows: Iterable[Row]) -> str:
     """Aligned text, the case left out."""
-    rows = [{k: v for k, v in row.items() if k != "case"} for row in rows]
+    rows = [{k: v for k, v in row.items() if k not in ("case", "clock")} for row in rows]
     columns = list(rows[0])
     cells = [columns] + [[str(rounded(row[c])) for c in columns] for row in rows]
     widths = [max(len(line[i]) for line in cells) for i in range(len(columns))]
