@@ -1,8 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
+from types import SimpleNamespace
+
+import laspy
 import numpy as np
 import pytest
 import torch
+import trimesh
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.centring import box_centre, frustum_centre
@@ -100,3 +104,25 @@ def test_points_are_ordered_by_z_then_y_then_x(ties):
         points[:40, 1] = np.where(np.arange(40) % 3 == 0, np.float32(-0.0), np.float32(0.0))
     expected = sorted(points.tolist(), key=lambda p: (p[2], p[1], p[0]))
     assert resample(points, 60).tolist() == expected
+
+
+def test_points_of_other_libraries_and_paths(tmp_path):
+    """laspy, trimesh, Open3D's two clouds (stand-ins: it is no dependency), files."""
+    points = np.random.default_rng(0).normal(size=(40, 3)).astype(np.float32)
+    np.save(tmp_path / "scan.npy", points)
+    las = laspy.create()
+    las.header.scales = np.full(3, 1e-6)
+    las.x, las.y, las.z = points.T.astype(np.float64)
+    tensor = torch.from_numpy(points)
+    given = {
+        "path": tmp_path / "scan.npy",
+        "text": str(tmp_path / "scan.npy"),
+        "laspy": las,
+        "trimesh": trimesh.PointCloud(points),
+        "open3d": SimpleNamespace(points=points.astype(np.float64).tolist()),
+        "open3d tensors": SimpleNamespace(point=SimpleNamespace(positions=tensor)),
+    }
+    for name, scan in given.items():
+        np.testing.assert_allclose(as_points(scan), points, atol=1e-6, err_msg=name)
+    with pytest.raises(BadInputError, match=r"nowhere\.ply"):
+        as_points(tmp_path / "nowhere.ply")

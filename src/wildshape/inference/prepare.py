@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a user's scan to the network's input (METHOD 2), without chance."""
 
+from operator import attrgetter
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -12,20 +14,29 @@ from torch import Tensor
 from wildshape.errors import BadInputError
 from wildshape.geometry.centring import scan_centre
 from wildshape.geometry.facing import face, roll
+from wildshape.io.points import read_scan
 from wildshape.records import Points, SensorKind
 
 MIN_POINTS = 16
+_OPEN3D_TENSOR = "point.positions"
+_PLACES = ("xyz", "vertices", _OPEN3D_TENSOR, "points")
 
 
 def as_points(scan: object, name: str = "scan") -> Points:
     """A scan handed in from Python as `(n, 3)` float32, rows that are not finite dropped.
 
+    Args:
+        scan: an array or tensor, a path of a scan file, or an object that holds points: of laspy
+            (`.xyz`), trimesh (`.vertices`), Open3D (`.points`, `.point.positions`), a `Completion`.
+        name: for the error.
+
     Raises:
         BadInputError: not `(n, 3)`, fewer than 16 finite points, or all points equal.
     """
+    if isinstance(scan, str | Path):
+        return read_scan(scan).points
     try:
-        held = scan.detach().cpu() if isinstance(scan, Tensor) else scan
-        points = np.asarray(held, dtype=np.float32)
+        points = np.asarray(_coordinates(scan), dtype=np.float32)
     except (TypeError, ValueError) as error:
         raise BadInputError(f"{name}: no array of numbers ({error}); pass (n, 3).") from error
     if points.ndim != 2 or points.shape[1] != 3:
@@ -41,6 +52,19 @@ def as_points(scan: object, name: str = "scan") -> Points:
     if float(np.ptp(points, axis=0).max()) == 0.0:
         raise BadInputError(f"{name}: all {len(points)} points are equal; is the file damaged?")
     return points
+
+
+def _coordinates(scan: object) -> object:
+    """What of an object is its points; the object itself if it is an array of some kind."""
+    if isinstance(scan, Tensor):
+        return scan.detach().cpu()
+    for place in _PLACES:  # laspy's `points` are records, hence the order
+        try:
+            held = attrgetter(place)(scan)
+        except (AttributeError, KeyError):
+            continue
+        return held.cpu().numpy() if place == _OPEN3D_TENSOR else held
+    return scan
 
 
 def resample(points: Points, count: int) -> Points:
