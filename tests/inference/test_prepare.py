@@ -52,7 +52,6 @@ def test_arrays_lists_and_tensors(given):
         (np.ones((40, 3)), "all 40 points are equal"),
         (np.zeros((40, 4)), r"shape \(n, 3\), found \(40, 4\)"),
         (np.zeros(40), r"found \(40,\)"),
-        ("scan.ply", "no such file"),
         ([[1.0, 2.0, 3.0], [1.0]], "no array of numbers"),
         (None, "shape"),
     ],
