@@ -43,5 +43,6 @@ def test_what_dpc_has_not_is_refused_and_leaves_nothing(refused, store, tmp_path
     out = tmp_path / "run"
     order = ("train", store, "--out", out, "--device", "cpu", "--preset")
     assert "--teacher" in refused(*order, "dpc-lidar", "--teacher", "truth")
+    assert "--encoder" in refused(*order, "dpc-lidar", "--encoder", "dgcnn")
     assert "choose dpc-lidar" in refused(*order, "dpc")
     assert not out.exists()

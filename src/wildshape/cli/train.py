@@ -28,6 +28,7 @@ Preset = Literal[
     "paper-lidar", "paper-views", "default", "small", "tiny",
     "dpc", "dpc-dagger", "dpc-lidar", "dpc-small", "dpc-dagger-small", "dpc-lidar-small",
 ]  # fmt: skip
+Encoder = Literal["pcn", "pointnet2", "dgcnn"]
 OutRun = Annotated[Path, arg(metavar="RUN", help="folder of the run")]
 _PACKED = "data.store"
 _FILES = (
@@ -51,6 +52,7 @@ class Settings:
     Attributes:
         preset: sizes, losses and schedule; dpc... is the learned baseline of the paper, for
             `evaluate` to stand beside ours.
+        encoder: point network that reads a scan, at the preset's widths; by default PCN's.
         steps: gradient steps instead of the preset's; the schedule is stretched to them.
         seed: of weights and batches.
         resume: go on with RUN; a finished one is left as it is.
@@ -63,6 +65,7 @@ class Settings:
     data: Data
     out: OutRun
     preset: Preset = "default"
+    encoder: Encoder | None = None
     steps: Annotated[int | None, arg(metavar="N")] = None
     seed: Annotated[int, arg(metavar="S")] = 0
     resume: bool = False
@@ -88,6 +91,7 @@ def run(settings: Settings) -> None:
     from wildshape.io.provenance import provenance
     from wildshape.training.loop import setup
     from wildshape.training.profile import PROFILE
+    from wildshape.training.recipes import with_encoder
 
     if settings.seed < 0:
         raise BadInputError(f"--seed {settings.seed}: expected 0 or more.")
@@ -102,6 +106,7 @@ def run(settings: Settings) -> None:
     try:
         store = open_data(settings)
         recipe = recipe_for(store, settings.preset, settings.steps)
+        recipe = with_encoder(recipe, settings.encoder or recipe.network.backbone)
     except BadInputError:
         if output is not None:
             output.abandon()
@@ -257,7 +262,8 @@ def _check_folder(settings: Settings) -> "Output | None":
             f"{settings.out}: a run is there already; pass --resume to go on with it, --overwrite"
             " to replace it, or choose another --out."
         )
-    identity = {name: str(getattr(settings, name)) for name in ("data", "preset", "steps", "seed")}
+    parts = ("data", "preset", "encoder", "steps", "seed")
+    identity = {name: str(getattr(settings, name)) for name in parts}
     return begin(settings.out, "train", identity, _FILES, overwrite=settings.overwrite)
 
 

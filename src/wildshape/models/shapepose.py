@@ -11,14 +11,20 @@ from torch import Tensor, nn
 from torch.profiler import record_function
 
 from wildshape.errors import BadInputError
+from wildshape.models.dgcnn import DGCNNEncoder
 from wildshape.models.heads import PoseDecoder, ShapeDecoder
 from wildshape.models.pcn import PCNEncoder
 from wildshape.models.pcn_static import encode_static
 from wildshape.models.pcn_winners import encode_winners
+from wildshape.models.pointnet2 import PointNet2Encoder
 
-# How codes with a gradient are computed: through the winning points (CPU), in passes of fixed shape
-# (GPU), or those with products in bfloat16.
-Encoding = Literal["winners", "static", "bf16"]
+# How codes with a gradient are computed: through the winning points (CPU), searched in float32 or
+# in bfloat16; in passes of fixed shape (GPU), or those with products in bfloat16.
+Encoding = Literal["winners", "winners-bf16", "static", "bf16"]
+
+# Any point network can be the encoder (paper, section 4.1).
+Backbone = Literal["pcn", "pointnet2", "dgcnn"]
+ENCODERS = {"pcn": PCNEncoder, "pointnet2": PointNet2Encoder, "dgcnn": DGCNNEncoder}
 
 
 @dataclass(frozen=True)
@@ -38,6 +44,7 @@ class NetworkConfig:
         start: half lengths, in network units, of the ellipsoid of points the shape starts from.
             Longer along x than along y, it puts a mirror plane along the object, not across.
         scale: metres of one network unit, about half an object's length; 1 in the paper.
+        backbone: which point network the encoder is; the paper's is PCN's.
     """
 
     encoder: tuple[int, int, int, int] = (128, 256, 512, 1024)
@@ -50,6 +57,7 @@ class NetworkConfig:
     mirror: bool = False
     start: tuple[float, float, float] = (0.5, 0.5, 0.5)
     scale: float = 1.0
+    backbone: Backbone = "pcn"
 
     def __post_init__(self) -> None:
         """Refuse what would silently give another number of points."""
@@ -89,7 +97,7 @@ class ShapePoseNet(nn.Module):
         super().__init__()
         self.config = config
         code = config.encoder[-1]
-        self.encoder = PCNEncoder(config.encoder)
+        self.encoder = ENCODERS[config.backbone](config.encoder)
         self.shape = ShapeDecoder(code, config.decoder, config.points, config.mirror, config.start)
         self.pose = PoseDecoder(code, config.pose, config.branches, config.spread, config.selector)
 
@@ -98,15 +106,18 @@ class ShapePoseNet(nn.Module):
     ) -> Float[Tensor, "B z"]:
         """Code of centred scans; `encoding` matters to training alone, by default as exact as fast.
 
-        Without a gradient the encoder runs as it is, in the type of its weights.
+        Without a gradient the encoder runs as it is, in the type of its weights, and so do others
+        than PCN's with one.
         """
         scaled = scans / self.config.scale
-        if not torch.is_grad_enabled():
+        if not torch.is_grad_enabled() or not isinstance(self.encoder, PCNEncoder):
             with record_function("wildshape: encoder dense"):
                 return self.encoder(scaled)
         on_cpu = scans.device.type == "cpu"
         if encoding == "winners" or (encoding is None and on_cpu):
             return encode_winners(self.encoder, scaled)
+        if encoding == "winners-bf16":
+            return encode_winners(self.encoder, scaled, torch.bfloat16)
         inner = torch.bfloat16 if encoding == "bf16" else scaled.dtype
         with record_function("wildshape: encoder static"):
             return encode_static(self.encoder, scaled, inner)

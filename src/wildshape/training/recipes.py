@@ -7,7 +7,7 @@ from dataclasses import replace
 from wildshape.datasets.views import ViewConfig
 from wildshape.geometry.visibility import FacingBins, PixelBins, PolarBins
 from wildshape.losses.multiview import LossConfig
-from wildshape.models.shapepose import NetworkConfig
+from wildshape.models.shapepose import Backbone, NetworkConfig
 from wildshape.training.config import OptimConfig, Recipe
 
 
@@ -114,6 +114,11 @@ def tiny() -> Recipe:
         optim=OptimConfig(steps=500, lr=2e-3, decay_every=0, warmup=20, average=0.99, clip=5.0),
         validate_every=100,
     )
+
+
+def with_encoder(recipe: Recipe, backbone: Backbone) -> Recipe:
+    """The recipe with that point network as the encoder, of the same widths."""
+    return replace(recipe, network=replace(recipe.network, backbone=backbone))
 
 
 PRESETS = {
