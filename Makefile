@@ -4,6 +4,8 @@
 #   make demo [DATA=folder]   the whole way in five minutes, ending in demo/report.html
 #   make test                 lint, types, import floors, tests
 #   make bench                everything timed beside the alternatives, in five minutes; all bars
+#   make wheel                wheels built, installed in fresh environments, tried
+#   make docs                 the site of docs/, in site/index.html
 #
 # Each sets up .venv by itself and needs python >= 3.11 with venv; a C compiler makes it faster.
 # No GPU in a Linux machine? PyPI's torch may bring 2 GB of CUDA along; this takes the CPU build:
@@ -23,10 +25,11 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install $(PIP_AR
 INSTALLED := $(VENV)/.installed
 TESTED := $(VENV)/.installed-test
 BENCHED := $(VENV)/.installed-bench
+DOCUMENTED := $(VENV)/.installed-docs
 # The package is installed in place: only these make another installation necessary.
 SOURCES := pyproject.toml constraints.txt hatch_build.py $(wildcard src/wildshape/ops/native/*.[ch])
 
-.PHONY: demo test bench clean
+.PHONY: demo test bench wheel docs clean
 .DELETE_ON_ERROR:
 
 demo: $(INSTALLED)
@@ -41,6 +44,12 @@ test: $(TESTED)
 
 bench: $(BENCHED)
 	@$(BIN)/python benchmarks/run.py
+
+wheel: $(TESTED)
+	$(BIN)/python .ci/wheel.py
+
+docs: $(DOCUMENTED)
+	$(BIN)/mkdocs build --strict --quiet
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { \
@@ -67,5 +76,9 @@ $(BENCHED): $(INSTALLED)
 	$(PIP) -e ".[bench]"
 	@touch $@
 
+$(DOCUMENTED): $(INSTALLED)
+	$(PIP) -e ".[docs]"
+	@touch $@
+
 clean:
-	rm -rf $(VENV) "$(OUT)"
+	rm -rf $(VENV) "$(OUT)" site

@@ -2,12 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compiles the C kernels of `wildshape.ops` into the package when it is installed or built.
 
-No compiler is no error: the wheel is then pure Python and the torch backends do the work.
+No compiler is no error: the wheel is then pure Python, for any platform, and the torch backends do
+the work. So it is on Windows, and where WILDSHAPE_NATIVE=0 asks for it. With kernels the wheel is
+`py3-none-PLATFORM`: they are called through ctypes, so no version of Python is written into them.
 """
 
 import os
+import platform
 import shlex
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -23,19 +27,31 @@ FLAGS = ["-O3", "-fPIC", "-shared", "-ffp-contract=off", "-pthread"]
 class NativeBuildHook(BuildHookInterface):
     """Hatch's hook for wheels, editable ones too."""
 
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile, ship the library, and tag the wheel for this platform alone."""
-        reason = compile_library(Path(self.root) / NATIVE)
+        reason = unwanted() or _uncompiled(compile_library(Path(self.root) / NATIVE))
         if reason:
-            (Path(self.root) / NATIVE / LIBRARY).unlink(missing_ok=True)  # no stale kernels
+            if version == "editable":  # no stale kernels; a wheel has none without `artifacts`
+                (Path(self.root) / NATIVE / LIBRARY).unlink(missing_ok=True)
             self.app.display_warning(
-                f"Wildshape is installed without its native kernels ({reason}): everything works, "
-                "slower; install a C compiler (or set CC) and reinstall to have them."
+                f"Wildshape comes without its native kernels ({reason}); everything works, slower."
             )
             return
         build_data["artifacts"].append(f"/{NATIVE.as_posix()}/{LIBRARY}")
         build_data["pure_python"] = False
         build_data["tag"] = f"py3-none-{platform_tag()}"
+
+
+def unwanted() -> str:
+    """Why no kernels are to be compiled here at all, or nothing."""
+    if os.environ.get("WILDSHAPE_NATIVE") == "0":
+        return "WILDSHAPE_NATIVE=0"
+    return "they need POSIX threads, which Windows lacks" if sys.platform == "win32" else ""
+
+
+def _uncompiled(reason: str) -> str:
+    cure = "; install a C compiler (or set CC) and reinstall to have them"
+    return f"{reason}{cure}" if reason else ""
 
 
 def compile_library(folder: Path) -> str:
@@ -58,5 +74,9 @@ def compile_library(folder: Path) -> str:
 
 def platform_tag() -> str:
     """This machine's plain platform tag; no promise about other distributions (manylinux)."""
+    oldest = os.environ.get("MACOSX_DEPLOYMENT_TARGET")
+    if sys.platform == "darwin" and oldest:  # what the compiler aims at, not what it runs on
+        major, _, minor = oldest.partition(".")
+        return f"macosx_{major}_{minor or 0}_{platform.machine()}"
     tags = (tag.platform for tag in sys_tags())
     return next(tag for tag in tags if "manylinux" not in tag and "musllinux" not in tag)

@@ -51,3 +51,27 @@ def test_a_failing_compiler_is_quoted(hook, sources, monkeypatch):
     monkeypatch.delenv("CC", raising=False)
     (sources / "broken.c").write_text("not C\n")
     assert "broken.c" in hook.compile_library(sources)
+
+
+@pytest.mark.parametrize(
+    ("system", "asked", "why"), [("win32", "", "Windows"), ("linux", "0", "=0")]
+)
+def test_kernels_are_left_out_on_windows_and_on_request(hook, monkeypatch, system, asked, why):
+    monkeypatch.setenv("WILDSHAPE_NATIVE", asked)
+    monkeypatch.setattr(hook.sys, "platform", system)
+    assert why in hook.unwanted()
+
+
+def test_kernels_are_wanted_elsewhere(hook, monkeypatch):
+    monkeypatch.delenv("WILDSHAPE_NATIVE", raising=False)
+    for system in ("linux", "darwin"):
+        monkeypatch.setattr(hook.sys, "platform", system)
+        assert hook.unwanted() == ""
+
+
+def test_a_wheel_for_macos_is_for_the_oldest_it_is_compiled_for(hook, monkeypatch):
+    monkeypatch.setattr(hook.sys, "platform", "darwin")
+    monkeypatch.setattr(hook.platform, "machine", lambda: "arm64")
+    for oldest, tag in (("11.0", "macosx_11_0_arm64"), ("14", "macosx_14_0_arm64")):
+        monkeypatch.setenv("MACOSX_DEPLOYMENT_TARGET", oldest)
+        assert hook.platform_tag() == tag
