@@ -4,6 +4,11 @@
 
     python experiments/default_weights.py --cad CAD_FOLDER --teacher TEACHER --out runs/default
 
+A second round starts from the first and is taught by it:
+
+    python experiments/default_weights.py --cad CAD_FOLDER --teacher ROUND1 --start ROUND1 \
+        --seed 1 --tracks 2400 --lr 5e-4 --out runs/round2
+
 CAD_FOLDER holds `manifest.csv` (columns category, file, split) and the meshes it names; vehicles of
 split `train` are used, as they are and stretched, besides our own procedural ones. Without --cad
 only the latter. TEACHER is a checkpoint trained as the paper has it (`wildshape train DATA`, no
@@ -40,8 +45,10 @@ class Settings:
         out: folder of the run.
         cad: folder of CAD meshes with a manifest.
         teacher: checkpoint that fuses the tracks; without one, training begins from nothing.
+        start: checkpoint whose weights are trained on, instead of random ones.
         tracks: simulated tracks, an eighth for each pair of sensor and source.
         steps: gradient steps.
+        lr: learning rate to fall from; the preset's by default.
         preset: of `wildshape train`.
         seed: of data and training.
         resume: go on with a run that was stopped.
@@ -50,8 +57,10 @@ class Settings:
     out: Path
     cad: Path | None = None
     teacher: Path | None = None
+    start: Path | None = None
     tracks: int = 1600
     steps: int = STEPS
+    lr: float | None = None
     preset: str = "default"
     seed: int = 0
     resume: bool = False
@@ -106,7 +115,8 @@ def main(settings: Settings) -> None:
             meshes = train_meshes(settings.cad, into, seed) if settings.cad else None
             make_data(settings, data, meshes)
     recipe = PRESETS[settings.preset]()
-    recipe = replace(recipe, optim=replace(recipe.optim, steps=settings.steps))
+    rate = recipe.optim.lr if settings.lr is None else settings.lr
+    recipe = replace(recipe, optim=replace(recipe.optim, steps=settings.steps, lr=rate))
     run = setup(
         recipe,
         open_store(data),
@@ -114,6 +124,7 @@ def main(settings: Settings) -> None:
         seed=settings.seed,
         resume=settings.resume,
         teacher=settings.teacher,
+        start=settings.start,
         taught=lambda done, total: (
             print(f"fused {done} of {total}", flush=True) if done % 100 == 0 else None
         ),

@@ -99,3 +99,17 @@ def test_weights_that_are_not_finite_give_a_code_that_is_not():
     with torch.no_grad():
         net.point1.bias.fill_(torch.nan)
     assert encode_winners(net, clouds(11, 2, 20, 3)).isnan().all()
+
+
+def test_a_search_in_bfloat16_loses_no_more_than_its_rounding():
+    """Winners found in bfloat16: their own values, just below the maximum at worst."""
+    net = encoder(4).float()
+    points = clouds(13, 4, 300, 3).float()
+    exact = net(points).detach()
+    found = encode_winners(net, points, torch.bfloat16)
+    found.sum().backward()
+    size = exact.abs().amax(1, keepdim=True)
+    assert bool((found <= exact + 1e-5 * size).all())
+    assert bool((found >= exact - 0.03 * size).all())
+    assert 0 < float((found < exact - 1e-6 * size).float().mean()) < 0.5
+    assert all(bool(p.grad.isfinite().all()) for p in net.parameters() if p.grad is not None)

@@ -21,10 +21,17 @@ from wildshape.ops.column_argmax import column_argmax
 _MIXERS = np.array((0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)).view(np.int64)
 
 
-def encode_winners(encoder: PCNEncoder, points: Float[Tensor, "B N 3"]) -> Float[Tensor, "B d"]:
-    """`encoder(points)`, with a gradient to the weights; `points` get none."""
+def encode_winners(
+    encoder: PCNEncoder, points: Float[Tensor, "B N 3"], scoring: torch.dtype | None = None
+) -> Float[Tensor, "B d"]:
+    """`encoder(points)`, with a gradient to the weights; `points` get none.
+
+    `scoring` is the type in which the last two layers are searched for their winners, by default
+    that of the points. In bfloat16 a point within a rounding (1/256) of the maximum may win; the
+    code is then that point's own value, in full precision.
+    """
     with record_function("wildshape: encoder scoring"):
-        pooled_row, code_row = _winning_rows(encoder, points)
+        pooled_row, code_row = _winning_rows(encoder, points, scoring or points.dtype)
     with record_function("wildshape: encoder winners"):
         return _code_of_winners(encoder, points, pooled_row, code_row)
 
@@ -50,13 +57,15 @@ def _code_of_winners(
 
 @torch.no_grad()
 def _winning_rows(
-    encoder: PCNEncoder, points: Float[Tensor, "B N 3"]
+    encoder: PCNEncoder, points: Float[Tensor, "B N 3"], scoring: torch.dtype
 ) -> tuple[Int[Tensor, "B b"], Int[Tensor, "B d"]]:
     """Row of the maximum of each pooled feature and of each code entry, cloud by cloud.
 
     One cloud at a time keeps its activations in the cache. Of equal points the first counts.
     """
-    weight3, weight4 = encoder.join_point.weight.T, encoder.point4.weight.T
+    weight3, weight4 = (
+        layer.weight.T.to(scoring) for layer in (encoder.join_point, encoder.point4)
+    )
     pooled_rows, code_rows = [], []
     for cloud, distinct in zip(points, distinct_rows(points)):
         local = torch.addmm(encoder.point1.bias, cloud[distinct], encoder.point1.weight.T).relu_()
@@ -64,9 +73,9 @@ def _winning_rows(
         row = column_argmax(local)
         pooled = local.gather(0, row[None])
         bias = (encoder.join_pooled(pooled) + encoder.join_point.bias)[0]
-        joined = torch.addmm(bias, local, weight3).relu_()
+        joined = torch.addmm(bias.to(scoring), local.to(scoring), weight3).relu_()
         pooled_rows.append(distinct[row])
-        code_rows.append(distinct[column_argmax(joined @ weight4)])
+        code_rows.append(distinct[column_argmax((joined @ weight4).to(local.dtype))])
     return torch.stack(pooled_rows), torch.stack(code_rows)
 
 

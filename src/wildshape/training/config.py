@@ -23,7 +23,9 @@ class OptimConfig:
         average: decay of the running mean of the weights that is kept; 0 keeps the last.
         clip: largest norm of the gradient; 0 is none.
         precision: of the encoder's matrix products when training on a GPU, `bf16` or `fp32`; all
-            else, and all on a CPU, is float32.
+            else is float32.
+        search: the type in which the encoder's winning points are searched for when training on a
+            CPU; bf16 only where the processor multiplies in it (`models/pcn_winners.py`).
     """
 
     steps: int = 400_000
@@ -34,6 +36,7 @@ class OptimConfig:
     average: float = 0.0
     clip: float = 0.0
     precision: Literal["bf16", "fp32"] = "bf16"
+    search: Literal["bf16", "fp32"] = "fp32"
 
 
 @dataclass(frozen=True)

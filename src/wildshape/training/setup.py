@@ -22,6 +22,7 @@ from wildshape.io.store import Store
 from wildshape.models.checkpoint import load_checkpoint
 from wildshape.models.shapepose import Encoding, ShapePoseNet
 from wildshape.ops.allocator import keep_memory
+from wildshape.ops.processor import multiplies_bf16
 from wildshape.training.capture import Captured
 from wildshape.training.config import Recipe
 from wildshape.training.fusing import fused_targets, load_targets, save_targets, true_targets
@@ -208,9 +209,7 @@ def _views(
 
 def step_of(run: Run, meter: Meter) -> tuple[Step, Callable[[], None]]:
     """The run's step, and how its device's part is called: as it is, or recorded and replayed."""
-    encoding: Encoding | None = None
-    if run.processes.device.type == "cuda":
-        encoding = "bf16" if run.recipe.optim.precision == "bf16" else "static"
+    encoding = _encoding(run)
     network, loss = run.state.network, run.recipe.loss
     if run.targets is None:
         objective = WeaklySupervised(network, loss, encoding)
@@ -219,6 +218,14 @@ def step_of(run: Run, meter: Meter) -> tuple[Step, Callable[[], None]]:
     wrapped = run.processes.wrap(objective)
     step = Step(run.state, wrapped, run.views, meter, run.recipe.optim.clip)
     return step, Captured(step.advance, run.say) if _records(run) else step.advance
+
+
+def _encoding(run: Run) -> Encoding:
+    """What the device is good at, as far as the recipe allows."""
+    optim = run.recipe.optim
+    if run.processes.device.type == "cuda":
+        return "bf16" if optim.precision == "bf16" else "static"
+    return "winners-bf16" if optim.search == "bf16" and multiplies_bf16() else "winners"
 
 
 def _records(run: Run) -> bool:
