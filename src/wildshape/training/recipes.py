@@ -72,7 +72,7 @@ def small() -> Recipe:
 def default() -> Recipe:
     """For a long run: `small` with more points and finer bins; the shipped weights' recipe.
 
-    Its widths are those of `small`, so that it can be trained without a GPU: about 7 steps a second
+    Its widths are those of `small`, so that it can be trained without a GPU: about 6 steps a second
     and core.
     """
     base = small()
