@@ -6,7 +6,7 @@
     python benchmarks/bench_export.py --small    # 48
 
 `torch` is `Predictor.complete`, box and all; `onnxruntime` is the exported graph from raw points to
-completed ones, with the sorting and drawing of points that examples/onnx_inference.py does.
+completed ones, with the sorting and drawing of points that examples/06_onnx_inference.py does.
 """
 
 from functools import partial

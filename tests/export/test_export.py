@@ -170,12 +170,12 @@ def test_command_says_how_far_from_torch(exported):
 
 
 def test_example_needs_no_torch(facing, onnx_file, tmp_path, monkeypatch, capsys):
-    source = (ROOT / "examples" / "onnx_inference.py").read_text(encoding="utf-8")
+    source = (ROOT / "examples" / "06_onnx_inference.py").read_text(encoding="utf-8")
     assert "torch" not in source
     assert "import wildshape" not in source
     scan, out = ROOT / "examples" / "scan.npy", tmp_path / "completed.npy"
     monkeypatch.setattr("sys.argv", ["example", str(onnx_file), str(scan), str(out)])
-    runpy.run_path(str(ROOT / "examples" / "onnx_inference.py"), run_name="__main__")
+    runpy.run_path(str(ROOT / "examples" / "06_onnx_inference.py"), run_name="__main__")
     done = facing.complete(np.load(scan))
     np.testing.assert_allclose(np.load(out), done.points, atol=1e-4)
     assert f"300 out, confidence {done.confidence:.2f}" in capsys.readouterr().out

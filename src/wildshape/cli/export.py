@@ -24,7 +24,7 @@ class Settings:
     """Write a model as ONNX (.onnx) or for torch.export.load (.pt2), and compare it with torch.
 
     The file takes raw scans (B, N, 3), sensor frame, metres, any B and N, and which of their points
-    the network sees (B, M), see examples/onnx_inference.py. It gives completed points, poses
+    the network sees (B, M), see examples/06_onnx_inference.py. It gives completed points, poses
     (rotation, translation), confidence, cost and branch, all in the sensor frame: centring and the
     choice among poses are inside. The largest difference to torch is said.
     """

@@ -3,7 +3,7 @@
 """Complete a scan with onnxruntime and numpy alone.
 
 wildshape export --out model.onnx
-python examples/onnx_inference.py model.onnx examples/scan.npy completed.npy
+python examples/06_onnx_inference.py model.onnx examples/scan.npy completed.npy
 """
 
 import sys
