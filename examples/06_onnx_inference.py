@@ -28,16 +28,11 @@ def main(model: str, scan: str, out: str) -> None:
     session = onnxruntime.InferenceSession(model, providers=["CPUExecutionProvider"])
     about = session.get_modelmeta().custom_metadata_map
     given = prepare(np.load(scan), int(about["input_points"]))
-    names = [output.name for output in session.get_outputs()]
-    found = dict(zip(names, session.run(None, given), strict=True))
+    found = dict(zip((o.name for o in session.get_outputs()), session.run(None, given)))
     np.save(out, found["points"][0])  # (m, 3), the scan's sensor frame, metres
-    T_sensor_canonical = np.eye(4)
-    T_sensor_canonical[:3, :3] = found["rotation"][0]
-    T_sensor_canonical[:3, 3] = found["translation"][0]
-    print(
-        f"{given['scans'].shape[1]} points in, {found['points'].shape[1]} out, confidence", end=" "
-    )
-    print(f"{found['confidence'][0]:.2f}, pose\n{T_sensor_canonical.round(3)}")
+    T_sensor_canonical = np.column_stack((found["rotation"][0], found["translation"][0]))
+    print(f"{given['scans'].shape[1]} points in, {found['points'].shape[1]} out,", end=" ")
+    print(f"confidence {found['confidence'][0]:.2f}, pose\n{T_sensor_canonical.round(3)}")
 
 
 if __name__ == "__main__":
