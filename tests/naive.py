@@ -59,6 +59,23 @@ def visible(points, centre, projection):
     return sorted(i for _, i in front.values())
 
 
+def in_image(points, centre, projection):
+    """Where points lie in the sensor's image, scaled to lengths at the centre; with a graph."""
+    if not isinstance(projection, PolarBins | FacingBins):
+        return torch.stack([p[:2] / p[2] * centre[2] for p in points])
+    far, level = math.hypot(*centre.tolist()), math.hypot(*centre[:2].tolist())
+    yaw, pitch = math.atan2(centre[1], centre[0]), math.atan2(centre[2], level)
+    places = []
+    for x, y, z in points:
+        ahead = math.cos(yaw) * x + math.sin(yaw) * y
+        left = -math.sin(yaw) * x + math.cos(yaw) * y
+        forward = math.cos(pitch) * ahead + math.sin(pitch) * z
+        up = -math.sin(pitch) * ahead + math.cos(pitch) * z
+        length = (x * x + y * y + z * z).sqrt()
+        places.append(torch.stack((torch.atan2(left, forward), torch.asin(up / length))))
+    return far * torch.stack(places)
+
+
 def multiview_loss(scans, centres, shapes, rotation, translation, beta, projection):
     """Equation 5: sum over views, mean over tracks, the least branch of each view; and the winners.
 
@@ -70,8 +87,11 @@ def multiview_loss(scans, centres, shapes, rotation, translation, beta, projecti
         costs = []
         for R, t in zip(rotation[b], translation[b]):
             posed = shapes[b // views] @ R.T + t
-            apart = torch.cdist(scan, posed, compute_mode="donot_use_mm_for_euclid_dist")
             seen = visible(posed.detach() + centres[b], centres[b], projection)
+            both = (scan, posed)
+            if projection.flat:
+                both = [in_image(x + centres[b], centres[b], projection) for x in both]
+            apart = torch.cdist(*both, compute_mode="donot_use_mm_for_euclid_dist")
             costs.append(apart.amin(1).mean() + beta * apart.amin(0)[seen].mean())
         cost, index = torch.stack(costs).min(0)
         total = total + cost

@@ -23,7 +23,8 @@ class Size:
         train: tracks.
         test: tracks measured; at most 141, the CAD cars of the test split.
         steps: of each training; None: the preset's own number, network and schedule.
-        seeds: trainings of each method; ablations take one where this is under five.
+        seeds: trainings of each method; ablations take one where this is under five, and so do
+            views and trucks where `like` is tiny.
         max_scans: of a tested track, evenly; None: all.
         like: the preset whose widths, points and schedule are used where `steps` is given.
     """
@@ -40,6 +41,11 @@ class Size:
     def ablation_seeds(self) -> int:
         """Ablations have many rows: one seed each but for the largest size."""
         return self.seeds if self.seeds >= 5 else 1
+
+    @property
+    def side_seeds(self) -> int:
+        """Of tables with many trainings: enough for a spread where a method could be judged."""
+        return 1 if self.like == "tiny" and self.steps is not None else min(self.seeds, 3)
 
     @property
     def said(self) -> str:

@@ -26,4 +26,4 @@ def table(given: Given) -> Table:
     note = (
         "Fine-tuned, as the paper has it, on the very tracks that are measured: no label is used."
     )
-    return Table("Fine-tuning on trucks (paper, supplement)", (block,), size.seeds, (note,))
+    return Table("Fine-tuning on trucks (paper, supplement)", (block,), size.side_seeds, (note,))

@@ -20,7 +20,7 @@ def table(given: Given) -> Table:
     blocks = tuple(_block(given, category) for category in ("airplane", "car", "chair"))
     title = "Depth views: completion and registration (paper, tables 1, 4 and 7)"
     note = "Objects have a box diagonal of 1; trans is in this unit. 5 views each, no turns."
-    return Table(title, blocks, min(given.size.seeds, 3), (note,))
+    return Table(title, blocks, given.size.side_seeds, (note,))
 
 
 def _block(given: Given, category: Category) -> Block:

@@ -15,6 +15,7 @@ from wildshape.losses.multiview import LossConfig, multiview_loss
 from wildshape.losses.observation import observation_term, projection_term
 
 PROJECTIONS = [PolarBins(0.03, 0.03), FacingBins(0.3), PixelBins(1 / 30)]
+IN_THE_IMAGE = [PolarBins(0.03, 0.03, flat=True), FacingBins(0.3, True), PixelBins(1 / 30, True)]
 
 
 def batch(tracks=2, views=3, branches=4, n=30, m=40, seed=0, dtype=torch.float64):
@@ -36,7 +37,7 @@ def batch(tracks=2, views=3, branches=4, n=30, m=40, seed=0, dtype=torch.float64
     return {k: v.to(dtype) for k, v in scans.items()}, leaves
 
 
-@pytest.mark.parametrize("projection", PROJECTIONS)
+@pytest.mark.parametrize("projection", [*PROJECTIONS, *IN_THE_IMAGE])
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(("dtype", "rtol"), [(torch.float64, 1e-9), (torch.float32, 2e-4)])
 def test_loss_and_gradients_are_those_of_the_slow_twin(projection, seed, dtype, rtol):

@@ -54,7 +54,9 @@ def rewritten(path, *, metadata=None, drop=(), add=None):
     return path
 
 
-@pytest.mark.parametrize("projection", [PolarBins(0.01, 0.03), FacingBins(0.3), PixelBins(0.02)])
+@pytest.mark.parametrize(
+    "projection", [PolarBins(0.01, 0.03), FacingBins(0.3), PixelBins(0.02, flat=True)]
+)
 def test_round_trip(network, tmp_path, projection):
     path = tmp_path / "deep" / "model.safetensors"
     save_checkpoint(path, network, settings(projection))

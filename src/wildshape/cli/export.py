@@ -65,6 +65,11 @@ def _export(settings: Settings, suffix: str) -> None:
     if suffix == ".onnx":
         onnx.require_onnx()
     predictor = load_model(settings.model, "cpu")
+    if predictor.settings.network.backbone != "pcn":
+        raise BadInputError(
+            f"{settings.model}: its encoder is {predictor.settings.network.backbone}, and only"
+            " networks with PCN's encoder are exported; train without --encoder."
+        )
     scans = verify.rehearsal_scans(predictor.settings, settings.scans)
     write = onnx.write_onnx if suffix == ".onnx" else onnx.write_torch
     settings.out.parent.mkdir(parents=True, exist_ok=True)

@@ -11,6 +11,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from wildshape.geometry.image_plane import compared
 from wildshape.geometry.visibility import Bins, Projection, bin_points
 
 
@@ -75,7 +76,8 @@ def score_plain(
     hypotheses = posed.shape[1]
     flat = posed.flatten(0, 1)
     repeated, middle = _repeat(scans, hypotheses), _repeat(centres, hypotheses)
-    to_shape, to_scan = nearest_both_plain(repeated, flat)
+    both = (compared(cloud, middle, projection) for cloud in (repeated, flat))
+    to_shape, to_scan = nearest_both_plain(*both)
     seen = visible_plain(bin_points(flat + middle[:, None], middle, projection))
     found = (to_shape.mean(-1), _mean_of(to_scan, seen), to_scan)
     return PlainScores(*(part.unflatten(0, (-1, hypotheses)) for part in found))

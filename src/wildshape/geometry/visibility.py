@@ -29,10 +29,14 @@ class Bins:
 
 @dataclass(frozen=True)
 class PolarBins:
-    """The paper's bins: `(floor(phi / d_phi), floor(theta / d_theta))`, radians."""
+    """The paper's bins: `(floor(phi / d_phi), floor(theta / d_theta))`, radians.
+
+    With `flat`, scan and shape are compared in the image alone (`image_plane.py`).
+    """
 
     d_azimuth: float = 0.02
     d_pitch: float = 0.02
+    flat: bool = False
 
 
 @dataclass(frozen=True)
@@ -41,9 +45,11 @@ class FacingBins:
 
     Free of the seam and the poles, and equally coarse on the object at every range: fixed angles
     let the far side shine through near objects, whose points are farther apart than a bin.
+    With `flat`, scan and shape are compared in the image alone (`image_plane.py`).
     """
 
     cell_m: float = 0.2
+    flat: bool = False
 
 
 @dataclass(frozen=True)
@@ -51,9 +57,11 @@ class PixelBins:
     """Square pixels of a pinhole image: `(floor(x / z / cell), floor(y / z / cell))`.
 
     `cell` is the pixel's width over the focal length, so no intrinsics are needed.
+    With `flat`, scan and shape are compared in the image alone (`image_plane.py`).
     """
 
     cell: float = 1 / 30
+    flat: bool = False
 
 
 Projection = PolarBins | FacingBins | PixelBins

@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 from torch.profiler import record_function
 
+from wildshape.geometry.image_plane import compared
 from wildshape.geometry.visibility import Projection, bin_points
 from wildshape.losses.chamfer import masked_mean
 from wildshape.ops.nearest import Neighbours, nearest_both
@@ -65,7 +66,8 @@ def score_hypotheses(
     repeated = scans[:, None].expand(-1, hypotheses, -1, -1).flatten(0, 1)
     middle = centres[:, None].expand(-1, hypotheses, -1).flatten(0, 1)
     with record_function("wildshape: search"):
-        to_shape, to_scan = nearest_both(repeated, flat)
+        both = (compared(cloud, middle, projection) for cloud in (repeated, flat))
+        to_shape, to_scan = nearest_both(*both)
     with record_function("wildshape: z-buffer"):
         bins = bin_points(flat + middle[:, None], middle, projection)
         seen = visible(bins.index, bins.depth, bins.count)

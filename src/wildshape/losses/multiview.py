@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from wildshape.geometry.image_plane import compared
 from wildshape.geometry.visibility import PolarBins, Projection
 from wildshape.losses.hindsight import Scores, score_hypotheses
 from wildshape.losses.observation import observation_term, projection_term
@@ -21,7 +22,8 @@ class LossConfig:
 
     Attributes:
         beta: weight of the projection term.
-        projection: how the sensor's image is binned.
+        projection: how the sensor's image is binned; if it is `flat`, both terms are of points in
+            the image (the paper's losses on 2D projections).
         template: weight of the pull of every canonical shape to the batch's mean shape, at the
             first step (beyond the paper; see docs/decisions.md).
         template_end: the same at the last step; geometric in between.
@@ -88,24 +90,25 @@ def multiview_loss(
         scores = score_hypotheses(scans, centres, posed, config.projection)
         cost = scores.cost(config.beta)
         winner = (cost if handicap is None else cost + handicap(cost)).argmin(-1)
-    observation, projection = _winner_terms(scans, shape, rotation, translation, scores, winner)
+    posed = _posed(shape, rotation, translation, winner)
+    both = (compared(cloud, centres, config.projection) for cloud in (scans, posed))
+    observation, projection = _winner_terms(*both, scores, winner)
     total = (observation + config.beta * projection).mean() * views
     return LossTerms(total, observation.mean().detach(), projection.mean().detach(), winner)
 
 
+def _posed(shape: Tensor, rotation: Tensor, translation: Tensor, winner: Tensor) -> Tensor:
+    """Each shape under the winning hypothesis of its scan."""
+    R = rotation.gather(1, winner[:, None, None, None].expand(-1, 1, 3, 3))[:, 0]
+    t = translation.gather(1, winner[:, None, None].expand(-1, 1, 3))
+    return shape @ R.mT + t
+
+
 def _winner_terms(
-    scans: Tensor,
-    shape: Tensor,
-    rotation: Tensor,
-    translation: Tensor,
-    scores: Scores,
-    winner: Tensor,
+    scans: Tensor, posed: Tensor, scores: Scores, winner: Tensor
 ) -> tuple[Tensor, Tensor]:
     """Both terms of the winning hypothesis of each scan, differentiable (winner takes all)."""
     rows = torch.arange(len(scans), device=scans.device)
-    R = rotation.gather(1, winner[:, None, None, None].expand(-1, 1, 3, 3))[:, 0]
-    t = translation.gather(1, winner[:, None, None].expand(-1, 1, 3))
-    posed = shape @ R.mT + t
     observation = observation_term(scans, posed, scores.to_shape[rows, winner])
     seen = scores.visible[rows, winner]
     projection = projection_term(posed, scans, scores.to_scan[rows, winner], seen)
