@@ -14,7 +14,7 @@ from tests.inference.test_predictor import CONFIG, SETTINGS
 from wildshape.geometry.rotation import rotation_z
 from wildshape.geometry.se3 import SE3, stack
 from wildshape.inference import track as whole
-from wildshape.inference.boxes import box_of
+from wildshape.inference.boxes import carried, fit_to_scans
 from wildshape.inference.predictor import Predictor
 from wildshape.inference.voting import half_turn, likeness_of_next, slow, steady_signs, voted_signs
 from wildshape.models.shapepose import ShapePoseNet
@@ -22,13 +22,14 @@ from wildshape.records import Completion
 
 TRACK = drive_by(scans=7, step=2.0, heading=0.3, side=5.0)
 SHAPE = torch.from_numpy(car_surface(2000)[0])
+BOX = fit_to_scans(SHAPE, [], mirror=True)
 
 
 def completed(poses):
     """As a network would that knows the car's shape, but not quite its pose."""
     return [
         Completion(
-            poses[i].apply(SHAPE).float().numpy(), poses[i], box_of(SHAPE, poses[i]), 0.5, 0, 0.1
+            poses[i].apply(SHAPE).float().numpy(), poses[i], carried(BOX, poses[i]), 0.5, 0, 0.1
         )
         for i in range(len(poses))
     ]

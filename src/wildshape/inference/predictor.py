@@ -15,7 +15,7 @@ from torch import Tensor
 
 from wildshape.geometry.facing import roll_angle
 from wildshape.geometry.se3 import SE3, stack
-from wildshape.inference.boxes import box_of
+from wildshape.inference.boxes import box_seen
 from wildshape.inference.facts import facts_of, seen_facts
 from wildshape.inference.prepare import NetworkInput, as_points, extent, network_input
 from wildshape.inference.track import complete_together
@@ -198,7 +198,7 @@ class Predictor:
         return Completion(
             points=T_sensor_can.apply(found.shapes[i]).numpy(),
             pose=T_sensor_can.to(torch.float64),
-            box=box_of(found.shapes[i], T_sensor_can),
+            box=box_seen(found.shapes[i], T_sensor_can, scan, mirror=self.settings.network.mirror),
             confidence=0.0 if warning else self.confidence(facts),
             branch=int(found.branch[i]),
             cost=cost,

@@ -14,9 +14,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from wildshape.geometry.box import FittedBox
 from wildshape.geometry.outliers import voxel_thin
 from wildshape.geometry.se3 import SE3, stack
-from wildshape.inference.boxes import box_of
+from wildshape.inference.boxes import carried, fit_to_scans
 from wildshape.inference.joint import FINE, refine_jointly
 from wildshape.inference.prepare import network_input
 from wildshape.inference.voting import half_turn, likeness_of_next, voted_signs
@@ -60,6 +61,7 @@ def complete_together(
     voted = _voted(stack([item.pose for item in done]), shape, weights, scans, settings)
     fit = refine_checked(scans, voted, mirror=settings.network.mirror)
     shape = drawn_to(shape, _seen(scans, fit.T_sensor_object, settings.network.mirror))
+    fitted = _box(shape, scans, fit.T_sensor_object, mirror=settings.network.mirror)
     cost = track_cost(shape, fit.T_sensor_object, scans, settings)
     confidence = float(np.mean([item.confidence for item in done]))
     return [
@@ -67,13 +69,22 @@ def complete_together(
             item,
             points=fit.T_sensor_object[i].apply(shape).float().numpy(),
             pose=fit.T_sensor_object[i],
-            box=box_of(shape, fit.T_sensor_object[i]),
+            box=carried(fitted, fit.T_sensor_object[i]),
             confidence=0.0 if item.warning else confidence,
             cost=float(cost[i]),
             refined=fit.refined,
         )
         for i, item in enumerate(done)
     ]
+
+
+def _box(
+    shape: Float[Tensor, "P 3"], scans: list[Points], T_sensor_object: SE3, *, mirror: bool
+) -> FittedBox:
+    """One box for all scans of the track, object frame."""
+    T_object_sensor = T_sensor_object.inverse()
+    seen = [T_object_sensor[i].apply(torch.from_numpy(s).double()) for i, s in enumerate(scans)]
+    return fit_to_scans(shape, seen, mirror=mirror)
 
 
 def _mean_shape(done: list[Completion], weights: Float[Tensor, "V"]) -> Float[Tensor, "P 3"]:

@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Boxes hold the shape and what scans saw around it, and believe no stray point."""
+
+import math
+
+import pytest
+import torch
+
+from wildshape.geometry.rotation import rotation_from_quaternion
+from wildshape.geometry.se3 import SE3
+from wildshape.inference.boxes import box_seen, carried, fit_to_scans
+
+SIZE = torch.tensor((4.0, 1.8, 1.5), dtype=torch.float64)
+
+
+def surface(count=3000, seed=0, size=SIZE):
+    """Points on the six sides of a box around the origin."""
+    generator = torch.Generator().manual_seed(seed)
+    points = torch.rand(count, 3, generator=generator, dtype=torch.float64) - 0.5
+    side = torch.arange(count) % 6
+    points[torch.arange(count), side // 2] = (side % 2 - 0.5).double()
+    return points * size
+
+
+def about_y(degrees):
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    return torch.tensor(((c, 0, s), (0, 1, 0), (-s, 0, c)), dtype=torch.float64)
+
+
+def test_a_shape_alone_has_its_own_box():
+    fitted = fit_to_scans(surface(), [], mirror=True)
+    torch.testing.assert_close(fitted.size, SIZE, atol=0.02, rtol=0)
+    torch.testing.assert_close(fitted.rotation, torch.eye(3).double())
+
+
+def test_points_of_a_scan_beyond_the_shape_push_the_side_out_on_both_sides_of_the_mirror():
+    mirrors = torch.tensor([[0.8, 1.05, 0.2]] * 3, dtype=torch.float64)
+    fitted = fit_to_scans(surface(), [mirrors], mirror=True)
+    assert fitted.size.tolist() == pytest.approx((4.0, 2.1, 1.5), abs=0.02)
+    assert fitted.centre.tolist() == pytest.approx((0, 0, 0), abs=0.02)
+    one_sided = fit_to_scans(surface(), [mirrors], mirror=False)
+    assert float(one_sided.size[1]) == pytest.approx(1.95, abs=0.05)
+
+
+def test_a_stray_point_far_outside_is_not_believed():
+    scan = torch.cat((surface(200, seed=1), torch.tensor([[0.0, 0.0, 9.0]], dtype=torch.float64)))
+    fitted = fit_to_scans(surface(), [scan], mirror=True)
+    torch.testing.assert_close(fitted.size, SIZE, atol=0.03, rtol=0)
+
+
+def test_of_eight_scans_one_alone_is_not_believed():
+    good, bad = surface(200, seed=1), surface(200, seed=1) * 1.08
+    alone = fit_to_scans(surface(), [bad, *[good] * 7], mirror=True)
+    torch.testing.assert_close(alone.size, SIZE, atol=0.03, rtol=0)
+    two = fit_to_scans(surface(), [bad, bad, *[good] * 6], mirror=True)
+    torch.testing.assert_close(two.size, SIZE * 1.08, atol=0.03, rtol=0)
+
+
+@pytest.mark.parametrize("degrees", [-3.0, -1.0, 0.0, 2.0])
+def test_a_canonical_frame_that_leans_is_made_level(degrees):
+    leaning = about_y(degrees)
+    fitted = fit_to_scans(surface() @ leaning.mT, [], mirror=True)
+    torch.testing.assert_close(fitted.rotation, leaning, atol=1e-6, rtol=0)
+    torch.testing.assert_close(fitted.size, SIZE, atol=0.03, rtol=0)
+
+
+def test_carried_to_the_sensor_with_the_pose():
+    turn = rotation_from_quaternion(torch.tensor((0.8, 0.1, -0.2, 0.5), dtype=torch.float64))
+    pose = SE3(turn, torch.tensor((9.0, -3.0, 1.0), dtype=torch.float64))
+    scan = pose.apply(surface(300, seed=2)).float().numpy()
+    box = box_seen(surface().float(), pose, scan, mirror=True)
+    assert box.centre == pytest.approx(pose.translation.tolist(), abs=0.02)
+    assert box.size == pytest.approx(SIZE.tolist(), abs=0.02)
+    quaternion = torch.tensor(box.quaternion_wxyz, dtype=torch.float64)
+    torch.testing.assert_close(rotation_from_quaternion(quaternion), turn, atol=1e-5, rtol=0)
+    assert carried(fit_to_scans(surface(), [], mirror=True), pose).size == pytest.approx(
+        SIZE.tolist(), abs=0.02
+    )
