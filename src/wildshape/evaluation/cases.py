@@ -8,9 +8,11 @@ import numpy as np
 import torch
 
 from wildshape.datasets.accumulate import shape_mirrored, shape_partial
+from wildshape.evaluation.boxes import true_box
 from wildshape.evaluation.metrics import hull_area
 from wildshape.evaluation.skipped import Skipped
 from wildshape.evaluation.turning import Rotate, turn_track
+from wildshape.geometry.box import FittedBox
 from wildshape.geometry.se3 import SE3
 from wildshape.records import Points, Sensor, Track
 
@@ -27,12 +29,14 @@ class Truth:
         shape: `(g, 3)`.
         partial: `(g, 3)` as accumulated; None where the shape is known.
         area: of the surface, square metres, roughly (convex hull).
+        box: tight around the shape.
     """
 
     kind: str
     shape: Points
     partial: Points | None
     area: float
+    box: FittedBox
 
 
 @dataclass(frozen=True)
@@ -125,9 +129,10 @@ def _truth(track: Track) -> Truth | None:
         return None
     if track.shape is not None:
         shape = _thin(track.shape)
-        return Truth("shape", shape, None, hull_area(shape))
-    mirrored = _thin(shape_mirrored(track))
-    return Truth("mirrored", mirrored, _thin(shape_partial(track)), hull_area(mirrored))
+        return Truth("shape", shape, None, hull_area(shape), true_box(track.shape))
+    whole = shape_mirrored(track)
+    mirrored, partial = _thin(whole), _thin(shape_partial(track))
+    return Truth("mirrored", mirrored, partial, hull_area(mirrored), true_box(whole))
 
 
 def _thin(points: Points) -> Points:

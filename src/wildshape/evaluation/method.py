@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import Protocol, runtime_checkable
 
 from wildshape.geometry.se3 import SE3
-from wildshape.records import Points, Sensor
+from wildshape.records import Box, Points, Sensor
 
 
 @runtime_checkable
@@ -38,6 +38,17 @@ class Confident(Completer, Protocol):
         self, scans: list[Points], sensor: Sensor
     ) -> Iterable[tuple[Points, float]]:
         """`complete` of each scan, in order, and the confidence in it, 0 to 1."""
+        ...
+
+
+@runtime_checkable
+class Boxed(Completer, Protocol):
+    """Completes scans, says how far it trusts each, and draws a box around each object."""
+
+    def complete_boxed(
+        self, scans: list[Points], sensor: Sensor
+    ) -> Iterable[tuple[Points, float, Box]]:
+        """`complete` of each scan, in order, the confidence in it, and the object's box."""
         ...
 
 

@@ -5,14 +5,17 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import torch
 
 from wildshape.errors import BadInputError
+from wildshape.evaluation.boxes import box_score
 from wildshape.evaluation.cases import Case, Truth, prepare
 from wildshape.evaluation.method import (
     BatchCompleter,
+    Boxed,
     Completer,
     Confident,
     Described,
@@ -30,7 +33,7 @@ from wildshape.evaluation.results import (
 from wildshape.evaluation.skipped import Skipped
 from wildshape.evaluation.turning import Rotate
 from wildshape.geometry.se3 import SE3
-from wildshape.records import Points, Track
+from wildshape.records import Box, Points, Track
 
 Progress = Callable[[int, str], None]
 REFUSED = "refused by the method"
@@ -116,17 +119,26 @@ def _score_scans(method: Completer, case: Case, ledger: _Ledger) -> None:
         for i in range(len(case.scans)):
             ledger.skip(case, i, "completion: no true shape")
         return
-    for i, (predicted, confidence) in enumerate(_complete_surely(method, case)):
-        sure = (case.truth, case.T_sensor_object, i, ledger, confidence)
-        _score_completion(predicted, case, *sure)
+    for i, answer in enumerate(_answers(method, case)):
+        _score_completion(answer, case, case.truth, case.T_sensor_object, i, ledger)
 
 
-def _complete_surely(method: Completer, case: Case) -> list[tuple[Points | None, float | None]]:
-    """As `complete_scans`, with the confidence of those that state one."""
-    if isinstance(method, Confident):
-        with suppress(BadInputError):
-            return list(method.complete_surely(case.inputs(), case.sensor))
-    return [(predicted, None) for predicted in complete_scans(method, case)]
+class _Answer(NamedTuple):
+    """What a method says of a scan; None where it says nothing."""
+
+    points: Points | None
+    confidence: float | None = None
+    box: Box | None = None
+
+
+def _answers(method: Completer, case: Case) -> list[_Answer]:
+    """As `complete_scans`, with confidence and box of those that state them."""
+    with suppress(BadInputError):
+        if isinstance(method, Boxed):
+            return [_Answer(*one) for one in method.complete_boxed(case.inputs(), case.sensor)]
+        if isinstance(method, Confident):
+            return [_Answer(*one) for one in method.complete_surely(case.inputs(), case.sensor)]
+    return [_Answer(predicted) for predicted in complete_scans(method, case)]
 
 
 def complete_scans(method: Completer, case: Case) -> Sequence[Points | None]:
@@ -153,18 +165,19 @@ def _score_whole(method: TrackCompleter, case: Case, ledger: _Ledger) -> None:
         predicted = method.complete_track(case.inputs(), case.sensor)
     except BadInputError:
         predicted = None
-    _score_completion(predicted, case, case.truth, case.T_sensor_object, case.middle, ledger)
+    whole = (case.truth, case.T_sensor_object, case.middle, ledger)
+    _score_completion(_Answer(predicted), case, *whole)
 
 
 def _score_completion(
-    predicted: Points | None,
+    answer: _Answer,
     case: Case,
     truth: Truth,
     T_sensor_object: SE3,
     i: int,
     ledger: _Ledger,
-    confidence: float | None = None,
 ) -> None:
+    predicted = answer.points
     if predicted is None:
         ledger.skip(case, i, f"completion: {REFUSED}")
         return
@@ -185,7 +198,10 @@ def _score_completion(
             truth_points=len(truth.shape),
             cd_floor=floor,
             partial_points=None if truth.partial is None else len(truth.partial),
-            confidence=confidence,
+            confidence=answer.confidence,
+            box=None
+            if answer.box is None
+            else box_score(answer.box, truth.box, T_sensor_object[i]),
         )
     )
 

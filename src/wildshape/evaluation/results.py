@@ -11,42 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
+from wildshape.evaluation.boxes import BoxScore, box_figures
 from wildshape.evaluation.confidence import confidence_figures, risk_coverage_curves
 from wildshape.evaluation.metrics import ACCURATE_DEG, CompletionError
+from wildshape.evaluation.names import NAMES, UNITS
 from wildshape.evaluation.skipped import Skipped, by_reason, with_rows
 from wildshape.evaluation.turning import Rotate
 from wildshape.io.atomic import write_json
 
 FORMAT = 1
 Figures = dict[str, float | None]
-# Names fixed in the design, then what stands beside them.
-NAMES = (
-    "cd",
-    "precision",
-    "coverage",
-    "acc30",
-    "rot_median_deg",
-    "trans_median_m",
-    "acc30_sym",
-    "rot_sym_median_deg",
-    "cd_partial",
-    "precision_partial",
-    "coverage_partial",
-    "cd_floor",
-    "points",
-    "truth_points",
-    "partial_points",
-    "confidence_rank_correlation",
-    "risk_coverage_area",
-)
-UNITS = {
-    "cd, precision, coverage, *_partial, cd_floor, trans_median_m": "metres",
-    "acc30, acc30_sym": "share, 0 to 1",
-    "rot_median_deg, rot_sym_median_deg": "degrees",
-    "confidence_rank_correlation": "Spearman, doubt with cd: 1 orders perfectly, 0 by chance",
-    "risk_coverage_area, risk_coverage": "metres of cd, over the share of the surest scans",
-    "std": "sample standard deviation over seeds; null for one seed",
-}
 
 
 @dataclass(frozen=True)
@@ -64,6 +38,7 @@ class CompletionScore:
         cd_floor: CD of perfect points as many as these, metres (METHOD 8).
         partial_points: of the accumulation as it is; None where the shape is known.
         confidence: 0 to 1, as the method states it; None if it states none.
+        box: of the object, if the method draws one.
     """
 
     track: str
@@ -76,6 +51,7 @@ class CompletionScore:
     cd_floor: float
     partial_points: int | None = None
     confidence: float | None = None
+    box: BoxScore | None = None
 
 
 @dataclass(frozen=True)
@@ -165,6 +141,7 @@ def _completion_figures(scores: MethodScores) -> Figures:
         "truth_points": float(np.median([row.truth_points for row in rows])),
         "partial_points": _median([row.partial_points for row in rows]),
         **confidence_figures(stated(rows)),
+        **box_figures([row.box for row in rows if row.box is not None]),
     }
 
 

@@ -28,6 +28,11 @@ COLUMNS = (
     ("acc 30 sym, %", "acc30_sym", 100, 1),
     ("rot sym, deg", "rot_sym_median_deg", 1, 2),
 )
+_BOXES = (
+    ("box IoU", "box_iou", 1, 3),
+    ("heading 30, %", "heading30", 100, 1),
+    ("heading 30 sym, %", "heading30_sym", 100, 1),
+)
 _PARTIAL = ("CD partial", "cd_partial", 1, 3)
 _PAPER = tuple(column for column in COLUMNS if column[1] in PaperRow.__dataclass_fields__)
 
@@ -68,7 +73,9 @@ def write_table(folder: Path, runs: Sequence[Results], *, views: bool = False) -
 
 def _columns(summaries: Sequence[Summary]) -> list[tuple[str, str, int, int]]:
     partial = any(summary.mean["cd_partial"] is not None for summary in summaries)
-    return [*COLUMNS[:3], *([_PARTIAL] if partial else []), *COLUMNS[3:]]
+    boxes = any(summary.mean["box_iou"] is not None for summary in summaries)
+    extra = ([_PARTIAL] if partial else [], _BOXES if boxes else ())
+    return [*COLUMNS[:3], *extra[0], *COLUMNS[3:], *extra[1]]
 
 
 def _cells(summary: Summary, columns: Sequence[tuple[str, str, int, int]]) -> list[str]:

@@ -33,9 +33,7 @@ def box_seen(
     return carried(fit_to_scans(shape, [seen], mirror=mirror), T)
 
 
-def fit_to_scans(
-    shape: Float[Tensor, "P 3"], seen: Sequence[Tensor], *, mirror: bool
-) -> FittedBox:
+def fit_to_scans(shape: Float[Tensor, "P 3"], seen: Sequence[Tensor], *, mirror: bool) -> FittedBox:
     """The box around a shape and what scans saw of it, in the canonical frame.
 
     The heading is the canonical frame's x where the network is mirror-symmetric, else that of the

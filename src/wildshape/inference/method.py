@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from wildshape.geometry.se3 import SE3
 from wildshape.inference.predictor import Predictor
-from wildshape.records import Points, Sensor
+from wildshape.records import Box, Points, Sensor
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,17 @@ class Learned:
         """
         done = self.predictor.complete_many(scans, sensor)
         return [(item.points, item.confidence) for item in done]
+
+    def complete_boxed(
+        self, scans: list[Points], sensor: Sensor
+    ) -> list[tuple[Points, float, Box]]:
+        """`complete_surely`, with the object's box.
+
+        Raises:
+            BadInputError: one of them has fewer than 16 finite points.
+        """
+        done = self.predictor.complete_many(scans, sensor)
+        return [(item.points, item.confidence, item.box) for item in done]
 
     def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:
         """`T_middle_scan`, one a scan: takes each scan to the frame of the middle scan.
@@ -93,6 +104,17 @@ class LearnedTrack:
         """
         done = self.predictor.complete_track(scans, sensor)
         return [(item.points, item.confidence) for item in done]
+
+    def complete_boxed(
+        self, scans: list[Points], sensor: Sensor
+    ) -> list[tuple[Points, float, Box]]:
+        """`complete_surely`, with the object's box.
+
+        Raises:
+            BadInputError: one of them has fewer than 16 finite points.
+        """
+        done = self.predictor.complete_track(scans, sensor)
+        return [(item.points, item.confidence, item.box) for item in done]
 
     def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:
         """`T_middle_scan`, one a scan.

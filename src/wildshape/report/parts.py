@@ -30,6 +30,9 @@ _COLUMNS = (
     ("translation, m", "trans_median_m", 1, 2),
     ("acc ≤ 30° sym, %", "acc30_sym", 100, 1),
     ("rotation sym, °", "rot_sym_median_deg", 1, 1),
+    ("box IoU", "box_iou", 1, 3),
+    ("heading ≤ 30°, %", "heading30", 100, 1),
+    ("heading ≤ 30° sym, %", "heading30_sym", 100, 1),
 )
 _TRAINED_RIVALS = ("dpc", "oracle")  # and what their names begin, such as dpc-lidar
 _VALIDATION = "validation/"

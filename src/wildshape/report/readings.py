@@ -44,6 +44,12 @@ def _ours(
             f"together a Chamfer distance of {figures['cd']:.3f} m"
             f"{_beside(rivals, 'cd', best=min, text=_metres)}{least}."
         )
+    if _known(figures, "box_iou", "heading30", "heading30_sym"):
+        yield (
+            f"Boxes: those of {name} share {_percent(figures['box_iou'])} of their joint volume "
+            f"with the true ones on average; {_percent(figures['heading30'])} look within 30° of "
+            f"the true heading, {_percent(figures['heading30_sym'])} if half turns are forgiven."
+        )
 
 
 def _known(figures: Mapping[str, Any], *keys: str) -> bool:

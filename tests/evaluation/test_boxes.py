@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Boxes against the true one: overlap by hand, headings raw and by symmetry, columns of a table."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import torch
+from tests.cars import drive_by, poses_of
+
+from wildshape.evaluation.boxes import BoxScore, box_figures, box_score, true_box
+from wildshape.evaluation.protocol import run
+from wildshape.evaluation.results import figures_of, write_metrics
+from wildshape.evaluation.tables import markdown
+from wildshape.geometry.box import FittedBox
+from wildshape.geometry.rotation import random_rotation, rotation_z
+from wildshape.geometry.se3 import SE3
+from wildshape.inference.boxes import carried
+
+SHAPE = np.array([[x, y, z] for x in (-2, 2) for y in (-1, 1) for z in (0, 1)], np.float32)
+TRUTH = true_box(SHAPE)
+
+
+def turned(degrees):
+    return rotation_z(torch.tensor(math.radians(degrees), dtype=torch.float64))
+
+
+def placed(seed=0):
+    turn = random_rotation(1, torch.Generator().manual_seed(seed))[0].double()
+    return SE3(turn, torch.tensor((9.0, -4.0, 1.0), dtype=torch.float64))
+
+
+def test_the_box_of_a_shape_holds_it_tightly():
+    assert TRUTH.centre.tolist() == [0, 0, 0.5]
+    assert TRUTH.size.tolist() == [4, 2, 1]
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    ("shift", "degrees", "iou", "heading"),
+    [
+        ((0.0, 0.0, 0.0), 0.0, 1.0, 0.0),
+        ((2.0, 0.0, 0.0), 0.0, 1 / 3, 0.0),
+        ((0.0, 0.0, 0.0), 180.0, 1.0, 180.0),
+        ((0.0, 0.0, 0.0), 90.0, 1 / 3, 90.0),
+        ((0.0, 0.0, 2.0), -20.0, 0.0, 20.0),
+    ],
+)
+def test_scores_by_hand_wherever_the_object_is(seed, shift, degrees, iou, heading):
+    moved = FittedBox(TRUTH.centre + torch.tensor(shift), TRUTH.size, turned(degrees))
+    pose = placed(seed)
+    score = box_score(carried(moved, pose), TRUTH, pose)
+    assert score.iou == pytest.approx(iou, abs=1e-4)
+    assert score.heading_deg == pytest.approx(heading, abs=1e-3)
+
+
+def test_one_end_is_the_front_for_the_whole_row():
+    found = [BoxScore(0.8, off) for off in (178.0, 175.0, 10.0, 95.0)]
+    figures = box_figures(found)
+    assert figures["box_iou"] == pytest.approx(0.8)
+    assert figures["heading30"] == 0.5
+    assert figures["heading30_sym"] == 0.75
+    assert figures["heading_sym_median_deg"] == pytest.approx((5 + 10) / 2)
+    assert box_figures([]) == {}
+
+
+class Boxing:
+    """Completes with the scan, and knows the box but for a shift of one scan."""
+
+    def __init__(self, track, shift=0.0):
+        assert track.shape is not None
+        self.poses, self.box = poses_of(track), true_box(track.shape)
+        self.shift = torch.tensor((shift, 0.0, 0.0), dtype=torch.float64)
+
+    def complete(self, points, sensor):
+        return points
+
+    def complete_boxed(self, scans, sensor):
+        moved = self.box._replace(centre=self.box.centre + self.shift)
+        boxes = [carried(moved, self.poses[i]) for i in range(len(scans))]
+        return [(scan, 0.5, box) for scan, box in zip(scans, boxes, strict=True)]
+
+
+class Silent:
+    """Draws no box."""
+
+    def complete(self, points, sensor):
+        return points
+
+
+def test_an_evaluation_has_columns_where_a_method_draws_boxes(tmp_path):
+    track = drive_by(scans=3, points=60)
+    methods = {"exact": Boxing(track), "off": Boxing(track, shift=1.0), "silent": Silent()}
+    results = run(methods, [track])
+    assert figures_of(results["exact"])["box_iou"] == pytest.approx(1, abs=1e-4)
+    length = float(Boxing(track).box.size[0])
+    expected = (length - 1) / (length + 1)
+    assert figures_of(results["off"])["box_iou"] == pytest.approx(expected, abs=1e-4)
+    assert figures_of(results["exact"])["heading30"] == 1
+    assert figures_of(results["silent"])["box_iou"] is None
+    found = json.loads(write_metrics(tmp_path, [results]).read_text("utf-8"))
+    assert found["methods"]["exact"]["heading30_sym"] == 1
+    assert "box IoU" in markdown([results])
+    assert "box IoU" not in markdown([run({"silent": Silent()}, [track])])
