@@ -5,8 +5,9 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from wildshape.errors import BadInputError
+    from wildshape.errors import BadInputError, MissingExtraError
     from wildshape.inference.predictor import Predictor, load
+    from wildshape.io.cloud_writer import save
     from wildshape.records import Box, Completion, Registration, Sensor, Track
 
 __version__ = "0.1.0"
@@ -14,17 +15,21 @@ __all__ = [
     "BadInputError",
     "Box",
     "Completion",
+    "MissingExtraError",
     "Predictor",
     "Registration",
     "Sensor",
     "Track",
     "load",
+    "save",
 ]
 
 _HOME = {
     "BadInputError": "wildshape.errors",
+    "MissingExtraError": "wildshape.errors",
     "Predictor": "wildshape.inference.predictor",
     "load": "wildshape.inference.predictor",
+    "save": "wildshape.io.cloud_writer",
 }
 
 

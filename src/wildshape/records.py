@@ -6,15 +6,18 @@ Points are numpy float32 `(n, 3)`; poses are `SE3` over float64 tensors on the C
 """
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+import torch
 from jaxtyping import Float
 
 from wildshape.geometry.se3 import SE3
 
 if TYPE_CHECKING:
+    import laspy
     import trimesh
+    from numpy.typing import DTypeLike
 
 Points = Float[np.ndarray, "_ 3"]
 SensorKind = Literal["lidar", "camera"]
@@ -96,10 +99,13 @@ class Box:
 class Completion:
     """One scan completed; everything in that scan's sensor frame, metres.
 
+    `np.asarray(done)` is its points; `wildshape.save(done, "shape.ply")` writes them.
+
     Attributes:
         points: `(m, 3)` float32, the complete shape.
         pose: `T_sensor_canonical`.
-        box: tight around `points`, its axes those of the canonical frame.
+        box: around `points` and what the scan saw beside them; x, the heading, is the canonical
+            frame's.
         confidence: 0 to 1.
         branch: the pose branch that spoke.
         cost: its label-free cost, metres (METHOD 6).
@@ -120,17 +126,59 @@ class Completion:
     seconds: float = 0.0
     facts: tuple[float, ...] = ()
 
-    def mesh(self) -> "trimesh.Trimesh":
-        """A closed triangle mesh of the shape, sensor frame, metres; made when asked for."""
+    def __array__(self, dtype: "DTypeLike | None" = None, copy: bool | None = None) -> np.ndarray:
+        """The points."""
+        return np.array(self.points, dtype=dtype, copy=copy)
+
+    def to_torch(self) -> Float[torch.Tensor, "m 3"]:
+        """The points as a tensor of its own, float32."""
+        return torch.from_numpy(self.points.copy())
+
+    def to_open3d(self) -> Any:
+        """The points as an `open3d.geometry.PointCloud`.
+
+        Raises:
+            MissingExtraError: Open3D is not installed.
+        """
+        from wildshape.geometry.foreign import open3d_cloud
+
+        return open3d_cloud(self.points)
+
+    def to_trimesh(self) -> "trimesh.PointCloud":
+        """The points as a `trimesh.PointCloud`; see also `mesh`."""
+        from wildshape.geometry.foreign import trimesh_cloud
+
+        return trimesh_cloud(self.points)
+
+    def to_laspy(self) -> "laspy.LasData":
+        """The points as a `laspy.LasData`, a tenth of a millimetre fine."""
+        from wildshape.geometry.foreign import las_cloud
+
+        return las_cloud(self.points)
+
+    def mesh(self, scan: Points | None = None) -> "trimesh.Trimesh":
+        """A closed triangle mesh of the shape, sensor frame, metres; made when asked for.
+
+        Args:
+            scan: the points completed, sensor frame; the mesh is then coloured by confidence, and
+                has the vertex attribute `confidence` (`geometry/trusting.py`).
+        """
         from wildshape.geometry.meshing import closed_mesh
 
         mesh = closed_mesh(self.pose.inverse().apply_numpy(self.points))
-        return mesh.apply_transform(self.pose.matrix.numpy())
+        mesh.apply_transform(self.pose.matrix.numpy())
+        if scan is not None:
+            from wildshape.geometry.trusting import colour_by_confidence
+
+            colour_by_confidence(mesh, scan, self.confidence)
+        return mesh
 
 
 @dataclass(frozen=True)
 class Registration:
     """Source registered to target.
+
+    `np.asarray(found)` is the 4x4 matrix of `T_target_source`.
 
     Attributes:
         T_target_source: takes the source scan's points to the target scan's sensor frame.
@@ -144,3 +192,12 @@ class Registration:
     inlier_ratio: float
     confidence: float
     warning: str = ""
+
+    def __array__(self, dtype: "DTypeLike | None" = None, copy: bool | None = None) -> np.ndarray:
+        """`T_target_source` as a 4x4 matrix, row-major, metres."""
+        return np.array(self.matrix, dtype=dtype, copy=copy)
+
+    @property
+    def matrix(self) -> Float[np.ndarray, "4 4"]:
+        """`T_target_source` as a 4x4 matrix, row-major, metres."""
+        return self.T_target_source.matrix.numpy()

@@ -3,35 +3,15 @@
 """FPFH and fast global registration (Zhou et al., ECCV 2016) by Open3D, as in the paper."""
 
 from dataclasses import dataclass
-from importlib import import_module
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from wildshape.baselines.pairs import about_centroids
-from wildshape.errors import MissingExtraError
+from wildshape.geometry.foreign import load_open3d
 from wildshape.geometry.se3 import SE3
 from wildshape.records import Points
-
-
-def load_open3d() -> ModuleType:
-    """The library.
-
-    Raises:
-        MissingExtraError: it is not installed, or a library of the system that it needs is not.
-    """
-    try:
-        return import_module("open3d")
-    except ModuleNotFoundError as error:
-        raise MissingExtraError(
-            f"Open3D is not installed ({error}): pip install 'wildshape[open3d]'."
-        ) from error
-    except (ImportError, OSError) as error:
-        raise MissingExtraError(
-            f"Open3D is installed but does not load ({error}): install the system library that it"
-            " names (on Debian and Ubuntu: apt install libgl1 libegl1 libx11-6 libusb-1.0-0)."
-        ) from error
 
 
 @dataclass(frozen=True)

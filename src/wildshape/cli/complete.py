@@ -3,14 +3,34 @@
 """`wildshape complete`: shape, pose, box and confidence of each scan."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from tyro.conf import arg
+from tyro.conf import Positional, arg
 
 from wildshape.cli.importing import uncollected
-from wildshape.cli.options import AsJson, Device, Input, Model, OutFolder, Overwrite, Together, Unit
+from wildshape.cli.options import AsJson, Device, Model, Overwrite, Together, Unit
+from wildshape.cli.piped import Format, is_pipe
+from wildshape.errors import BadInputError
+
+if TYPE_CHECKING:
+    from wildshape.io.mesh_writer import MeshOrder
 
 EXAMPLE = "wildshape complete scan.ply --out completed"
+
+Input = Annotated[
+    Path,
+    Positional,
+    arg(
+        metavar="INPUT",
+        help="a scan file, a TRACK folder, a DATASET folder of tracks, or a packed store; or -,"
+        " a scan on stdin",
+    ),
+]
+Out = Annotated[
+    Path | None,
+    arg(metavar="DIR", help="folder to write; or -, the shape of one scan as a file on stdout"),
+]
 
 
 @dataclass(frozen=True)
@@ -20,16 +40,24 @@ class Settings:
     Writes DIR/TRACK/completed/SCAN.ply (the shape in that scan's sensor frame, metres), poses.txt
     (T_sensor_canonical) and objects.json (box, confidence); with --mesh a closed triangle mesh
     DIR/TRACK/mesh/SCAN.ply, too. An interrupted run goes on where it stopped when repeated.
+
+    In pipes, `wildshape complete - < scan.ply > shape.ply`: nothing but the shape (PLY; with --mesh
+    a mesh, with --json an object with box, pose and points) goes to stdout.
     """
 
     input: Input
-    out: OutFolder
+    out: Out = None
     model: Model = None
     unit: Unit = "m"
     device: Device = "auto"
     together: Together = False
     mesh: Annotated[bool, arg(help="also write a closed mesh of each shape")] = False
     mesh_format: Annotated[Literal["ply", "obj", "glb"], arg(help="of the meshes")] = "ply"
+    mesh_colours: Annotated[
+        Literal["none", "confidence"],
+        arg(help="blue where the mesh was measured, orange where it was guessed"),
+    ] = "none"
+    format: Format = "auto"
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -40,17 +68,59 @@ def run(settings: Settings) -> None:
     Raises:
         BadInputError: input, model or output cannot be used.
     """
+    if is_pipe(settings.out) or (is_pipe(settings.input) and settings.out is None):
+        _to_stdout(settings)
+    elif settings.out is None:
+        raise BadInputError("complete needs --out DIR to write to; --out - is stdout.")
+    elif is_pipe(settings.input):
+        raise BadInputError(
+            f"--out {settings.out}: a scan from stdin is completed to stdout; leave --out away, or"
+            " name the scan's file."
+        )
+    else:
+        _to_folder(settings, settings.out)
+
+
+def _to_folder(settings: Settings, out: Path) -> None:
     with uncollected():
         from wildshape.cli.results import Work, perform
 
+    if settings.format != "auto":
+        raise BadInputError(f"--format {settings.format}: is for a scan on stdin; leave it away.")
     work = Work(
         command="complete",
         input=settings.input,
-        out=settings.out,
+        out=out,
         model=settings.model,
         unit=settings.unit,
         device=settings.device,
         track=settings.together,
-        mesh=settings.mesh_format if settings.mesh else None,
+        mesh=_mesh(settings),
     )
     perform(work, overwrite=settings.overwrite, as_json=settings.json)
+
+
+def _to_stdout(settings: Settings) -> None:
+    with uncollected():
+        from wildshape.cli.one_shape import Order, complete_to_stdout
+
+    complete_to_stdout(
+        Order(
+            input=settings.input,
+            format=settings.format,
+            model=settings.model,
+            unit=settings.unit,
+            device=settings.device,
+            mesh=_mesh(settings),
+            json=settings.json,
+        )
+    )
+
+
+def _mesh(settings: Settings) -> "MeshOrder | None":
+    from wildshape.io.mesh_writer import MeshOrder
+
+    coloured = settings.mesh_colours == "confidence"
+    if coloured and not settings.mesh:
+        raise BadInputError("--mesh-colours: there is no mesh to colour; pass --mesh, too.")
+    return MeshOrder(settings.mesh_format, coloured) if settings.mesh else None

@@ -10,7 +10,6 @@ from typing import Any, Literal
 from wildshape.baselines.local_icp import LocalIcp
 from wildshape.cli.demo_data import TEST, DemoData
 from wildshape.cli.evaluate import choose_baselines, evaluate_once, write
-from wildshape.cli.fuse import write_cloud
 from wildshape.cli.output import Output, begin
 from wildshape.cli.reading import Reading
 from wildshape.cli.results import FILES, write_results
@@ -19,6 +18,7 @@ from wildshape.evaluation.examples import pick
 from wildshape.evaluation.results import Results, as_json, figures_of
 from wildshape.inference.method import Learned
 from wildshape.inference.predictor import Predictor, fuse_scans
+from wildshape.io.cloud_writer import write_cloud
 from wildshape.records import Completion, Track
 from wildshape.report.content import Cloud, Report, ReportObject
 from wildshape.report.page import write_report

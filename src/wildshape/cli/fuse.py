@@ -4,21 +4,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from tyro.conf import Positional, arg
 
 from wildshape.cli.options import AsJson, Device, Model, Overwrite, Together, Unit
-from wildshape.errors import BadInputError
-
-if TYPE_CHECKING:
-    from wildshape.records import Points
 
 EXAMPLE = "wildshape fuse track --out fused.ply"
-_SUFFIXES = (".ply", ".npy", ".xyz", ".txt")
 
 TrackFolder = Annotated[Path, Positional, arg(metavar="TRACK", help="a TRACK folder")]
-OutFile = Annotated[Path, arg(metavar="FILE", help="cloud to write: .ply .npy .xyz .txt")]
+OutFile = Annotated[Path, arg(metavar="FILE", help="cloud to write: .ply .npy .xyz .txt .las .laz")]
 
 
 @dataclass(frozen=True)
@@ -47,9 +42,9 @@ def run(settings: Settings) -> None:
     from wildshape.cli.terminal import answer, say, say_skipped
     from wildshape.geometry.se3 import stack
     from wildshape.inference.predictor import fuse_scans, to_middle
+    from wildshape.io.cloud_writer import check_suffix, write_cloud
 
-    if settings.out.suffix.lower() not in _SUFFIXES:
-        raise BadInputError(f"{settings.out}: give --out one of {', '.join(_SUFFIXES)}.")
+    check_suffix(settings.out)
     refuse_file(settings.out, overwrite=settings.overwrite)
     reading = Reading(settings.track, settings.unit)
     track = reading.single("fuse")
@@ -70,20 +65,3 @@ def run(settings: Settings) -> None:
     data = {"out": str(settings.out), "points": len(fused), "scans": len(track.scans)}
     data |= {"flagged": len(warnings), "uses": "track" if settings.together else "scan"}
     answer(text, {**data, "middle_scan": middle}, as_json=settings.json)
-
-
-def write_cloud(path: Path, points: "Points") -> None:
-    """Write points atomically, in the format of the suffix."""
-    import numpy as np
-
-    from wildshape.io.atomic import atomic_write
-    from wildshape.io.points import write_ply
-
-    if path.suffix.lower() == ".ply":
-        write_ply(path, points)
-        return
-    with atomic_write(path) as file:
-        if path.suffix.lower() == ".npy":
-            np.save(file, points)
-        else:
-            np.savetxt(file, points, fmt="%.6f")

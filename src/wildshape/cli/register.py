@@ -10,6 +10,7 @@ from tyro.conf import Positional, arg
 
 from wildshape.cli.importing import uncollected
 from wildshape.cli.options import AsJson, Device, Model, Overwrite, Together, Unit
+from wildshape.cli.piped import Format, as_file, is_pipe
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -18,10 +19,14 @@ if TYPE_CHECKING:
 EXAMPLE = "wildshape register before.ply after.ply"
 
 Source = Annotated[
-    Path, Positional, arg(metavar="SOURCE", help="a scan; without TARGET a TRACK or DATASET")
+    Path,
+    Positional,
+    arg(metavar="SOURCE", help="a scan, or - for stdin; without TARGET a TRACK or DATASET"),
 ]
 Target = Annotated[
-    Path | None, Positional, arg(metavar="TARGET", help="the scan to whose frame SOURCE is taken")
+    Path | None,
+    Positional,
+    arg(metavar="TARGET", help="the scan to whose frame SOURCE is taken, or -"),
 ]
 Out = Annotated[Path | None, arg(metavar="DIR", help="folder to write, with a TRACK")]
 
@@ -42,6 +47,7 @@ class Settings:
     unit: Unit = "m"
     device: Device = "auto"
     together: Together = False
+    format: Format = "auto"
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -58,6 +64,8 @@ def run(settings: Settings) -> None:
         )
     if settings.target is not None and settings.together:
         raise BadInputError("--track poses the scans of a TRACK together; a pair has no track.")
+    if settings.format != "auto" and not (is_pipe(settings.source) or is_pipe(settings.target)):
+        raise BadInputError(f"--format {settings.format}: is for a scan on stdin; leave it away.")
     if settings.target is not None:
         _pair(settings, settings.target)
     elif settings.out is not None:
@@ -86,6 +94,8 @@ def _pair(settings: Settings, target: Path) -> None:
     from wildshape.cli.models import load_model
     from wildshape.cli.terminal import answer, say
 
+    if is_pipe(settings.source) and is_pipe(target):
+        raise BadInputError("register - -: stdin holds one scan; name a file for the other.")
     source, target_track = (_scan(path, settings) for path in (settings.source, target))
     predictor = load_model(settings.model, settings.device)
     found = predictor.register(source.scans[0], target_track.scans[0], source.sensor)
@@ -106,7 +116,9 @@ def _pair(settings: Settings, target: Path) -> None:
 def _scan(path: Path, settings: Settings) -> "Track":
     from wildshape.cli.reading import Reading
 
-    track = Reading(path, settings.unit).single("a pair")
+    kind = settings.format if is_pipe(path) else "auto"
+    with as_file(path, kind) as file:
+        track = Reading(file, settings.unit).single("a pair")
     if len(track.scans) != 1:
         raise BadInputError(
             f"{path}: holds {len(track.scans)} scans, but a pair takes two files of one scan each;"

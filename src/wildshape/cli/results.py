@@ -22,7 +22,7 @@ from wildshape.geometry.se3 import stack
 from wildshape.inference.predictor import Predictor, to_middle
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import reading as reading_file
-from wildshape.io.mesh_writer import MESH_FORMATS, MeshFormat, write_mesh
+from wildshape.io.mesh_writer import MESH_FORMATS, MeshOrder, write_mesh
 from wildshape.io.points import write_ply
 from wildshape.io.tracks import write_poses
 from wildshape.records import Completion, Track
@@ -50,7 +50,7 @@ class Work:
         unit: of the files.
         device: `auto`, `cpu` or `cuda`.
         track: use all scans of a track together.
-        mesh: also write a closed mesh of each shape, in this format.
+        mesh: also write a closed mesh of each shape, in this way.
     """
 
     command: Literal["complete", "register"]
@@ -60,14 +60,16 @@ class Work:
     unit: Unit
     device: Device
     track: bool = False
-    mesh: MeshFormat | None = None
+    mesh: MeshOrder | None = None
 
     def identity(self) -> dict[str, Any]:
         """What decides the output's content."""
         source = str(self.input.resolve())
         found = {"input": source, "unit": self.unit, "model": fingerprint(self.model)}
         uses = {"uses": "track"} if self.track else {}
-        return {**found, **uses, **({"mesh": self.mesh} if self.mesh else {})}
+        mesh = {"mesh": self.mesh.kind} if self.mesh else {}
+        colours = {"mesh_colours": "confidence"} if self.mesh and self.mesh.coloured else {}
+        return {**found, **uses, **mesh, **colours}
 
 
 @dataclass
@@ -164,7 +166,7 @@ def write_results(
     *,
     registers: bool = False,
     together: bool = False,
-    mesh: MeshFormat | None = None,
+    mesh: MeshOrder | None = None,
 ) -> Tally:
     """Complete every scan of every track and write the results, track after track.
 
@@ -174,7 +176,7 @@ def write_results(
         output: the folder, begun.
         registers: write `T_middle_scan` instead of the completed shapes.
         together: complete from all scans of a track, not from each on its own.
-        mesh: also write a closed mesh of each shape, in this format.
+        mesh: also write a closed mesh of each shape, in this way.
 
     Raises:
         BadInputError: nothing can be used, or a name cannot be that of a file.
@@ -216,7 +218,7 @@ def complete_track(
     *,
     registers: bool = False,
     together: bool = False,
-    mesh: MeshFormat | None = None,
+    mesh: MeshOrder | None = None,
 ) -> list[Completion]:
     """Complete the scans of a track, writing each into its folder; all but `objects.json`."""
     found: list[Completion] = []
@@ -226,7 +228,8 @@ def complete_track(
         if not registers:
             write_ply(folder / COMPLETED / f"{name}.ply", done.points)
         if mesh is not None:
-            write_mesh(folder / MESH / f"{name}.{mesh}", done.mesh())
+            scan = track.scans[len(found)] if mesh.coloured else None
+            write_mesh(folder / MESH / f"{name}.{mesh.kind}", done.mesh(scan))
         found.append(done)
         at(f"{track.name}, scan {len(found)} of {len(track.scans)}")
     poses = stack([done.pose for done in found])

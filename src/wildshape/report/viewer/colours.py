@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, UInt8
 
+from wildshape.geometry.shades import shades
 from wildshape.ops.nearest import nearest
 from wildshape.records import Points
 
@@ -19,8 +20,6 @@ LEGENDS = {
     WRONG: "blue on the true surface, orange 0.3 m off it",
 }
 _FAR_M = {GUESSED: 0.5, WRONG: 0.3}
-# Blue to orange (Okabe & Ito's two, a light grey between): told apart by colour-blind readers.
-_SCALE = np.array([(0, 114, 178), (196, 200, 206), (213, 94, 0)], np.float64)
 
 
 def by_height(heights: Float[np.ndarray, "n"], colour: str) -> Rgb:
@@ -40,7 +39,7 @@ def completed_colours(
 ) -> Rgb | None:
     """Colours of a completed shape; None where they stay plain. All clouds in one frame."""
     if colouring == CONFIDENCE and confidence is not None:
-        return np.repeat(_on_scale(np.array([1.0 - confidence])), len(points), axis=0)
+        return np.repeat(shades(np.array([1.0 - confidence])), len(points), axis=0)
     others = {GUESSED: scan, WRONG: truth}.get(colouring)
     if others is None or not len(others):
         return None
@@ -52,7 +51,7 @@ def by_distance(points: Points, others: Points, far: float) -> Rgb:
     middle = points.mean(0)
     a, b = (torch.from_numpy(np.ascontiguousarray(p - middle))[None] for p in (points, others))
     distance = nearest(a.float(), b.float()).distance_squared[0].clamp(min=0).sqrt().numpy()
-    return _on_scale(np.minimum(distance / far, 1.0))
+    return shades(np.minimum(distance / far, 1.0))
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
@@ -63,11 +62,5 @@ def rgb(colour: str) -> tuple[int, int, int]:
 
 def css(confidence: float) -> str:
     """A confidence as a CSS colour."""
-    r, g, b = _on_scale(np.array([1.0 - confidence]))[0]
+    r, g, b = shades(np.array([1.0 - confidence]))[0]
     return f"rgb({r},{g},{b})"
-
-
-def _on_scale(shares: np.ndarray) -> Rgb:
-    places = np.linspace(0.0, 1.0, len(_SCALE))
-    columns = [np.interp(shares, places, _SCALE[:, i]) for i in range(3)]
-    return np.stack(columns, axis=1).astype(np.uint8)

@@ -1,0 +1,48 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""How far each place of a mesh is to be believed: measured beside a scan's points, guessed else."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from wildshape.geometry.shades import shades
+from wildshape.ops.nearest import nearest
+
+if TYPE_CHECKING:
+    import trimesh
+
+# Of 120,000 places of 60 simulated cars: within 20 cm of the true surface are all that lie within
+# 10 cm of a measured point, and of those beyond half a metre six in ten (confidence 0.93).
+_GUESSED_M, _GUESSED = 0.5, 0.65
+
+
+def place_confidence(
+    places: Float[np.ndarray, "n 3"], scan: Float[np.ndarray, "m 3"], confidence: float
+) -> Float[np.ndarray, "n"]:
+    """The chance that each place lies within 20 cm of the true surface, 0 to 1, roughly.
+
+    1 on a measured point, falling linearly to 0.65 times the completion's confidence at half a
+    metre from any; no further beyond.
+
+    Args:
+        places: in the scan's frame, metres.
+        scan: the points measured.
+        confidence: of the whole completion.
+    """
+    # In double and about the middle of the scan: far from the sensor float32 counts in millimetres.
+    middle = np.asarray(scan, np.float64).mean(0)
+    a, b = (torch.from_numpy((np.asarray(p) - middle)[None]).float() for p in (places, scan))
+    apart = nearest(a, b).distance_squared[0].clamp_min(0).sqrt().numpy()
+    return 1.0 - (1.0 - _GUESSED * confidence) * np.minimum(apart / _GUESSED_M, 1.0)
+
+
+def colour_by_confidence(
+    mesh: "trimesh.Trimesh", scan: Float[np.ndarray, "m 3"], confidence: float
+) -> None:
+    """Colour a mesh's vertices, blue for 1 to orange for 0; they get the attribute `confidence`."""
+    found = place_confidence(mesh.vertices.view(np.ndarray), scan, confidence)
+    mesh.visual.vertex_colors = shades(1.0 - found)  # pyright: ignore[reportAttributeAccessIssue]
+    mesh.vertex_attributes["confidence"] = found.astype(np.float32)
