@@ -1,0 +1,193 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Boxes written for KITTI, nuScenes and Argoverse 2 are what our readers take for those labels."""
+
+import json
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from tests.cars import poses_of
+from tests.datasets.street import SIZE, street
+from tests.datasets.write_argoverse2 import LOG, STAMPS, write_log
+from tests.datasets.write_kitti_tracking import EYE, write_sequence
+from tests.datasets.write_nuscenes import Scene, Thing, ego_pose, sensor_pose, write_nuscenes
+
+from wildshape.datasets.argoverse2 import Argoverse2
+from wildshape.datasets.argoverse2_log import read_boxes as read_argoverse2
+from wildshape.datasets.argoverse2_log import read_sensor_pose
+from wildshape.datasets.kitti_calibration import read_calibration, rigid
+from wildshape.datasets.kitti_tracking import KittiTracking
+from wildshape.datasets.kitti_tracking_labels import read_boxes
+from wildshape.datasets.nuscenes import NuScenes
+from wildshape.errors import MissingExtraError
+from wildshape.geometry.rotation import quaternion_from_rotation
+from wildshape.io.argoverse2_boxes import write_argoverse2_boxes
+from wildshape.io.detections import Detection, number_of, write_box_list
+from wildshape.io.kitti_labels import KittiCamera, camera_at_the_lidar, write_kitti_labels
+from wildshape.io.nuscenes_boxes import write_nuscenes_boxes
+from wildshape.records import Box
+
+
+def detections(tracks, size):
+    """The true boxes of tracks, as a perfect method would find them."""
+    return [
+        Detection(
+            track=track.name,
+            track_number=i,
+            scan=scan,
+            scan_number=number_of(scan, k),
+            category=track.category,
+            sensor="lidar",
+            score=0.75,
+            box=true_box(poses_of(track)[k], size),
+        )
+        for i, track in enumerate(tracks)
+        for k, scan in enumerate(track.scan_names)
+    ]
+
+
+def true_box(pose, size):
+    x, y, z = pose.translation.tolist()
+    qw, qx, qy, qz = quaternion_from_rotation(pose.rotation).tolist()
+    return Box((x, y, z), tuple(size), (qw, qx, qy, qz))
+
+
+def test_kitti_labels_come_back_as_the_labels_they_were_read_from(tmp_path):
+    training = write_sequence(tmp_path / "training", street(4, points=2500, eye=EYE))
+    tracks = list(KittiTracking(training).tracks_of("0001"))
+    path = training / "calib" / "0001.txt"
+    calibration = read_calibration(path, "")
+    T_rect_velo = rigid(calibration, ("R0_rect",), path) @ rigid(
+        calibration, ("Tr_velo_to_cam",), path
+    )
+    camera = KittiCamera(T_rect_velo, calibration["P2"].reshape(3, 4))
+    expected = {(b.frame, b.track): b for b in read_boxes(training / "label_02" / "0001.txt")}
+    written = write_kitti_labels(tmp_path / "out", detections(tracks, SIZE), camera)
+    assert [file.name for file in written] == [f"{track.name}.txt" for track in tracks]
+    for file, track in zip(written, tracks, strict=True):
+        found = read_boxes(file)
+        assert len(found) == len(track.scans)
+        for box in found:
+            same = expected[box.frame, int(track.name[-4:])]
+            assert box.category == "Car"
+            assert box.size == pytest.approx(same.size, abs=1e-4)
+            assert np.asarray(box.T_rect_object) == pytest.approx(
+                np.asarray(same.T_rect_object), abs=1e-4
+            )
+    assert {box.track for file in written for box in read_boxes(file)} == {0, 1}
+
+
+def test_a_kitti_line_by_hand(tmp_path):
+    # 10 m ahead and 2 m to the left of the LiDAR, 1 m under it, looking to the left.
+    half = float(np.sqrt(0.5))
+    box = Box((10.0, 2.0, -1.0), (4.0, 1.8, 1.6), (half, 0.0, 0.0, half))
+    one = Detection("car", 7, "scan", 3, "", "lidar", 0.5, box)
+    projection = np.array([[700.0, 0, 600, 0], [0, 700, 180, 0], [0, 0, 1, 0]])
+    camera = replace(camera_at_the_lidar(), projection=projection)
+    (file,) = write_kitti_labels(tmp_path, [one], camera)
+    words = file.read_text().split()
+    assert words[:5] == ["3", "7", "Misc", "-1", "-1"]
+    numbers = [float(word) for word in words[5:]]
+    turn = -np.pi  # of the camera's x, to the right, about its y, down
+    alpha = turn - np.arctan2(-2.0, 10.0) + 2 * np.pi
+    near, far = 10 - 0.9, 10 + 0.9
+    image = [600 - 700 * 4 / near, 180 + 700 * 0.2 / far, 600, 180 + 700 * 1.8 / near]
+    expected = [alpha, *image, 1.6, 1.8, 4.0, -2.0, 1.8, 10.0, turn, 0.5]
+    numbers[11] = -abs(numbers[11])  # a half turn has two names
+    assert np.cos(numbers[0] - alpha) == pytest.approx(1)
+    assert numbers[1:] == pytest.approx(expected[1:], abs=1e-4)
+    # Half of it behind the camera: no place in the image.
+    behind = replace(one, box=replace(box, centre=(0.5, 0.0, 0.0)))
+    write_kitti_labels(tmp_path, [behind], camera)
+    assert file.read_text().split()[6:10] == ["-1.000000"] * 4
+
+
+def test_nuscenes_records_are_the_annotations_in_the_sensors_frame(tmp_path):
+    car = Thing("car", velocity=(5.0, 3.0, 0.1), yaw_rate=0.3)
+    written = write_nuscenes(tmp_path / "nuscenes", (Scene("scene-0061", (car,)),))
+    (track,) = NuScenes(written, cache=tmp_path / "cache").tracks_of("scene-0061")
+    write_nuscenes_boxes(tmp_path / "boxes.json", detections([track], car.size))
+    results = json.loads((tmp_path / "boxes.json").read_text())["results"]
+    labels = json.loads((written / "v1.0-mini" / "sample_annotation.json").read_text())
+    assert list(results) == list(track.scan_names)
+    for key, (scan, rows) in enumerate(results.items()):
+        (row,) = rows
+        rotation, translation = car.pose(0.5 * key)
+        ego, calibration = ego_pose(0.5 * key), sensor_pose("LIDAR_TOP")
+        to_global = ego[0] * calibration[0]
+        at = to_global.apply(row["translation"]) + ego[0].apply(calibration[1]) + ego[1]
+        assert at == pytest.approx(translation, abs=1e-4)
+        w, x, y, z = row["rotation"]
+        found = to_global.as_matrix() @ type(rotation).from_quat((x, y, z, w)).as_matrix()
+        assert found == pytest.approx(rotation.as_matrix(), abs=1e-5)
+        assert any(label["size"] == row["size"] for label in labels)
+        assert row["sample_token"] == scan
+        assert (row["detection_name"], row["tracking_id"]) == ("car", track.name)
+        assert row["detection_score"] == row["tracking_score"] == 0.75
+
+
+def test_an_argoverse2_table_comes_back_as_the_labels_it_was_read_from(tmp_path):
+    root = tmp_path / "val"
+    log = write_log(root / LOG, street(3, points=4000))
+    source = Argoverse2(root)
+    tracks = list(source.tracks_of(source.parts()[0]))
+    T_ego_sensor = read_sensor_pose(log, "both")
+    given = detections(tracks, SIZE)
+    write_argoverse2_boxes(tmp_path / "out" / "annotations.feather", given, T_ego_sensor)
+    found, labels = read_argoverse2(tmp_path / "out"), read_argoverse2(log)
+    assert len(found.timestamps) == len(labels.timestamps) == 6
+    rows = {(f"{LOG}_{track}", t): i for i, (track, t) in enumerate(_keys(labels))}
+    for i, key in enumerate(_keys(found)):
+        j = rows[key]
+        assert found.sizes[i] == pytest.approx(labels.sizes[j])
+        assert np.asarray(found.T_ego_object[i]) == pytest.approx(
+            np.asarray(labels.T_ego_object[j]), abs=1e-4
+        )
+        assert found.categories[i] == labels.categories[j]
+    write_argoverse2_boxes(tmp_path / "sensor" / "annotations.feather", given)
+    there = read_argoverse2(tmp_path / "sensor").T_ego_object[0]
+    assert there.translation.tolist() == pytest.approx(list(given[0].box.centre), abs=1e-5)
+    assert found.timestamps.max() == STAMPS[2]
+
+
+def _keys(boxes):
+    return list(zip(boxes.tracks.tolist(), boxes.timestamps.tolist(), strict=True))
+
+
+def test_without_pyarrow_one_sentence_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'wildshape\[arrow\]'"):
+        write_argoverse2_boxes(tmp_path / "annotations.feather", [])
+    assert not list(tmp_path.iterdir())
+
+
+def test_json_holds_every_box_as_it_is(tmp_path):
+    box = Box((1.0, 2.0, 3.0), (4.0, 1.8, 1.5), (1.0, 0.0, 0.0, 0.0))
+    given = [Detection("a", 0, "000004", 4, "car", "lidar", 0.25, box)]
+    write_box_list(tmp_path / "boxes.json", given)
+    (row,) = json.loads((tmp_path / "boxes.json").read_text())["boxes"]
+    assert Box(*(tuple(row[k]) for k in ("centre", "size", "quaternion_wxyz"))) == box
+    assert (row["track"], row["scan"], row["score"]) == ("a", "000004", 0.25)
+
+
+def test_the_number_of_a_scan_is_its_name_where_that_counts():
+    assert [number_of(name, 5) for name in ("000012", "315966253660357000", "left", "-3")] == [
+        12,
+        315966253660357000,
+        5,
+        5,
+    ]
+
+
+def test_leaning_boxes_stand_upright_in_kitti(tmp_path):
+    lean = torch.tensor((0.999, 0.03, 0.02, 0.02), dtype=torch.float64)
+    qw, qx, qy, qz = (lean / lean.norm()).tolist()
+    box = Box((10.0, 0.0, -1.0), (4.0, 1.8, 1.6), (qw, qx, qy, qz))
+    one = Detection("car", 0, "0", 0, "car", "lidar", 1.0, box)
+    (file,) = write_kitti_labels(tmp_path, [one], camera_at_the_lidar())
+    (found,) = read_boxes(file)
+    assert found.T_rect_object.translation.tolist() == pytest.approx((0, 1, 10), abs=1e-5)
+    assert found.T_rect_object.rotation[1].tolist() == [0, 0, -1]
