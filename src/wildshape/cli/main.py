@@ -47,6 +47,9 @@ def main(argv: Sequence[str] | None = None) -> None:
 
         print(__version__)
         return
+    if arguments[0] == "--print-completion":
+        _print_completion(*arguments[1:2])
+        return
     if arguments[0] not in COMMANDS:
         _leave(f"'{arguments[0]}' is no command; there are {', '.join(COMMANDS)}.", _BAD_INPUT)
     # Threads that wait must sleep: where another program has one of two cores, spinning ones made
@@ -69,12 +72,21 @@ def overview() -> str:
             "",
             *lines,
             "",
-            "`wildshape COMMAND --help` explains one; `wildshape --version` tells which this is.",
+            "`wildshape COMMAND --help` explains one; `wildshape --version` tells which this is;",
+            "`wildshape --print-completion bash` (or zsh) prints what that shell is to source.",
             "",
             "example:",
             "  wildshape complete scan.ply --out completed",
         )
     )
+
+
+def _print_completion(shell: str = "") -> None:
+    from wildshape.cli.completion import SHELLS, script
+
+    if shell not in SHELLS:
+        _leave(f"--print-completion {shell}: expected {' or '.join(SHELLS)}.", _BAD_INPUT)
+    print(script(shell, COMMANDS), end="")
 
 
 def _guarded(module: ModuleType, command: str, arguments: list[str]) -> None:

@@ -3,6 +3,7 @@
 """What the commands say: results on stdout, everything else on stderr."""
 
 import json
+import math
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,8 +25,17 @@ def printable(text: str) -> str:
 
 
 def answer(text: str, data: Mapping[str, Any], *, as_json: bool) -> None:
-    """The result of a command: a text, or with `--json` one JSON object."""
-    print(json.dumps(data) if as_json else text, flush=True)
+    """The result of a command: a text, or with `--json` one JSON object, null for NaN."""
+    print(json.dumps(_finite(data), allow_nan=False) if as_json else text, flush=True)
+
+
+def _finite(data: Any) -> Any:
+    """JSON knows neither NaN nor infinity, and most readers stop there."""
+    if isinstance(data, Mapping):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
 def say_skipped(skipped: Sequence[tuple[str, str]]) -> None:
