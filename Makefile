@@ -49,7 +49,7 @@ wheel: $(TESTED)
 	$(BIN)/python .ci/wheel.py
 
 docs: $(DOCUMENTED)
-	$(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { \

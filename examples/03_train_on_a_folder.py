@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Train on a folder of tracks, without labels; without an argument on simulated ones.
 
-python examples/03_train_on_a_folder.py [DATASET [RUN [STEPS]]]
+python examples/03_train_on_a_folder.py [DATASET [RUN [STEPS [PRESET]]]]
 """
 
 import sys
@@ -14,16 +14,17 @@ from wildshape.io.inputs import open_tracks
 from wildshape.io.store import StoreWriter, open_store
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.loop import fit, setup
-from wildshape.training.recipes import small
+from wildshape.training.recipes import PRESETS
 
 
-def main(dataset: str = "", run: str = "run", steps: str = "1000") -> None:
+def main(dataset: str = "", run: str = "run", steps: int = 1000, preset: str = "small") -> None:
     drives = SimulationConfig(tracks=20, scans=12)
     tracks = open_tracks(dataset) if dataset else simulate_tracks(drives, seed=1)
     with StoreWriter(Path(run) / "data.store", {}) as writer:
         for track in tracks:
             writer.add(track)
-    recipe = replace(small(), optim=replace(small().optim, steps=int(steps)))
+    recipe = PRESETS[preset]()
+    recipe = replace(recipe, optim=replace(recipe.optim, steps=int(steps)))
     prepared = setup(recipe, open_store(writer.path), Path(run), seed=0)
     model = fit(prepared, lambda step, values: print(f"step {step}: loss {values['loss']:.3f}"))
     done = wildshape.load(model).complete(open_store(writer.path).track(0).scans[0])

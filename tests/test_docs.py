@@ -1,0 +1,183 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The documents' promises: their Python and their commands run, on little data and few steps.
+
+Blocks are `python`, `bash` or `text`. Those of a page run in order, in one folder. A `bash` block
+that begins with `# not run by our tests` is parsed by the command line's own parser instead.
+"""
+
+import re
+import shlex
+import tomllib
+from contextlib import redirect_stdout
+from functools import cache
+from importlib import import_module
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tyro
+import yaml
+
+import wildshape
+from wildshape.cli.main import COMMANDS, main
+
+ROOT = Path(__file__).parent.parent
+PAGES = sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("docs/**/*.md"))
+WRITTEN = [*PAGES, "README.md", "CONTRIBUTING.md", "CHANGELOG.md"]
+NOT_RUN = "# not run by our tests"
+# What a page takes for granted, and what of ours stands in for it.
+GIVEN = {
+    "docs/datasets/folder.md": {"DATASET": "folders"},
+    "docs/info.md": {"cars.store": "store"},
+    "docs/limits.md": {"mytracks": "folders"},
+}
+MOST = {"--tracks": 4, "--scans": 3, "--steps": 2, "--max-scans": 2, "--seeds": 2}
+ALWAYS = {
+    "simulate": ("--tracks", "4", "--scans", "3", "--workers", "1"),
+    "convert": ("--workers", "1"),
+    "train": ("--preset", "tiny", "--steps", "2"),
+    "evaluate": ("--max-scans", "2"),
+    "export": ("--scans", "2"),
+}
+
+
+def blocks(page: str) -> list[tuple[str, str]]:
+    """Language and content of each fenced block."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    return re.findall(r"^```(\w*)\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE)
+
+
+def commands(block: str) -> list[list[str]]:
+    """The words of each line, without comments."""
+    lines = block.replace("\\\n", " ").splitlines()
+    return [words for line in lines if (words := shlex.split(line, comments=True))]
+
+
+RUN = [page for page in PAGES if any(language != "text" for language, _ in blocks(page))]
+
+
+@pytest.fixture(scope="session")
+def given(tmp_path_factory) -> Path:
+    """A few tracks, packed and as folders."""
+    folder = tmp_path_factory.mktemp("given")
+    store, folders = str(folder / "store"), str(folder / "folders")
+    main(["simulate", store, "--tracks", "2", "--scans", "3", "--seed", "3", "--workers", "1"])
+    main(["convert", "packed", store, folders, "--layout", "folders", "--workers", "1"])
+    return folder
+
+
+@pytest.mark.parametrize("page", WRITTEN)
+def test_blocks_say_what_they_are(page):
+    languages = {language for language, _ in blocks(page)}
+    assert languages <= {"python", "bash", "text"} | ({""} if page == "README.md" else set())
+
+
+@pytest.mark.parametrize("page", RUN)
+def test_a_page_runs(page, given, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    for name, ours in GIVEN.get(page, {}).items():
+        (tmp_path / name).symlink_to(given / ours)
+    names: dict[str, Any] = {}
+    for language, block in blocks(page):
+        if language == "python" and "--8<--" in block:
+            assert (ROOT / block.split('"')[1]).is_file()  # tests/test_examples.py runs it
+        elif language == "python":
+            exec(compile(block, page, "exec"), names)
+        elif language == "bash":
+            for words in commands(block):
+                check(words, run=not block.startswith(NOT_RUN))
+
+
+def check(words: list[str], *, run: bool) -> None:
+    """One line of a shell: ours is parsed, and run; of others, what they name must exist."""
+    program, *arguments = words
+    if program == "wildshape":
+        parse(arguments)
+        if run:
+            perform(arguments)
+    elif program == "make":
+        makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+        assert all(re.search(f"^{a}:", makefile, re.MULTILINE) for a in arguments if "=" not in a)
+    elif program == "pip":
+        extras = re.findall(r"\[(\w+)\]", " ".join(arguments))
+        assert set(extras) <= set(project()["optional-dependencies"])
+    elif program == "python":
+        name = arguments[1].replace(".", "/") if arguments[0] == "-m" else arguments[0]
+        assert (ROOT / name).exists() or (ROOT / "site").name == arguments[-1], words
+    else:
+        assert not run, f"{program} is neither run nor marked"
+
+
+def parse(arguments: list[str]) -> None:
+    """Have the command line's own parser read the arguments."""
+    command, *rest = arguments
+    settings = import_module(f"wildshape.cli.{command}").Settings
+    tyro.cli(settings, args=rest, config=(tyro.conf.FlagCreatePairsOff,))
+
+
+def perform(arguments: list[str]) -> None:
+    """The command in this process, made small."""
+    words = list(arguments)
+    for i, word in enumerate(words[:-1]):
+        if word in MOST:
+            words[i + 1] = str(min(MOST[word], int(words[i + 1])))
+        if word == "--preset":
+            words[i + 1] = "tiny"
+    extra = ALWAYS.get(words[0], ())
+    for option, value in zip(extra[::2], extra[1::2], strict=True):
+        words += [] if option in words else [option, value]
+    main(words)
+
+
+def project() -> dict[str, Any]:
+    """The table of pyproject.toml."""
+    return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
+@cache
+def options(command: str) -> frozenset[str]:
+    """Every option of a command."""
+    settings = import_module(f"wildshape.cli.{command}").Settings
+    with pytest.raises(SystemExit), redirect_stdout(StringIO()) as said:
+        tyro.cli(settings, args=["--help"], config=(tyro.conf.FlagCreatePairsOff,))
+    return frozenset(re.findall(r"--[a-z0-9-]+", said.getvalue()))
+
+
+@pytest.mark.parametrize("page", WRITTEN)
+def test_commands_in_the_text_exist_with_their_options(page):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    for command, rest in re.findall(r"`wildshape ([a-z]+)([^`]*)`", text):
+        assert command in COMMANDS, command
+        unknown = set(re.findall(r"--[a-z0-9-]+", rest)) - options(command) - {"--help"}
+        assert not unknown, f"wildshape {command} has no {unknown}"
+
+
+@pytest.mark.parametrize("page", WRITTEN)
+def test_links_lead_to_files_of_the_project(page):
+    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", (ROOT / page).read_text(encoding="utf-8")):
+        place = (ROOT / page).parent / target
+        assert ":" in target or place.exists() or target.endswith("commands.md"), target
+
+
+def test_the_software_and_the_paper_can_be_cited():
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert {"cff-version", "message", "title", "authors"} <= set(cited)
+    assert (cited["version"], cited["license"]) == (wildshape.__version__, project()["license"])
+    (paper,) = cited["references"]
+    assert paper["title"] == "Weakly-supervised 3D Shape Completion in the Wild"
+    assert paper["authors"][0]["family-names"] == "Gu"
+
+
+def test_the_changelog_knows_this_version():
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert re.search(
+        rf"^## \[({re.escape(wildshape.__version__)}|Unreleased)\]", text, re.MULTILINE
+    )
+
+
+def test_the_site_lists_every_page():
+    listed = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    assert not [page for page in PAGES if page.removeprefix("docs/") not in listed]
