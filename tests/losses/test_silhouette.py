@@ -15,7 +15,7 @@ from wildshape.geometry.viewing_volume import (
     scan_image,
     to_volume,
 )
-from wildshape.losses.silhouette import Rendering, hindsight, image_costs, student_loss
+from wildshape.losses.silhouette import Rendering, hindsight, image_costs, nearest, student_loss
 
 CAMERA = PinholeVolume()
 OFFSET = torch.tensor([2.0, 2.0])
@@ -76,3 +76,11 @@ def test_the_student_s_loss_is_a_squared_sine_and_knows_no_sign():
     loss.backward()
     assert teacher.grad is None
     assert student.grad is not None
+
+
+def test_the_candidate_at_the_least_angle_is_nearest_whatever_its_sign():
+    quaternions = quaternion_from_rotation(rotation_z(torch.tensor([0.1, 1.0, 2.0])))
+    signs = torch.tensor([1.0, -1.0, 1.0])[:, None]
+    teacher = quaternion_from_rotation(rotation_z(torch.tensor([1.2, 0.3])))
+    found = nearest((signs * quaternions).expand(2, -1, -1), teacher)
+    assert torch.equal(found, torch.stack((-quaternions[1], quaternions[0])))

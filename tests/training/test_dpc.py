@@ -15,6 +15,7 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.rotation import rotation_angle
 from wildshape.geometry.viewing_volume import PolarVolume
 from wildshape.io.store import StoreWriter, open_store
+from wildshape.losses.silhouette import Hindsight
 from wildshape.models.dpc import DpcNet
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.dpc import PRESETS, DpcObjective
@@ -52,6 +53,7 @@ def test_the_presets_hold_the_authors_numbers():
     assert (network.points, network.voxels, network.image, network.candidates) == (8000, 64, 128, 4)
     assert (loss.sigma, loss.keep, loss.student, loss.depth) == ((3.0, 0.2), (0.07, 1.0), 20.0, 0.0)
     assert (recipe.optim.steps, recipe.optim.lr) == (600_000, 1e-4)
+    assert loss.half_turns == 0
     assert (network.reach, PRESETS["dpc-dagger"].network.reach) == (0.0, 0.15)
     lidar = PRESETS["dpc-lidar"].network
     assert (lidar.volume, lidar.image) == (PolarVolume(6.0), 128)
@@ -75,6 +77,31 @@ def test_every_part_is_taught(name, plane_store, car_store):
         assert p.grad is not None, weight
         assert p.grad.isfinite().all(), weight
         assert p.grad.abs().sum() > 0, weight
+
+
+def test_a_half_turn_that_wins_teaches_a_candidate_too(plane_store, monkeypatch):
+    recipe = tiny("dpc-small")
+    loss = replace(recipe.loss, half_turns=2)
+    batch = ViewSampler(plane_store, np.arange(2), recipe.views).draw(0)
+    torch.manual_seed(0)
+    network = DpcNet(recipe.network)
+
+    def last_wins(posed, *others):
+        zero = posed.sum() * 0
+        return Hindsight(zero, zero, zero, torch.full((len(posed),), posed.shape[1] - 1))
+
+    monkeypatch.setattr("wildshape.training.dpc.hindsight", last_wins)
+    result = DpcObjective(network, loss)(batch, 0.0, torch.Generator().manual_seed(0))
+    result.loss.backward()
+    taught = {
+        int(weight.split(".")[1])
+        for weight, p in network.named_parameters()
+        if weight.startswith("branches") and p.grad is not None and p.grad.abs().sum() > 0
+    }
+    student = network.config.candidates
+    assert result.winner.tolist() == [student + 1] * 6
+    assert student in taught
+    assert len(taught) > 1
 
 
 def test_training_lowers_the_loss_and_can_be_resumed(plane_store, tmp_path):

@@ -94,3 +94,9 @@ def _costs(
 def student_loss(student: Float[Tensor, "B 4"], teacher: Float[Tensor, "B 4"]) -> Float[Tensor, ""]:
     """Squared sine of half the angle between unit quaternions; the teacher gets no gradient."""
     return (1 - (student * teacher.detach()).sum(-1).square()).mean()
+
+
+def nearest(poses: Float[Tensor, "B K 4"], teacher: Float[Tensor, "B 4"]) -> Float[Tensor, "B 4"]:
+    """Of each view's unit quaternions the one at the least angle to the teacher."""
+    likeness = (poses * teacher[:, None]).sum(-1).abs()
+    return poses[torch.arange(len(poses), device=poses.device), likeness.argmax(1)]

@@ -5,6 +5,7 @@
 from dataclasses import dataclass, field, replace
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 
 from wildshape.datasets.views import Batch, ViewConfig
@@ -18,8 +19,9 @@ from wildshape.geometry.viewing_volume import (
     scan_image,
     to_volume,
 )
-from wildshape.losses.silhouette import Rendering, hindsight, student_loss
-from wildshape.models.dpc import DpcConfig, DpcNet
+from wildshape.losses.half_turns import some_half_turn
+from wildshape.losses.silhouette import Rendering, hindsight, nearest, student_loss
+from wildshape.models.dpc import DpcConfig, DpcNet, DpcPoses
 from wildshape.training.config import OptimConfig
 from wildshape.training.objectives import Objective
 
@@ -33,12 +35,14 @@ class DpcLoss:
         keep: share of the points that is projected, at the first and at the last step.
         student: weight of the student's loss.
         depth: weight of the depth image; the authors use silhouettes alone.
+        half_turns: tries of the student's pose, turned, beside the candidates; the authors' 0.
     """
 
     sigma: tuple[float, float] = (3.0, 0.2)
     keep: tuple[float, float] = (0.07, 1.0)
     student: float = 20.0
     depth: float = 0.0
+    half_turns: int = 0
 
 
 @dataclass(frozen=True)
@@ -134,16 +138,26 @@ class DpcObjective(nn.Module):
         cloud = self._kept(cloud, share, generator)
         views = len(scans) // len(cloud)
         middle = volume.scale * poses.translation + ahead(offset, volume)
-        rotation = rotation_from_quaternion(poses.candidates)
-        each = cloud.repeat_interleave(views, dim=0)[:, None]
-        posed = place(each, rotation, middle[:, None], volume)
+        each = cloud.repeat_interleave(views, dim=0)
+        tried = self._tried(poses, each, generator)
+        posed = place(each[:, None], rotation_from_quaternion(tried), middle[:, None], volume)
         rendering = Rendering(volume, size, self._sigma(share, size), self.config.depth)
         strength = strength.repeat_interleave(views, dim=0)
         found = hindsight(posed, offset, coarser(image, size), rendering, strength)
-        teacher = poses.candidates[torch.arange(len(code)), found.winner]
+        teacher = tried[torch.arange(len(code)), found.winner]
         lesson = student_loss(poses.student, teacher)
-        loss = found.loss + self.config.student * lesson
+        taught = lesson + student_loss(nearest(poses.candidates, teacher), teacher)
+        loss = found.loss + self.config.student * taught
         return Objective(loss, found.silhouette, found.depth, lesson.detach(), found.winner)
+
+    def _tried(
+        self, poses: DpcPoses, cloud: Tensor, generator: torch.Generator
+    ) -> Float[Tensor, "B M 4"]:
+        """The candidates and what is tried beside them."""
+        turned = [
+            some_half_turn(poses.student, cloud, generator) for _ in range(self.config.half_turns)
+        ]
+        return torch.cat((poses.candidates, *(pose[:, None] for pose in turned)), dim=1)
 
     def _sigma(self, share: float, size: int) -> float:
         first, last = self.config.sigma
