@@ -39,7 +39,8 @@ class Settings:
 
     Writes DIR/TRACK/completed/SCAN.ply (the shape in that scan's sensor frame, metres), poses.txt
     (T_sensor_canonical) and objects.json (box, confidence); with --mesh a closed triangle mesh
-    DIR/TRACK/mesh/SCAN.ply, too. An interrupted run goes on where it stopped when repeated.
+    DIR/TRACK/mesh/SCAN.ply, too; with --boxes json kitti nuscenes argoverse2 all boxes in these
+    formats below DIR/boxes. An interrupted run goes on where it stopped when repeated.
 
     In pipes, `wildshape complete - < scan.ply > shape.ply`: nothing but the shape (PLY; with --mesh
     a mesh, with --json an object with box, pose and points) goes to stdout.
@@ -57,6 +58,17 @@ class Settings:
         Literal["none", "confidence"],
         arg(help="blue where the mesh was measured, orange where it was guessed"),
     ] = "none"
+    boxes: Annotated[
+        tuple[Literal["json", "kitti", "nuscenes", "argoverse2"], ...],
+        arg(
+            metavar="FORMAT",
+            help="json, kitti, nuscenes, argoverse2: also write all boxes so, below DIR/boxes",
+        ),
+    ] = ()
+    calibration: Annotated[
+        Path | None,
+        arg(metavar="FILE", help="of KITTI (.txt) or Argoverse 2 (.feather), for these boxes"),
+    ] = None
     format: Format = "auto"
     overwrite: Overwrite = False
     json: AsJson = False
@@ -83,10 +95,13 @@ def run(settings: Settings) -> None:
 
 def _to_folder(settings: Settings, out: Path) -> None:
     with uncollected():
+        from wildshape.cli.boxing import BoxOrder
         from wildshape.cli.results import Work, perform
 
     if settings.format != "auto":
         raise BadInputError(f"--format {settings.format}: is for a scan on stdin; leave it away.")
+    boxes = BoxOrder(settings.boxes, settings.calibration)
+    boxes.check()
     work = Work(
         command="complete",
         input=settings.input,
@@ -96,11 +111,14 @@ def _to_folder(settings: Settings, out: Path) -> None:
         device=settings.device,
         track=settings.together,
         mesh=_mesh(settings),
+        boxes=boxes,
     )
     perform(work, overwrite=settings.overwrite, as_json=settings.json)
 
 
 def _to_stdout(settings: Settings) -> None:
+    if settings.boxes or settings.calibration:
+        raise BadInputError("--boxes: stdout holds one shape; name a folder with --out DIR.")
     with uncollected():
         from wildshape.cli.one_shape import Order, complete_to_stdout
 

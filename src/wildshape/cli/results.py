@@ -12,10 +12,12 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from wildshape.cli.boxing import BOX_FILES, BoxOrder
 from wildshape.cli.models import fingerprint, load_model
 from wildshape.cli.options import Device, Unit
 from wildshape.cli.output import Output, begin, keep_apart
 from wildshape.cli.reading import Reading
+from wildshape.cli.tally import Tally
 from wildshape.cli.terminal import answer, duration, progress, say, say_skipped
 from wildshape.errors import BadInputError
 from wildshape.geometry.se3 import stack
@@ -35,6 +37,7 @@ FILES = (
     f"*/{POSES}",
     f"*/{MIDDLE}",
     f"*/{OBJECTS}",
+    *BOX_FILES,
 )
 
 
@@ -51,6 +54,7 @@ class Work:
         device: `auto`, `cpu` or `cuda`.
         track: use all scans of a track together.
         mesh: also write a closed mesh of each shape, in this way.
+        boxes: also write all boxes, in this way.
     """
 
     command: Literal["complete", "register"]
@@ -61,6 +65,7 @@ class Work:
     device: Device
     track: bool = False
     mesh: MeshOrder | None = None
+    boxes: BoxOrder = field(default_factory=BoxOrder)
 
     def identity(self) -> dict[str, Any]:
         """What decides the output's content."""
@@ -69,43 +74,7 @@ class Work:
         uses = {"uses": "track"} if self.track else {}
         mesh = {"mesh": self.mesh.kind} if self.mesh else {}
         colours = {"mesh_colours": "confidence"} if self.mesh and self.mesh.coloured else {}
-        return {**found, **uses, **mesh, **colours}
-
-
-@dataclass
-class Tally:
-    """What was done.
-
-    Attributes:
-        tracks: written now.
-        kept: finished by an earlier, interrupted run.
-        scans: written now.
-        skipped: what could not be used, with the reason.
-        flagged: scans that carry a warning; `example` is the first of them.
-    """
-
-    tracks: int = 0
-    kept: int = 0
-    scans: int = 0
-    skipped: list[tuple[str, str]] = field(default_factory=list)
-    flagged: int = 0
-    example: str = ""
-
-    def add(self, track: Track, scans: list[Completion]) -> None:
-        """Count a track."""
-        self.tracks += 1
-        self.scans += len(scans)
-        for name, done in zip(track.scan_names, scans):
-            if done.warning:
-                self.flagged += 1
-                self.example = self.example or f"{track.name}/{name}: {done.warning}"
-
-    @property
-    def warning(self) -> str:
-        """A sentence on the scans that the model was not made for, or nothing."""
-        if not self.flagged:
-            return ""
-        return f"{self.flagged} scans are flagged with confidence 0, for example {self.example}"
+        return {**found, **uses, **mesh, **colours, **self.boxes.identity()}
 
 
 def perform(work: Work, *, overwrite: bool, as_json: bool) -> None:
@@ -131,6 +100,7 @@ def perform(work: Work, *, overwrite: bool, as_json: bool) -> None:
     except BadInputError:
         output.abandon()
         raise
+    work.boxes.write(work.out)
     output.finish(skipped=tally.skipped)
     _conclude(work, tally, reading, time.monotonic() - began, as_json)
 
@@ -265,6 +235,8 @@ def _objects(
         "input": str(reading.source.path.resolve()),
         "uses": "track" if together else "scan",
         "together": together,
+        "category": track.category,
+        "sensor": track.sensor.kind,
         "model": _model(predictor),
         "scans": [describe(name, done) for name, done in zip(track.scan_names, scans)],
         "skipped": [{"scan": scan, "reason": reason} for scan, reason in skipped.items()],

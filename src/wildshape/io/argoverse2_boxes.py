@@ -28,7 +28,7 @@ def write_argoverse2_boxes(
     Raises:
         MissingExtraError: pyarrow is not installed.
     """
-    pyarrow = _pyarrow()
+    pyarrow = load_pyarrow()
     from pyarrow import feather
 
     boxes = [
@@ -60,7 +60,12 @@ def write_argoverse2_boxes(
         feather.write_feather(table, file)
 
 
-def _pyarrow() -> Any:
+def load_pyarrow() -> Any:
+    """The library.
+
+    Raises:
+        MissingExtraError: it is not installed.
+    """
     try:
         import pyarrow
     except ImportError as error:
