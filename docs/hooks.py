@@ -68,13 +68,13 @@ def commands() -> str:
 
     said = ["# Commands", "Exit code 0: done; 2: bad input, one sentence on stderr."]
     for name in ("", *COMMANDS):
-        said += [f"## {name}", COMMANDS[name].capitalize() + "."] if name else []
+        said += [f"## {name}", f"To {COMMANDS[name]}."] if name else []
         said.append(f"```text\n{_help(name)}\n```")
     return "\n\n".join(said) + "\n"
 
 
 def _help(command: str) -> str:
     words = [sys.executable, "-m", "wildshape.cli", *command.split(), "--help"]
-    environment = {**os.environ, "COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
+    environment = {**os.environ, "COLUMNS": "88", "NO_COLOR": "1", "TERM": "dumb"}
     run = subprocess.run(words, check=True, capture_output=True, text=True, env=environment)
     return run.stdout.strip()
