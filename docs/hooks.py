@@ -68,7 +68,7 @@ def commands() -> str:
 
     said = ["# Commands", "Exit code 0: done; 2: bad input, one sentence on stderr."]
     for name in ("", *COMMANDS):
-        said += [f"## {name}", f"To {COMMANDS[name]}."] if name else []
+        said += [f"## {name}", f"{COMMANDS[name][0].upper()}{COMMANDS[name][1:]}."] if name else []
         said.append(f"```text\n{_help(name)}\n```")
     return "\n\n".join(said) + "\n"
 
