@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whether `load().compile()` pays here: the first call, one scan and a batch, compiled and not.
+
+    python benchmarks/bench_compile.py    # a minute or more, nearly all of it compiling
+
+`first` includes compiling: with nothing kept from an earlier run, and once more by a new process
+that finds the kept code.
+"""
+
+import os
+import subprocess
+import sys
+from functools import partial
+from tempfile import TemporaryDirectory
+
+import torch
+from machine import header
+from outcome import Outcome
+from torch import Tensor
+from turns import begin, options, set_clock, take_turns, timed
+
+from wildshape.inference.predictor import Predictor, load
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+
+DIFFERENCE_BAR_M = 1e-4
+BATCH = 32
+
+
+@torch.inference_mode()
+def network(made: Predictor, inputs: Tensor) -> None:
+    made.network(inputs)
+
+
+def start(compiling: bool, folder: str, threads: int) -> None:
+    """A process of its own that completes one scan."""
+    call = ".compile()" if compiling else ""
+    program = (
+        f"import numpy, torch, wildshape; torch.set_num_threads({threads}); "
+        f"wildshape.load(){call}.complete(numpy.random.default_rng(0).normal(size=(200, 3)) + 9)"
+    )
+    kept = {**os.environ, "TORCHINDUCTOR_CACHE_DIR": folder}
+    subprocess.run([sys.executable, "-c", program], env=kept, check=True, capture_output=True)
+
+
+def main() -> None:
+    arguments = begin(options(__doc__))
+    print(header("bench_compile.py"))
+    outcome, eager = Outcome("compile"), load()
+    compiled = eager.compile()
+    tracks = simulate_tracks(SimulationConfig(tracks=4, scans=8), seed=5, workers=1)
+    scans = [scan for track in tracks for scan in track.scans][:BATCH]
+    pairs = zip(eager.complete_many(scans), compiled.complete_many(scans), strict=True)
+    apart = max(float(abs(a.points - b.points).max()) for a, b in pairs)
+    outcome.bar(f"largest difference over {len(scans)} scans, m", apart, DIFFERENCE_BAR_M)
+    for count in (1, BATCH):
+        inputs = torch.randn(count, eager.settings.input_points, 3)
+        for name, work in (("network", network), ("complete", complete)):
+            given = inputs if work is network else scans[:count]
+            works = {
+                "eager": partial(work, eager, given),
+                "compiled": partial(work, compiled, given),
+            }
+            outcome.add(f"{name}, {count} scans", take_turns(works, 3.0, at_least=3))
+    set_clock(cpu=False)  # the compiler is another process
+    with TemporaryDirectory() as folder:
+        first = {
+            "eager": [timed(partial(start, False, folder, arguments.threads))],
+            "compiled, nothing kept": [timed(partial(start, True, folder, arguments.threads))],
+            "compiled, code kept": [timed(partial(start, True, folder, arguments.threads))],
+        }
+    outcome.add("first completion of a process", first)
+    outcome.publish(arguments.out, small=arguments.small)
+
+
+def complete(made: Predictor, scans: list) -> None:
+    list(made.complete_many(scans))
+
+
+if __name__ == "__main__":
+    main()
