@@ -43,7 +43,7 @@ def exported(predictor: Predictor, threads: int) -> Runner:
 def main() -> None:
     arguments = begin(options(__doc__))
     print(header("bench_export.py"))
-    outcome, predictor = Outcome("export"), load()
+    outcome, predictor = Outcome("export"), load(raw=True)
     runner = exported(predictor, arguments.threads)
     scans = simulated(48 if arguments.small else 1000)
     found = compare(runner, predictor, scans)

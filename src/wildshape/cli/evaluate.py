@@ -47,6 +47,7 @@ class Settings:
         as_seeds: the models are training seeds of one method: one row with mean and deviation,
             and a second for the one whose label-free validation cost is lowest.
         track: a second row for each model, which uses all scans of a track together.
+        raw: measure the networks' own answers, not refined against the scan.
     """
 
     data: Data
@@ -58,6 +59,7 @@ class Settings:
     max_scans: Annotated[int | None, arg(metavar="N")] = None
     as_seeds: bool = False
     track: bool = False
+    raw: bool = False
     unit: Unit = "m"
     device: Device = "auto"
     overwrite: Overwrite = False
@@ -81,7 +83,7 @@ def run(settings: Settings) -> None:
     baselines = choose_baselines(settings.baselines)
     reading = Reading(settings.data, settings.unit)
     _check_truth(reading)
-    models = load_models(settings.model, settings.device)
+    models = load_models(settings.model, settings.device, raw=settings.raw)
     keep_apart(settings.data, settings.out)
     output = begin(
         settings.out, "evaluate", _identity(settings), FILES, overwrite=settings.overwrite
@@ -118,7 +120,9 @@ def choose_baselines(names: str) -> "dict[str, Method]":
     return {name: baseline(name) for name in wanted if name not in ("", "none")}
 
 
-def load_models(models: "Sequence[Path]", device: str) -> "dict[str, Predictor | Dpc]":
+def load_models(
+    models: "Sequence[Path]", device: str, *, raw: bool = False
+) -> "dict[str, Predictor | Dpc]":
     """Models by the name of their row, ours or DPC's; the shipped weights if none is named.
 
     Raises:
@@ -129,7 +133,7 @@ def load_models(models: "Sequence[Path]", device: str) -> "dict[str, Predictor |
     from wildshape.training.loop import MODEL
 
     if not models:
-        return {OURS: load_model(None, device)}
+        return {OURS: load_model(None, device, raw=raw)}
     found: dict[str, Predictor | Dpc] = {}
     for model in models:
         file = model_file(model)
@@ -138,7 +142,7 @@ def load_models(models: "Sequence[Path]", device: str) -> "dict[str, Predictor |
             raise BadInputError(f"{model}: another --model is called {name} too; rename one.")
         if name in NAMES:
             raise BadInputError(f"{model}: {name} is the name of a baseline; rename the model.")
-        found[name] = _dpc(file, device) or load_model(model, device)
+        found[name] = _dpc(file, device) or load_model(model, device, raw=raw)
     return found
 
 

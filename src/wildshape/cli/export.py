@@ -64,7 +64,7 @@ def _export(settings: Settings, suffix: str) -> None:
 
     if suffix == ".onnx":
         onnx.require_onnx()
-    predictor = load_model(settings.model, "cpu")
+    predictor = load_model(settings.model, "cpu", raw=True)
     if predictor.settings.network.backbone != "pcn":
         raise BadInputError(
             f"{settings.model}: its encoder is {predictor.settings.network.backbone}, and only"

@@ -20,13 +20,13 @@ def model_file(model: Path | None) -> Path:
     return model / MODEL
 
 
-def load_model(model: Path | None, device: str = "auto") -> Predictor:
-    """The predictor.
+def load_model(model: Path | None, device: str = "auto", *, raw: bool = False) -> Predictor:
+    """The predictor; `raw`: the network's own answers, not refined against the scan.
 
     Raises:
         BadInputError: no such checkpoint, or none that can be used.
     """
-    return load(model_file(model), choose_device(device))
+    return load(model_file(model), choose_device(device), raw=raw)
 
 
 def fingerprint(model: Path | None) -> str:

@@ -82,6 +82,7 @@ def describe(predictor: Predictor) -> dict[str, str]:
         "settings": json.dumps(made),
         "sensor": settings.sensor,
         "input_points": str(settings.input_points),
+        "refined": "no: the network's own answer, as wildshape.load(raw=True) gives it",
         "outputs": ",".join(OUTPUTS),
         "unit": "m",
     }

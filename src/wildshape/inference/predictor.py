@@ -19,7 +19,8 @@ from wildshape.geometry.se3 import SE3, stack
 from wildshape.inference.boxes import box_seen
 from wildshape.inference.compiled import compiled
 from wildshape.inference.facts import facts_of, seen_facts
-from wildshape.inference.prepare import NetworkInput, as_points, extent, network_input
+from wildshape.inference.prepare import NetworkInput, as_points, extent, in_order, network_input
+from wildshape.inference.refine import denser, refine
 from wildshape.inference.track import complete_together
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.models.checkpoint import ModelSettings, load_checkpoint
@@ -44,21 +45,36 @@ class _Found(NamedTuple):
     facts: Tensor
 
 
-def load(model: str | Path | None = None, device: str = "cpu") -> "Predictor":
+def load(model: str | Path | None = None, device: str = "cpu", *, raw: bool = False) -> "Predictor":
     """A predictor from a checkpoint; the weights shipped in the package by default.
+
+    Args:
+        model: checkpoint.
+        device: cpu or cuda.
+        raw: give the network's own answers, not refined against the scan (`inference/refine.py`).
+            Networks trained with a `paper-*` preset are never refined.
 
     Raises:
         BadInputError: the checkpoint cannot be used; the sentence says why.
     """
     network, settings = load_checkpoint(Path(model) if model is not None else SHIPPED)
-    return Predictor(network.to(device), settings)
+    return Predictor(network.to(device), settings, raw=raw)
 
 
 class Predictor:
-    """A trained network and what it needs to know of its training. Sensor frames in and out."""
+    """A trained network and what it needs to know of its training. Sensor frames in and out.
 
-    def __init__(self, network: ShapePoseNet, settings: ModelSettings) -> None:
+    Args:
+        network: trained.
+        settings: of its training.
+        raw: see `load`.
+    """
+
+    def __init__(
+        self, network: ShapePoseNet, settings: ModelSettings, *, raw: bool = False
+    ) -> None:
         self.network, self.settings = network, settings
+        self.refines = settings.facing and not raw
         self.device = next(network.parameters()).device
 
     def compile(self) -> "Predictor":
@@ -206,15 +222,20 @@ class Predictor:
 
     def _completion(self, scan: Points, i: int, found: _Found, sensor: Sensor | None) -> Completion:
         """Scan `i` of those found."""
-        T_sensor_can, cost = SE3(found.rotation[i], found.translation[i]), float(found.cost[i])
+        shape, T_sensor_can = found.shapes[i], SE3(found.rotation[i], found.translation[i])
+        mirror, cost = self.settings.network.mirror, float(found.cost[i])
         facts, warning = facts_of(scan, cost, found.facts[i]), self._warning(scan, sensor)
+        if self.refines:
+            shape, T_sensor_can = _refined(scan, shape, T_sensor_can, mirror=mirror)
+        points = T_sensor_can.to(torch.float32).apply(shape).numpy()
         return Completion(
-            points=T_sensor_can.apply(found.shapes[i]).numpy(),
+            points=denser(points) if self.refines else points,
             pose=T_sensor_can.to(torch.float64),
-            box=box_seen(found.shapes[i], T_sensor_can, scan, mirror=self.settings.network.mirror),
+            box=box_seen(shape, T_sensor_can, scan, mirror=mirror),
             confidence=0.0 if warning else self.confidence(facts),
             branch=int(found.branch[i]),
             cost=cost,
+            refined=self.refines,
             warning=warning,
             facts=facts,
         )
@@ -243,6 +264,16 @@ class Predictor:
                 " check the unit, or train on such objects"
             )
         return ""
+
+
+def _refined(
+    scan: Points, shape: Tensor, T_sensor_canonical: SE3, *, mirror: bool
+) -> tuple[Tensor, SE3]:
+    """Shape and pose fitted to the scan (`inference/refine.py`)."""
+    pose = (T_sensor_canonical.rotation.numpy(), T_sensor_canonical.translation.numpy())
+    found = refine(in_order(scan), shape.numpy(), *pose, mirror=mirror)
+    rotation, translation = torch.from_numpy(found.rotation), torch.from_numpy(found.translation)
+    return torch.from_numpy(found.shape), SE3(rotation, translation)
 
 
 def to_middle(T_sensor_canonical: SE3) -> SE3:

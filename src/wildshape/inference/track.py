@@ -20,6 +20,7 @@ from wildshape.geometry.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
 from wildshape.inference.joint import FINE, refine_jointly
 from wildshape.inference.prepare import network_input
+from wildshape.inference.refine import denser
 from wildshape.inference.voting import half_turn, likeness_of_next, voted_signs
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.models.checkpoint import ModelSettings
@@ -57,17 +58,18 @@ def complete_together(
     if len(done) < 2:
         return done
     weights = torch.tensor([max(item.confidence, 1e-3) for item in done], dtype=torch.float64)
-    shape = _mean_shape(done, weights)
+    shape = _mean_shape(done, weights, settings.network.points)
     voted = _voted(stack([item.pose for item in done]), shape, weights, scans, settings)
     fit = refine_checked(scans, voted, mirror=settings.network.mirror)
     shape = drawn_to(shape, _seen(scans, fit.T_sensor_object, settings.network.mirror))
     fitted = _box(shape, scans, fit.T_sensor_object, mirror=settings.network.mirror)
+    whole = torch.from_numpy(denser(shape.numpy())) if settings.facing else shape
     cost = track_cost(shape, fit.T_sensor_object, scans, settings)
     confidence = float(np.mean([item.confidence for item in done]))
     return [
         replace(
             item,
-            points=fit.T_sensor_object[i].apply(shape).float().numpy(),
+            points=fit.T_sensor_object[i].apply(whole).float().numpy(),
             pose=fit.T_sensor_object[i],
             box=carried(fitted, fit.T_sensor_object[i]),
             confidence=0.0 if item.warning else confidence,
@@ -87,9 +89,15 @@ def _box(
     return fit_to_scans(shape, seen, mirror=mirror)
 
 
-def _mean_shape(done: list[Completion], weights: Float[Tensor, "V"]) -> Float[Tensor, "P 3"]:
-    """The mean of the canonical shapes: points of one index are the same place of the object."""
-    shapes = [item.pose.inverse().apply(torch.from_numpy(item.points).double()) for item in done]
+def _mean_shape(
+    done: list[Completion], weights: Float[Tensor, "V"], count: int
+) -> Float[Tensor, "P 3"]:
+    """The mean of the canonical shapes: points of one index are the same place of the object.
+
+    That holds for the network's own `count` points, which come first.
+    """
+    points = [torch.from_numpy(item.points[:count]).double() for item in done]
+    shapes = [item.pose.inverse().apply(of) for item, of in zip(done, points)]
     return (torch.stack(shapes) * weights[:, None, None]).sum(0) / weights.sum()
 
 

@@ -1,0 +1,177 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A completion held against its scan once more: pose and size fitted, the seen side drawn to it.
+
+Beyond the paper (METHOD 11, test-time refinement). The network knows an object's pose to a few
+degrees and its size to a few percent, and draws shapes towards what is usual; the scan in hand
+knows better where it saw something. Nine numbers (rotation, translation and a stretch along the
+canonical axes) are fitted by Gauss-Newton, each scan point to the plane of the shape around it; the
+network's answer is the prior. Nothing but the scan is used.
+"""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
+
+_ITERATIONS, _MATCHED_AT = 6, (0, 2, 4)
+_PLANE_POINTS, _SCAN_POINTS = 8, 512
+# Lengths are for an object of five metres or more; those of a smaller one are smaller.
+_USUAL_M = 5.0
+# Scan points err together, because the shape errs: as much is believed as if there were these many.
+_BELIEVED, _ERROR_M, _KERNEL_M = 300.0, 0.07, 0.3
+_PRIOR_RAD, _PRIOR_M, _PRIOR_STRETCH = np.radians(3.0), 0.05, 0.08
+_REACH_M, _STIFFNESS, _DRAWN_BY, _VOXEL_M = 0.12, 0.2, 8, 0.08
+_PARTNER = 5
+
+Cloud = Float[np.ndarray, "_ 3"]
+
+
+class Refined(NamedTuple):
+    """A shape and its pose.
+
+    Attributes:
+        shape: canonical frame, metres.
+        rotation: of `T_scan_canonical`.
+        translation: of the same, metres.
+    """
+
+    shape: Cloud
+    rotation: Float[np.ndarray, "3 3"]
+    translation: Float[np.ndarray, "3"]
+
+
+class _Planes(NamedTuple):
+    """The plane of the shape around each scan point: `(n, 3)` places and unit normals."""
+
+    at: np.ndarray
+    normal: np.ndarray
+
+
+def refine(
+    scan: Cloud,
+    shape: Cloud,
+    rotation: Float[np.ndarray, "3 3"],
+    translation: Float[np.ndarray, "3"],
+    *,
+    mirror: bool,
+) -> Refined:
+    """Pose and shape after a look at the scan they came from.
+
+    Args:
+        scan: at least a handful of points, metres.
+        shape: canonical frame.
+        rotation: of `T_scan_canonical`, good to some ten degrees.
+        translation: of the same, good to some decimetres.
+        mirror: what was seen of one side of y = 0 is known of the other.
+    """
+    exact = shape.astype(np.float64)
+    unit = min(1.0, float(np.linalg.norm(np.ptp(exact, axis=0))) / _USUAL_M)
+    order = np.random.default_rng(0).permutation(len(scan))
+    points = scan[order[:_SCAN_POINTS]].astype(np.float64)
+    fitted = _fitted(points / unit, Refined(exact / unit, rotation, translation / unit))
+    seen = (points / unit - fitted.translation) @ fitted.rotation
+    drawn = drawn_to_scan(fitted.shape, seen, mirror=mirror)
+    moved = fitted.translation * unit
+    return Refined((drawn * unit).astype(shape.dtype), fitted.rotation, moved)
+
+
+def _fitted(points: Cloud, found: Refined) -> Refined:
+    """The nine numbers fitted."""
+    from scipy.spatial import KDTree
+
+    tree = KDTree(found.shape, balanced_tree=False)
+    before = _off(tree, (points - found.translation) @ found.rotation)
+    motion, planes = np.zeros(9), _Planes(points, points)
+    R, t = (part.astype(np.float64) for part in found[1:])
+    for step in range(_ITERATIONS):
+        stretch = np.exp(motion[6:])
+        local = (points - t) @ R
+        if step in _MATCHED_AT:
+            planes = _planes(tree, local / stretch)
+        change = _step(local, planes, stretch, motion)
+        motion += change
+        R = R @ _turn(change[:3]).T
+        t = t - R @ change[3:6]
+    stretch = np.exp(motion[6:])
+    if _off(tree, (points - t) @ R / stretch) > before:
+        return found
+    return Refined(found.shape * stretch, R, t)
+
+
+def _off(tree: "KDTree", points: Cloud) -> float:
+    """Mean distance of points to a shape, each at most the kernel's width."""
+    return float(np.minimum(tree.query(points)[0], _KERNEL_M).mean())
+
+
+def _planes(tree: "KDTree", points: Cloud) -> _Planes:
+    """Planes through the shape's points around each of these, unstretched canonical frame."""
+    _, index = tree.query(points, k=_PLANE_POINTS)
+    around = tree.data[index]
+    middle = around.mean(axis=1)
+    off = around - middle[:, None]
+    _, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", off, off))
+    return _Planes(middle, axes[:, :, 0])
+
+
+def _step(local: Cloud, planes: _Planes, stretch: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    """One Gauss-Newton step of the nine numbers; `motion` is how far they are from the prior."""
+    at, normal = planes.at * stretch, planes.normal / stretch
+    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    off = local - at
+    residual = (off * normal).sum(axis=1)
+    kernel = (1 + (off**2).sum(axis=1) / _KERNEL_M**2) ** -2  # Geman-McClure
+    weight = kernel * _BELIEVED / len(local) / _ERROR_M**2
+    rows = np.concatenate((np.cross(local, normal), normal, -normal * at), axis=1)
+    trust = np.repeat((_PRIOR_RAD, _PRIOR_M, _PRIOR_STRETCH), 3) ** -2
+    A = (rows * weight[:, None]).T @ rows + np.diag(trust)
+    b = rows.T @ (weight * residual) + trust * motion
+    return -np.linalg.solve(A, b)
+
+
+def _turn(w: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """The rotation by |w| radians about w (Rodrigues)."""
+    angle = float(np.linalg.norm(w))
+    if angle < 1e-12:
+        return np.eye(3)
+    x, y, z = w / angle
+    cross = np.array(((0, -z, y), (z, 0, -x), (-y, x, 0)))
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def drawn_to_scan(shape: Cloud, seen: Cloud, *, mirror: bool) -> Cloud:
+    """The shape's points drawn to the mean of what was seen around them; the others stay.
+
+    Args:
+        shape: canonical frame.
+        seen: the scan, the same frame.
+        mirror: draw to its reflection in y = 0 too.
+    """
+    from scipy.spatial import KDTree
+
+    from wildshape.geometry.outliers import voxel_thin
+
+    both = np.concatenate((seen, seen * (1, -1, 1))) if mirror else seen
+    thin = voxel_thin(both.astype(np.float32), _VOXEL_M).astype(np.float64)
+    most = min(_DRAWN_BY, len(thin))
+    apart, index = KDTree(thin).query(shape, k=most, distance_upper_bound=2.5 * _REACH_M)
+    apart, index = apart.reshape(-1, most), index.reshape(-1, most)
+    weight = np.exp(-((apart / _REACH_M) ** 2))  # beyond the bound: 0
+    near = thin[np.minimum(index, len(thin) - 1)]
+    total = weight.sum(axis=1, keepdims=True) + _STIFFNESS
+    return ((weight[..., None] * near).sum(axis=1) + _STIFFNESS * shape) / total
+
+
+def denser(points: Cloud) -> Cloud:
+    """The points, then as many more: the middle between each one and its fifth neighbour.
+
+    Points of a decoder lie unevenly: middles with the nearest ones would fall where there are
+    enough.
+    """
+    from scipy.spatial import KDTree
+
+    _, index = KDTree(points).query(points, k=_PARTNER + 1)
+    return np.concatenate((points, (points + points[index[:, -1]]) / 2)).astype(points.dtype)

@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Refinement against the scan: nearer in pose and size, never further, the same at every size."""
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+from tests.cars import car_surface, drive_by, poses_of
+
+from wildshape.inference.refine import denser, drawn_to_scan, refine
+
+SHAPE = car_surface(4000, seed=5)[0].astype(np.float32)
+STRETCH = np.array((1.07, 0.96, 1.05), np.float32)
+TRACK = drive_by(scans=9, step=2.0, heading=0.3)
+
+
+def turn(axis, degrees):
+    axis = np.asarray(axis, float) / np.linalg.norm(axis)
+    a = np.radians(degrees)
+    x, y, z = axis
+    cross = np.array(((0, -z, y), (z, 0, -x), (-y, x, 0)))
+    return np.eye(3) + np.sin(a) * cross + (1 - np.cos(a)) * cross @ cross
+
+
+def spoilt(i, degrees=3.0, metres=0.08):
+    """The true pose of a scan, a little off."""
+    rng = np.random.default_rng(i)
+    T = poses_of(TRACK)[i]
+    off = rng.normal(size=3)
+    R = T.rotation.numpy() @ turn(rng.normal(size=3), degrees)
+    return R, T.translation.numpy() + metres * off / np.linalg.norm(off)
+
+
+def pose_errors(i, R, t):
+    T = poses_of(TRACK)[i]
+    cosine = (np.trace(R.T @ T.rotation.numpy()) - 1) / 2
+    return np.degrees(np.arccos(np.clip(cosine, -1, 1))), np.linalg.norm(t - T.translation.numpy())
+
+
+def test_pose_and_size_come_nearer():
+    """Median over a track: what one scan cannot tell of one angle, another tells."""
+    before, after = [], []
+    for i, scan in enumerate(TRACK.scans):
+        R, t = spoilt(i)
+        found = refine(scan, SHAPE / STRETCH, R, t, mirror=True)
+        size = np.ptp(found.shape, axis=0) / np.ptp(SHAPE, axis=0)
+        before.append((*pose_errors(i, R, t), np.abs(np.log(STRETCH)).mean()))
+        after.append(
+            (*pose_errors(i, found.rotation, found.translation), np.abs(np.log(size)).mean())
+        )
+        np.testing.assert_allclose(found.rotation @ found.rotation.T, np.eye(3), atol=1e-9)
+    turned, moved, sized = np.median(after, axis=0) / np.median(before, axis=0)
+    assert turned < 0.4
+    assert moved < 0.7
+    assert sized < 0.7
+
+
+def test_a_perfect_answer_stays():
+    T = poses_of(TRACK)[4]
+    found = refine(TRACK.scans[4], SHAPE, T.rotation.numpy(), T.translation.numpy(), mirror=True)
+    rotation, translation = pose_errors(4, found.rotation, found.translation)
+    assert rotation < 0.3
+    assert translation < 0.03
+    surface = KDTree(car_surface(60_000, seed=7)[0])
+    assert surface.query(found.shape)[0].mean() < 0.03
+    np.testing.assert_allclose(np.ptp(found.shape, axis=0), np.ptp(SHAPE, axis=0), atol=0.06)
+
+
+def test_nothing_moves_where_the_scan_is_elsewhere():
+    R, t = spoilt(0)
+    found = refine(TRACK.scans[0] + np.float32(40.0), SHAPE, R, t, mirror=True)
+    np.testing.assert_allclose(found.rotation, R, atol=1e-3)
+    np.testing.assert_allclose(found.translation, t, atol=1e-3)
+    np.testing.assert_allclose(found.shape, SHAPE, atol=1e-2)
+
+
+@pytest.mark.parametrize("scale", [0.1, 0.01])
+def test_small_objects_are_refined_as_large_ones(scale):
+    """A model car in all its lengths: the same rotation, everything else to scale."""
+    diagonal = float(np.linalg.norm(np.ptp(SHAPE, axis=0)))
+    R, t = spoilt(3)
+    base = 4.0 / diagonal  # below the five metres from which lengths are fixed
+    large, small = (
+        refine(TRACK.scans[3] * s, SHAPE * s, R, t * s, mirror=True) for s in (base, base * scale)
+    )
+    np.testing.assert_allclose(small.rotation, large.rotation, atol=1e-4)
+    np.testing.assert_allclose(small.translation, large.translation * scale, atol=1e-4 * scale)
+    np.testing.assert_allclose(small.shape, large.shape * scale, atol=1e-3 * scale)
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+def test_only_what_was_seen_is_drawn(mirror):
+    seen = SHAPE[SHAPE[:, 1] > 0.84] + np.float32((0.0, 0.06, 0.0))
+    drawn = drawn_to_scan(SHAPE.astype(float), seen.astype(float), mirror=mirror)
+    moved = np.linalg.norm(drawn - SHAPE, axis=1)
+    left, right = SHAPE[:, 1] > 0.84, SHAPE[:, 1] < -0.84
+    middle = np.abs(SHAPE[:, 1]) < 0.3
+    assert np.median(np.abs(drawn[left, 1] - 0.91)) < 0.02
+    assert moved[middle].max() < 1e-9
+    if mirror:
+        assert np.median(np.abs(drawn[right, 1] + 0.91)) < 0.02
+    else:
+        assert moved[right].max() < 1e-9
+
+
+def test_denser_fills_gaps_and_keeps_the_points():
+    dense = denser(SHAPE)
+    assert dense.shape == (2 * len(SHAPE), 3)
+    assert dense.dtype == SHAPE.dtype
+    np.testing.assert_array_equal(dense[: len(SHAPE)], SHAPE)
+    spacing = KDTree(SHAPE).query(SHAPE, k=6)[0][:, 5]
+    added = KDTree(SHAPE).query(dense[len(SHAPE) :])[0]
+    assert (added <= spacing / 2 + 1e-6).all()
+    assert len(np.unique(dense.round(6), axis=0)) > 1.8 * len(SHAPE)
+    other = car_surface(3000, seed=6)[0]
+    assert KDTree(dense).query(other)[0].mean() < 0.9 * KDTree(SHAPE).query(other)[0].mean()
