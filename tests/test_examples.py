@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The numbered examples run, as they stand or on a few tracks; tests/export runs the sixth."""
 
+import re
 import runpy
 from pathlib import Path
 
@@ -45,9 +46,10 @@ def test_there_are_six_short_ones():
 
 
 def test_complete_one_scan(example, tmp_path):
-    assert "4096 in completed.ply" in example(1)
+    printed = example(1)
     scan = np.load(EXAMPLES / "scan.npy")
     done = read_points(tmp_path / "completed.ply")
+    assert f"{len(scan)} points in, {len(done)} in completed.ply" in printed
     assert np.linalg.norm(done.mean(0) - scan.mean(0)) < 2
 
 
@@ -59,7 +61,7 @@ def test_register_and_fuse_a_track(example):
 def test_train_on_a_folder(example, folders):
     printed = example(3, folders, "run", 2, "tiny")
     assert "step 2: loss" in printed
-    assert "with 512 points" in printed
+    assert re.search(r"model.safetensors completes a scan with [1-9]\d+ points", printed)
 
 
 def test_evaluate_against_baselines(example, folders):
