@@ -16,6 +16,7 @@ from wildshape.geometry.viewing_volume import (
     place,
     scan_image,
     to_volume,
+    upwards,
 )
 
 CAMERA, LIDAR = PinholeVolume(), PolarVolume()
@@ -53,6 +54,15 @@ def test_a_pixel_of_a_lidar_image_is_as_wide_near_as_far():
         for r in (8.0, 40.0)
     ]
     assert across == pytest.approx([-0.05, -0.05], rel=1e-2)
+
+
+def test_up_is_up_in_the_image():
+    for volume, distance in ((CAMERA, 2.0), (LIDAR, 14.0)):
+        offset = torch.tensor([distance])
+        above = ahead(offset, volume) + 0.1 * upwards(volume, offset)
+        right, down, _ = to_volume(above[:, None], offset, volume)[0, 0].tolist()
+        assert right == pytest.approx(0, abs=1e-6)
+        assert down < -0.01
 
 
 def test_what_is_told_of_the_distance():

@@ -53,7 +53,7 @@ def test_the_presets_hold_the_authors_numbers():
     assert (network.points, network.voxels, network.image, network.candidates) == (8000, 64, 128, 4)
     assert (loss.sigma, loss.keep, loss.student, loss.depth) == ((3.0, 0.2), (0.07, 1.0), 20.0, 0.0)
     assert (recipe.optim.steps, recipe.optim.lr) == (600_000, 1e-4)
-    assert loss.half_turns == 0
+    assert not loss.half_turn
     assert (network.reach, PRESETS["dpc-dagger"].network.reach) == (0.0, 0.15)
     lidar = PRESETS["dpc-lidar"].network
     assert (lidar.volume, lidar.image) == (PolarVolume(6.0), 128)
@@ -81,7 +81,7 @@ def test_every_part_is_taught(name, plane_store, car_store):
 
 def test_a_half_turn_that_wins_teaches_a_candidate_too(plane_store, monkeypatch):
     recipe = tiny("dpc-small")
-    loss = replace(recipe.loss, half_turns=2)
+    loss = replace(recipe.loss, half_turn=True)
     batch = ViewSampler(plane_store, np.arange(2), recipe.views).draw(0)
     torch.manual_seed(0)
     network = DpcNet(recipe.network)
@@ -99,7 +99,7 @@ def test_a_half_turn_that_wins_teaches_a_candidate_too(plane_store, monkeypatch)
         if weight.startswith("branches") and p.grad is not None and p.grad.abs().sum() > 0
     }
     student = network.config.candidates
-    assert result.winner.tolist() == [student + 1] * 6
+    assert result.winner.tolist() == [student] * 6
     assert student in taught
     assert len(taught) > 1
 

@@ -63,3 +63,21 @@ def test_the_nearest_of_four_headings_is_turned_into_the_pose(volume, distance, 
     error = torch.rad2deg(rotation_angle(turned().detach()[winners[-1]].mT @ truth))
     assert set(winners) == {0}
     assert error < 8
+
+
+def test_a_translation_is_found_by_descent():
+    """DPC-dagger's part: the pose is known, the object is moved by up to a tenth of the cube."""
+    shape, offset, volume = aeroplane(), torch.tensor([2.0]), PinholeVolume()
+    tilt = rotation_from_quaternion(torch.tensor([[0.9, 0.35, 0.2, 0.1]]))
+    truth, middle, ones = torch.tensor([[0.08, -0.05, 0.1]]), ahead(offset, volume), torch.ones(1)
+    moved = torch.zeros(1, 3, requires_grad=True)
+    optimiser = torch.optim.Adam([moved], lr=0.01)
+    rendering = Rendering(volume, SIZE, 1.0, 1.0)
+    seen = to_volume(place(shape, tilt, middle + truth, volume), offset, volume)
+    image = project(seen, SIZE, rendering.sigma, ones)
+    for _ in range(50):
+        posed = place(shape, tilt, middle + moved, volume)[:, None]
+        optimiser.zero_grad()
+        hindsight(posed, offset, image, rendering, ones).loss.backward()
+        optimiser.step()
+    assert (moved - truth).norm() < 0.02

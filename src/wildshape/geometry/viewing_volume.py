@@ -103,6 +103,12 @@ def ahead(offset: Float[Tensor, "*batch"], volume: Volume) -> Float[Tensor, "*ba
     return torch.stack((zero, zero, offset) if pinhole else (offset, zero, zero), dim=-1)
 
 
+def upwards(volume: Volume, like: Tensor) -> Float[Tensor, "3"]:
+    """The direction that is up in the frame of the volume's sensor."""
+    up = (0.0, -1.0, 0.0) if isinstance(volume, PinholeVolume) else (0.0, 0.0, 1.0)
+    return torch.tensor(up, dtype=like.dtype, device=like.device)
+
+
 def beyond(size: int) -> float:
     """The depth of a ray that meets nothing: one voxel behind the last of `size`."""
     return 0.5 + 0.5 / size

@@ -71,16 +71,30 @@ def hindsight(
         rendering: how images are made.
         strength: of each view's occupancy.
     """
-    with torch.no_grad():
-        costs = [
-            sum(_costs(posed[:, k], offset, seen, rendering, strength))
-            for k in range(posed.shape[1])
-        ]
-        winner = torch.stack([torch.as_tensor(cost) for cost in costs], dim=1).argmin(1)
-    best = posed[torch.arange(len(posed), device=posed.device), winner]
-    silhouette, depth = _costs(best, offset, seen, rendering, strength)
+    winner = cheapest(posed, offset, seen, rendering, strength)
+    silhouette, depth = _costs(chosen(posed, winner), offset, seen, rendering, strength)
     silhouette, depth = silhouette.mean(), depth.mean()
     return Hindsight(silhouette + depth, silhouette.detach(), depth.detach(), winner)
+
+
+@torch.no_grad()
+def cheapest(
+    posed: Float[Tensor, "B K n 3"],
+    offset: Float[Tensor, "B"],
+    seen: RangeImage,
+    rendering: Rendering,
+    strength: Float[Tensor, "B"],
+) -> Int[Tensor, "B"]:
+    """Row of the candidate whose image is nearest; arguments as of `hindsight`."""
+    costs = [
+        sum(_costs(posed[:, k], offset, seen, rendering, strength)) for k in range(posed.shape[1])
+    ]
+    return torch.stack([torch.as_tensor(cost) for cost in costs], dim=1).argmin(1)
+
+
+def chosen(candidates: Float[Tensor, "B K *rest"], row: Int[Tensor, "B"]) -> Tensor:
+    """One candidate of each view."""
+    return candidates[torch.arange(len(row), device=row.device), row]
 
 
 def _costs(
@@ -99,4 +113,4 @@ def student_loss(student: Float[Tensor, "B 4"], teacher: Float[Tensor, "B 4"]) -
 def nearest(poses: Float[Tensor, "B K 4"], teacher: Float[Tensor, "B 4"]) -> Float[Tensor, "B 4"]:
     """Of each view's unit quaternions the one at the least angle to the teacher."""
     likeness = (poses * teacher[:, None]).sum(-1).abs()
-    return poses[torch.arange(len(poses), device=poses.device), likeness.argmax(1)]
+    return chosen(poses, likeness.argmax(1))

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """How DPC, DPC-dagger and DPC-LIDAR are trained: settings and what is minimised (METHOD 9)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import torch
 from jaxtyping import Float
@@ -18,12 +20,22 @@ from wildshape.geometry.viewing_volume import (
     place,
     scan_image,
     to_volume,
+    upwards,
 )
-from wildshape.losses.half_turns import some_half_turn
-from wildshape.losses.silhouette import Rendering, hindsight, nearest, student_loss
-from wildshape.models.dpc import DpcConfig, DpcNet, DpcPoses
+from wildshape.losses.half_turns import common_up, half_turned
+from wildshape.losses.silhouette import (
+    Rendering,
+    cheapest,
+    chosen,
+    hindsight,
+    nearest,
+    student_loss,
+)
+from wildshape.models.dpc import DpcConfig, DpcNet
 from wildshape.training.config import OptimConfig
 from wildshape.training.objectives import Objective
+
+Judged = TypeVar("Judged")
 
 
 @dataclass(frozen=True)
@@ -35,14 +47,14 @@ class DpcLoss:
         keep: share of the points that is projected, at the first and at the last step.
         student: weight of the student's loss.
         depth: weight of the depth image; the authors use silhouettes alone.
-        half_turns: tries of the student's pose, turned, beside the candidates; the authors' 0.
+        half_turn: also try the best candidate turned by half about what is up; not the authors'.
     """
 
     sigma: tuple[float, float] = (3.0, 0.2)
     keep: tuple[float, float] = (0.07, 1.0)
     student: float = 20.0
     depth: float = 0.0
-    half_turns: int = 0
+    half_turn: bool = False
 
 
 @dataclass(frozen=True)
@@ -138,26 +150,34 @@ class DpcObjective(nn.Module):
         cloud = self._kept(cloud, share, generator)
         views = len(scans) // len(cloud)
         middle = volume.scale * poses.translation + ahead(offset, volume)
-        each = cloud.repeat_interleave(views, dim=0)
-        tried = self._tried(poses, each, generator)
-        posed = place(each[:, None], rotation_from_quaternion(tried), middle[:, None], volume)
         rendering = Rendering(volume, size, self._sigma(share, size), self.config.depth)
         strength = strength.repeat_interleave(views, dim=0)
-        found = hindsight(posed, offset, coarser(image, size), rendering, strength)
-        teacher = tried[torch.arange(len(code)), found.winner]
+        each = cloud.repeat_interleave(views, dim=0)[:, None]
+        seen = coarser(image, size)
+
+        def judged(tried: Float[Tensor, "B M 4"], judge: Callable[..., Judged]) -> Judged:
+            posed = place(each, rotation_from_quaternion(tried), middle[:, None], volume)
+            return judge(posed, offset, seen, rendering, strength)
+
+        tried, best = poses.candidates, None
+        if self.config.half_turn:
+            best = judged(tried, cheapest)
+            tried = self._and_half_turned(chosen(tried, best))
+        found = judged(tried, hindsight)
+        teacher = chosen(tried, found.winner)
+        winner = found.winner
+        if best is not None:
+            winner = torch.where(winner == 0, best, network.config.candidates)
         lesson = student_loss(poses.student, teacher)
         taught = lesson + student_loss(nearest(poses.candidates, teacher), teacher)
         loss = found.loss + self.config.student * taught
-        return Objective(loss, found.silhouette, found.depth, lesson.detach(), found.winner)
+        return Objective(loss, found.silhouette, found.depth, lesson.detach(), winner)
 
-    def _tried(
-        self, poses: DpcPoses, cloud: Tensor, generator: torch.Generator
-    ) -> Float[Tensor, "B M 4"]:
-        """The candidates and what is tried beside them."""
-        turned = [
-            some_half_turn(poses.student, cloud, generator) for _ in range(self.config.half_turns)
-        ]
-        return torch.cat((poses.candidates, *(pose[:, None] for pose in turned)), dim=1)
+    def _and_half_turned(self, pose: Float[Tensor, "B 4"]) -> Float[Tensor, "B 2 4"]:
+        """Each pose, and beside it the one that is opposed to it."""
+        fixed = pose.detach()
+        up = upwards(self.network.config.volume, fixed)
+        return torch.stack((pose, half_turned(fixed, common_up(fixed, up))), dim=1)
 
     def _sigma(self, share: float, size: int) -> float:
         first, last = self.config.sigma
