@@ -88,10 +88,11 @@ def multiview_loss(scans, centres, shapes, rotation, translation, beta, projecti
         for R, t in zip(rotation[b], translation[b]):
             posed = shapes[b // views] @ R.T + t
             seen = visible(posed.detach() + centres[b], centres[b], projection)
-            both = (scan, posed)
+            given, made = scan, posed
             if projection.flat:
-                both = [in_image(x + centres[b], centres[b], projection) for x in both]
-            apart = torch.cdist(*both, compute_mode="donot_use_mm_for_euclid_dist")
+                given = in_image(scan + centres[b], centres[b], projection)
+                made = in_image(posed + centres[b], centres[b], projection)
+            apart = torch.cdist(given, made, compute_mode="donot_use_mm_for_euclid_dist")
             costs.append(apart.amin(1).mean() + beta * apart.amin(0)[seen].mean())
         cost, index = torch.stack(costs).min(0)
         total = total + cost

@@ -39,7 +39,15 @@ TABLES = {
     "trucks": trucks.table,
     "encoders": encoders.table,
 }
-FIGURES = {"codes": codes.draw, "objects": objects.draw}
+FIGURES = {
+    "codes": codes.draw,
+    "objects": objects.drives,
+    "objects-kitti": objects.kitti,
+    "objects-trucks": objects.trucks,
+    "objects-airplane": objects.views_of("airplane"),
+    "objects-car": objects.views_of("car"),
+    "objects-chair": objects.views_of("chair"),
+}
 Name = Literal[
     "views",
     "vehicle",
@@ -50,6 +58,11 @@ Name = Literal[
     "encoders",
     "codes",
     "objects",
+    "objects-kitti",
+    "objects-trucks",
+    "objects-airplane",
+    "objects-car",
+    "objects-chair",
 ]
 
 
@@ -61,7 +74,7 @@ class Settings:
     same command goes on.
 
     Attributes:
-        table: which; codes and objects are figures.
+        table: which; codes and those of objects are figures.
         size: test (seconds), tiny (minutes on a CPU), small (hours) or full (a GPU).
         out: folder of data, runs and scores.
         results: folder of the page and its JSON; by default `out`.

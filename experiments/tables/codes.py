@@ -41,7 +41,7 @@ def draw(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
     places = tsne(codes)
     with atomic_write(path) as file:
         _picture(places, [np.asarray(track.shape) for track in tracks]).savefig(
-            file, dpi=150, format="png"
+            file, dpi=110, format="webp"
         )
     kinds = [track.source for track in tracks]
     return {"method": row.name, "objects": count, "places": places.tolist(), "sources": kinds}

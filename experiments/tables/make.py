@@ -109,8 +109,8 @@ def make(shop: Workshop, given: Given, table: Table, name: str, results: Path) -
 
 
 def draw(shop: Workshop, given: Given, figure: Figure, name: str, results: Path) -> str:
-    """Make a figure and write NAME.png and NAME.json; returns where it is."""
-    picture = results / f"{name}.png"
+    """Make a figure and write NAME.webp and NAME.json; returns where it is."""
+    picture = results / f"{name}.webp"
     drawn = figure(shop, given, picture)
     made = {"provenance": provenance(shop.command), "size": as_values(given.size)}
     write_json(results / f"{name}.json", {**made, **drawn})

@@ -1,48 +1,90 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Input, truth, ICP, shape and fusion of the best, the median and the worst object (paper, fig. 4).
+"""Input, truth, ICP, shape and fusion of the best, the median and the worst object.
 
-The objects are chosen by their CD, never by hand; the seed by its label-free cost.
+The paper's figures 3 and 4 and those of its supplement. The objects are chosen by their CD, never
+by hand; the seed by its label-free cost.
 """
 
 from pathlib import Path
+from typing import cast
 
 from experiments.tables.data import store_of
 from experiments.tables.given import Given
-from experiments.tables.make import selected
-from experiments.tables.measure import measure
-from experiments.tables.rows import default_form
-from experiments.tables.table import Block
+from experiments.tables.make import Figure, selected
+from experiments.tables.measure import Measured, measure
+from experiments.tables.rows import default_form, views_form
+from experiments.tables.table import Block, Row, Shipped, Trained
 from experiments.tables.train import Workshop
 
 from wildshape.baselines.local_icp import LocalIcp
 from wildshape.cli.models import load_model
 from wildshape.cli.reading import Reading
-from wildshape.evaluation.examples import gather
+from wildshape.evaluation.examples import Example, gather
 from wildshape.evaluation.figures import draw_examples
 from wildshape.inference.method import Learned
 from wildshape.io.atomic import atomic_write
+from wildshape.simulate.config import Category
 
 
-def draw(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
-    """Write the figure; returns what is drawn."""
+def drives(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
+    """Cars driven past, by the default form."""
     row = default_form(given.size, given.drives("train"))
     block = Block("objects", given.drives("test"), (row,))
-    most = given.size.max_scans
-    tried = [measure(shop, row, block, "none", seed, most) for seed in range(given.size.seeds)]
-    best = selected(row.name, tuple(one for one in tried if one is not None))
-    assert best.model is not None
-    method = Learned(load_model(best.model.path, shop.device))
-    scores = best.results.methods[0]
-    examples = gather(
+    return _draw(shop, row, block, range(given.size.seeds), given.size.max_scans, path)
+
+
+def kitti(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
+    """Real cars, by the weights that the package carries."""
+    block = Block("objects", given.real_cars(), (Shipped(),))
+    return _draw(shop, Shipped(), block, range(1), given.size.max_scans, path)
+
+
+def trucks(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
+    """Trucks, by the default form trained on cars and fine-tuned on the trucks without labels."""
+    cars, data = default_form(given.size, given.drives("train")), given.trucks()
+    row = Trained("ours, default form, fine-tuned", cars.recipe, data, start=cars)
+    block = Block("objects", data, (row,))
+    return _draw(shop, row, block, range(given.size.side_seeds), given.size.max_scans, path)
+
+
+def views_of(category: Category) -> Figure:
+    """Depth views of a category, by the paper's form."""
+
+    def views(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
+        row = views_form(given.size, given.views(category, "train"))
+        block = Block("objects", given.views(category, "test"), (row,))
+        return _draw(shop, row, block, range(given.size.side_seeds), given.size.max_scans, path)
+
+    return views
+
+
+def _draw(
+    shop: Workshop, row: Row, block: Block, seeds: range, most: int | None, path: Path
+) -> dict[str, object]:
+    """Measure the row, choose the seed and the objects, and write the figure."""
+    tried = [measure(shop, row, block, "none", seed, most) for seed in seeds]
+    best = _selected(row.name, tuple(cast("list[Measured]", tried)))
+    examples = _examples(shop, block, best, most)
+    with atomic_write(path) as file:
+        draw_examples(examples).savefig(file, dpi=130, format="webp")
+    drawn = {example.label: {"track": example.track, "cd_m": example.cd} for example in examples}
+    name = best.results.methods[0].name
+    return {"method": name, "rival": LocalIcp().about, "objects": drawn, "measured": best.made}
+
+
+def _selected(name: str, measured: tuple[Measured, ...]) -> Measured:
+    """The only one, or that of the lowest label-free cost."""
+    return measured[0] if len(measured) == 1 else selected(name, measured)
+
+
+def _examples(shop: Workshop, block: Block, best: Measured, most: int | None) -> list[Example]:
+    model = None if best.model is None else best.model.path
+    return gather(
         (track for _, track in Reading(store_of(shop.folder, block.test)).tracks()),
         best.results,
-        scores.name,
-        method,
+        best.results.methods[0].name,
+        Learned(load_model(model, shop.device)),
         max_scans=most,
         rival=LocalIcp(),
     )
-    with atomic_write(path) as file:
-        draw_examples(examples).savefig(file, dpi=130, format="png")
-    drawn = {example.label: {"track": example.track, "cd_m": example.cd} for example in examples}
-    return {"method": scores.name, "rival": LocalIcp().about, "objects": drawn}

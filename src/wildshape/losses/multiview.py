@@ -91,8 +91,8 @@ def multiview_loss(
         cost = scores.cost(config.beta)
         winner = (cost if handicap is None else cost + handicap(cost)).argmin(-1)
     posed = _posed(shape, rotation, translation, winner)
-    both = (compared(cloud, centres, config.projection) for cloud in (scans, posed))
-    observation, projection = _winner_terms(*both, scores, winner)
+    seen, made = (compared(cloud, centres, config.projection) for cloud in (scans, posed))
+    observation, projection = _winner_terms(seen, made, scores, winner)
     total = (observation + config.beta * projection).mean() * views
     return LossTerms(total, observation.mean().detach(), projection.mean().detach(), winner)
 

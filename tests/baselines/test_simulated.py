@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The paper's baselines on simulated drives: small motions they chain, half turns lose one."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+from tests.baselines.test_baselines import errors, named
+from tests.cars import half_turned, poses_of
+
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+
+
+@pytest.fixture(scope="module")
+def drives():
+    """Neighbouring scans as a 64-beam LiDAR takes them in passing, nothing in the way."""
+    config = SimulationConfig(tracks=3, scans=7, occlusion=0.0)
+    return list(simulate_tracks(config, seed=5, workers=1))
+
+
+@pytest.mark.parametrize("name", ["local-icp", "global-icp"])
+def test_chained_over_a_drive_the_error_stays_small(drives, name):
+    """Bar: under 5 degrees median."""
+    found = [errors(named(name), track) for track in drives]
+    assert torch.cat([e.rotation_deg for e in found]).median() < 5
+
+
+def turned_around(track):
+    """Two neighbours, the first of them turned by 180 degrees."""
+    names, poses = track.scan_names[:2], poses_of(track)[:2]
+    pair = replace(track, scans=track.scans[:2], scan_names=names, T_sensor_object=poses)
+    return half_turned(pair, 0)
+
+
+def found_again(drives, name):
+    """Angles, degrees, by which the scans that were turned around are wrong."""
+    return [float(errors(named(name), turned_around(track)).rotation_deg[0]) for track in drives]
+
+
+def test_local_icp_loses_a_scan_that_is_turned_around(drives):
+    assert min(found_again(drives, "local-icp")) > 150
+
+
+def test_global_icp_finds_most_of_them(drives):
+    """Features do not care how a scan is turned, but now and then they are of the other end."""
+    assert sorted(found_again(drives, "global-icp"))[1] < 10
