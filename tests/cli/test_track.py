@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from wildshape.io.points import read_points
+from wildshape.io.trajectories import read_tum
 
 
 @pytest.fixture(scope="module")
@@ -64,3 +65,23 @@ def test_evaluate_gives_it_a_row(wildshape, store, trained, tmp_path):
     assert "all scans" in rows[f"{trained.name}, track"]["about"]
     assert set(found["risk_coverage"]) == set(rows)
     assert (tmp_path / "found" / "confidence.png").is_file()
+
+
+def test_a_pose_graph_is_another_output_and_wants_scans_used_together(
+    refused, wildshape, first_track, trained, tmp_path
+):
+    order = ("register", first_track, "--out", tmp_path / "out", "--model", trained)
+    assert "--track" in refused(*order, "--refine", "graph")
+    done = wildshape(*order, "--track", "--refine", "graph")
+    assert done.code == 0, done.err
+    folder = tmp_path / "out" / first_track.name
+    times, poses = read_tum(folder / "trajectory.tum")
+    written = np.loadtxt(folder / "poses.txt").reshape(-1, 3, 4)
+    np.testing.assert_allclose(poses.matrix[:, :3], written, atol=1e-5)
+    found = json.loads((folder / "trajectory.json").read_text("utf-8"))
+    assert [row["time"] for row in found["poses"]] == times
+    assert found["smoothness"]["translation_p95_m"] >= 0
+    refused(*order, "--track")
+    fused = ("fuse", first_track, "--out", tmp_path / "fused.ply", "--model", trained)
+    assert "--track" in refused(*fused, "--refine", "graph")
+    assert wildshape(*fused, "--track", "--refine", "graph").code == 0

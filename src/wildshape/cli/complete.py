@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import Positional, arg
 
 from wildshape.cli.importing import uncollected
-from wildshape.cli.options import AsJson, Device, Model, Overwrite, Together, Unit
+from wildshape.cli.options import AsJson, Device, Model, Overwrite, Refine, Together, Unit
 from wildshape.cli.piped import Format, is_pipe
 from wildshape.errors import BadInputError
 
@@ -52,6 +52,7 @@ class Settings:
     unit: Unit = "m"
     device: Device = "auto"
     together: Together = False
+    refine: Refine = "joint"
     mesh: Annotated[bool, arg(help="also write a closed mesh of each shape")] = False
     mesh_format: Annotated[Literal["ply", "obj", "glb"], arg(help="of the meshes")] = "ply"
     mesh_colours: Annotated[
@@ -110,6 +111,7 @@ def _to_folder(settings: Settings, out: Path) -> None:
         unit=settings.unit,
         device=settings.device,
         track=settings.together,
+        refine=settings.refine,
         mesh=_mesh(settings),
         boxes=boxes,
     )

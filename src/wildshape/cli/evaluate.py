@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import arg
 
-from wildshape.cli.options import AsJson, Data, Device, OutFolder, Overwrite, Unit
+from wildshape.cli.options import AsJson, Data, Device, OutFolder, Overwrite, Refine, Unit
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -59,6 +59,7 @@ class Settings:
     max_scans: Annotated[int | None, arg(metavar="N")] = None
     as_seeds: bool = False
     track: bool = False
+    refine: Refine = "joint"
     raw: bool = False
     unit: Unit = "m"
     device: Device = "auto"
@@ -74,12 +75,14 @@ def run(settings: Settings) -> None:
     """
     from wildshape.cli.output import begin, keep_apart
     from wildshape.cli.reading import Reading
+    from wildshape.cli.results import check_refine
     from wildshape.cli.terminal import answer, say_skipped
 
     if settings.seeds < 1:
         raise BadInputError(f"--seeds {settings.seeds}: expected 1 or more.")
     if settings.max_scans is not None and settings.max_scans < 1:
         raise BadInputError(f"--max-scans {settings.max_scans}: expected 1 or more.")
+    check_refine(settings.refine, track=settings.track)
     baselines = choose_baselines(settings.baselines)
     reading = Reading(settings.data, settings.unit)
     _check_truth(reading)
@@ -89,7 +92,7 @@ def run(settings: Settings) -> None:
         settings.out, "evaluate", _identity(settings), FILES, overwrite=settings.overwrite
     )
     pooled = settings.as_seeds and len(models) > 1
-    together = settings.track
+    together = settings.refine if settings.track else None
     evaluated = (
         _pooled(models, together) if pooled else [_rows(models, together)] * _useful_seeds(settings)
     )
@@ -211,7 +214,7 @@ def _useful_seeds(settings: Settings) -> int:
     return settings.seeds
 
 
-def _rows(models: "dict[str, Predictor | Dpc]", together: bool) -> "dict[str, Method]":
+def _rows(models: "dict[str, Predictor | Dpc]", together: Refine | None) -> "dict[str, Method]":
     """A row a model; where asked, one more for whole tracks used together."""
     from wildshape.baselines.dpc import Dpc
     from wildshape.inference.method import Learned, LearnedTrack
@@ -220,11 +223,13 @@ def _rows(models: "dict[str, Predictor | Dpc]", together: bool) -> "dict[str, Me
     for name, model in models.items():
         rows[name] = model if isinstance(model, Dpc) else Learned(model)
         if together and not isinstance(model, Dpc):
-            rows[f"{name}, track"] = LearnedTrack(model)
+            rows[f"{name}, track"] = LearnedTrack(model, together)
     return rows
 
 
-def _pooled(models: "dict[str, Predictor | Dpc]", together: bool) -> "list[dict[str, Method]]":
+def _pooled(
+    models: "dict[str, Predictor | Dpc]", together: Refine | None
+) -> "list[dict[str, Method]]":
     """Each model under our one name, in a run of its own.
 
     Raises:
@@ -268,7 +273,8 @@ def _views(reading: "Reading") -> bool:
 def _identity(settings: Settings) -> dict[str, Any]:
     from wildshape.cli.models import fingerprint
 
-    names = ("baselines", "rotate", "seeds", "max_scans", "as_seeds", "track", "unit")
+    names = ("baselines", "rotate", "seeds", "max_scans", "as_seeds", "track", "unit", "raw")
+    names += ("refine",) if settings.refine != "joint" else ()
     models = [fingerprint(model) for model in settings.model] or [fingerprint(None)]
     chosen = {name: getattr(settings, name) for name in names}
     return {**chosen, "data": str(settings.data.resolve()), "models": models}

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from wildshape.cli.options import AsJson, Device, Model, Overwrite, Together, Unit
+from wildshape.cli.options import AsJson, Device, Model, Overwrite, Refine, Together, Unit
 
 EXAMPLE = "wildshape fuse track --out fused.ply"
 
@@ -26,6 +26,7 @@ class Settings:
     unit: Unit = "m"
     device: Device = "auto"
     together: Together = False
+    refine: Refine = "joint"
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -39,18 +40,22 @@ def run(settings: Settings) -> None:
     from wildshape.cli.models import load_model
     from wildshape.cli.output import refuse_file
     from wildshape.cli.reading import Reading
+    from wildshape.cli.results import check_refine
     from wildshape.cli.terminal import answer, say, say_skipped
     from wildshape.geometry.se3 import stack
     from wildshape.inference.predictor import fuse_scans, to_middle
     from wildshape.io.cloud_writer import check_suffix, write_cloud
 
+    check_refine(settings.refine, track=settings.together)
     check_suffix(settings.out)
     refuse_file(settings.out, overwrite=settings.overwrite)
     reading = Reading(settings.track, settings.unit)
     track = reading.single("fuse")
     predictor = load_model(settings.model, settings.device)
-    complete = predictor.complete_track if settings.together else predictor.complete_many
-    done = list(complete(track.scans, track.sensor))
+    if settings.together:
+        done = predictor.complete_track(track.scans, track.sensor, refine=settings.refine)
+    else:
+        done = list(predictor.complete_many(track.scans, track.sensor))
     fused = fuse_scans(track.scans, to_middle(stack([scan.pose for scan in done])))
     write_cloud(settings.out, fused)
     say_skipped(reading.skipped)

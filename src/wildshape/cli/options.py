@@ -35,6 +35,10 @@ Layout = Annotated[
     Literal["packed", "folders"],
     arg(help="one packed store, or track folders with a file a scan"),
 ]
+Refine = Annotated[
+    Literal["joint", "graph"],
+    arg(help="with --track: all scans onto each other; graph: also each onto its neighbours"),
+]
 Together = Annotated[
     bool, arg(name="track", help="use all scans of a track together: one shape, posed in each")
 ]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, arg
 
 from wildshape.cli.importing import uncollected
-from wildshape.cli.options import AsJson, Device, Model, Overwrite, Together, Unit
+from wildshape.cli.options import AsJson, Device, Model, Overwrite, Refine, Together, Unit
 from wildshape.cli.piped import Format, as_file, is_pipe
 from wildshape.errors import BadInputError
 
@@ -37,7 +37,8 @@ class Settings:
 
     Two scans: prints T_target_source, which takes the source's points to the target's sensor
     frame, and the share of them that then lie near the target. A TRACK: writes
-    DIR/TRACK/poses.txt (T_sensor_canonical), T_middle_scan.txt and objects.json.
+    DIR/TRACK/poses.txt (T_sensor_canonical, KITTI's format), trajectory.tum (the same in TUM's),
+    trajectory.json (the same with smoothness figures), T_middle_scan.txt and objects.json.
     """
 
     source: Source
@@ -47,6 +48,7 @@ class Settings:
     unit: Unit = "m"
     device: Device = "auto"
     together: Together = False
+    refine: Refine = "joint"
     format: Format = "auto"
     overwrite: Overwrite = False
     json: AsJson = False
@@ -86,6 +88,7 @@ def _tracks(settings: Settings, out: Path) -> None:
         unit=settings.unit,
         device=settings.device,
         track=settings.together,
+        refine=settings.refine,
     )
     perform(work, overwrite=settings.overwrite, as_json=settings.json)
 

@@ -9,6 +9,7 @@ import json
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -22,20 +23,24 @@ from wildshape.cli.terminal import answer, duration, progress, say, say_skipped
 from wildshape.errors import BadInputError
 from wildshape.geometry.se3 import stack
 from wildshape.inference.predictor import Predictor, to_middle
+from wildshape.inference.track import Refine
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import reading as reading_file
 from wildshape.io.mesh_writer import MESH_FORMATS, MeshOrder, write_mesh
 from wildshape.io.points import write_ply
 from wildshape.io.tracks import write_poses
+from wildshape.io.trajectories import times_of, write_trajectory, write_tum
 from wildshape.records import Completion, Track
 
 OBJECTS, POSES, COMPLETED, MIDDLE = "objects.json", "poses.txt", "completed", "T_middle_scan.txt"
-MESH = "mesh"
+MESH, TUM, TRAJECTORY = "mesh", "trajectory.tum", "trajectory.json"
 FILES = (
     f"*/{COMPLETED}/*.ply",
     *(f"*/{MESH}/*.{kind}" for kind in MESH_FORMATS),
     f"*/{POSES}",
     f"*/{MIDDLE}",
+    f"*/{TUM}",
+    f"*/{TRAJECTORY}",
     f"*/{OBJECTS}",
     *BOX_FILES,
 )
@@ -55,6 +60,7 @@ class Work:
         track: use all scans of a track together.
         mesh: also write a closed mesh of each shape, in this way.
         boxes: also write all boxes, in this way.
+        refine: how the poses of scans used together are refined.
     """
 
     command: Literal["complete", "register"]
@@ -66,12 +72,14 @@ class Work:
     track: bool = False
     mesh: MeshOrder | None = None
     boxes: BoxOrder = field(default_factory=BoxOrder)
+    refine: Refine = "joint"
 
     def identity(self) -> dict[str, Any]:
         """What decides the output's content."""
         source = str(self.input.resolve())
         found = {"input": source, "unit": self.unit, "model": fingerprint(self.model)}
         uses = {"uses": "track"} if self.track else {}
+        uses |= {"refine": self.refine} if self.refine != "joint" else {}
         mesh = {"mesh": self.mesh.kind} if self.mesh else {}
         colours = {"mesh_colours": "confidence"} if self.mesh and self.mesh.coloured else {}
         return {**found, **uses, **mesh, **colours, **self.boxes.identity()}
@@ -83,6 +91,7 @@ def perform(work: Work, *, overwrite: bool, as_json: bool) -> None:
     Raises:
         BadInputError: input, model or output cannot be used.
     """
+    check_refine(work.refine, track=work.track)
     began = time.monotonic()
     reading = Reading(work.input, work.unit)
     predictor = load_model(work.model, work.device)
@@ -96,6 +105,7 @@ def perform(work: Work, *, overwrite: bool, as_json: bool) -> None:
             registers=work.command == "register",
             together=work.track,
             mesh=work.mesh,
+            refine=work.refine,
         )
     except BadInputError:
         output.abandon()
@@ -103,6 +113,16 @@ def perform(work: Work, *, overwrite: bool, as_json: bool) -> None:
     work.boxes.write(work.out)
     output.finish(skipped=tally.skipped)
     _conclude(work, tally, reading, time.monotonic() - began, as_json)
+
+
+def check_refine(refine: Refine, *, track: bool) -> None:
+    """Refuse a way to refine that would do nothing.
+
+    Raises:
+        BadInputError: the scans are not used together.
+    """
+    if refine != "joint" and not track:
+        raise BadInputError(f"--refine {refine}: is for scans used together; pass --track, too.")
 
 
 def _conclude(work: Work, tally: Tally, reading: Reading, seconds: float, as_json: bool) -> None:
@@ -137,6 +157,7 @@ def write_results(
     registers: bool = False,
     together: bool = False,
     mesh: MeshOrder | None = None,
+    refine: Refine = "joint",
 ) -> Tally:
     """Complete every scan of every track and write the results, track after track.
 
@@ -147,6 +168,7 @@ def write_results(
         registers: write `T_middle_scan` instead of the completed shapes.
         together: complete from all scans of a track, not from each on its own.
         mesh: also write a closed mesh of each shape, in this way.
+        refine: how the poses of scans used together are refined.
 
     Raises:
         BadInputError: nothing can be used, or a name cannot be that of a file.
@@ -170,7 +192,14 @@ def write_results(
             at = lambda text, index=index: bar.at(index, text)  # noqa: E731
             folder = output.path / file_name(track.name)
             scans = complete_track(
-                track, predictor, folder, at, registers=registers, together=together, mesh=mesh
+                track,
+                predictor,
+                folder,
+                at,
+                registers=registers,
+                together=together,
+                mesh=mesh,
+                refine=refine,
             )
             described = _objects(track, scans, reading, predictor, together=together)
             write_json(folder / OBJECTS, described)
@@ -189,10 +218,12 @@ def complete_track(
     registers: bool = False,
     together: bool = False,
     mesh: MeshOrder | None = None,
+    refine: Refine = "joint",
 ) -> list[Completion]:
     """Complete the scans of a track, writing each into its folder; all but `objects.json`."""
     found: list[Completion] = []
-    complete = predictor.complete_track if together else predictor.complete_many
+    whole = partial(predictor.complete_track, refine=refine)
+    complete = whole if together else predictor.complete_many
     for done in complete(track.scans, track.sensor):
         name = file_name(track.scan_names[len(found)])
         if not registers:
@@ -206,6 +237,8 @@ def complete_track(
     write_poses(folder / POSES, poses)
     if registers:
         write_poses(folder / MIDDLE, to_middle(poses))
+        write_tum(folder / TUM, poses, times_of(track.scan_names))
+        write_trajectory(folder / TRAJECTORY, poses, track.scan_names)
     return found
 
 

@@ -5,9 +5,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from wildshape.geometry.se3 import SE3
-from wildshape.inference.predictor import Predictor
-from wildshape.records import Box, Points, Sensor
+from wildshape.geometry.se3 import SE3, stack
+from wildshape.inference.predictor import Predictor, to_middle
+from wildshape.inference.track import Refine
+from wildshape.records import Box, Completion, Points, Sensor
 
 
 @dataclass(frozen=True)
@@ -71,14 +72,17 @@ class LearnedTrack:
 
     Attributes:
         predictor: does the work.
+        refine: how the poses are made to fit each other.
     """
 
     predictor: Predictor
+    refine: Refine = "joint"
 
     @property
     def about(self) -> str:
         """What sets this row apart."""
-        return "poses and shape from all scans of the track together"
+        graph = ", laid on their neighbours by a pose graph" if self.refine == "graph" else ""
+        return f"poses and shape from all scans of the track together{graph}"
 
     def complete(self, points: Points, sensor: Sensor) -> Points:
         """One scan is a track of one.
@@ -94,7 +98,7 @@ class LearnedTrack:
         Raises:
             BadInputError: one of them has fewer than 16 finite points.
         """
-        return [done.points for done in self.predictor.complete_track(scans, sensor)]
+        return [done.points for done in self._completed(scans, sensor)]
 
     def complete_surely(self, scans: list[Points], sensor: Sensor) -> list[tuple[Points, float]]:
         """`complete_many`, with the confidence in each, 0 to 1.
@@ -102,7 +106,7 @@ class LearnedTrack:
         Raises:
             BadInputError: one of them has fewer than 16 finite points.
         """
-        done = self.predictor.complete_track(scans, sensor)
+        done = self._completed(scans, sensor)
         return [(item.points, item.confidence) for item in done]
 
     def complete_boxed(
@@ -113,7 +117,7 @@ class LearnedTrack:
         Raises:
             BadInputError: one of them has fewer than 16 finite points.
         """
-        done = self.predictor.complete_track(scans, sensor)
+        done = self._completed(scans, sensor)
         return [(item.points, item.confidence, item.box) for item in done]
 
     def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:
@@ -122,4 +126,7 @@ class LearnedTrack:
         Raises:
             BadInputError: a scan has fewer than 16 finite points.
         """
-        return self.predictor.register_track(scans, sensor, track=True)
+        return to_middle(stack([done.pose for done in self._completed(scans, sensor)]))
+
+    def _completed(self, scans: Sequence[Points], sensor: Sensor) -> list[Completion]:
+        return self.predictor.complete_track(scans, sensor, refine=self.refine)

@@ -21,7 +21,7 @@ from wildshape.inference.compiled import compiled
 from wildshape.inference.facts import facts_of, seen_facts
 from wildshape.inference.prepare import NetworkInput, as_points, extent, in_order, network_input
 from wildshape.inference.refine import denser, refine
-from wildshape.inference.track import complete_together
+from wildshape.inference.track import Refine, complete_together
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.models.checkpoint import ModelSettings, load_checkpoint
 from wildshape.models.confidence import Facts
@@ -113,19 +113,20 @@ class Predictor:
             yield from (replace(item, seconds=seconds) for item in done)
 
     def complete_track(
-        self, scans: Sequence[object], sensor: Sensor | None = None
+        self, scans: Sequence[object], sensor: Sensor | None = None, *, refine: Refine = "joint"
     ) -> list[Completion]:
         """One shape from all scans of a track, in time order, posed in each of them.
 
         Headings are voted, poses refined against each other (`Completion.refined`), and the shape
-        is drawn to what the scans saw (`inference/track.py`).
+        is drawn to what the scans saw (`inference/track.py`, where `refine` is explained).
 
         Raises:
             BadInputError: a scan is not `(n, 3)`, or has fewer than 16 finite points.
         """
         clouds = [as_points(scan, f"scan {i}") for i, scan in enumerate(scans)]
         began = time.perf_counter()
-        done = complete_together(list(self.complete_many(clouds, sensor)), clouds, self.settings)
+        alone = list(self.complete_many(clouds, sensor))
+        done = complete_together(alone, clouds, self.settings, refine=refine)
         seconds = (time.perf_counter() - began) / max(len(done), 1)
         return [replace(item, seconds=seconds) for item in done]
 

@@ -7,7 +7,7 @@ Nothing but the scans and what the network said of each is used.
 """
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import torch
@@ -19,6 +19,7 @@ from wildshape.geometry.outliers import voxel_thin
 from wildshape.geometry.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
 from wildshape.inference.joint import FINE, refine_jointly
+from wildshape.inference.pose_graph import refine_by_graph
 from wildshape.inference.prepare import network_input
 from wildshape.inference.refine import denser
 from wildshape.inference.voting import half_turn, likeness_of_next, voted_signs
@@ -30,6 +31,10 @@ from wildshape.records import Completion, Points
 _BATCH, _MOST_POINTS, _VOTING_POINTS = 32, 4096, 192
 _VOXEL_M, _REACH_M, _STIFFNESS = 0.08, 0.12, 0.2
 _WITHIN_M, _WITHIN_RAD = 1.5, 0.6
+
+
+Refine = Literal["joint", "graph"]
+"""All scans onto each other at once; or, before and after that, each onto its neighbours."""
 
 
 class TrackFit(NamedTuple):
@@ -46,7 +51,11 @@ class TrackFit(NamedTuple):
 
 @torch.inference_mode()
 def complete_together(
-    done: list[Completion], scans: list[Points], settings: ModelSettings
+    done: list[Completion],
+    scans: list[Points],
+    settings: ModelSettings,
+    *,
+    refine: Refine = "joint",
 ) -> list[Completion]:
     """Completions of a track's single scans made those of one object.
 
@@ -54,13 +63,14 @@ def complete_together(
         done: each scan on its own.
         scans: of one rigid object, in time order, sensor frames.
         settings: of the network that completed them.
+        refine: how the poses are made to fit each other.
     """
     if len(done) < 2:
         return done
     weights = torch.tensor([max(item.confidence, 1e-3) for item in done], dtype=torch.float64)
     shape = _mean_shape(done, weights, settings.network.points)
     voted = _voted(stack([item.pose for item in done]), shape, weights, scans, settings)
-    fit = refine_checked(scans, voted, mirror=settings.network.mirror)
+    fit = refine_checked(scans, voted, mirror=settings.network.mirror, refine=refine)
     shape = drawn_to(shape, _seen(scans, fit.T_sensor_object, settings.network.mirror))
     fitted = _box(shape, scans, fit.T_sensor_object, mirror=settings.network.mirror)
     whole = torch.from_numpy(denser(shape.numpy())) if settings.facing else shape
@@ -146,10 +156,14 @@ def track_cost(
     return torch.cat(found).double()
 
 
-def refine_checked(scans: list[Points], voted: SE3, *, mirror: bool) -> TrackFit:
-    """Joint refinement, kept only if the scans then lie nearer to each other, and near the vote."""
-    refined = refine_jointly(scans, voted, mirror=mirror)
+def refine_checked(
+    scans: list[Points], voted: SE3, *, mirror: bool, refine: Refine = "joint"
+) -> TrackFit:
+    """Refined poses, kept only if the scans then lie nearer to each other, and near the vote."""
+    refined = refine_by_graph(scans, voted) if refine == "graph" else voted
+    refined = refine_jointly(scans, refined, mirror=mirror)
     refined = refine_jointly(scans, refined, mirror=False, schedule=FINE)
+    refined = refine_by_graph(scans, refined) if refine == "graph" else refined
     moved = voted.inverse() @ refined
     near = bool((moved.angle() < _WITHIN_RAD).all())
     near = near and bool((moved.translation.norm(dim=-1) < _WITHIN_M).all())
