@@ -88,8 +88,7 @@ def toy(options: argparse.Namespace) -> DpcRecipe:
 def right_share(method: Dpc, trained: Track, tested: Track) -> dict[str, float]:
     """How many rotations of the tested views are right, in the frame that suits those known."""
     known, found = (canonical(method, track) for track in (trained, tested))
-    close = torch.rad2deg(rotation_angle(known[:, None].mT @ known[None])) < CLOSE_DEG
-    aligned = torch.rad2deg(rotation_angle(known[close.sum(1).argmax()].mT @ found))
+    aligned = torch.rad2deg(rotation_angle(most(known).mT @ found))
     pairs = torch.rad2deg(rotation_angle(found[:, None].mT @ found[None]))
     return {
         "aligned_within_15": float((aligned < CLOSE_DEG).double().mean()),
@@ -98,6 +97,14 @@ def right_share(method: Dpc, trained: Track, tested: Track) -> dict[str, float]:
         "aligned_opposed": float((aligned > 120).double().mean()),
         "pairs_within_15": float((pairs < CLOSE_DEG).double().mean()),
     }
+
+
+def most(rotations: torch.Tensor) -> torch.Tensor:
+    """The mean of those within 15 degrees of the one that has most others so near, `(3, 3)`."""
+    close = torch.rad2deg(rotation_angle(rotations[:, None].mT @ rotations[None])) < CLOSE_DEG
+    mean = rotations[close[close.sum(1).argmax()]].mean(0)
+    left, _, right = torch.linalg.svd(mean)
+    return left @ torch.diag(left.new_tensor((1, 1, torch.det(left @ right).item()))) @ right
 
 
 def canonical(method: Dpc, track: Track) -> torch.Tensor:
@@ -189,7 +196,7 @@ def give_shape(run: DpcRun, shape: Points) -> None:
 def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--preset", choices=("dpc-small", "dpc-dagger-small"), default="dpc-small")
-    parser.add_argument("--steps", type=int, default=2400)
+    parser.add_argument("--steps", type=int, default=3000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--depth", type=float, default=4.0, help="weight of the depth image")
     parser.add_argument("--half-turn", action=argparse.BooleanOptionalAction, default=True)
