@@ -6,8 +6,10 @@ python .ci/smoke.py native|pure SCAN
 """
 
 import json
+import shutil
 import subprocess
 import sys
+import sysconfig
 import tempfile
 from importlib.metadata import distribution
 from pathlib import Path
@@ -19,9 +21,10 @@ from wildshape.ops.library import library
 
 def wildshape_command(*arguments: object) -> str:
     """What the installed command prints."""
-    folder = Path(sys.executable).parent
-    words = [folder / "wildshape", *arguments]
-    run = subprocess.run([str(w) for w in words], check=True, capture_output=True, text=True)
+    program = shutil.which("wildshape", path=sysconfig.get_path("scripts"))
+    assert program, "the command is not installed"
+    words = [program, *map(str, arguments)]
+    run = subprocess.run(words, check=True, capture_output=True, text=True)
     return run.stdout
 
 
