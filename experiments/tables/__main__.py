@@ -24,7 +24,7 @@ from experiments.tables import (
     views,
 )
 from experiments.tables.given import Given
-from experiments.tables.make import chosen_rows, draw, make
+from experiments.tables.make import chosen_protocols, chosen_rows, draw, make
 from experiments.tables.size import SIZES
 from experiments.tables.train import Workshop
 
@@ -82,6 +82,7 @@ class Settings:
         kitti: KITTI raw, the folder above the dates.
         device: of trainings and predictions.
         rows: only rows whose names hold one of these, with commas.
+        rotate: only these input protocols (none, yaw, so3), with commas.
     """
 
     table: Annotated[Name, tyro.conf.Positional]
@@ -92,6 +93,7 @@ class Settings:
     kitti: Path | None = None
     device: Literal["auto", "cpu", "cuda"] = "auto"
     rows: str = ""
+    rotate: str = ""
 
 
 def main(settings: Settings, command: str) -> None:
@@ -102,9 +104,13 @@ def main(settings: Settings, command: str) -> None:
     if settings.table in FIGURES:
         print(draw(shop, given, FIGURES[settings.table], name, results))
         return
-    words = tuple(word.strip() for word in settings.rows.split(",") if word.strip())
-    table = chosen_rows(TABLES[settings.table](given), words)
+    table = chosen_rows(TABLES[settings.table](given), _words(settings.rows))
+    table = chosen_protocols(table, _words(settings.rotate))
     print(make(shop, given, table, name, results))
+
+
+def _words(text: str) -> tuple[str, ...]:
+    return tuple(word.strip() for word in text.split(",") if word.strip())
 
 
 if __name__ == "__main__":

@@ -96,6 +96,25 @@ def chosen_rows(table: Table, words: tuple[str, ...]) -> Table:
     return replace(table, blocks=kept, notes=(*table.notes, note))
 
 
+def chosen_protocols(table: Table, names: tuple[str, ...]) -> Table:
+    """The table under those input protocols only.
+
+    Raises:
+        BadInputError: no block is measured under one of them.
+    """
+    if not names:
+        return table
+    blocks = [
+        replace(block, rotate=tuple(one for one in block.rotate if one in names))
+        for block in table.blocks
+    ]
+    kept = tuple(block for block in blocks if block.rotate)
+    if not kept:
+        raise BadInputError(f"--rotate {','.join(names)}: this table has no such protocol.")
+    note = f"Only under {' and '.join(names)}."
+    return replace(table, blocks=kept, notes=(*table.notes, note))
+
+
 def make(shop: Workshop, given: Given, table: Table, name: str, results: Path) -> str:
     """Make a table and write NAME.md and NAME.json; returns the markdown."""
     parts = Making(shop, given, table).parts()

@@ -17,6 +17,7 @@ from wildshape.cli.models import choose_device, fingerprint, load_model
 from wildshape.cli.reading import Reading
 from wildshape.cli.terminal import say
 from wildshape.errors import MissingExtraError
+from wildshape.evaluation.boxes import BoxScore
 from wildshape.evaluation.method import Method
 from wildshape.evaluation.metrics import CompletionError
 from wildshape.evaluation.results import (
@@ -81,10 +82,12 @@ def _mark(row: Row, model: Model | None) -> str:
 
 
 def _method(shop: Workshop, row: Row, model: Model | None) -> Method | None:
+    """What is measured; of trained rows the network's own answers, not refined against the scan."""
     if model is not None and is_dpc(model.path):
         return dpc.load(model.path, choose_device(shop.device))
     if isinstance(row, Shipped) or model is not None:
-        return Learned(load_model(None if model is None else model.path, shop.device))
+        path = None if model is None else model.path
+        return Learned(load_model(path, shop.device, raw=isinstance(row, Trained)))
     try:
         return baseline(row.name)
     except MissingExtraError as error:
@@ -109,9 +112,10 @@ def _scores(kept: dict[str, Any]) -> MethodScores:
 
 
 def _completion(row: dict[str, Any]) -> CompletionScore:
-    partial = row["error_partial"]
+    partial, box = row["error_partial"], row.get("box")
     errors = {
         "error": CompletionError(**row["error"]),
         "error_partial": None if partial is None else CompletionError(**partial),
+        "box": None if box is None else BoxScore(**box),
     }
     return CompletionScore(**{**row, **errors})

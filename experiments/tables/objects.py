@@ -84,7 +84,7 @@ def _examples(shop: Workshop, block: Block, best: Measured, most: int | None) ->
         (track for _, track in Reading(store_of(shop.folder, block.test)).tracks()),
         best.results,
         best.results.methods[0].name,
-        Learned(load_model(model, shop.device)),
+        Learned(load_model(model, shop.device, raw=model is not None)),
         max_scans=most,
         rival=LocalIcp(),
     )

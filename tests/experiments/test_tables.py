@@ -15,10 +15,12 @@ from experiments.tables.measure import Measured, as_results  # pyright: ignore
 from experiments.tables.size import SIZES, sized  # pyright: ignore
 from experiments.tables.table import Trained  # pyright: ignore
 from experiments.tables.tsne import tsne  # pyright: ignore
+from PIL import Image
 from tests.cars import drive_by
 
 from wildshape.baselines.identity import Identity, OneScan
 from wildshape.errors import BadInputError
+from wildshape.evaluation.boxes import BoxScore
 from wildshape.evaluation.protocol import run
 from wildshape.evaluation.results import Results, figures_of
 from wildshape.training.recipes import PRESETS, paper_lidar
@@ -64,6 +66,21 @@ def test_seeds_table_finds_what_is_trained_and_measured(folder, monkeypatch):
     assert first["parts"][0]["methods"] == second["parts"][0]["methods"]
 
 
+def test_figures_of_objects_and_codes(folder):
+    """Of the same training; the objects are the best, the median and the worst of those tested."""
+    for name in ("objects", "codes"):
+        main(Settings(name, "test", folder), "the command")
+        with Image.open(folder / f"{name}-test.webp") as picture:
+            assert min(picture.size) > 300
+    made = json.loads((folder / "objects-test.json").read_text("utf-8"))
+    assert "selected without labels" in made["method"]
+    errors = [made["objects"][label]["cd_m"] for label in ("best", "median", "worst")]
+    assert errors == sorted(errors)
+    assert errors[0] < errors[2]
+    places = json.loads((folder / "codes-test.json").read_text("utf-8"))["places"]
+    assert len(places) == SIZES["test"].test
+
+
 @pytest.mark.parametrize("size", SIZES.values(), ids=SIZES)
 @pytest.mark.parametrize("name", TABLES)
 def test_tables_as_declared(name, size):
@@ -89,6 +106,15 @@ def test_rows_that_are_not_there():
         make.chosen_rows(table, ("nothing",))
 
 
+def test_protocols_that_are_chosen_and_that_are_not_there():
+    table = TABLES["vehicle"](Given(SIZES["tiny"]))
+    chosen = make.chosen_protocols(table, ("yaw",))
+    assert [block.rotate for block in chosen.blocks] == [("yaw",)]
+    assert make.chosen_protocols(table, ()) == table
+    with pytest.raises(BadInputError, match="protocol"):
+        make.chosen_protocols(table, ("upside-down",))
+
+
 def test_size_keeps_what_is_minimised():
     recipe = paper_lidar()
     tiny = sized(recipe, SIZES["tiny"])
@@ -102,6 +128,9 @@ def test_size_keeps_what_is_minimised():
 def test_scores_are_read_as_they_were_written():
     tracks = [drive_by(scans=3, points=60), replace(drive_by(scans=2, points=60), shape=None)]
     found = run({"scan": OneScan(), "identity": Identity()}, tracks, "yaw", 3)
+    scan, identity = found.methods
+    boxed = tuple(replace(row, box=BoxScore(0.5, 12.0)) for row in scan.completions)
+    found = replace(found, methods=(replace(scan, completions=boxed), identity))
     assert as_results(json.loads(json.dumps(asdict(found)))) == found
 
 
