@@ -48,7 +48,7 @@ def test_the_candidates_start_apart():
 @pytest.mark.parametrize("volume", [PinholeVolume(1.5, 1.2, 2.0), PolarVolume(8.0)])
 def test_a_checkpoint_holds_all_of_it(volume, tmp_path):
     network, _, _ = looked(replace(TINY, volume=volume, reach=0.1))
-    settings = DpcSettings(network.config, "dpc-dagger", 0.5, {"seed": 3})
+    settings = DpcSettings(network.config, "dpc-dagger", 0.5, {"seed": 3}, half_turn=True)
     save_dpc(tmp_path / "dpc.safetensors", network, settings)
     assert is_dpc(tmp_path / "dpc.safetensors")
     again, found = load_dpc(tmp_path / "dpc.safetensors")

@@ -177,3 +177,7 @@ def test_what_dpc_cannot_see_it_refuses(camera_method, lidar_method, planes, car
 def test_the_row_says_what_it_is_given(camera_method, lidar_method):
     assert "IS GIVEN the camera's distance (2)" in camera_method.about
     assert "cube of 6 m, radial offset" in lidar_method.about
+    assert "half turns" not in camera_method.about
+    helped = replace(camera_method.settings, depth=4.0, half_turn=True)
+    told = replace(camera_method, settings=helped).about
+    assert "trained on silhouettes and depths, half turns tried;" in told

@@ -58,6 +58,7 @@ class Dpc:
         """What it is, and what it is told that other rows are not."""
         volume = self.settings.network.volume
         lost = "silhouettes and depths" if self.settings.depth else "silhouettes"
+        lost += ", half turns tried" if self.settings.half_turn else ""
         made = f"our port of DPC ({self.settings.name}), trained on {lost}"
         if not isinstance(volume, PinholeVolume):
             return f"{made}; range images, cube of {volume.scale:g} m, radial offset of the scan"

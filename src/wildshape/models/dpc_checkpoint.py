@@ -28,12 +28,14 @@ class DpcSettings:
         name: of its preset.
         depth: weight of the depth image in training; 0: silhouettes alone.
         provenance: command, commit, data, hardware, seed, steps.
+        half_turn: whether half turns were tried beside the best candidate in training.
     """
 
     network: DpcConfig
     name: str = "dpc"
     depth: float = 0.0
     provenance: dict[str, Any] = field(default_factory=dict)
+    half_turn: bool = False
 
 
 def is_dpc(path: Path) -> bool:

@@ -143,8 +143,8 @@ def _take(run: DpcRun, objective: DpcObjective, meter: Meter) -> None:
 def _save(run: DpcRun) -> None:
     """The checkpoint and the state."""
     provenance = {**run.provenance, "steps": run.state.step, "seed": run.seed}
-    recipe = run.recipe
-    settings = DpcSettings(recipe.network, recipe.name, recipe.loss.depth, provenance)
+    recipe, loss = run.recipe, run.recipe.loss
+    settings = DpcSettings(recipe.network, recipe.name, loss.depth, provenance, loss.half_turn)
     save_dpc(run.folder / MODEL, run.state.mean, settings)
     save_state(run.folder, run.state, run.identity)
 
