@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MOST, _DRAWN, _WIDTH = 200, 400, 0.07
+_MOST, _DRAWN, _WIDTH, _WIDEST = 200, 400, 0.07, 0.2
 
 
 def draw(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
@@ -61,16 +61,17 @@ def _picture(places: np.ndarray, shapes: list[np.ndarray]) -> Figure:
     ax = figure.add_axes((0, 0, 1, 1))
     ax.set_axis_off()
     low, high = places.min(0), places.max(0)
+    width = min(_WIDEST, _WIDTH * (_MOST / len(shapes)) ** 0.5)
     for place, shape in zip((places - low) / (high - low), shapes, strict=True):
-        _thumbnail(ax, place, shape)
-    ax.set_xlim(-0.06, 1.06)
-    ax.set_ylim(-0.06, 1.06)
+        _thumbnail(ax, place, shape, width)
+    ax.set_xlim(-0.8 * width, 1 + 0.8 * width)
+    ax.set_ylim(-0.8 * width, 1 + 0.8 * width)
     return figure
 
 
-def _thumbnail(ax: Axes, place: np.ndarray, shape: np.ndarray) -> None:
+def _thumbnail(ax: Axes, place: np.ndarray, shape: np.ndarray, width: float) -> None:
     """The true shape from the fixed viewpoint, the same width for every object."""
     seen = project(shape[:: max(1, len(shape) // _DRAWN)])
     seen = seen[np.argsort(seen[:, 2])]
-    x, y = (place + seen[:, :2] * _WIDTH / np.ptp(seen[:, 0])).T
-    ax.scatter(x, y, c=seen[:, 2], s=1.0, cmap="viridis", linewidths=0)
+    x, y = (place + seen[:, :2] * width / np.ptp(seen[:, 0])).T
+    ax.scatter(x, y, c=seen[:, 2], s=20 * width, cmap="viridis", linewidths=0)

@@ -85,7 +85,8 @@ def _draw_cloud(ax: Axes, cloud: Points, heights: tuple[float, float]) -> None:
     height = cloud[::step, 2][order]
     x, y = seen[order, 0], seen[order, 1]
     low, high = heights
-    ax.scatter(x, y, c=height, s=1.6, cmap="viridis", vmin=low, vmax=high, linewidths=0)
+    dot = 1.6 * min(4.0, max(1.0, math.sqrt(_MAX_DRAWN / max(1, len(cloud)))))  # few are larger
+    ax.scatter(x, y, c=height, s=dot, cmap="viridis", vmin=low, vmax=high, linewidths=0)
 
 
 def draw_errors(results: Results) -> Figure:
