@@ -3,8 +3,9 @@
 """A closed mesh around a completed shape, in its canonical frame.
 
 The points are swollen until they touch, what is hidden from five of the six sides is filled (a
-LiDAR never sees an underside), and the solid is worn down again by as much as it was swollen. Its
-surface is a level set, which marching cubes closes whatever the points are.
+LiDAR never sees an underside), and the solid is worn down again by as much as it was swollen: until
+its surface lies in the middle of the points around, which are a layer, not a sheet. That surface is
+a level set, which marching cubes closes whatever the points are.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -23,7 +24,9 @@ _CELLS = 96  # along the longest side
 _REACH = 0.05  # of the longest side: what lies closer than twice that is joined
 _SIDES = 5
 _SMALLEST_BODY = 0.01  # of all cells inside
-_MARGIN, _BAND = 3, 4  # cells
+_MARGIN, _BAND = 3, 10  # cells
+_AROUND, _ROUNDS = 0.02, 2  # of the longest side
+_FEW = 0.02  # of the densest place: where there are fewer points, none are followed
 
 
 class _Grid(NamedTuple):
@@ -54,6 +57,7 @@ def closed_mesh(points: Float[np.ndarray, "n 3"]) -> "trimesh.Trimesh":
     grid = _grid_around(points, extent / _CELLS, reach)
     depth = _depth(points, grid, reach, march)
     level = float(np.median(_interpolate(depth, grid, points)))
+    depth = _centred(depth, grid, points, level)
     vertices, faces, *_ = march(_large_bodies(depth, level), level, gradient_direction="ascent")
     return trimesh.Trimesh(vertices * grid.step + grid.start, faces, process=False)
 
@@ -91,6 +95,24 @@ def _depth(points: np.ndarray, grid: _Grid, reach: float, march) -> np.ndarray:
     # Counted in cells near the surface that is sought would be stairs.
     close = solid & (np.abs(depth - reach) < _BAND * grid.step)
     depth[close] = _distance(grid.places[close], skin * grid.step + grid.start)
+    return depth
+
+
+def _centred(depth: np.ndarray, grid: _Grid, points: np.ndarray, level: float) -> np.ndarray:
+    """The same with the points as deep as `level` in the mean of every neighbourhood."""
+    from scipy.ndimage import gaussian_filter
+
+    width = _AROUND * float(np.ptp(points, axis=0).max()) / grid.step
+    cells = tuple(np.rint((points - grid.start) / grid.step).astype(int).T)
+    number = np.zeros(depth.shape)
+    np.add.at(number, cells, 1.0)
+    number = gaussian_filter(number, width)
+    few = _FEW * float(number.max())
+    for _ in range(_ROUNDS):
+        deeper = np.zeros(depth.shape)
+        np.add.at(deeper, cells, _interpolate(depth, grid, points) - level)
+        shift = gaussian_filter(deeper, width) / (number + few)
+        depth = np.where(depth > 0, np.maximum(depth - shift, 0.0), 0.0)
     return depth
 
 
