@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MOST, _DRAWN, _WIDTH, _WIDEST = 200, 400, 0.07, 0.2
+_MOST, _DRAWN, _WIDTH, _WIDEST = 200, 400, 0.07, 0.1
 
 
 def draw(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
