@@ -143,8 +143,8 @@ def _detections(out: Path) -> "list[Detection]":
                 track_number=number,
                 scan=scan["scan"],
                 scan_number=number_of(scan["scan"], place),
-                category=track["category"],
-                sensor=track["sensor"],
+                category=track.get("category", ""),
+                sensor=track.get("sensor", "lidar"),
                 score=scan["confidence"],
                 box=Box(**{name: tuple(part) for name, part in scan["box"].items()}),
             )

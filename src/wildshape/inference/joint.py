@@ -20,7 +20,7 @@ from wildshape.ops.nearest import nearest
 from wildshape.records import Points
 
 _NARROWER = 0.75
-_STEP, _RIDGE = 0.8, 1e-3
+_STEP, _RIDGE, _BLOCK = 0.8, 1e-3, 2048
 _NORMAL_M, _AWAY_M = 0.35, 1e4
 
 
@@ -39,7 +39,7 @@ class Schedule(NamedTuple):
 
     rounds: int = 10
     points: int = 128
-    most: int = 65_536
+    most: int = 16_384
     widest_m: float = 0.5
     narrowest_m: float = 0.06
     normal_m: float = _NORMAL_M
@@ -102,15 +102,22 @@ def surface_normals(
     points: Float[Tensor, "n 3"], radius: float = _NORMAL_M
 ) -> Float[Tensor, "n 3"]:
     """Unit normals: the direction in which the neighbourhood, `radius` metres, is thinnest."""
-    squared = points.square().sum(-1)
-    distance = torch.addmm(squared[:, None] + squared, points, points.T, alpha=-2)
-    weight = distance.div_(-(radius**2)).add_(1).relu_().square_()
     products = (points[:, :, None] * points[:, None]).flatten(1)
-    ones = torch.ones_like(points[:, :1])
-    sums = weight @ torch.cat((ones, points, products), dim=1)
+    moments = torch.cat((torch.ones_like(points[:, :1]), points, products), dim=1)
+    blocks = points.split(_BLOCK)
+    sums = torch.cat([_weight(block, points, radius) @ moments for block in blocks])
     mean, second = sums[:, 1:4] / sums[:, :1], (sums[:, 4:] / sums[:, :1]).view(-1, 3, 3)
     covariance = second - mean[:, :, None] * mean[:, None]
     return torch.linalg.eigh(covariance).eigenvectors[:, :, 0]
+
+
+def _weight(
+    block: Float[Tensor, "b 3"], points: Float[Tensor, "n 3"], radius: float
+) -> Float[Tensor, "b n"]:
+    """How much each point counts in the neighbourhood of each of a block's."""
+    squared = (points.square().sum(-1), block.square().sum(-1)[:, None])
+    distance = torch.addmm(squared[1] + squared[0], block, points.T, alpha=-2)
+    return distance.div_(-(radius**2)).add_(1).relu_().square_()
 
 
 def _moved(
