@@ -13,7 +13,6 @@ the page.
 
 import json
 import runpy
-import signal
 import subprocess
 import sys
 import time
@@ -119,7 +118,7 @@ def main() -> None:
         found = pauses(tab, 60 if arguments.small else SCANS)
         if arguments.picture:
             save(arguments.picture, tab.shot())
-        viewer.send_signal(signal.SIGINT)
+        viewer.terminate()
         viewer.wait()
     start = {"page served": [1e3 * served], "first picture": [1e3 * drawn]}
     outcome.add(f"start, {SCANS} scans", start)

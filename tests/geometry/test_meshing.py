@@ -59,5 +59,7 @@ def test_completions_close(cars):
     assert mesh.volume > 0
     box = np.asarray(done.box.centre)
     assert np.linalg.norm(mesh.bounds.mean(0) - box) < 0.5
-    apart, _ = KDTree(mesh.vertices).query(done.points)
-    assert np.median(apart) < 0.05
+    assert mesh.body_count == 1, "bubbles or crumbs"
+    apart, _ = KDTree(mesh.sample(20_000, seed=0)).query(done.points)
+    assert np.median(apart) < 0.03
+    assert np.quantile(apart, 0.95) < 0.09

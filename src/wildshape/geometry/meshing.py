@@ -25,7 +25,7 @@ _REACH = 0.05  # of the longest side: what lies closer than twice that is joined
 _SIDES = 5
 _SMALLEST_BODY = 0.01  # of all cells inside
 _MARGIN, _BAND = 3, 10  # cells
-_AROUND, _ROUNDS = 0.02, 2  # of the longest side
+_AROUND, _ROUNDS = 0.015, 3  # of the longest side
 _FEW = 0.02  # of the densest place: where there are fewer points, none are followed
 
 
@@ -140,10 +140,12 @@ def _interpolate(field: np.ndarray, grid: _Grid, points: np.ndarray) -> np.ndarr
 
 
 def _large_bodies(depth: np.ndarray, level: float) -> np.ndarray:
-    """The field without crumbs: separate bodies of less than a hundredth of the whole."""
-    from scipy.ndimage import label
+    """The field without bubbles, and without crumbs: bodies of less than a hundredth of all."""
+    from scipy.ndimage import binary_fill_holes, label
 
-    found = label(depth > level, structure=np.ones((3, 3, 3)))
+    solid = np.asarray(binary_fill_holes(depth > level))
+    depth = np.where(solid & (depth <= level), depth.max(), depth)
+    found = label(solid)
     bodies = np.asarray(found[0])  # pyright: ignore[reportIndexIssue]
     size = np.bincount(bodies.ravel())
     crumbs = size < _SMALLEST_BODY * size[1:].sum()
