@@ -81,7 +81,7 @@ class Settings:
         cad: folder of CAD meshes with a manifest; else our procedural shapes.
         kitti: KITTI raw, the folder above the dates.
         device: of trainings and predictions.
-        rows: only rows whose names hold one of these, with commas.
+        rows: only rows whose names hold one of these, with commas; ^word: begin with it.
         rotate: only these input protocols (none, yaw, so3), with commas.
     """
 

@@ -78,7 +78,7 @@ def cost_of(model: Model) -> float:
 
 
 def chosen_rows(table: Table, words: tuple[str, ...]) -> Table:
-    """The table with those rows only whose names hold one of the words.
+    """The table with those rows only whose names hold one of the words, or begin with a ^word.
 
     Raises:
         BadInputError: no row is left.
@@ -86,7 +86,7 @@ def chosen_rows(table: Table, words: tuple[str, ...]) -> Table:
     if not words:
         return table
     blocks = [
-        replace(block, rows=tuple(r for r in block.rows if any(w in r.name for w in words)))
+        replace(block, rows=tuple(r for r in block.rows if any(_called(r, w) for w in words)))
         for block in table.blocks
     ]
     kept = tuple(block for block in blocks if block.rows)
@@ -94,6 +94,10 @@ def chosen_rows(table: Table, words: tuple[str, ...]) -> Table:
         raise BadInputError(f"--rows {','.join(words)}: no row of this table is called so.")
     note = f"Only rows with {' or '.join(words)} were made."
     return replace(table, blocks=kept, notes=(*table.notes, note))
+
+
+def _called(row: Row, word: str) -> bool:
+    return row.name.startswith(word[1:]) if word.startswith("^") else word in row.name
 
 
 def chosen_protocols(table: Table, names: tuple[str, ...]) -> Table:

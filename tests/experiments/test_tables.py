@@ -102,6 +102,9 @@ def test_a_table_that_needs_a_folder_says_so():
 
 def test_rows_that_are_not_there():
     table = TABLES["seeds"](Given(SIZES["tiny"]))
+    ablations = TABLES["ablations"](Given(SIZES["tiny"]))
+    found = make.chosen_rows(ablations, ("^w/o projection",)).blocks
+    assert [row.name for block in found for row in block.rows] == ["w/o projection"]
     with pytest.raises(BadInputError, match="no row"):
         make.chosen_rows(table, ("nothing",))
 
