@@ -173,5 +173,6 @@ def denser(points: Cloud) -> Cloud:
     """
     from scipy.spatial import KDTree
 
-    _, index = KDTree(points).query(points, k=_PARTNER + 1)
-    return np.concatenate((points, (points + points[index[:, -1]]) / 2)).astype(points.dtype)
+    _, partner = KDTree(points).query(points, k=[_PARTNER + 1])
+    middles = (points + points[np.asarray(partner)[:, 0]]) / 2
+    return np.concatenate((points, middles)).astype(points.dtype)
