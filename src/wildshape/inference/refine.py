@@ -173,6 +173,6 @@ def denser(points: Cloud) -> Cloud:
     """
     from scipy.spatial import KDTree
 
-    _, partner = KDTree(points).query(points, k=[_PARTNER + 1])
-    middles = (points + points[np.asarray(partner)[:, 0]]) / 2
+    near = KDTree(points).query(points, k=_PARTNER + 1)[1]
+    middles = (points + points[np.asarray(near)[:, -1]]) / 2
     return np.concatenate((points, middles)).astype(points.dtype)
