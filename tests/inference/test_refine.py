@@ -90,7 +90,7 @@ def test_small_objects_are_refined_as_large_ones(scale):
 
 @pytest.mark.parametrize("mirror", [False, True])
 def test_only_what_was_seen_is_drawn(mirror):
-    seen = SHAPE[SHAPE[:, 1] > 0.84] + np.float32((0.0, 0.06, 0.0))
+    seen = SHAPE[SHAPE[:, 1] > 0.84] + np.array((0.0, 0.06, 0.0), np.float32)
     drawn = drawn_to_scan(SHAPE.astype(float), seen.astype(float), mirror=mirror)
     moved = np.linalg.norm(drawn - SHAPE, axis=1)
     left, right = SHAPE[:, 1] > 0.84, SHAPE[:, 1] < -0.84

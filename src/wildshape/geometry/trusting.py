@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How far each place of a mesh is to be believed: measured beside a scan's points, guessed else."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -44,5 +44,6 @@ def colour_by_confidence(
 ) -> None:
     """Colour a mesh's vertices, blue for 1 to orange for 0; they get the attribute `confidence`."""
     found = place_confidence(mesh.vertices.view(np.ndarray), scan, confidence)
-    mesh.visual.vertex_colors = shades(1.0 - found)  # pyright: ignore[reportAttributeAccessIssue]
+    visual: Any = mesh.visual
+    visual.vertex_colors = shades(1.0 - found)
     mesh.vertex_attributes["confidence"] = found.astype(np.float32)

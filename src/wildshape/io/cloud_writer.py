@@ -3,6 +3,7 @@
 """Writing points, in the format that the file's suffix names."""
 
 from pathlib import Path
+from typing import BinaryIO, cast
 
 import numpy as np
 from jaxtyping import Float
@@ -46,7 +47,7 @@ def write_cloud(path: Path, points: Float[np.ndarray, "n 3"]) -> None:
         elif suffix == ".npy":
             np.save(file, points)
         elif suffix in (".las", ".laz"):
-            las_cloud(points).write(file, do_compress=suffix == ".laz")
+            las_cloud(points).write(cast(BinaryIO, file), do_compress=suffix == ".laz")
         else:
             np.savetxt(file, points, fmt="%.6f")
 
