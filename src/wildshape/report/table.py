@@ -10,6 +10,7 @@ from wildshape.report.content import Cell, Table
 _DASH = "\N{EN DASH}"
 _NUMERIC = f"0123456789-+±{_DASH}"
 _SPREAD = " ± "
+_MANY = 12
 
 
 def html_table(table: Table) -> str:
@@ -21,7 +22,8 @@ def html_table(table: Table) -> str:
     )
     rows = "".join(_row(table, i, right) for i in range(len(table.rows)))
     caption = f"<p class=caption>{escape(table.caption)}</p>" if table.caption else ""
-    kind = " class=sortable" if table.sortable else ""
+    kinds = ["sortable"] * table.sortable + ["wide"] * (len(table.columns) > _MANY)
+    kind = f' class="{" ".join(kinds)}"' if kinds else ""
     grid = f"<table{kind}><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
     return f"<div class=scroll>{grid}</div>{caption}"
 
