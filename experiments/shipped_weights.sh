@@ -16,9 +16,10 @@ wildshape simulate "$out/cad" --tracks 168 --scans 12 --seed 9002 --meshes "$mes
 wildshape convert kitti-raw "$kitti" "$out/kitti" --every 2
 for data in procedural cad kitti; do
     for rotate in none yaw so3; do
-        seeds=3
-        [ "$rotate" = none ] && seeds=1
+        seeds=3 more=
+        [ "$rotate" = none ] && seeds=1 more=--track
         wildshape evaluate "$out/$data" --out "$out/$data-$rotate" --rotate "$rotate" \
-            --seeds "$seeds" --max-scans 8 --baselines identity,one-scan,local-icp
+            --seeds "$seeds" --max-scans 8 --baselines identity,one-scan,local-icp $more
     done
+    wildshape evaluate "$out/$data" --out "$out/$data-raw" --max-scans 8 --baselines none --raw
 done
