@@ -232,7 +232,8 @@ class Predictor:
         return Completion(
             points=denser(points) if self.refines else points,
             pose=T_sensor_can.to(torch.float64),
-            box=box_seen(shape, T_sensor_can, scan, mirror=mirror),
+            # The network's own size: a stretch follows what sticks out of the side that was seen.
+            box=box_seen(found.shapes[i], T_sensor_can, scan, mirror=mirror),
             confidence=0.0 if warning else self.confidence(facts),
             branch=int(found.branch[i]),
             cost=cost,
