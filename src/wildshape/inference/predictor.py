@@ -232,8 +232,7 @@ class Predictor:
         return Completion(
             points=denser(points) if self.refines else points,
             pose=T_sensor_can.to(torch.float64),
-            # The network's own size: a stretch follows what sticks out of the side that was seen.
-            box=box_seen(found.shapes[i], T_sensor_can, scan, mirror=mirror),
+            box=box_seen(shape, T_sensor_can, scan, mirror=mirror),
             confidence=0.0 if warning else self.confidence(facts),
             branch=int(found.branch[i]),
             cost=cost,
