@@ -12,7 +12,7 @@ import torch
 import wildshape
 from wildshape.geometry.se3 import SE3
 from wildshape.inference.prepare import as_points
-from wildshape.records import Box, Completion, Registration
+from wildshape.records import Box, Completion, Registration, Track
 
 
 @pytest.fixture
@@ -74,3 +74,18 @@ def test_every_public_name_is_there():
         assert getattr(wildshape, name).__doc__
     with pytest.raises(AttributeError, match="no attribute 'lode'"):
         _ = wildshape.lode
+
+
+@pytest.mark.parametrize("posed", [True, False])
+def test_part_of_a_track_keeps_scans_names_and_poses_together(posed):
+    shifts = torch.arange(15.0, dtype=torch.float64).reshape(5, 3)
+    poses = SE3(torch.eye(3, dtype=torch.float64).expand(5, 3, 3), shifts) if posed else None
+    scans = tuple(np.full((3, 3), i, np.float32) for i in range(5))
+    part = Track("a", scans, tuple("vwxyz"), category="car", T_sensor_object=poses).part([4, 0, 2])
+    assert [int(scan[0, 0]) for scan in part.scans] == [4, 0, 2]
+    assert part.scan_names == ("z", "v", "x")
+    assert (part.name, part.category) == ("a", "car")
+    if posed:
+        torch.testing.assert_close(part.T_sensor_object.translation, shifts[[4, 0, 2]])
+    else:
+        assert part.T_sensor_object is None

@@ -5,7 +5,8 @@
 Points are numpy float32 `(n, 3)`; poses are `SE3` over float64 tensors on the CPU.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -78,6 +79,16 @@ class Track:
     def middle(self) -> int:
         """Index of the middle scan, the reference of registration and fusion (METHOD 7, 8)."""
         return len(self.scans) // 2
+
+    def part(self, kept: Sequence[int]) -> "Track":
+        """The same track with these of its scans alone."""
+        poses = self.T_sensor_object
+        return replace(
+            self,
+            scans=tuple(self.scans[i] for i in kept),
+            scan_names=tuple(self.scan_names[i] for i in kept),
+            T_sensor_object=None if poses is None else poses[torch.tensor(kept, dtype=torch.long)],
+        )
 
 
 @dataclass(frozen=True)

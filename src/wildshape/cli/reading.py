@@ -3,10 +3,7 @@
 """The tracks of an input, one at a time; what cannot be used is counted with its reason."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
-
-import torch
 
 from wildshape.cli.options import Unit
 from wildshape.errors import BadInputError
@@ -103,14 +100,4 @@ class Reading:
             kept.append(i)
         if not kept:
             raise BadInputError(f"{track.name}: no scan can be used; {reason}")
-        return track if len(kept) == len(track.scans) else _select(track, kept)
-
-
-def _select(track: Track, kept: list[int]) -> Track:
-    poses = track.T_sensor_object
-    return replace(
-        track,
-        scans=tuple(track.scans[i] for i in kept),
-        scan_names=tuple(track.scan_names[i] for i in kept),
-        T_sensor_object=None if poses is None else poses[torch.tensor(kept)],
-    )
+        return track if len(kept) == len(track.scans) else track.part(kept)

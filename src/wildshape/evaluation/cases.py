@@ -5,7 +5,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import torch
 
 from wildshape.datasets.accumulate import shape_mirrored, shape_partial
 from wildshape.evaluation.boxes import true_box
@@ -98,7 +97,7 @@ def _usable(track: Track) -> tuple[Track, tuple[Skipped, ...]]:
     cleaned = replace(track, scans=tuple(finite))
     named = zip(track.scan_names, reasons, strict=True)
     skipped = tuple(Skipped(track.name, scan, reason) for scan, reason in named if reason)
-    return _select(cleaned, kept), skipped
+    return cleaned.part(kept), skipped
 
 
 def _unusable(scan: Points) -> str:
@@ -111,17 +110,7 @@ def _subsample(track: Track, max_scans: int | None) -> Track:
     count = len(track.scans)
     if max_scans is None or count <= max_scans:
         return track
-    return _select(track, np.linspace(0, count - 1, max_scans).round().astype(int).tolist())
-
-
-def _select(track: Track, kept: list[int]) -> Track:
-    poses = track.T_sensor_object
-    return replace(
-        track,
-        scans=tuple(track.scans[i] for i in kept),
-        scan_names=tuple(track.scan_names[i] for i in kept),
-        T_sensor_object=None if poses is None else poses[torch.tensor(kept, dtype=torch.long)],
-    )
+    return track.part(np.linspace(0, count - 1, max_scans).round().astype(int).tolist())
 
 
 def _truth(track: Track) -> Truth | None:

@@ -4,12 +4,10 @@
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-import torch
 
 from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
@@ -148,14 +146,4 @@ def _track(result: TrackResult) -> Track:
             raise BadInputError(f"{result.folder}: neither its scans nor shapes can be read.")
         return Track(result.folder.name, empty, names, source="its scans cannot be read")
     kept = [i for i, name in enumerate(result.track.scan_names) if name in set(names)]
-    return _select(result.track, kept or list(range(len(result.track.scans))))
-
-
-def _select(track: Track, kept: list[int]) -> Track:
-    poses = track.T_sensor_object
-    return replace(
-        track,
-        scans=tuple(track.scans[i] for i in kept),
-        scan_names=tuple(track.scan_names[i] for i in kept),
-        T_sensor_object=None if poses is None else poses[torch.tensor(kept, dtype=torch.long)],
-    )
+    return result.track.part(kept or list(range(len(result.track.scans))))
