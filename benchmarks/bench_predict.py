@@ -37,7 +37,7 @@ COMPLETE_BAR_MS = 60.0
 
 
 def predictor(preset: str) -> Predictor:
-    """A predictor of the preset's sizes with random weights."""
+    """A predictor of the preset's sizes with random weights; it refines as the preset's do."""
     recipe = PRESETS[preset]()
     torch.manual_seed(0)
     settings = ModelSettings(
@@ -47,6 +47,7 @@ def predictor(preset: str) -> Predictor:
         projection=recipe.loss.projection,
         beta=recipe.loss.beta,
         belief=recipe.loss.belief,
+        facing=recipe.views.turn == "facing",
     )
     return Predictor(ShapePoseNet(recipe.network).eval(), settings)
 
