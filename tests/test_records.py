@@ -85,7 +85,6 @@ def test_part_of_a_track_keeps_scans_names_and_poses_together(posed):
     assert [int(scan[0, 0]) for scan in part.scans] == [4, 0, 2]
     assert part.scan_names == ("z", "v", "x")
     assert (part.name, part.category) == ("a", "car")
-    if posed:
+    assert (part.T_sensor_object is not None) == posed
+    if part.T_sensor_object is not None:
         torch.testing.assert_close(part.T_sensor_object.translation, shifts[[4, 0, 2]])
-    else:
-        assert part.T_sensor_object is None
