@@ -7,7 +7,7 @@ python -m experiments.tables vehicle --size tiny --cad CAD
 
 import shlex
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -83,6 +83,7 @@ class Settings:
         device: of trainings and predictions.
         rows: only rows whose names hold one of these, with commas; ^word: begin with it.
         rotate: only these input protocols (none, yaw, so3), with commas.
+        seeds: trainings of each row, and turns of each baseline; 0: as the size has it.
     """
 
     table: Annotated[Name, tyro.conf.Positional]
@@ -94,6 +95,7 @@ class Settings:
     device: Literal["auto", "cpu", "cuda"] = "auto"
     rows: str = ""
     rotate: str = ""
+    seeds: int = 0
 
 
 def main(settings: Settings, command: str) -> None:
@@ -106,6 +108,7 @@ def main(settings: Settings, command: str) -> None:
         return
     table = chosen_rows(TABLES[settings.table](given), _words(settings.rows))
     table = chosen_protocols(table, _words(settings.rotate))
+    table = replace(table, seeds=settings.seeds) if settings.seeds > 0 else table
     print(make(shop, given, table, name, results))
 
 
