@@ -26,14 +26,16 @@ def true_targets_of(store, cars):
     return FusedTargets(rotation, translation, shapes, torch.stack(sensors), complete=True)
 
 
-def sampler_of(store, cars, **changes):
+def sampler_of(store, cars, mirror=False, **changes):
     views = ViewSampler(store, np.arange(len(store)), replace(CONFIG, **changes))
-    return FusedSampler(views, true_targets_of(store, cars))
+    return FusedSampler(views, true_targets_of(store, cars), mirror=mirror)
 
 
+@pytest.mark.parametrize("mirror", [False, True])
 @pytest.mark.parametrize("turn", ["none", "yaw", "so3", "facing"])
-def test_the_target_pose_carries_the_target_shape_onto_the_scan(car_store, cars, turn):
-    batch = sampler_of(car_store, cars, turn=turn).draw(1, 2)
+def test_the_target_pose_carries_the_target_shape_onto_the_scan(car_store, cars, turn, mirror):
+    batch = sampler_of(car_store, cars, mirror, turn=turn).draw(1, 2)
+    assert torch.allclose(torch.linalg.det(batch.rotation), torch.ones(12), atol=1e-5)
     assert batch.scans.shape == (12, 300, 3)
     posed = SE3(batch.rotation, batch.translation).apply(batch.shapes)
     nearest = torch.cdist(batch.scans, posed).amin(2)
@@ -114,3 +116,14 @@ def test_stretching_keeps_what_hides_what(seed):
         both = torch.cat((cloud, hidden), dim=1)
         index = facing_bins(both, cloud.mean(1), FacingBins(0.25)).index
         assert float((index[:, :50] == index[:, 50:]).float().mean()) > 0.97
+
+
+def test_half_of_the_scans_are_reflected_where_objects_are_symmetric(car_store, cars):
+    plain = sampler_of(car_store, cars).draw(1, 2)
+    mirrored = sampler_of(car_store, cars, mirror=True).draw(1, 2)
+    turned = mirrored.scans * torch.tensor((1.0, -1.0, 1.0))
+    same = [torch.equal(a, b) for a, b in zip(plain.scans, mirrored.scans)]
+    reflected = [torch.equal(a, b) for a, b in zip(plain.scans, turned)]
+    assert all(a != b for a, b in zip(same, reflected))
+    assert any(same)
+    assert any(reflected)

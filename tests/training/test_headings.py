@@ -3,7 +3,8 @@
 import torch
 
 from wildshape.geometry.rotation import rotation_z
-from wildshape.training.headings import agreed_signs, outline, steady_signs
+from wildshape.training.headings import steady_signs
+from wildshape.training.profiles import agreed_signs, profile, together
 
 
 def _wedge(generator: torch.Generator, length: float) -> torch.Tensor:
@@ -18,22 +19,39 @@ def test_tracks_turned_at_random_agree_on_a_heading():
     turned = torch.rand(40, generator=generator) < 0.5
     half_turn = torch.diag(torch.tensor((-1.0, -1.0, 1.0)))
     clouds = [_wedge(generator, 4 + i % 5) for i in range(40)]
-    outlines = [outline(c @ half_turn if t else c) for c, t in zip(clouds, turned)]
-    signs = agreed_signs(torch.stack(outlines))
+    profiles = [profile(c @ half_turn if t else c) for c, t in zip(clouds, turned)]
+    signs = agreed_signs(together(profiles))
     agreement = (signs > 0) == turned
     assert bool(agreement.all()) or not bool(agreement.any())
 
 
-def test_an_outline_rises_where_the_object_does():
-    heights = outline(_wedge(torch.Generator().manual_seed(2), 5.0))
-    assert bool((heights.diff() > 0).all())
+def test_a_profile_rises_where_the_object_does():
+    found = profile(_wedge(torch.Generator().manual_seed(2), 5.0))
+    assert bool((found.tops.diff() > 0).all())
+    assert torch.allclose(found.length, torch.tensor(5.0), atol=0.2)
+    sides = found.sides[0][torch.isfinite(found.sides[0])]
+    assert 0.75 < float(sides.median()) < 0.85  # nine tenths of 0.9
 
 
 def test_unseen_slices_do_not_count():
     generator = torch.Generator().manual_seed(3)
-    outlines = torch.stack([outline(_wedge(generator, 4.0)) for _ in range(6)])
-    outlines[0, :6] = float("nan")
-    assert len(set(agreed_signs(outlines).tolist())) == 1
+    profiles = together([profile(_wedge(generator, 4.0)) for _ in range(6)])
+    profiles.tops[0, :6] = float("nan")
+    assert len(set(agreed_signs(profiles).tolist())) == 1
+
+
+def test_each_kind_agrees_even_if_another_kind_rises_the_other_way():
+    """Lorries, high in front, agree among each other beside many cars that rise to the back."""
+    generator = torch.Generator().manual_seed(4)
+    half_turn = torch.diag(torch.tensor((-1.0, -1.0, 1.0)))
+    cars = [_wedge(generator, 4 + i % 5 / 4) for i in range(40)]
+    lorries = [_wedge(generator, 9 + i % 3) @ half_turn for i in range(15)]
+    turned = torch.rand(55, generator=generator) < 0.5
+    clouds = [c @ half_turn if t else c for c, t in zip(cars + lorries, turned)]
+    signs = agreed_signs(together([profile(c) for c in clouds]))
+    agreement = (signs > 0) == turned
+    for kind in (agreement[:40], agreement[40:]):
+        assert bool(kind.all()) or not bool(kind.any())
 
 
 def test_half_turns_within_a_track_are_found():

@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from wildshape.datasets.views import ViewSampler
 
 _PLACES = 2
-_LARGER, _AXIS = 0.2, 0.08
+_LARGER, _AXIS, _HALF = 0.2, 0.08, 0.5
 
 
 class FusedTargets(NamedTuple):
@@ -62,11 +62,13 @@ class FusedSampler:
     """Draws batches of single scans; a batch depends on its seeds alone.
 
     Every scan is stretched with its object (see `stretching`), turned as scans to be posed are, and
-    rolled as configured.
+    rolled as configured. Where objects are mirror-symmetric, half of the scans are reflected: what
+    is seen of an object's left side could as well be seen of its right.
     """
 
-    def __init__(self, views: ViewSampler, targets: FusedTargets) -> None:
-        self.views, self.targets = views, targets
+    def __init__(self, views: ViewSampler, targets: FusedTargets, *, mirror: bool = False) -> None:
+        """Sample from the sampler's tracks; `mirror`: objects are symmetric in y = 0."""
+        self.views, self.targets, self.mirror = views, targets, mirror
 
     def draw(self, *seed: int) -> FusedBatch:
         """The batch of these seeds: as many scans as a batch of views has."""
@@ -84,7 +86,22 @@ class FusedSampler:
         some = torch.from_numpy(rng.integers(targets.sensors.shape[1], size=(len(rows), _PLACES)))
         sensors = targets.sensors[chosen[:, None], some] * factors[:, None]
         shapes = targets.shapes[chosen] * factors[:, None]
-        return FusedBatch(scans, turn @ rotation, translation, shapes, sensors)
+        batch = FusedBatch(scans, turn @ rotation, translation, shapes, sensors)
+        return reflected(batch, rng.random(len(rows)) < _HALF) if self.mirror else batch
+
+
+def reflected(batch: FusedBatch, chosen: Bool[np.ndarray, "B"]) -> FusedBatch:
+    """Some of the scans as if seen in a mirror, y reversed, and so their objects.
+
+    With the reflection S of the scan and M of the object in y = 0, `S (R x + t) = (S R M) (M x) +
+    S t`: a rotation again.
+    """
+    signs = torch.ones(len(batch.scans), 3)
+    signs[torch.from_numpy(chosen), 1] = -1.0
+    rotation = signs[:, :, None] * batch.rotation * signs[:, None]
+    across = signs[:, None]
+    scans, shapes, sensors = batch.scans * across, batch.shapes * across, batch.sensors * across
+    return FusedBatch(scans, rotation, batch.translation * signs, shapes, sensors)
 
 
 def stretching(

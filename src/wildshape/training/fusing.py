@@ -26,6 +26,7 @@ from wildshape.inference.joint import refine_jointly
 from wildshape.io.atomic import atomic_write
 from wildshape.losses.multiview import LossConfig
 from wildshape.models.checkpoint import load_checkpoint
+from wildshape.training.closing import unseen_roof
 from wildshape.training.headings import AgreedPoses, agreed_poses
 
 TARGETS = "targets.safetensors"
@@ -63,9 +64,29 @@ def fused_targets(
         clouds = [sampler.store.scan_points(int(scan)) for scan in scans]
         return refine_jointly(clouds, T_sensor_can, mirror=mirror)
 
-    poses = agreed_poses(network, asked, loss, refined, progress)
-    shapes = [_shape(sampler, scans, poses, mirror) for scans in sampler.scans_of]
+    def fused(_: ViewSampler, scans: np.ndarray, T_sensor_can: SE3) -> Tensor:
+        return torch.from_numpy(_shape(sampler, scans, T_sensor_can, mirror))
+
+    poses = agreed_poses(network, asked, loss, refined, progress, fused)
+    shapes = [_shape(sampler, scans, _of(poses, scans), mirror) for scans in sampler.scans_of]
+    if settings.sensor == "lidar":
+        shapes = [
+            _closed(shape, _sensors(poses, scans), mirror)
+            for shape, scans in zip(shapes, sampler.scans_of)
+        ]
     return _targets(sampler, poses, shapes, complete=False)
+
+
+def _of(poses: AgreedPoses, scans: np.ndarray) -> SE3:
+    """`T_sensor_canonical` of some scans."""
+    rows = torch.from_numpy(scans)
+    return SE3(poses.rotation[rows], poses.translation[rows])
+
+
+def _closed(shape: np.ndarray, sensors: Tensor, mirror: bool) -> np.ndarray:
+    """With the roof that no sensor could see, as many points as before."""
+    roof = unseen_roof(torch.from_numpy(shape), sensors, mirror=mirror)
+    return _exactly(np.concatenate((shape, roof.numpy())))
 
 
 def true_targets(sampler: ViewSampler) -> FusedTargets:
@@ -112,15 +133,15 @@ def _sensors(poses: AgreedPoses, scans: np.ndarray) -> Float[Tensor, "O 3"]:
 
 
 def _shape(
-    sampler: ViewSampler, scans: np.ndarray, poses: AgreedPoses, mirror: bool
+    sampler: ViewSampler, scans: np.ndarray, T_sensor_can: SE3, mirror: bool
 ) -> Float32[np.ndarray, "G 3"]:
     """A track's scans in the canonical frame, reflected, thinned and without strays."""
     rng = np.random.default_rng(0)
     clouds = []
-    for scan in scans:
+    for index, scan in enumerate(scans):
         points = sampler.store.scan_points(int(scan))
-        picked = points[rng.permutation(len(points))[:_SCAN_POINTS]]
-        clouds.append((picked - poses.translation[scan].numpy()) @ poses.rotation[scan].numpy())
+        picked = torch.from_numpy(points[rng.permutation(len(points))[:_SCAN_POINTS]])
+        clouds.append(T_sensor_can[index].inverse().apply(picked).numpy())
     fused = np.concatenate(clouds)
     if mirror:
         fused = np.concatenate((fused, fused * np.asarray((1, -1, 1), np.float32)))

@@ -4,9 +4,9 @@
 
 A near-symmetric object settles in either of two headings, a half turn apart, each track as chance
 has it (METHOD 12.2). Two facts that need no label decide: within a track an object does not turn
-around between neighbouring scans; across tracks, the outlines of fused scans, height over length,
-are more alike when turned the same way. Each is a problem of signs (Z2 synchronisation), solved by
-a leading eigenvector. Which of the two ways is called front stays open: nobody defines it.
+around between neighbouring scans; across tracks, the profiles of fused scans are more alike when
+turned the same way (`training/profiles.py`). Each is a problem of signs (Z2 synchronisation),
+solved by a leading eigenvector. Which of the two ways is called front stays open: nobody says.
 """
 
 from collections.abc import Callable
@@ -23,13 +23,13 @@ from wildshape.geometry.se3 import SE3
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.losses.multiview import LossConfig
 from wildshape.models.shapepose import ShapePoseNet
+from wildshape.training.profiles import agreed_signs, profile, together
 
 NOT_FINITE = (
     "training stopped: the loss is not finite; resume from the last checkpoint with a smaller"
     " learning rate, or check the data's units."
 )
-_BATCH, _POINTS, _REFERENCES, _NEIGHBOURS = 64, 256, 300, 5
-_BINS, _FEWEST, _TOP = 16, 20, 0.95
+_BATCH, _POINTS, _NEIGHBOURS = 64, 256, 5
 _HALF_TURN = torch.diag(torch.tensor((-1.0, -1.0, 1.0)))
 
 
@@ -52,6 +52,7 @@ def agreed_poses(
     config: LossConfig,
     refined: Callable[[np.ndarray, SE3], SE3] = lambda _, pose: pose,
     progress: Callable[[int, int], None] = lambda *_: None,
+    fused: Callable[[ViewSampler, np.ndarray, SE3], Tensor] | None = None,
 ) -> AgreedPoses:
     """Pose all scans, refine each track, and let all tracks look one way.
 
@@ -61,6 +62,8 @@ def agreed_poses(
         config: decides which branch speaks.
         refined: from a track's scans and their poses to better poses.
         progress: called with the tracks done, and their number.
+        fused: a track's object from its scans and their poses, to be compared with others; by
+            default some points of each scan.
 
     Raises:
         BadInputError: the network's weights are no longer finite.
@@ -69,7 +72,8 @@ def agreed_poses(
         raise BadInputError(NOT_FINITE)
     count = len(sampler.store.scan_sizes)
     agreed = AgreedPoses(torch.zeros(count, 3, 3), torch.zeros(count, 3))
-    outlines, kept = [], []
+    profiles, kept = [], []
+    fused = fused or _fused
     for done, scans in enumerate(sampler.scans_of):
         T_sensor_can = _poses(network, sampler, config, scans)
         steady = steady_signs(T_sensor_can.rotation)
@@ -78,10 +82,10 @@ def agreed_poses(
         rows = torch.from_numpy(scans)
         agreed.rotation[rows] = T_steady_can.rotation
         agreed.translation[rows] = T_steady_can.translation
-        outlines.append(outline(_fused(sampler, scans, T_steady_can)))
+        profiles.append(profile(fused(sampler, scans, T_steady_can)))
         kept.append(steady)
         progress(done + 1, len(sampler.scans_of))
-    signs = agreed_signs(torch.stack(outlines))
+    signs = agreed_signs(together(profiles))
     # Of the two ways that all may look, take the one that most scans look already.
     looks = torch.stack([(s * sign).sum() for s, sign in zip(kept, signs)]).sum()
     way = torch.where(looks < 0, -1.0, 1.0)
@@ -94,38 +98,6 @@ def agreed_poses(
 def _turn(rotation: Float[Tensor, "V 3 3"], sign: Float[Tensor, "V"]) -> Float[Tensor, "V 3 3"]:
     """Those of sign -1 turned by a half turn about the canonical z."""
     return torch.where(sign[:, None, None] < 0, rotation @ _HALF_TURN, rotation)
-
-
-def outline(cloud: Float[Tensor, "n 3"]) -> Float[Tensor, "bins"]:
-    """Height over length of an object in its canonical frame, metres about the mean height.
-
-    The top of each slice along x; NaN where a slice was hardly seen.
-    """
-    low, high = cloud[:, 0].quantile(0.01), cloud[:, 0].quantile(0.99)
-    slices = ((cloud[:, 0] - low) / (high - low).clamp_min(1e-6) * _BINS).floor()
-    heights = [cloud[slices == index, 2] for index in range(_BINS)]
-    unseen = cloud.new_tensor(float("nan"))
-    tops = torch.stack([z.quantile(_TOP) if len(z) >= _FEWEST else unseen for z in heights])
-    return tops - tops.nanmean()
-
-
-def agreed_signs(outlines: Float[Tensor, "J bins"]) -> Float[Tensor, "J"]:
-    """+1 or -1 for each outline: reverse those of -1 and all look one way.
-
-    The first few hundred are compared pair by pair and agree by the leading eigenvector of how
-    much more alike each pair is as it stands than reversed; the rest follow their vote.
-    """
-    known = outlines[:_REFERENCES]
-    vote = _difference(outlines, known.flip(1)) - _difference(outlines, known)
-    among = vote[: len(known)]
-    eigenvector = torch.linalg.eigh((among + among.T) / 2).eigenvectors[:, -1]
-    signs = torch.sign(vote @ torch.sign(eigenvector))
-    return torch.where(signs == 0, torch.ones_like(signs), signs)
-
-
-def _difference(a: Float[Tensor, "I bins"], b: Float[Tensor, "J bins"]) -> Float[Tensor, "I J"]:
-    """Mean absolute difference over the slices that both have seen; 0 if there are none."""
-    return torch.nan_to_num((a[:, None] - b[None]).abs().nanmean(-1))
 
 
 def steady_signs(rotation: Float[Tensor, "V 3 3"]) -> Float[Tensor, "V"]:

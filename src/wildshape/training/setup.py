@@ -118,7 +118,7 @@ def setup(
     sampler = ViewSampler(store, fit_tracks, recipe.views)
     held_out = ViewSampler(store, held_tracks, recipe.views)
     targets = _targets(teacher, sampler, folder, identity, taught)
-    views = _views(sampler, targets, seed, processes, say)
+    views = _views(sampler, targets, seed, processes, recipe, say)
     if state.anchors is not None:
         views.hold(state.anchors)
     described = {"recipe": asdict(recipe), "identity": identity, **(provenance or {})}
@@ -191,12 +191,14 @@ def _views(
     targets: FusedTargets | None,
     seed: int,
     processes: Processes,
+    recipe: Recipe,
     say: Say,
 ) -> Views:
     """On a GPU the scans lie there, if they fit; on a CPU they stay in the mapped store."""
     device = processes.device
     if targets is not None:
-        return HostViews(FusedSampler(sampler, targets), seed, processes.rank, device)
+        single = FusedSampler(sampler, targets, mirror=recipe.network.mirror)
+        return HostViews(single, seed, processes.rank, device)
     if device.type != "cuda":
         return HostViews(sampler, seed, processes.rank, device)
     most = int(_RESIDENT_SHARE * torch.cuda.mem_get_info(device)[1])
