@@ -17,6 +17,7 @@ from experiments.tables import (
     codes,
     encoders,
     kitti,
+    ladder,
     objects,
     seeds,
     trucks,
@@ -38,6 +39,7 @@ TABLES = {
     "seeds": seeds.table,
     "trucks": trucks.table,
     "encoders": encoders.table,
+    "ladder": ladder.table,
 }
 FIGURES = {
     "codes": codes.draw,
@@ -47,6 +49,7 @@ FIGURES = {
     "objects-airplane": objects.views_of("airplane"),
     "objects-car": objects.views_of("car"),
     "objects-chair": objects.views_of("chair"),
+    "rungs": ladder.draw,
 }
 Name = Literal[
     "views",
@@ -56,6 +59,7 @@ Name = Literal[
     "seeds",
     "trucks",
     "encoders",
+    "ladder",
     "codes",
     "objects",
     "objects-kitti",
@@ -63,6 +67,7 @@ Name = Literal[
     "objects-airplane",
     "objects-car",
     "objects-chair",
+    "rungs",
 ]
 
 
@@ -75,7 +80,7 @@ class Settings:
 
     Attributes:
         table: which; codes and those of objects are figures.
-        size: test (seconds), tiny (minutes on a CPU), small (hours) or full (a GPU).
+        size: test (seconds), tiny (minutes on a CPU), hour, small (hours) or full (a GPU).
         out: folder of data, runs and scores.
         results: folder of the page and its JSON; by default `out`.
         cad: folder of CAD meshes with a manifest; else our procedural shapes.
@@ -87,7 +92,7 @@ class Settings:
     """
 
     table: Annotated[Name, tyro.conf.Positional]
-    size: Literal["test", "tiny", "small", "full"] = "tiny"
+    size: Literal["test", "tiny", "hour", "small", "full"] = "tiny"
     out: Path = Path("runs/tables")
     results: Path | None = None
     cad: Path | None = None

@@ -28,7 +28,7 @@ from wildshape.evaluation.results import (
 )
 from wildshape.evaluation.skipped import Skipped
 from wildshape.evaluation.turning import Rotate
-from wildshape.inference.method import Learned
+from wildshape.inference.method import Learned, LearnedTrack
 from wildshape.io.atomic import write_json
 from wildshape.io.provenance import provenance
 from wildshape.models.dpc_checkpoint import is_dpc
@@ -58,7 +58,7 @@ def measure(
     name = f"{key(row.name, mark, block.test, rotate, seed, max_scans)}.json"
     path = shop.folder / "scores" / name
     if not path.is_file():
-        method = _method(shop, row, model)
+        method = method_of(shop, row, model)
         if method is None:
             return None
         reading = Reading(store_of(shop.folder, block.test))
@@ -75,19 +75,23 @@ def seeds_of(row: Row, rotate: Rotate, seeds: int) -> range:
 
 
 def _mark(row: Row, model: Model | None) -> str:
-    """Fingerprint of the weights; nothing for baselines."""
+    """Fingerprint of the weights, and how they answer if not alone; nothing for baselines."""
     if isinstance(row, Baseline):
         return ""
-    return fingerprint(None if model is None else model.path)
+    answer = row.answer if isinstance(row, Trained) else "raw"
+    print_ = fingerprint(None if model is None else model.path)
+    return print_ if answer == "raw" else f"{print_}, {answer}"
 
 
-def _method(shop: Workshop, row: Row, model: Model | None) -> Method | None:
-    """What is measured; of trained rows the network's own answers, not refined against the scan."""
+def method_of(shop: Workshop, row: Row, model: Model | None) -> Method | None:
+    """What is measured; of trained rows the network's own answers, unless the row says more."""
     if model is not None and is_dpc(model.path):
         return dpc.load(model.path, choose_device(shop.device))
     if isinstance(row, Shipped) or model is not None:
         path = None if model is None else model.path
-        return Learned(load_model(path, shop.device, raw=isinstance(row, Trained)))
+        answer = row.answer if isinstance(row, Trained) else "refined"
+        predictor = load_model(path, shop.device, raw=answer == "raw")
+        return LearnedTrack(predictor) if answer == "track" else Learned(predictor)
     try:
         return baseline(row.name)
     except MissingExtraError as error:

@@ -12,6 +12,7 @@ from wildshape.evaluation.turning import Rotate
 from wildshape.training.config import Recipe
 from wildshape.training.dpc import DpcRecipe
 
+Answer = Literal["raw", "refined", "track"]
 PROTOCOLS: tuple[Rotate, ...] = ("none", "yaw", "so3")
 
 
@@ -25,6 +26,8 @@ class Trained:
         data: trained on, without labels unless the teacher is the truth.
         teacher: whose poses and shapes are taught (same seed); `truth`: the oracle.
         start: whose weights are fine-tuned (same seed).
+        answer: what is measured: the network's own answer, the same refined against its scan, or
+            what all scans of a track say together.
     """
 
     name: str
@@ -32,6 +35,7 @@ class Trained:
     data: Data
     teacher: "Trained | Literal['truth'] | None" = None
     start: "Trained | None" = None
+    answer: Answer = "raw"
 
     @property
     def key(self) -> str:

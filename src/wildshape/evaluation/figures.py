@@ -60,22 +60,26 @@ def draw_examples(examples: Sequence[Example]) -> Figure:
 def _draw_example(row: Sequence[Axes], example: Example) -> None:
     rival = (example.rival,) if len(row) == len(_WITH_RIVAL) else ()
     clouds = (example.scan, example.truth, *rival, example.completed, example.fused)
-    low, high = project(example.truth).min(0)[:2], project(example.truth).max(0)[:2]
-    heights = (float(example.truth[:, 2].min()), float(example.truth[:, 2].max()))
-    margin = 0.12 * float((high - low).max())
     for ax, cloud in zip(row, clouds, strict=True):
-        ax.set_aspect("equal")
-        ax.set_xlim(low[0] - margin, high[0] + margin)
-        ax.set_ylim(low[1] - margin, high[1] + margin)
-        ax.set_xticks([])
-        ax.set_yticks([])
-        if cloud is None:
-            ax.text(0.5, 0.5, "does not register", ha="center", transform=ax.transAxes)
-        else:
-            _draw_cloud(ax, cloud, heights)
-            ax.set_xlabel(f"{len(cloud)} points", fontsize=8)
+        draw_panel(ax, cloud, example.truth)
     row[0].set_ylabel(f"{example.label}\nCD {example.cd:.3f} m", fontsize=9)
     row[1].text(0.02, 0.97, example.track, va="top", fontsize=6, transform=row[1].transAxes)
+
+
+def draw_panel(ax: Axes, cloud: Points | None, truth: Points) -> None:
+    """A cloud `(n, 3)` from the fixed viewpoint, framed and coloured as the truth is; metres."""
+    low, high = project(truth).min(0)[:2], project(truth).max(0)[:2]
+    margin = 0.12 * float((high - low).max())
+    ax.set_aspect("equal")
+    ax.set_xlim(low[0] - margin, high[0] + margin)
+    ax.set_ylim(low[1] - margin, high[1] + margin)
+    ax.set_xticks([])
+    ax.set_yticks([])
+    if cloud is None:
+        ax.text(0.5, 0.5, "does not register", ha="center", transform=ax.transAxes)
+        return
+    _draw_cloud(ax, cloud, (float(truth[:, 2].min()), float(truth[:, 2].max())))
+    ax.set_xlabel(f"{len(cloud)} points", fontsize=8)
 
 
 def _draw_cloud(ax: Axes, cloud: Points, heights: tuple[float, float]) -> None:

@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""From the paper's method to ours, one change a rung (docs/accuracy.md)."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal
+
+from experiments.tables.data import store_of
+from experiments.tables.given import Given
+from experiments.tables.make import selected
+from experiments.tables.measure import measure, method_of
+from experiments.tables.rows import baselines, default_form, oracle, paper_form
+from experiments.tables.table import Block, Table, Trained
+from experiments.tables.train import Workshop, model_of
+
+from wildshape.cli.reading import Reading
+from wildshape.evaluation.cases import Case, prepare
+from wildshape.evaluation.examples import pick
+from wildshape.evaluation.figures import draw_panel
+from wildshape.evaluation.method import Completer
+from wildshape.evaluation.protocol import complete_scans
+from wildshape.io.atomic import atomic_write
+from wildshape.records import Points
+from wildshape.training.recipes import small
+
+Part = Literal["network", "loss", "views"]
+
+
+def rungs(given: Given) -> tuple[Trained, ...]:
+    """What is added, in order; each keeps what stands before it."""
+    size, data = given.size, given.drives("train")
+    base, goal = paper_form(size, data), small()
+    facing = _with(base, "views", turn="facing", window=goal.views.window)
+    facing = _with(facing, "loss", projection=goal.loss.projection, beta=goal.loss.beta)
+    mirror = _with(facing, "network", mirror=True)
+    template = _with(mirror, "network", start=goal.network.start)
+    loss = goal.loss
+    template = _with(template, "loss", template=loss.template, template_end=loss.template_end)
+    headings = _with(template, "loss", steady=loss.steady, agree_at=loss.agree_at)
+    ours = default_form(size, data)
+    taught = replace(ours, teacher=ours)
+    return (
+        replace(base, name="1 paper's form"),
+        replace(facing, name="2 + scans turned towards their object"),
+        replace(mirror, name="3 + mirror symmetry"),
+        replace(template, name="4 + a shared template"),
+        replace(headings, name="5 + agreed headings"),
+        replace(ours, name="6 + selector, finer bins (default form)"),
+        replace(taught, name="7 + self-training on fused tracks"),
+        replace(taught, name="8 + refined against the scan", answer="refined"),
+        replace(taught, name="9 + all scans of the track", answer="track"),
+    )
+
+
+def _with(row: Trained, part: Part, **values: Any) -> Trained:
+    """The row with other values in one part of its recipe."""
+    new = replace(getattr(row.recipe, part), **values)
+    return replace(row, recipe=replace(row.recipe, **{part: new}))
+
+
+def table(given: Given) -> Table:
+    """The rungs, the oracle, and what needs no training."""
+    size, data = given.size, given.drives("train")
+    top = replace(oracle(size, data), name="oracle of the paper's form")
+    ours = replace(default_form(size, data), name="oracle of the default form", teacher="truth")
+    rest = baselines("identity", "one-scan", "local-icp")
+    rows = (*rungs(given), top, ours, *rest)
+    block = Block("Simulated drives", given.drives("test"), rows, (), ("none", "yaw"))
+    note = "Each rung keeps those before it; 8 and 9 are the weights of 7, asked otherwise."
+    return Table("From the paper's method to ours", (block,), size.seeds, (note,))
+
+
+def draw(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
+    """Three objects on every rung; they are the best, the median and the worst of the first."""
+    rows, test = rungs(given), given.drives("test")
+    block = Block("rungs", test, rows)
+    seeds, most = range(given.size.seeds), given.size.max_scans
+    tried = [[measure(shop, row, block, "none", seed, most) for seed in seeds] for row in rows]
+    best = [selected(row.name, tuple(m for m in ms if m)) for row, ms in zip(rows, tried)]
+    chosen = pick(best[0].results.methods[0])
+    wanted = {track: label for label, (track, _) in chosen.items()}
+    tracks = [t for _, t in Reading(store_of(shop.folder, test)).tracks() if t.name in wanted]
+    cases = {wanted[t.name]: prepare(t, "none", 0, most) for t in tracks}
+    cases = {label: cases[label] for label in chosen}
+    columns = []
+    for row, one in zip(rows, best):
+        method = method_of(shop, row, model_of(shop, row, one.results.seed))
+        assert isinstance(method, Completer)
+        columns.append({label: _completed(method, case) for label, case in cases.items()})
+    with atomic_write(path) as file:
+        _picture(rows, cases, columns).savefig(file, dpi=90, format="webp")
+    seeds_ = {row.name: one.results.seed for row, one in zip(rows, best)}
+    return {"objects": chosen, "seeds": seeds_, "measured": [one.made for one in best]}
+
+
+def _completed(method: Completer, case: Case) -> Points:
+    """The completion of a track's middle scan, in the object's true frame."""
+    points = complete_scans(method, case)[case.middle]
+    assert points is not None
+    return _in_object(case, points)
+
+
+def _in_object(case: Case, points: Points) -> Points:
+    assert case.T_sensor_object is not None
+    return case.T_sensor_object[case.middle].inverse().apply_numpy(points)
+
+
+def _picture(
+    rows: tuple[Trained, ...], cases: dict[str, Case], columns: list[dict[str, Points]]
+) -> Any:
+    """A row a rung, a column an object; the scan and the truth above."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(3.2 * len(cases), 1.55 * (len(rows) + 2)), layout="constrained")
+    axes = figure.subplots(len(rows) + 2, len(cases), squeeze=False)
+    titles = ("one scan", "truth", *(row.name for row in rows))
+    for place, (label, case) in enumerate(cases.items()):
+        assert case.truth is not None
+        truth = case.truth.shape
+        scan = _in_object(case, case.scans[case.middle])
+        clouds = (scan, truth, *(column[label] for column in columns))
+        for ax, title, cloud in zip(axes[:, place], titles, clouds, strict=True):
+            draw_panel(ax, cloud, truth)
+            ax.set_title(title, fontsize=8)
+        axes[0, place].set_title(f"{label} of rung 1: one scan", fontsize=8)
+    return figure
