@@ -11,7 +11,7 @@ from wildshape.training.dpc import small as small_dpc
 from wildshape.training.recipes import small, tiny
 
 Like = Literal["tiny", "small"]
-_LIDAR_UNIT_M = 2.0
+_LIDAR_UNIT_M, _FEW = 2.0, 1000
 _TINY = (
     " The machinery works, a method is not judged by it: so early rows may stand in any order, and"
     " a difference below the spread over seeds is chance."
@@ -49,7 +49,7 @@ class Size:
     @property
     def side_seeds(self) -> int:
         """Of tables with many trainings: enough for a spread where a method could be judged."""
-        return 1 if self.like == "tiny" and self.steps is not None else min(self.seeds, 3)
+        return 1 if self.steps is not None and self.steps < _FEW else min(self.seeds, 3)
 
     @property
     def said(self) -> str:
@@ -57,7 +57,7 @@ class Size:
         drives = f"Size {self.name}: at most {self.train} tracks to train and {self.test} to test,"
         if self.steps is None:
             return f"{drives} the presets as they are."
-        return f"{drives} {self.steps} steps.{'' if self.like == 'small' else _TINY}{self._thinned}"
+        return f"{drives} {self.steps} steps.{_TINY if self.steps < _FEW else ''}{self._thinned}"
 
     @property
     def _thinned(self) -> str:
@@ -74,7 +74,7 @@ class Size:
 SIZES = {
     "test": Size("test", 6, 3, 10, 2, 4),
     "tiny": Size("tiny", 40, 12, 400, 3, 6),
-    "hour": Size("hour", 200, 30, 1200, 3, 8, "small"),
+    "hour": Size("hour", 200, 30, 2000, 3, 8),
     "small": Size("small", 300, 60, 6000, 3, 12, "small"),
     "full": Size("full", 4000, 141, None, 5, None),
 }
