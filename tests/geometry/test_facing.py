@@ -97,3 +97,46 @@ def test_the_roll_angle_takes_a_rolled_object_upright(tilt, heading, climb):
     up = (roll(angle) @ roll(torch.tensor([tilt], dtype=torch.float64)) @ upright)[0, :, 2]
     assert float(up[1]) == pytest.approx(0, abs=1e-9)
     assert float(up[2]) > 0
+
+
+OPTICAL_AXIS, DOWN = torch.tensor(((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)), dtype=torch.float64)
+
+
+def pictured(seed=0):
+    """An object two metres before a camera, a little off its optical axis."""
+    aside = torch.tensor((0.1 * seed - 0.2, 0.15 - 0.1 * seed, 0.0)).double()
+    return 0.2 * clouds(seed, 60, 3) + 2 * OPTICAL_AXIS + aside
+
+
+def test_a_camera_looks_along_z_and_its_y_points_down():
+    points = pictured()
+    middle = (points / points.norm(dim=1, keepdim=True)).mean(0)
+    centred = points @ facing_rotation_of(middle).mT
+    turn = face(centred, sensor_kind="camera").turn
+    torch.testing.assert_close(turn[0], OPTICAL_AXIS, atol=1e-9, rtol=0)
+    torch.testing.assert_close(turn[2], -DOWN, atol=1e-9, rtol=0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_up_for_a_camera_is_as_far_up_as_can_be(seed):
+    frame = face(pictured(seed), sensor_kind="camera")
+    assert torch.linalg.det(frame.turn) == pytest.approx(1)
+    assert float(frame.turn[1] @ DOWN) == pytest.approx(0, abs=1e-9)  # left stays level
+    assert float(frame.turn[2] @ -DOWN) > 0.9
+
+
+def test_many_views_at_once_face_as_each_does_alone():
+    views = torch.stack([pictured(seed) for seed in range(3)])
+    together = face(views, sensor_kind="camera")
+    for i, view in enumerate(views):
+        alone = face(view, sensor_kind="camera")
+        torch.testing.assert_close(together.turn[i], alone.turn)
+        torch.testing.assert_close(together.centre[i], alone.centre)
+
+
+def facing_rotation_of(direction):
+    """A rotation that turns `direction` to the optical axis."""
+    third = direction / direction.norm()
+    first = torch.linalg.cross(DOWN, third)
+    first = first / first.norm()
+    return torch.stack((first, torch.linalg.cross(third, first), third))

@@ -210,6 +210,6 @@ def _frames(
 def _frame(scans: Float[Tensor, "B n 3"], counted: Tensor, config: ViewConfig) -> Facing:
     """Turned towards the object, or as recorded and about the scan's centre."""
     if config.turn == "facing":
-        return face(scans, counted)
+        return face(scans, counted, sensor_kind=config.sensor)
     as_recorded = torch.eye(3, device=scans.device).expand(len(scans), 3, 3)
     return Facing(as_recorded, scan_centre(scans, config.sensor))

@@ -32,9 +32,10 @@ class ViewConfig:
         window: the V scans lie within this many consecutive frames of the track.
         turn: each scan turned about the sensor by its own random rotation before training:
             `none` (the paper), `yaw` or `so3`; or `facing`: turned towards its object and, as a
-            share `roll` of them, rolled about the line of sight (LiDAR; `geometry/facing.py`).
+            share `roll` of them, rolled about the line of sight (`geometry/facing.py`).
         roll: share of the scans rolled at random under `facing`; the others hardly roll.
-        sensor: decides the centring: `lidar` the frustum's middle, `camera` the box's.
+        sensor: decides the centring, `lidar` the frustum's middle, `camera` the box's, and which
+            way is up where scans are turned towards their object.
         min_points: scans with fewer are never drawn.
     """
 
@@ -134,7 +135,7 @@ class ViewSampler:
         """As `turned`, of scans `(B, n, 3)` that are not the store's; sensor frames."""
         config = self.config
         if config.turn == "facing":
-            frames = [face(scan) for scan in points]
+            frames = [face(scan, sensor_kind=config.sensor) for scan in points]
             turn = _rolls(len(points), config.roll, rng)
             turn = turn @ torch.stack([frame.turn for frame in frames])
             centres = torch.stack([frame.centre for frame in frames])
@@ -193,7 +194,7 @@ class ViewSampler:
         """The facing frame of a scan, found once."""
         frame = self._frames[scan]
         if np.isnan(frame[0, 0]):
-            turn, centre = face(self._points(scan))
+            turn, centre = face(self._points(scan), sensor_kind=self.config.sensor)
             frame[:3], frame[3] = turn.numpy(), centre.numpy()
         return Facing(torch.from_numpy(frame[:3]), torch.from_numpy(frame[3]))
 

@@ -73,7 +73,7 @@ class CompletionGraph(nn.Module):
         if not self.settings.facing:
             turn = torch.eye(3).expand(scans.shape[0], 3, 3)
             return self._look(sampled, scan_centre(scans, self.settings.sensor), turn)
-        turn, centre = face(scans)
+        turn, centre = face(scans, sensor_kind=self.settings.sensor)
         first = self._look(sampled @ turn.mT, centre, turn)
         angle = roll_angle(turn @ first[1])
         tilted = angle.abs() > _UPRIGHT_RAD

@@ -16,13 +16,16 @@ from torch import Tensor
 from wildshape.geometry.visibility import facing_rotation
 
 _AHEAD, _SMALLEST_M = (1.0, 0.0, 0.0), 1e-6
+# Axes x forward, y left, z up of a depth camera's own x right, y down, z forward.
+_CAMERA = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 
 
 class Facing(NamedTuple):
     """How one scan is turned and centred.
 
     Attributes:
-        turn: `R_facing_sensor`: x along the mean direction of the points, z as far up as can be.
+        turn: `R_facing_sensor`: x along the mean direction of the points, z as far up as can be,
+            where up is z of a LiDAR and -y of a depth camera.
         centre: on that line of sight, at the middle of the ranges; turned frame, metres.
     """
 
@@ -31,7 +34,10 @@ class Facing(NamedTuple):
 
 
 def face(
-    points: Float[Tensor, "*batch n 3"], counted: Bool[Tensor, "*batch n"] | None = None
+    points: Float[Tensor, "*batch n 3"],
+    counted: Bool[Tensor, "*batch n"] | None = None,
+    *,
+    sensor_kind: str = "lidar",
 ) -> Facing:
     """The facing frame of a scan, sensor frame, none of its points at the sensor itself.
 
@@ -40,6 +46,7 @@ def face(
     Args:
         points: of one scan or of many.
         counted: which of them the scan has; others repeat one of those. All by default.
+        sensor_kind: `lidar` or `camera`: says which way is up.
     """
     exact = points.double()
     distance = exact.norm(dim=-1)
@@ -47,9 +54,17 @@ def face(
     if counted is not None:
         unit = unit * counted[..., None]
     middle = (distance.amin(-1) + distance.amax(-1)) / 2
-    turn = facing_rotation(unit.mean(-2).reshape(-1, 3)).view(*middle.shape, 3, 3)
+    turn = _towards(unit.mean(-2).reshape(-1, 3), sensor_kind).view(*middle.shape, 3, 3)
     centre = middle[..., None] * exact.new_tensor(_AHEAD)
     return Facing(turn.to(points.dtype), centre.to(points.dtype))
+
+
+def _towards(direction: Float[Tensor, "B 3"], sensor_kind: str) -> Float[Tensor, "B 3 3"]:
+    """Rotation that turns `direction` to +x, up as far up as can be."""
+    if sensor_kind == "lidar":
+        return facing_rotation(direction)
+    axes = direction.new_tensor(_CAMERA)
+    return facing_rotation(direction @ axes.mT) @ axes
 
 
 def roll(angle: Float[Tensor, "B"]) -> Float[Tensor, "B 3 3"]:

@@ -131,7 +131,7 @@ def network_input(
     ordered = [torch.from_numpy(in_order(scan)) for scan in scans]
     sampled = torch.stack([scan[torch.from_numpy(drawn(len(scan), count))] for scan in ordered])
     if facing:
-        frames = [face(scan) for scan in ordered]
+        frames = [face(scan, sensor_kind=sensor) for scan in ordered]
         turn = torch.stack([frame.turn for frame in frames])
         centres = torch.stack([frame.centre for frame in frames])
         return NetworkInput(sampled @ turn.mT - centres[:, None], centres, turn)
