@@ -18,6 +18,7 @@ from wildshape.io.points import read_scan
 from wildshape.records import Points, SensorKind
 
 MIN_POINTS = 16
+_USUAL_M = 5.0
 _OPEN3D_TENSOR = "point.positions"
 _PLACES = ("xyz", "vertices", _OPEN3D_TENSOR, "points")
 
@@ -138,6 +139,15 @@ def network_input(
     centres = torch.stack([scan_centre(scan, sensor) for scan in ordered])
     turn = torch.eye(3).repeat(len(scans), 1, 1)
     return NetworkInput(sampled - centres[:, None], centres, turn)
+
+
+def unit_of(largest_m: float) -> float:
+    """Metres of one unit in which objects of up to that extent are as large as vehicles, at most 1.
+
+    Lengths that a method takes for granted (noise, gaps, how far off a pose may be) are stated for
+    vehicles; those of smaller objects are as much smaller.
+    """
+    return min(1.0, largest_m / _USUAL_M)
 
 
 def extent(points: Points) -> float:

@@ -20,7 +20,7 @@ from wildshape.geometry.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
 from wildshape.inference.joint import FINE, refine_jointly
 from wildshape.inference.pose_graph import refine_by_graph
-from wildshape.inference.prepare import network_input
+from wildshape.inference.prepare import network_input, unit_of
 from wildshape.inference.refine import denser
 from wildshape.inference.voting import half_turn, likeness_of_next, voted_signs
 from wildshape.losses.hindsight import score_hypotheses
@@ -70,9 +70,12 @@ def complete_together(
     weights = torch.tensor([max(item.confidence, 1e-3) for item in done], dtype=torch.float64)
     shape = _mean_shape(done, weights, settings.network.points)
     voted = _voted(stack([item.pose for item in done]), shape, weights, scans, settings)
-    fit = refine_checked(scans, voted, mirror=settings.network.mirror, refine=refine)
-    shape = drawn_to(shape, _seen(scans, fit.T_sensor_object, settings.network.mirror))
-    fitted = _box(shape, scans, fit.T_sensor_object, mirror=settings.network.mirror)
+    mirror, unit = settings.network.mirror, unit_of(settings.extent_m[1])
+    given, start = _in_units(scans, voted, unit)
+    fit = refine_checked(given, start, mirror=mirror, refine=refine)
+    shape = unit * drawn_to(shape / unit, _seen(given, fit.T_sensor_object, mirror))
+    fit = fit._replace(T_sensor_object=_scaled(fit.T_sensor_object, unit))
+    fitted = _box(shape, scans, fit.T_sensor_object, mirror=mirror)
     whole = torch.from_numpy(denser(shape.numpy())) if settings.facing else shape
     cost = track_cost(shape, fit.T_sensor_object, scans, settings)
     confidence = float(np.mean([item.confidence for item in done]))
@@ -88,6 +91,17 @@ def complete_together(
         )
         for i, item in enumerate(done)
     ]
+
+
+def _in_units(scans: list[Points], T_sensor_object: SE3, unit: float) -> tuple[list[Points], SE3]:
+    """Both as if the object were as large as a vehicle (`unit_of`)."""
+    if unit == 1.0:
+        return scans, T_sensor_object
+    return [scan / np.float32(unit) for scan in scans], _scaled(T_sensor_object, 1 / unit)
+
+
+def _scaled(T_a_b: SE3, factor: float) -> SE3:
+    return SE3(T_a_b.rotation, T_a_b.translation * factor)
 
 
 def _box(

@@ -30,8 +30,10 @@ class LossConfig:
         belief: weight of the cross-entropy that teaches the selector the winner; also the metres
             of cost that a nat of belief is worth when a branch is chosen.
         steady: an object does not turn around within a window of neighbouring scans: a branch
-            more than 90 degrees from the reference scan's pose, as recorded, cannot win.
-        agree_at: shares of the run at which all tracks agree on which way is front.
+            more than 90 degrees from the reference scan's pose, as recorded, cannot win. False for
+            views that come in no order.
+        agree_at: shares of the run at which all tracks agree on which way is front; from then on
+            a branch more than 90 degrees from its scan's agreed pose cannot win.
     """
 
     beta: float = 0.05

@@ -23,20 +23,28 @@ from wildshape.datasets.views import ViewSampler
 from wildshape.errors import BadInputError
 from wildshape.geometry.se3 import SE3
 from wildshape.inference.joint import refine_jointly
+from wildshape.inference.prepare import unit_of
 from wildshape.io.atomic import atomic_write
 from wildshape.losses.multiview import LossConfig
 from wildshape.models.checkpoint import load_checkpoint
+from wildshape.records import SensorKind
 from wildshape.training.closing import unseen_roof
 from wildshape.training.headings import AgreedPoses, agreed_poses
 
 TARGETS = "targets.safetensors"
 _POINTS, _SENSORS, _SCAN_POINTS = 2048, 8, 640
-_VOXEL_M, _NEIGHBOURS, _STRAY = 0.1, 4, 6.0
+# Of vehicles (`unit_of`); a camera's points are dense and need no mean over so many.
+_VOXEL_M: dict[SensorKind, float] = {"lidar": 0.1, "camera": 0.05}
+_NEIGHBOURS, _STRAY = 4, 6.0
 Progress = Callable[[int, int], None]
 
 
 def fused_targets(
-    teacher: Path, sampler: ViewSampler, progress: Progress = lambda *_: None
+    teacher: Path,
+    sampler: ViewSampler,
+    progress: Progress = lambda *_: None,
+    *,
+    steady: bool = True,
 ) -> FusedTargets:
     """Targets for all scans of a sampler, from a checkpoint and the scans alone.
 
@@ -44,6 +52,7 @@ def fused_targets(
         teacher: poses the scans.
         sampler: of the tracks trained on.
         progress: called with the tracks done, and their number.
+        steady: the scans of a track follow each other (`LossConfig.steady`).
 
     Raises:
         BadInputError: the checkpoint cannot be used.
@@ -57,18 +66,28 @@ def fused_targets(
     )
     asked = ViewSampler(sampler.store, np.arange(len(sampler.store)), views)
     asked.scans_of = sampler.scans_of
-    loss = LossConfig(beta=settings.beta, projection=settings.projection, belief=settings.belief)
+    loss = LossConfig(
+        beta=settings.beta,
+        projection=settings.projection,
+        belief=settings.belief,
+        steady=steady,
+    )
     mirror = settings.network.mirror
+    unit = unit_of(settings.extent_m[1])
+    voxel = unit * _VOXEL_M[settings.sensor]
 
     def refined(scans: np.ndarray, T_sensor_can: SE3) -> SE3:
-        clouds = [sampler.store.scan_points(int(scan)) for scan in scans]
-        return refine_jointly(clouds, T_sensor_can, mirror=mirror)
+        clouds = [sampler.store.scan_points(int(scan)) / np.float32(unit) for scan in scans]
+        found = refine_jointly(clouds, _scaled(T_sensor_can, 1 / unit), mirror=mirror)
+        return _scaled(found, unit)
 
     def fused(_: ViewSampler, scans: np.ndarray, T_sensor_can: SE3) -> Tensor:
-        return torch.from_numpy(_shape(sampler, scans, T_sensor_can, mirror))
+        return torch.from_numpy(_shape(sampler, scans, T_sensor_can, mirror, voxel))
 
     poses = agreed_poses(network, asked, loss, refined, progress, fused)
-    shapes = [_shape(sampler, scans, _of(poses, scans), mirror) for scans in sampler.scans_of]
+    shapes = [
+        _shape(sampler, scans, _of(poses, scans), mirror, voxel) for scans in sampler.scans_of
+    ]
     if settings.sensor == "lidar":
         shapes = [
             _closed(shape, _sensors(poses, scans), mirror)
@@ -81,6 +100,11 @@ def _of(poses: AgreedPoses, scans: np.ndarray) -> SE3:
     """`T_sensor_canonical` of some scans."""
     rows = torch.from_numpy(scans)
     return SE3(poses.rotation[rows], poses.translation[rows])
+
+
+def _scaled(T_a_b: SE3, factor: float) -> SE3:
+    """The same transform where lengths are so many times as large."""
+    return SE3(T_a_b.rotation, T_a_b.translation * factor)
 
 
 def _closed(shape: np.ndarray, sensors: Tensor, mirror: bool) -> np.ndarray:
@@ -133,7 +157,7 @@ def _sensors(poses: AgreedPoses, scans: np.ndarray) -> Float[Tensor, "O 3"]:
 
 
 def _shape(
-    sampler: ViewSampler, scans: np.ndarray, T_sensor_can: SE3, mirror: bool
+    sampler: ViewSampler, scans: np.ndarray, T_sensor_can: SE3, mirror: bool, voxel_m: float
 ) -> Float32[np.ndarray, "G 3"]:
     """A track's scans in the canonical frame, reflected, thinned and without strays."""
     rng = np.random.default_rng(0)
@@ -145,7 +169,7 @@ def _shape(
     fused = np.concatenate(clouds)
     if mirror:
         fused = np.concatenate((fused, fused * np.asarray((1, -1, 1), np.float32)))
-    thinned = _voxel_means(fused)
+    thinned = _voxel_means(fused, voxel_m)
     return _exactly(thinned[_near_others(thinned)])
 
 
@@ -157,9 +181,9 @@ def _near_others(points: Float32[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
     return apart <= _STRAY * np.median(apart)
 
 
-def _voxel_means(points: Float32[np.ndarray, "n 3"]) -> Float32[np.ndarray, "m 3"]:
-    """The mean of the points in each 10 cm cube: even density, and less noise than its points."""
-    cell = np.floor(points / _VOXEL_M).astype(np.int64)
+def _voxel_means(points: Float32[np.ndarray, "n 3"], edge_m: float) -> Float32[np.ndarray, "m 3"]:
+    """The mean of the points in each cube: even density, and less noise than its points."""
+    cell = np.floor(points / np.float32(edge_m)).astype(np.int64)
     _, place = np.unique(cell, axis=0, return_inverse=True)
     place = place.reshape(-1)
     count = np.bincount(place)

@@ -3,8 +3,9 @@
 """All tracks agree on which way is front (beyond the paper), without a label.
 
 A near-symmetric object settles in either of two headings, a half turn apart, each track as chance
-has it (METHOD 12.2). Two facts that need no label decide: within a track an object does not turn
-around between neighbouring scans; across tracks, the profiles of fused scans are more alike when
+has it (METHOD 12.2). Facts that need no label decide: within a track an object does not turn
+around between neighbouring scans, or, where the scans come in no order (`LossConfig.steady` is
+false), they contradict each other if not posed alike (`training/overlaps.py`); across tracks, the profiles of fused scans are more alike when
 turned the same way (`training/profiles.py`). Each is a problem of signs (Z2 synchronisation),
 solved by a leading eigenvector. Which of the two ways is called front stays open: nobody says.
 """
@@ -23,6 +24,7 @@ from wildshape.geometry.se3 import SE3
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.losses.multiview import LossConfig
 from wildshape.models.shapepose import ShapePoseNet
+from wildshape.training.overlaps import agreeing_signs
 from wildshape.training.profiles import agreed_signs, profile, together
 
 NOT_FINITE = (
@@ -59,7 +61,7 @@ def agreed_poses(
     Args:
         network: poses the scans.
         sampler: of the tracks trained on.
-        config: decides which branch speaks.
+        config: decides which branch speaks, and whether the scans of a track follow each other.
         refined: from a track's scans and their poses to better poses.
         progress: called with the tracks done, and their number.
         fused: a track's object from its scans and their poses, to be compared with others; by
@@ -76,7 +78,12 @@ def agreed_poses(
     fused = fused or _fused
     for done, scans in enumerate(sampler.scans_of):
         T_sensor_can = _poses(network, sampler, config, scans)
-        steady = steady_signs(T_sensor_can.rotation)
+        if config.steady:
+            steady = steady_signs(T_sensor_can.rotation)
+        else:
+            clouds = some_of_each(sampler, scans, T_sensor_can)
+            sensors = T_sensor_can.inverse().translation
+            steady = agreeing_signs(clouds, sensors, mirror=network.config.mirror)
         T_steady_can = SE3(_turn(T_sensor_can.rotation, steady), T_sensor_can.translation)
         T_steady_can = refined(scans, T_steady_can)
         rows = torch.from_numpy(scans)
@@ -133,6 +140,13 @@ def _poses(
 
 
 def _fused(sampler: ViewSampler, scans: np.ndarray, T_sensor_can: SE3) -> Float[Tensor, "n 3"]:
+    """The object of a track, roughly."""
+    return some_of_each(sampler, scans, T_sensor_can).flatten(0, 1)
+
+
+def some_of_each(
+    sampler: ViewSampler, scans: np.ndarray, T_sensor_can: SE3
+) -> Float[Tensor, "V n 3"]:
     """A few hundred points of each of a track's scans, in the canonical frame."""
     rng = np.random.default_rng(0)
     clouds = []
@@ -140,4 +154,4 @@ def _fused(sampler: ViewSampler, scans: np.ndarray, T_sensor_can: SE3) -> Float[
         points = sampler.store.scan_points(int(scan))
         picked = torch.from_numpy(points[rng.integers(len(points), size=_POINTS)])
         clouds.append(T_sensor_can[index].inverse().apply(picked))
-    return torch.cat(clouds)
+    return torch.stack(clouds)

@@ -36,6 +36,7 @@ class WeaklySupervised(nn.Module):
         super().__init__()
         self.network, self.config = network, config
         self.encoding: Encoding | None = encoding
+        self._held = config.steady or bool(config.agree_at)
 
     def forward(self, batch: Batch, template: float | Tensor) -> Objective:
         """Loss of one batch; `template` is this step's weight of the template pull."""
@@ -50,7 +51,7 @@ class WeaklySupervised(nn.Module):
             poses.rotation,
             poses.translation,
             self.config,
-            partial(self._handicap, batch, poses) if self.config.steady else None,
+            partial(self._handicap, batch, poses) if self._held else None,
         )
         deviation = template_deviation(shapes)
         loss = terms.total
@@ -66,11 +67,15 @@ class WeaklySupervised(nn.Module):
     def _handicap(
         self, batch: Batch, poses: Poses, cost: Float[Tensor, "B K"]
     ) -> Float[Tensor, "B K"]:
-        """What keeps a track from turning around between its scans."""
+        """What keeps a track from turning around between its scans, or from what was agreed on."""
+        agreed = batch.anchor.any(-1).any(-1)
+        if not self.config.steady:
+            held = turning_handicap(poses.rotation, batch.turn, batch.anchor)
+            return torch.where(agreed[:, None], held, torch.zeros_like(held))
         believed = cost - self.config.belief * poses.log_belief
         own = own_anchor(batch, poses.rotation, believed)
-        agreed = batch.anchor.any(-1).any(-1)[:, None, None]
-        return turning_handicap(poses.rotation, batch.turn, torch.where(agreed, batch.anchor, own))
+        anchor = torch.where(agreed[:, None, None], batch.anchor, own)
+        return turning_handicap(poses.rotation, batch.turn, anchor)
 
 
 def own_anchor(

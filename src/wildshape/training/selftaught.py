@@ -23,6 +23,7 @@ class SelfTaught(nn.Module):
         config: `template_end` is the weight of the template.
         complete: the target shapes are whole; else only what the sensors saw is taught.
         encoding: how the network encodes (see there).
+        unit: metres of the unit in which losses are taken (`unit_of`).
     """
 
     def __init__(
@@ -31,19 +32,21 @@ class SelfTaught(nn.Module):
         config: LossConfig,
         complete: bool,
         encoding: Encoding | None = None,
+        unit: float = 1.0,
     ) -> None:
         super().__init__()
         self.network, self.config = network, config
-        self.complete = complete
+        self.complete, self.unit = complete, unit
         self.encoding: Encoding | None = encoding
 
     def forward(self, batch: FusedBatch, template: float | Tensor) -> Objective:  # noqa: ARG002
         """Loss of one batch; the weight of the template does not change from step to step."""
         code = self.network.encode(batch.scans, self.encoding)
         with record_function("wildshape: heads"):
-            poses, shapes = self.network.poses(code), self.network.canonical(code)
+            poses, shapes = self.network.poses(code), self.network.canonical(code) / self.unit
+        translation, batch = poses.translation / self.unit, self._in_units(batch)
         pose = pose_terms(
-            poses.rotation, poses.translation, batch.rotation, batch.translation, batch.shapes
+            poses.rotation, translation, batch.rotation, batch.translation, batch.shapes
         )
         belief = poses.log_belief.gather(1, pose.winner[:, None]).mean()
         shape = shape_terms(shapes, batch.shapes, self._known(shapes, batch))
@@ -53,8 +56,16 @@ class SelfTaught(nn.Module):
         )
         loss = distance + precision + coverage - _BELIEF * belief
         loss = loss + self.config.template_end * deviation
-        shown = (coverage.detach(), precision.detach(), deviation.detach())
+        shown = (self.unit * part.detach() for part in (coverage, precision, deviation))
         return Objective(loss, *shown, pose.winner)
+
+    def _in_units(self, batch: FusedBatch) -> FusedBatch:
+        """Targets in units instead of metres; scans as they are."""
+        if self.unit == 1.0:
+            return batch
+        lengths = (batch.translation, batch.shapes, batch.sensors)
+        translation, shapes, sensors = (part / self.unit for part in lengths)
+        return batch._replace(translation=translation, shapes=shapes, sensors=sensors)
 
     def _known(self, shapes: Tensor, batch: FusedBatch) -> Tensor | None:
         """The points that some of the track's views would see; others may be as they like."""

@@ -18,6 +18,7 @@ from wildshape.datasets.host import HostViews
 from wildshape.datasets.resident import ResidentViews
 from wildshape.datasets.views import ViewSampler
 from wildshape.errors import BadInputError
+from wildshape.inference.prepare import unit_of
 from wildshape.io.store import Store
 from wildshape.models.checkpoint import load_checkpoint
 from wildshape.models.shapepose import Encoding, ShapePoseNet
@@ -117,7 +118,8 @@ def setup(
         load_state(folder, state, identity)
     sampler = ViewSampler(store, fit_tracks, recipe.views)
     held_out = ViewSampler(store, held_tracks, recipe.views)
-    targets = _targets(teacher, sampler, folder, identity, taught)
+    steady = recipe.loss.steady or recipe.views.sensor == "lidar"
+    targets = _targets(teacher, sampler, folder, identity, taught, steady)
     views = _views(sampler, targets, seed, processes, recipe, say)
     if state.anchors is not None:
         views.hold(state.anchors)
@@ -172,6 +174,7 @@ def _targets(
     folder: Path,
     identity: dict[str, str],
     taught: Taught,
+    steady: bool,
 ) -> FusedTargets | None:
     """Made once a run, and kept beside it."""
     if teacher is None:
@@ -181,7 +184,7 @@ def _targets(
     kept = {key: identity[key] for key in ("data", "teacher")}
     found = load_targets(folder, kept)
     if found is None:
-        found = fused_targets(teacher, sampler, taught)
+        found = fused_targets(teacher, sampler, taught, steady=steady)
         save_targets(folder, found, kept)
     return found
 
@@ -216,7 +219,8 @@ def step_of(run: Run, meter: Meter) -> tuple[Step, Callable[[], None]]:
     if run.targets is None:
         objective = WeaklySupervised(network, loss, encoding)
     else:
-        objective = SelfTaught(network, loss, run.targets.complete, encoding)
+        unit = unit_of(run.sampler.extent_range()[1])
+        objective = SelfTaught(network, loss, run.targets.complete, encoding, unit)
     wrapped = run.processes.wrap(objective)
     step = Step(run.state, wrapped, run.views, meter, run.recipe.optim.clip)
     return step, Captured(step.advance, run.say) if _records(run) else step.advance
