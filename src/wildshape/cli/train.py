@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 EXAMPLE = "wildshape train cars.store --out runs/cars --preset small"
 
 Preset = Literal[
-    "paper-lidar", "paper-views", "default", "small", "tiny",
+    "paper-lidar", "paper-views", "default", "small", "views", "tiny",
     "dpc", "dpc-dagger", "dpc-lidar", "dpc-small", "dpc-dagger-small", "dpc-lidar-small",
 ]  # fmt: skip
 Encoder = Literal["pcn", "pointnet2", "dgcnn"]

@@ -5,9 +5,10 @@
 A near-symmetric object settles in either of two headings, a half turn apart, each track as chance
 has it (METHOD 12.2). Facts that need no label decide: within a track an object does not turn
 around between neighbouring scans, or, where the scans come in no order (`LossConfig.steady` is
-false), they contradict each other if not posed alike (`training/overlaps.py`); across tracks, the profiles of fused scans are more alike when
-turned the same way (`training/profiles.py`). Each is a problem of signs (Z2 synchronisation),
-solved by a leading eigenvector. Which of the two ways is called front stays open: nobody says.
+false), they contradict each other if not posed alike (`training/overlaps.py`); across tracks, the
+profiles of fused scans are more alike when turned the same way (`training/profiles.py`). Each is a
+problem of signs (Z2 synchronisation), solved by a leading eigenvector. Which of the two ways is
+called front stays open: nobody says.
 """
 
 from collections.abc import Callable

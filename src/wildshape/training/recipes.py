@@ -69,6 +69,29 @@ def small() -> Recipe:
     )
 
 
+def views() -> Recipe:
+    """Depth views of objects of unit size (box diagonal 1): `small` with a fifth of its lengths.
+
+    Views come in no order, so that an object may well turn around from one to the next; headings
+    are agreed on by what the views say of each other.
+    """
+    base = small()
+    return replace(
+        base,
+        name="views",
+        network=replace(base.network, points=2048, scale=0.4),
+        loss=replace(
+            base.loss,
+            projection=FacingBins(0.05),
+            belief=0.01,
+            steady=False,
+            agree_at=(0.2, 0.5),
+        ),
+        views=replace(base.views, sensor="camera"),
+        optim=replace(base.optim, steps=8_000, search="bf16"),
+    )
+
+
 def default() -> Recipe:
     """For a long run: `small` with more points and finer bins; the shipped weights' recipe.
 
@@ -126,5 +149,6 @@ PRESETS = {
     "paper-views": paper_views,
     "default": default,
     "small": small,
+    "views": views,
     "tiny": tiny,
 }

@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Make depth views of a category and train weights for them, in two stages.
+
+    python -m experiments.views_weights --category airplane --cad CAD_FOLDER --out runs/airplane
+
+CAD_FOLDER holds `manifest.csv` (columns category, file, split) and the meshes it names. Those of
+split `train` are seen as they are and stretched, beside our own procedural shapes; ten views of
+each, no labels. The first stage is trained as the paper has it (preset `views`); the second starts
+from it and is taught by it: it poses and fuses the tracks. The weights, in half precision, are
+OUT/CATEGORY.safetensors.
+"""
+
+import csv
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Literal
+
+import numpy as np
+import tyro
+
+from wildshape.io.provenance import provenance
+from wildshape.io.store import open_store
+from wildshape.io.store_writer import StoreWriter
+from wildshape.models.checkpoint import load_checkpoint, save_checkpoint
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+from wildshape.training.config import Recipe
+from wildshape.training.loop import MODEL, fit, setup
+from wildshape.training.recipes import views
+
+_COPIES, _STRETCH, _VIEWS, _TRUTH_POINTS = 4, 0.2, 10, 2048
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to make the weights of a category.
+
+    Attributes:
+        out: folder of both runs.
+        cad: folder of CAD meshes with a manifest.
+        category: of the objects.
+        steps: gradient steps of the first stage.
+        taught_steps: of the second.
+        taught_lr: learning rate that the second falls from.
+        seed: of data and training.
+    """
+
+    out: Path
+    cad: Path
+    category: Literal["airplane", "chair", "car"]
+    steps: int = 1600
+    taught_steps: int = 2400
+    taught_lr: float = 7e-4
+    seed: int = 0
+
+
+def train_meshes(settings: Settings, into: Path) -> int:
+    """The category's meshes of the train split, as they are and stretched; their number."""
+    import trimesh
+
+    with (settings.cad / "manifest.csv").open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["split"] == "train"]
+    files = [settings.cad / row["file"] for row in rows if row["category"] == settings.category]
+    rng = np.random.default_rng(settings.seed)
+    order = rng.permutation(len(files) * _COPIES)
+    for place, number in zip(order, range(len(order))):
+        copy, index = divmod(number, len(files))
+        mesh = trimesh.load(files[index], force="mesh", process=False)
+        factors = rng.uniform(1 - _STRETCH, 1 + _STRETCH, 3) if copy else np.ones(3)
+        mesh.vertices = np.asarray(mesh.vertices) * factors
+        mesh.export(into / f"{place:04d}_{files[index].stem}.ply")
+    return len(files)
+
+
+def make_data(settings: Settings, path: Path) -> None:
+    """Write the store: CAD meshes, and half as many procedural shapes, ten views of each."""
+    described = provenance(f"python -m experiments.views_weights {settings}")
+    with TemporaryDirectory() as folder, StoreWriter(path, described) as store:
+        count = train_meshes(settings, Path(folder))
+        sources = ((Path(folder), _COPIES * count), (None, 2 * count))
+        for seed, (meshes, tracks) in enumerate(sources, start=settings.seed + 1):
+            config = SimulationConfig(
+                tracks=tracks,
+                scans=_VIEWS,
+                sensor="depth-camera",
+                category=settings.category,
+                meshes=meshes,
+                shape_points=_TRUTH_POINTS,
+            )
+            for track in simulate_tracks(config, seed):
+                store.add(replace(track, name=f"{seed}-{track.name}"))
+
+
+def main(settings: Settings) -> None:
+    """Make the data if it is not there yet, then train both stages."""
+    data = settings.out / "data"
+    settings.out.mkdir(parents=True, exist_ok=True)
+    if not data.exists():
+        make_data(settings, data)
+    recipe = views()
+    first = replace(recipe, optim=replace(recipe.optim, steps=settings.steps))
+    teacher = train(settings, first, "first")
+    optim = replace(recipe.optim, steps=settings.taught_steps, lr=settings.taught_lr)
+    model = train(settings, replace(recipe, optim=optim), "taught", teacher)
+    ship(model, settings)
+
+
+def train(settings: Settings, recipe: Recipe, name: str, teacher: Path | None = None) -> Path:
+    """One stage, begun from its teacher if it has one, and resumed if it was stopped."""
+    run = setup(
+        recipe,
+        open_store(settings.out / "data"),
+        settings.out / name,
+        seed=settings.seed,
+        resume=True,
+        start=teacher,
+        teacher=teacher,
+        provenance=provenance(f"python -m experiments.views_weights {settings}"),
+    )
+    fit(run, lambda step, values: print(name, step, values, flush=True))
+    return settings.out / name / MODEL
+
+
+def ship(model: Path, settings: Settings) -> None:
+    """The same checkpoint in half precision, as the package carries it."""
+    network, found = load_checkpoint(model)
+    what = f"--category {settings.category} --cad CAD --out RUN"
+    command = {"command": f"python -m experiments.views_weights {what}"}
+    described = replace(found, provenance=found.provenance | command)
+    out = settings.out / f"{settings.category}.safetensors"
+    save_checkpoint(out, network, described, half=True)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Settings))
