@@ -8,13 +8,13 @@ from pathlib import Path
 import torch
 
 from wildshape.errors import BadInputError
-from wildshape.inference.predictor import SHIPPED, Predictor, load
+from wildshape.inference.predictor import Predictor, load, weights_file
 
 
 def model_file(model: Path | None) -> Path:
-    """The checkpoint meant: a file, that of a run's folder, or the shipped one."""
+    """The checkpoint meant: a file, that of a run's folder, or a shipped one, by name or not."""
     if model is None or not model.is_dir():
-        return SHIPPED if model is None else model
+        return weights_file(model)
     from wildshape.training.loop import MODEL  # the trainer only where a run's folder is named
 
     return model / MODEL

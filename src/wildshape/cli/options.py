@@ -23,7 +23,9 @@ Data = Annotated[
 OutFolder = Annotated[Path, arg(metavar="DIR", help="folder to write")]
 Model = Annotated[
     Path | None,
-    arg(metavar="M", help="checkpoint, or folder of a training run; else the shipped weights"),
+    arg(
+        metavar="M", help="checkpoint, folder of a run, or name of shipped weights; else `default`"
+    ),
 ]
 Unit = Annotated[Literal["m", "cm", "mm"], arg(help="of the coordinates in the files")]
 Overwrite = Annotated[bool, arg(help="replace an earlier output")]

@@ -29,7 +29,8 @@ from wildshape.models.shapepose import Poses, ShapePoseNet
 from wildshape.ops.nearest import nearest
 from wildshape.records import Completion, Points, Registration, Sensor
 
-SHIPPED = Path(__file__).parent.parent / "weights" / "default.safetensors"
+_WEIGHTS = Path(__file__).parent.parent / "weights"
+SHIPPED = _WEIGHTS / "default.safetensors"
 _BATCH, _INLIER_M, _INLIER_SHARE = 32, 0.2, 0.05
 _UPRIGHT_RAD = 0.1
 
@@ -49,7 +50,7 @@ def load(model: str | Path | None = None, device: str = "cpu", *, raw: bool = Fa
     """A predictor from a checkpoint; the weights shipped in the package by default.
 
     Args:
-        model: checkpoint.
+        model: checkpoint, or the name of other weights shipped (docs/models.md).
         device: cpu or cuda.
         raw: give the network's own answers, not refined against the scan (`inference/refine.py`).
             Networks trained with a `paper-*` preset are never refined.
@@ -57,8 +58,19 @@ def load(model: str | Path | None = None, device: str = "cpu", *, raw: bool = Fa
     Raises:
         BadInputError: the checkpoint cannot be used; the sentence says why.
     """
-    network, settings = load_checkpoint(Path(model) if model is not None else SHIPPED)
+    network, settings = load_checkpoint(weights_file(model))
     return Predictor(network.to(device), settings, raw=raw)
+
+
+def weights_file(model: str | Path | None) -> Path:
+    """The checkpoint meant: a file, shipped weights by name, or those shipped for vehicles.
+
+    A file that exists goes before a name.
+    """
+    path = Path(model) if model is not None else SHIPPED
+    named = _WEIGHTS / f"{path.name}.safetensors"
+    bare = path.name == str(path) and not path.exists()
+    return named if bare and named.is_file() else path
 
 
 class Predictor:

@@ -84,7 +84,7 @@ def fused_targets(
     def fused(_: ViewSampler, scans: np.ndarray, T_sensor_can: SE3) -> Tensor:
         return torch.from_numpy(_shape(sampler, scans, T_sensor_can, mirror, voxel))
 
-    poses = agreed_poses(network, asked, loss, refined, progress, fused)
+    poses = agreed_poses(network, asked, loss, refined, progress, fused, settled=True)
     shapes = [
         _shape(sampler, scans, _of(poses, scans), mirror, voxel) for scans in sampler.scans_of
     ]

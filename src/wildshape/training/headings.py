@@ -25,6 +25,7 @@ from wildshape.geometry.se3 import SE3
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.losses.multiview import LossConfig
 from wildshape.models.shapepose import ShapePoseNet
+from wildshape.training.kinds import EndOn, end_on, uncontradicted_signs
 from wildshape.training.overlaps import agreeing_signs
 from wildshape.training.profiles import agreed_signs, profile, together
 
@@ -56,6 +57,8 @@ def agreed_poses(
     refined: Callable[[np.ndarray, SE3], SE3] = lambda _, pose: pose,
     progress: Callable[[int, int], None] = lambda *_: None,
     fused: Callable[[ViewSampler, np.ndarray, SE3], Tensor] | None = None,
+    *,
+    settled: bool = False,
 ) -> AgreedPoses:
     """Pose all scans, refine each track, and let all tracks look one way.
 
@@ -67,6 +70,8 @@ def agreed_poses(
         progress: called with the tracks done, and their number.
         fused: a track's object from its scans and their poses, to be compared with others; by
             default some points of each scan.
+        settled: the network has been trained to its end: what it says of a scan is worth something
+            against what all tracks together say (`training/kinds.py`).
 
     Raises:
         BadInputError: the network's weights are no longer finite.
@@ -96,11 +101,24 @@ def agreed_poses(
     signs = agreed_signs(together(profiles))
     # Of the two ways that all may look, take the one that most scans look already.
     looks = torch.stack([(s * sign).sum() for s, sign in zip(kept, signs)]).sum()
-    way = torch.where(looks < 0, -1.0, 1.0)
-    for scans, sign in zip(sampler.scans_of, signs * way):
+    signs = signs * torch.where(looks < 0, -1.0, 1.0)
+    if settled:
+        found = [_end_on(agreed, *one) for one in zip(sampler.scans_of, kept, signs)]
+        counts = EndOn(*(torch.cat(parts) for parts in zip(*found)))
+        signs = uncontradicted_signs(together(profiles), signs, counts)
+    for scans, sign in zip(sampler.scans_of, signs):
         rows = torch.from_numpy(scans)
         agreed.rotation[rows] = _turn(agreed.rotation[rows], sign.expand(len(rows)))
     return agreed
+
+
+def _end_on(
+    poses: AgreedPoses, scans: np.ndarray, votes: Float[Tensor, "V"], sign: Float[Tensor, ""]
+) -> EndOn:
+    """How the network's own headings of one track's scans stand against the track's."""
+    rows = torch.from_numpy(scans)
+    T_sensor_can = SE3(poses.rotation[rows], poses.translation[rows])
+    return end_on(votes, T_sensor_can.inverse().translation, sign)
 
 
 def _turn(rotation: Float[Tensor, "V 3 3"], sign: Float[Tensor, "V"]) -> Float[Tensor, "V 3 3"]:

@@ -11,7 +11,7 @@ synchronisation on a graph of neighbours).
 from typing import NamedTuple
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 _BINS, _LEVELS, _FEWEST_OF_SLICE, _FEWEST_OF_CELL = 16, 6, 20, 5
@@ -91,11 +91,11 @@ def _evidence(profiles: Profiles, known: Profiles) -> Float[Tensor, "J R"]:
 
     Objects that are no neighbours count too, though little: no group is left to itself.
     """
-    as_is, reversed_ = _difference(profiles, known), _difference(profiles, _reversed(known))
-    votes = (reversed_ - as_is) / (reversed_ + as_is).clamp_min(_SMALLEST)
-    unlike = torch.minimum(as_is, reversed_)
-    unlike += _LENGTH * (profiles.length[:, None] - known.length).abs()
-    unlike += _HEIGHT * (profiles.height[:, None] - known.height).abs()
+    every = torch.ones(len(known.length), dtype=torch.bool)
+    as_is, turned = difference(profiles, known), difference(profiles, reversed_where(known, every))
+    unlike = torch.minimum(as_is, turned)
+    sizes = _sizes_apart(profiles, known)
+    votes = (turned - as_is) / (turned + as_is - 2 * sizes).clamp_min(_SMALLEST)
     own = torch.arange(len(known.length))
     unlike[own, own] = torch.inf
     votes[own, own] = 0.0
@@ -104,18 +104,25 @@ def _evidence(profiles: Profiles, known: Profiles) -> Float[Tensor, "J R"]:
     return votes * weight
 
 
-def _reversed(profiles: Profiles) -> Profiles:
-    """The same objects turned by half a turn."""
-    return profiles._replace(tops=profiles.tops.flip(1), sides=profiles.sides.flip(1))
+def reversed_where(profiles: Profiles, chosen: Bool[Tensor, "J"]) -> Profiles:
+    """The same objects, those chosen turned by half a turn."""
+    tops = torch.where(chosen[:, None], profiles.tops.flip(1), profiles.tops)
+    sides = torch.where(chosen[:, None, None], profiles.sides.flip(1), profiles.sides)
+    return profiles._replace(tops=tops, sides=sides)
 
 
-def _difference(a: Profiles, b: Profiles) -> Float[Tensor, "I J"]:
-    """Mean absolute difference of tops and of sides, over what both have seen."""
+def difference(a: Profiles, b: Profiles) -> Float[Tensor, "I J"]:
+    """How unlike objects are as they stand: tops, sides, over what both have seen, and sizes."""
     rows = [
         _apart(tops, b.tops) + _apart(sides.flatten(), b.sides.flatten(1))
         for tops, sides in zip(a.tops, a.sides)
     ]
-    return torch.stack(rows)
+    return torch.stack(rows) + _sizes_apart(a, b)
+
+
+def _sizes_apart(a: Profiles, b: Profiles) -> Float[Tensor, "I J"]:
+    lengths = (a.length[:, None] - b.length).abs()
+    return _LENGTH * lengths + _HEIGHT * (a.height[:, None] - b.height).abs()
 
 
 def _apart(one: Float[Tensor, "m"], many: Float[Tensor, "J m"]) -> Float[Tensor, "J"]:

@@ -79,10 +79,10 @@ def views() -> Recipe:
     return replace(
         base,
         name="views",
-        network=replace(base.network, points=2048, scale=0.4),
+        network=replace(base.network, scale=0.4),
         loss=replace(
             base.loss,
-            projection=FacingBins(0.05),
+            projection=FacingBins(0.06),
             belief=0.01,
             steady=False,
             agree_at=(0.2, 0.5),
