@@ -4,6 +4,7 @@
 
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.rotation import rotation_from_quaternion
 from wildshape.geometry.se3 import SE3
 from wildshape.geometry.visibility import FacingBins
-from wildshape.inference.predictor import Predictor, inlier_ratio, load
+from wildshape.inference.predictor import Predictor, inlier_ratio, load, weights_file
 from wildshape.models.checkpoint import ModelSettings, save_checkpoint
 from wildshape.models.confidence import Facts
 from wildshape.models.shapepose import NetworkConfig, ShapePoseNet
@@ -256,6 +257,16 @@ def test_sixteen_points_are_enough(predictor):
 
 def test_no_scans_no_completions(predictor):
     assert list(predictor.complete_many([])) == []
+
+
+def test_shipped_weights_have_names(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shipped = weights_file(None)
+    assert weights_file("default") == weights_file(Path("default")) == shipped
+    (tmp_path / "default").write_text("a file of the user's")
+    assert weights_file("default") == Path("default")
+    assert weights_file("zeppelin") == Path("zeppelin")
+    assert weights_file("runs/default") == Path("runs/default")
 
 
 def test_load(predictor, tmp_path):

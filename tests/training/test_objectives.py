@@ -9,6 +9,7 @@ import pytest
 import torch
 from tests.training.worker import SMALLEST
 
+from wildshape.datasets.fused import FusedBatch
 from wildshape.datasets.views import ViewSampler
 from wildshape.geometry.rotation import random_rotation
 from wildshape.losses.hindsight import score_hypotheses
@@ -16,6 +17,7 @@ from wildshape.losses.steady import turning_handicap
 from wildshape.models.shapepose import Poses, ShapePoseNet
 from wildshape.training import objectives
 from wildshape.training.objectives import WeaklySupervised, own_anchor
+from wildshape.training.selftaught import SelfTaught
 
 VIEWS = replace(SMALLEST.views, tracks=4, views=3)
 
@@ -75,3 +77,32 @@ def test_the_least_cost_of_the_reference_scan_decides(batch):
     for track, at in enumerate(batch.reference.tolist()):
         expected = batch.turn[at].T @ rotation[at, track]
         torch.testing.assert_close(anchor[track], expected.expand(3, 3, 3))
+
+
+def test_views_in_no_order_are_held_to_what_was_agreed_on_alone(batch):
+    torch.manual_seed(0)
+    network = ShapePoseNet(SMALLEST.network)
+    loss = replace(SMALLEST.loss, steady=False, agree_at=(0.5,))
+    objective = WeaklySupervised(network, loss)
+    poses = network.poses(network.encode(batch.scans))
+    agreed = torch.arange(len(batch.scans)) % 2 == 0
+    anchor = batch.turn.mT @ poses.rotation[:, 1]
+    held = batch._replace(anchor=torch.where(agreed[:, None, None], anchor, 0.0))
+    handicap = objective._handicap(held, poses, torch.zeros(len(batch.scans), 4))
+    assert bool((handicap[~agreed] == 0).all())
+    assert bool((handicap[agreed, 1] == 0).all())
+    assert bool((handicap[agreed] > 1).any())
+
+
+def test_what_is_taught_does_not_depend_on_the_size_of_the_objects():
+    generator = torch.Generator().manual_seed(0)
+    scans, shapes, sensors = (torch.randn(4, n, 3, generator=generator) for n in (64, 80, 2))
+    rotation = random_rotation(4, generator)
+    losses = []
+    for unit in (1.0, 0.2):
+        torch.manual_seed(1)
+        network = ShapePoseNet(replace(SMALLEST.network, scale=2 * unit))
+        places = (unit * part for part in (torch.ones(4, 3), shapes, 5 * sensors))
+        batch = FusedBatch(unit * scans, rotation, *places)
+        losses.append(SelfTaught(network, SMALLEST.loss, False, unit=unit)(batch, 0.0).loss)
+    torch.testing.assert_close(losses[0], losses[1], atol=1e-3, rtol=1e-3)
