@@ -74,7 +74,7 @@ class Size:
 SIZES = {
     "test": Size("test", 6, 3, 10, 2, 4),
     "tiny": Size("tiny", 40, 12, 400, 3, 6),
-    "hour": Size("hour", 200, 30, 2000, 3, 8),
+    "hour": Size("hour", 200, 30, 1000, 3, 8),
     "small": Size("small", 300, 60, 6000, 3, 12, "small"),
     "full": Size("full", 4000, 141, None, 5, None),
 }
