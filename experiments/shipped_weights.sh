@@ -13,6 +13,8 @@ meshes=$1 kitti=$2 out=$3
 mkdir -p "$out"
 wildshape simulate "$out/procedural" --tracks 30 --seed 9001
 wildshape simulate "$out/cad" --tracks 168 --scans 12 --seed 9002 --meshes "$meshes"
+wildshape simulate "$out/hdl32" --tracks 30 --seed 9011 --sensor hdl32
+wildshape simulate "$out/os1" --tracks 30 --seed 9012 --sensor os1-128
 wildshape convert kitti-raw "$kitti" "$out/kitti" --every 2
 for data in procedural cad kitti; do
     for rotate in none yaw so3; do
@@ -22,4 +24,13 @@ for data in procedural cad kitti; do
             --seeds "$seeds" --max-scans 8 --baselines identity,one-scan,local-icp $more
     done
     wildshape evaluate "$out/$data" --out "$out/$data-raw" --max-scans 8 --baselines none --raw
+done
+for data in hdl32 os1; do
+    wildshape evaluate "$out/$data" --out "$out/$data-yaw" --rotate yaw --max-scans 8 --track \
+        --baselines one-scan
+done
+for data in procedural cad hdl32 os1; do
+    protocol=yaw
+    case "$data" in procedural | cad) protocol=none ;; esac
+    python experiments/by_kind.py --data "$out/$data" --evaluation "$out/$data-$protocol"
 done
