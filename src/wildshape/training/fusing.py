@@ -29,6 +29,7 @@ from wildshape.losses.multiview import LossConfig
 from wildshape.models.checkpoint import load_checkpoint
 from wildshape.records import SensorKind
 from wildshape.training.closing import unseen_roof
+from wildshape.training.ground import skirt
 from wildshape.training.headings import AgreedPoses, agreed_poses
 
 TARGETS = "targets.safetensors"
@@ -159,7 +160,7 @@ def _sensors(poses: AgreedPoses, scans: np.ndarray) -> Float[Tensor, "O 3"]:
 def _shape(
     sampler: ViewSampler, scans: np.ndarray, T_sensor_can: SE3, mirror: bool, voxel_m: float
 ) -> Float32[np.ndarray, "G 3"]:
-    """A track's scans in the canonical frame, reflected, thinned and without strays."""
+    """A track's scans in the canonical frame, reflected, thinned, without strays and ground."""
     rng = np.random.default_rng(0)
     clouds = []
     for index, scan in enumerate(scans):
@@ -170,7 +171,8 @@ def _shape(
     if mirror:
         fused = np.concatenate((fused, fused * np.asarray((1, -1, 1), np.float32)))
     thinned = _voxel_means(fused, voxel_m)
-    return _exactly(thinned[_near_others(thinned)])
+    kept = thinned[_near_others(thinned)]
+    return _exactly(kept[~skirt(kept)] if sampler.config.sensor == "lidar" else kept)
 
 
 def _near_others(points: Float32[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
