@@ -29,7 +29,7 @@ from wildshape.losses.multiview import LossConfig
 from wildshape.models.checkpoint import load_checkpoint
 from wildshape.records import SensorKind
 from wildshape.training.closing import unseen_roof
-from wildshape.training.ground import skirt
+from wildshape.geometry.ground import skirt
 from wildshape.training.headings import AgreedPoses, agreed_poses
 
 TARGETS = "targets.safetensors"

@@ -5,7 +5,7 @@
 import numpy as np
 from tests.cars import drive_by
 
-from wildshape.training.ground import skirt
+from wildshape.geometry.ground import skirt
 
 
 def test_ground_around_a_vehicle_is_found_and_the_vehicle_kept():
