@@ -25,7 +25,8 @@ from wildshape.evaluation.confidence import RiskCoverage, rank_correlation, risk
 from wildshape.evaluation.metrics import completion_error
 from wildshape.evaluation.turning import turn_track
 from wildshape.geometry.se3 import stack
-from wildshape.inference.predictor import SHIPPED, Predictor, load
+from wildshape.inference.predictor import Predictor, load
+from wildshape.inference.shipped import SHIPPED
 from wildshape.io.atomic import write_json
 from wildshape.io.provenance import provenance
 from wildshape.io.store import Store, open_store

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import KDTree
 from tests.cars import car_surface, drive_by, poses_of
 
-from wildshape.inference.refine import denser, drawn_to_scan, refine
+from wildshape.inference.refine import denser, drawn_to_scan, filled, refine
 
 SHAPE = car_surface(4000, seed=5)[0].astype(np.float32)
 STRETCH = np.array((1.07, 0.96, 1.05), np.float32)
@@ -114,3 +114,16 @@ def test_denser_fills_gaps_and_keeps_the_points():
     assert len(np.unique(dense.round(6), axis=0)) > 1.8 * len(SHAPE)
     other = car_surface(3000, seed=6)[0]
     assert KDTree(dense).query(other)[0].mean() < 0.9 * KDTree(SHAPE).query(other)[0].mean()
+
+
+def test_an_exact_scan_takes_the_place_of_points_put_between():
+    """The network's own points stay first; what the scan saw is nearer, the rest is as it was."""
+    shape = SHAPE[::4] + np.float32((0.0, 0.0, 0.04))
+    seen = SHAPE[SHAPE[:, 0] > 0]
+    whole, plain = filled(shape, seen, True), filled(shape, seen, False)
+    np.testing.assert_array_equal(whole[: len(shape)], shape)
+    np.testing.assert_array_equal(plain, denser(shape))
+    truth = KDTree(whole)
+    assert truth.query(seen)[0].mean() < 0.7 * KDTree(plain).query(seen)[0].mean()
+    behind = plain[plain[:, 0] < -0.5]
+    assert truth.query(behind)[0].max() == 0

@@ -134,7 +134,8 @@ def train(settings: Settings) -> "Predictor":
 def shipped() -> "dict[str, Predictor]":
     """The shipped weights, if this checkout has them."""
     from wildshape.cli.terminal import say
-    from wildshape.inference.predictor import SHIPPED, load
+    from wildshape.inference.predictor import load
+    from wildshape.inference.shipped import SHIPPED
 
     if not SHIPPED.is_file():
         say("no weights are shipped with this version; the demo goes on with its own alone")

@@ -8,7 +8,8 @@ from pathlib import Path
 import torch
 
 from wildshape.errors import BadInputError
-from wildshape.inference.predictor import Predictor, load, weights_file
+from wildshape.inference.predictor import Predictor, load
+from wildshape.inference.shipped import weights_file
 
 
 def model_file(model: Path | None) -> Path:

@@ -20,7 +20,8 @@ from wildshape.inference.boxes import box_seen
 from wildshape.inference.compiled import compiled
 from wildshape.inference.facts import facts_of, seen_facts
 from wildshape.inference.prepare import NetworkInput, as_points, extent, in_order, network_input
-from wildshape.inference.refine import denser, refine
+from wildshape.inference.refine import filled, refine
+from wildshape.inference.shipped import weights_file
 from wildshape.inference.track import Refine, complete_together
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.models.checkpoint import ModelSettings, load_checkpoint
@@ -29,8 +30,6 @@ from wildshape.models.shapepose import Poses, ShapePoseNet
 from wildshape.ops.nearest import nearest
 from wildshape.records import Completion, Points, Registration, Sensor
 
-_WEIGHTS = Path(__file__).parent.parent / "weights"
-SHIPPED = _WEIGHTS / "default.safetensors"
 _BATCH, _INLIER_M, _INLIER_SHARE = 32, 0.2, 0.05
 _UPRIGHT_RAD = 0.1
 
@@ -60,17 +59,6 @@ def load(model: str | Path | None = None, device: str = "cpu", *, raw: bool = Fa
     """
     network, settings = load_checkpoint(weights_file(model))
     return Predictor(network.to(device), settings, raw=raw)
-
-
-def weights_file(model: str | Path | None) -> Path:
-    """The checkpoint meant: a file, shipped weights by name, or those shipped for vehicles.
-
-    A file that exists goes before a name.
-    """
-    path = Path(model) if model is not None else SHIPPED
-    named = _WEIGHTS / f"{path.name}.safetensors"
-    bare = path.name == str(path) and not path.exists()
-    return named if bare and named.is_file() else path
 
 
 class Predictor:
@@ -237,12 +225,13 @@ class Predictor:
         """Scan `i` of those found."""
         shape, T_sensor_can = found.shapes[i], SE3(found.rotation[i], found.translation[i])
         mirror, cost = self.settings.network.mirror, float(found.cost[i])
+        exact = self.settings.sensor == "camera"
         facts, warning = facts_of(scan, cost, found.facts[i]), self._warning(scan, sensor)
         if self.refines:
             shape, T_sensor_can = _refined(scan, shape, T_sensor_can, mirror=mirror)
         points = T_sensor_can.to(torch.float32).apply(shape).numpy()
         return Completion(
-            points=denser(points) if self.refines else points,
+            points=filled(points, scan, exact) if self.refines else points,
             pose=T_sensor_can.to(torch.float64),
             box=box_seen(shape, T_sensor_can, scan, mirror=mirror),
             confidence=0.0 if warning else self.confidence(facts),

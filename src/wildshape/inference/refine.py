@@ -25,7 +25,7 @@ _USUAL_M = 5.0
 _BELIEVED, _ERROR_M, _KERNEL_M = 300.0, 0.07, 0.3
 _PRIOR_RAD, _PRIOR_M, _PRIOR_STRETCH = np.radians(3.0), 0.05, 0.08
 _REACH_M, _STIFFNESS, _DRAWN_BY, _VOXEL_M = 0.12, 0.2, 8, 0.08
-_PARTNER = 5
+_PARTNER, _SMALLEST_M = 5, 1e-6
 
 Cloud = Float[np.ndarray, "_ 3"]
 
@@ -176,3 +176,25 @@ def denser(points: Cloud) -> Cloud:
     near = KDTree(points).query(points, k=_PARTNER + 1)[1]
     middles = (points + points[np.asarray(near)[:, -1]]) / 2
     return np.concatenate((points, middles)).astype(points.dtype)
+
+
+def filled(points: Cloud, scan: Cloud, exact: bool) -> Cloud:
+    """A refined shape's points and as many more (`denser`), sensor frame; the given ones first.
+
+    Args:
+        points: of the shape.
+        scan: it was refined against, the same frame.
+        exact: the scan is dense and has hardly any noise, as a depth camera's: where it saw
+            something, its own points, as far apart as the shape's, stand in for those added.
+    """
+    from scipy.spatial import KDTree
+
+    from wildshape.geometry.outliers import voxel_thin
+
+    more = denser(points)
+    if not exact:
+        return more
+    gap = max(float(np.median(np.asarray(KDTree(more).query(more, k=2)[0])[:, 1])), _SMALLEST_M)
+    added = more[len(points) :]
+    unseen = added[KDTree(scan).query(added)[0] > gap]
+    return np.concatenate((points, unseen, voxel_thin(scan, gap))).astype(points.dtype)
