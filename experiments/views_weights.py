@@ -41,7 +41,7 @@ class Settings:
         cad: folder of CAD meshes with a manifest.
         category: of the objects.
         steps: gradient steps of the first stage.
-        taught_steps: of the second.
+        taught_steps: of the second; 0 ends with the first.
         taught_lr: learning rate that the second falls from.
         seed: of data and training.
     """
@@ -100,9 +100,10 @@ def main(settings: Settings) -> None:
         make_data(settings, data)
     recipe = views()
     first = replace(recipe, optim=replace(recipe.optim, steps=settings.steps))
-    teacher = train(settings, first, "first")
-    optim = replace(recipe.optim, steps=settings.taught_steps, lr=settings.taught_lr)
-    model = train(settings, replace(recipe, optim=optim), "taught", teacher)
+    model = train(settings, first, "first")
+    if settings.taught_steps:
+        optim = replace(recipe.optim, steps=settings.taught_steps, lr=settings.taught_lr)
+        model = train(settings, replace(recipe, optim=optim), "taught", teacher=model)
     ship(model, settings)
 
 
@@ -125,7 +126,8 @@ def train(settings: Settings, recipe: Recipe, name: str, teacher: Path | None = 
 def ship(model: Path, settings: Settings) -> None:
     """The same checkpoint in half precision, as the package carries it."""
     network, found = load_checkpoint(model)
-    what = f"--category {settings.category} --cad CAD --out RUN"
+    stages = f"--steps {settings.steps} --taught-steps {settings.taught_steps}"
+    what = f"--category {settings.category} --cad CAD --out RUN {stages} --seed {settings.seed}"
     command = {"command": f"python -m experiments.views_weights {what}"}
     described = replace(found, provenance=found.provenance | command)
     out = settings.out / f"{settings.category}.safetensors"
