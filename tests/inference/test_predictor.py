@@ -15,7 +15,8 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.rotation import rotation_from_quaternion
 from wildshape.geometry.se3 import SE3
 from wildshape.geometry.visibility import FacingBins
-from wildshape.inference.predictor import Predictor, inlier_ratio, load
+from wildshape.inference.predictor import Predictor, load
+from wildshape.inference.registering import inlier_ratio
 from wildshape.inference.shipped import weights_file
 from wildshape.models.checkpoint import ModelSettings, save_checkpoint
 from wildshape.models.confidence import Facts

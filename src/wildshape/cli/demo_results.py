@@ -17,7 +17,8 @@ from wildshape.cli.terminal import duration
 from wildshape.evaluation.examples import pick
 from wildshape.evaluation.results import Results, as_json, figures_of
 from wildshape.inference.method import Learned
-from wildshape.inference.predictor import Predictor, fuse_scans
+from wildshape.inference.predictor import Predictor
+from wildshape.inference.registering import fuse_scans
 from wildshape.io.cloud_writer import write_cloud
 from wildshape.records import Completion, Track
 from wildshape.report.content import Cloud, Report, ReportObject

@@ -43,7 +43,7 @@ def run(settings: Settings) -> None:
     from wildshape.cli.results import check_refine
     from wildshape.cli.terminal import answer, say, say_skipped
     from wildshape.geometry.se3 import stack
-    from wildshape.inference.predictor import fuse_scans, to_middle
+    from wildshape.inference.registering import fuse_scans, to_middle
     from wildshape.io.cloud_writer import check_suffix, write_cloud
 
     check_refine(settings.refine, track=settings.together)

@@ -22,7 +22,8 @@ from wildshape.cli.tally import Tally
 from wildshape.cli.terminal import answer, duration, progress, say, say_skipped
 from wildshape.errors import BadInputError
 from wildshape.geometry.se3 import stack
-from wildshape.inference.predictor import Predictor, to_middle
+from wildshape.inference.predictor import Predictor
+from wildshape.inference.registering import to_middle
 from wildshape.inference.track import Refine
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import reading as reading_file

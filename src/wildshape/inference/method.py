@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from wildshape.geometry.se3 import SE3, stack
-from wildshape.inference.predictor import Predictor, to_middle
+from wildshape.inference.predictor import Predictor
+from wildshape.inference.registering import to_middle
 from wildshape.inference.track import Refine
 from wildshape.records import Box, Completion, Points, Sensor
 

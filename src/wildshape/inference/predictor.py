@@ -10,27 +10,34 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from wildshape.geometry.facing import roll_angle
+from wildshape.geometry.ground import skirt
 from wildshape.geometry.se3 import SE3, stack
 from wildshape.inference.boxes import box_seen
 from wildshape.inference.compiled import compiled
 from wildshape.inference.facts import facts_of, seen_facts
-from wildshape.inference.prepare import NetworkInput, as_points, extent, in_order, network_input
+from wildshape.inference.prepare import (
+    MIN_POINTS,
+    NetworkInput,
+    as_points,
+    extent,
+    in_order,
+    network_input,
+)
 from wildshape.inference.refine import filled, refine
+from wildshape.inference.registering import fuse_scans, inlier_ratio, to_middle
 from wildshape.inference.shipped import weights_file
 from wildshape.inference.track import Refine, complete_together
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.models.checkpoint import ModelSettings, load_checkpoint
 from wildshape.models.confidence import Facts
 from wildshape.models.shapepose import Poses, ShapePoseNet
-from wildshape.ops.nearest import nearest
 from wildshape.records import Completion, Points, Registration, Sensor
 
-_BATCH, _INLIER_M, _INLIER_SHARE = 32, 0.2, 0.05
+_BATCH = 32
 _UPRIGHT_RAD = 0.1
 
 
@@ -126,6 +133,10 @@ class Predictor:
         clouds = [as_points(scan, f"scan {i}") for i, scan in enumerate(scans)]
         began = time.perf_counter()
         alone = list(self.complete_many(clouds, sensor))
+        clouds = [
+            self._off_ground(cloud, done.pose.inverse().apply_numpy(done.points), done.pose)
+            for cloud, done in zip(clouds, alone)
+        ]
         done = complete_together(alone, clouds, self.settings, refine=refine)
         seconds = (time.perf_counter() - began) / max(len(done), 1)
         return [replace(item, seconds=seconds) for item in done]
@@ -227,13 +238,14 @@ class Predictor:
         mirror, cost = self.settings.network.mirror, float(found.cost[i])
         exact = self.settings.sensor == "camera"
         facts, warning = facts_of(scan, cost, found.facts[i]), self._warning(scan, sensor)
+        seen = self._off_ground(scan, shape.numpy(), T_sensor_can)
         if self.refines:
-            shape, T_sensor_can = _refined(scan, shape, T_sensor_can, mirror=mirror)
+            shape, T_sensor_can = _refined(seen, shape, T_sensor_can, mirror=mirror)
         points = T_sensor_can.to(torch.float32).apply(shape).numpy()
         return Completion(
             points=filled(points, scan, exact) if self.refines else points,
             pose=T_sensor_can.to(torch.float64),
-            box=box_seen(shape, T_sensor_can, scan, mirror=mirror),
+            box=box_seen(shape, T_sensor_can, seen, mirror=mirror),
             confidence=0.0 if warning else self.confidence(facts),
             branch=int(found.branch[i]),
             cost=cost,
@@ -241,6 +253,13 @@ class Predictor:
             warning=warning,
             facts=facts,
         )
+
+    def _off_ground(self, scan: Points, shape: Points, T_sensor_canonical: SE3) -> Points:
+        """The scan without the ground beside its object, for networks that do not complete it."""
+        if not self.refines or self.settings.sensor != "lidar":
+            return scan
+        kept = scan[~skirt(T_sensor_canonical.inverse().apply_numpy(scan), shape)]
+        return kept if len(kept) >= MIN_POINTS else scan
 
     def confidence(self, facts: Facts) -> float:
         """0 to 1: as the weights are calibrated (`models/confidence.py`).
@@ -276,23 +295,3 @@ def _refined(
     found = refine(in_order(scan), shape.numpy(), *pose, mirror=mirror)
     rotation, translation = torch.from_numpy(found.rotation), torch.from_numpy(found.translation)
     return torch.from_numpy(found.shape), SE3(rotation, translation)
-
-
-def to_middle(T_sensor_canonical: SE3) -> SE3:
-    """`T_middle_scan = T_middle_can inv(T_scan_can)` of every scan of a track."""
-    middle = T_sensor_canonical[len(T_sensor_canonical) // 2]
-    return middle @ T_sensor_canonical.inverse()
-
-
-def fuse_scans(scans: Sequence[Points], T_middle_scan: SE3) -> Points:
-    """The scans' points, moved and joined."""
-    moved = [T_middle_scan[i].apply_numpy(scan) for i, scan in enumerate(scans)]
-    return np.concatenate(moved).astype(np.float32)
-
-
-def inlier_ratio(T_target_source: SE3, source: Points, target: Points) -> float:
-    """Share of moved source points near a target point (`Registration.inlier_ratio`)."""
-    reach = min(_INLIER_M, _INLIER_SHARE * extent(target))
-    moved = torch.from_numpy(T_target_source.apply_numpy(source))
-    found = nearest(moved[None], torch.from_numpy(np.ascontiguousarray(target))[None])
-    return float((found.distance_squared <= reach * reach).float().mean())

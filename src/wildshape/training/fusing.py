@@ -21,6 +21,7 @@ from torch import Tensor
 from wildshape.datasets.fused import FusedTargets
 from wildshape.datasets.views import ViewSampler
 from wildshape.errors import BadInputError
+from wildshape.geometry.ground import skirt
 from wildshape.geometry.se3 import SE3
 from wildshape.inference.joint import refine_jointly
 from wildshape.inference.prepare import unit_of
@@ -29,7 +30,6 @@ from wildshape.losses.multiview import LossConfig
 from wildshape.models.checkpoint import load_checkpoint
 from wildshape.records import SensorKind
 from wildshape.training.closing import unseen_roof
-from wildshape.geometry.ground import skirt
 from wildshape.training.headings import AgreedPoses, agreed_poses
 
 TARGETS = "targets.safetensors"

@@ -9,7 +9,7 @@ from wildshape.baselines.identity import Identity
 from wildshape.baselines.local_icp import LocalIcp
 from wildshape.evaluation.metrics import ACCURATE_DEG, RegistrationError, registration_error
 from wildshape.geometry.se3 import SE3, stack
-from wildshape.inference.predictor import to_middle
+from wildshape.inference.registering import to_middle
 from wildshape.records import Track
 from wildshape.report.viewer.content import Made
 
