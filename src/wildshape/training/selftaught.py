@@ -56,8 +56,10 @@ class SelfTaught(nn.Module):
         )
         loss = distance + precision + coverage - _BELIEF * belief
         loss = loss + self.config.template_end * deviation
-        shown = (self.unit * part.detach() for part in (coverage, precision, deviation))
-        return Objective(loss, *shown, pose.winner)
+        coverage, precision, deviation = (
+            self.unit * part.detach() for part in (coverage, precision, deviation)
+        )
+        return Objective(loss, coverage, precision, deviation, pose.winner)
 
     def _in_units(self, batch: FusedBatch) -> FusedBatch:
         """Targets in units instead of metres; scans as they are."""
