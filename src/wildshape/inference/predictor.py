@@ -258,7 +258,8 @@ class Predictor:
         """The scan without the ground beside its object, for networks that do not complete it."""
         if not self.refines or self.settings.sensor != "lidar":
             return scan
-        kept = scan[~skirt(T_sensor_canonical.inverse().apply_numpy(scan), shape)]
+        T_canonical_sensor = T_sensor_canonical.to(torch.float64).inverse()
+        kept = scan[~skirt(T_canonical_sensor.apply_numpy(scan), shape)]
         return kept if len(kept) >= MIN_POINTS else scan
 
     def confidence(self, facts: Facts) -> float:
