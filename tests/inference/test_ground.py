@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Ground left around a car in its scan does not make the car larger."""
+
+import numpy as np
+import torch
+from tests.cars import drive_by
+
+from wildshape.inference.predictor import load
+
+
+def _with_ground(scan: np.ndarray, T_sensor_object, low: np.ndarray, high: np.ndarray):
+    """The scan, and ground up to 35 cm around the car, as the sensor has them."""
+    rng = np.random.default_rng(3)
+    places = rng.uniform(low[:2] - 0.35, high[:2] + 0.35, (600, 2))
+    outside = ((places < low[:2]) | (places > high[:2])).any(1)
+    heights = np.full(int(outside.sum()), low[2])
+    ground = np.column_stack((places[outside], heights))
+    return np.concatenate((scan, T_sensor_object.apply_numpy(ground))).astype(np.float32)
+
+
+def test_a_box_is_hardly_wider_with_ground_than_without():
+    model = load()
+    track = drive_by(scans=5)
+    low, high = track.shape.min(0), track.shape.max(0)
+    wider = []
+    for i, scan in enumerate(track.scans):
+        pose = track.T_sensor_object[torch.tensor(i)]
+        clean = np.asarray(model.complete(scan).box.size)
+        grounded = np.asarray(model.complete(_with_ground(scan, pose, low, high)).box.size)
+        wider.append((grounded / clean)[:2])
+    assert np.mean(wider) < 1.08  # 35 cm on each side would be 1.15 along and 1.4 across
