@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Make depth views of a category and train weights for them, in two stages.
+"""Make depth views of a category and train weights for them, in one stage or two.
 
     python -m experiments.views_weights --category airplane --cad CAD_FOLDER --out runs/airplane
 
 CAD_FOLDER holds `manifest.csv` (columns category, file, split) and the meshes it names. Those of
 split `train` are seen as they are and stretched, beside our own procedural shapes; ten views of
-each, no labels. The first stage is trained as the paper has it (preset `views`); the second starts
-from it and is taught by it: it poses and fuses the tracks. The weights, in half precision, are
-OUT/CATEGORY.safetensors.
+each, no labels. The first stage is trained as the paper has it (preset `views`); a second, left out by
+default, starts from it and is taught by it: it poses and fuses the tracks. The weights, in half
+precision, are OUT/CATEGORY.safetensors.
 """
 
 import csv
@@ -49,8 +49,8 @@ class Settings:
     out: Path
     cad: Path
     category: Literal["airplane", "chair", "car"]
-    steps: int = 1600
-    taught_steps: int = 2400
+    steps: int = 3500
+    taught_steps: int = 0
     taught_lr: float = 7e-4
     seed: int = 0
 
