@@ -10,6 +10,7 @@ from wildshape.geometry.ground import skirt
 
 def test_ground_around_a_vehicle_is_found_and_the_vehicle_kept():
     car = drive_by(scans=2).shape
+    assert car is not None
     rng = np.random.default_rng(0)
     low, high = car.min(0), car.max(0)
     places = rng.uniform(low[:2] - 0.4, high[:2] + 0.4, (800, 2))
@@ -21,7 +22,9 @@ def test_ground_around_a_vehicle_is_found_and_the_vehicle_kept():
 
 
 def test_nothing_is_taken_of_a_vehicle_without_ground():
-    assert skirt(drive_by(scans=2).shape).mean() < 0.01
+    car = drive_by(scans=2).shape
+    assert car is not None
+    assert skirt(car).mean() < 0.01
 
 
 def test_a_flat_thing_has_no_skirt():

@@ -22,6 +22,8 @@ def _with_ground(scan: np.ndarray, T_sensor_object, low: np.ndarray, high: np.nd
 def test_a_box_is_hardly_wider_with_ground_than_without():
     model = load()
     track = drive_by(scans=5)
+    assert track.shape is not None
+    assert track.T_sensor_object is not None
     low, high = track.shape.min(0), track.shape.max(0)
     wider = []
     for i, scan in enumerate(track.scans):

@@ -118,7 +118,7 @@ def test_denser_fills_gaps_and_keeps_the_points():
 
 def test_an_exact_scan_takes_the_place_of_points_put_between():
     """The network's own points stay first; what the scan saw is nearer, the rest is as it was."""
-    shape = SHAPE[::4] + np.float32((0.0, 0.0, 0.04))
+    shape = SHAPE[::4] + np.array((0.0, 0.0, 0.04), dtype=np.float32)
     seen = SHAPE[SHAPE[:, 0] > 0]
     whole, plain = filled(shape, seen, True), filled(shape, seen, False)
     np.testing.assert_array_equal(whole[: len(shape)], shape)
