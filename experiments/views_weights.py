@@ -6,8 +6,8 @@
 
 CAD_FOLDER holds `manifest.csv` (columns category, file, split) and the meshes it names. Those of
 split `train` are seen as they are and stretched, beside our own procedural shapes; ten views of
-each, no labels. The first stage is trained as the paper has it (preset `views`); a second, left out by
-default, starts from it and is taught by it: it poses and fuses the tracks. The weights, in half
+each, no labels. The first stage is trained as the paper has it (preset `views`); a second, left out
+by default, starts from it and is taught by it: it poses and fuses the tracks. The weights, in half
 precision, are OUT/CATEGORY.safetensors.
 """
 
