@@ -35,7 +35,8 @@ class Settings:
 
 def main(settings: Settings) -> None:
     """Print a table: a row a kind."""
-    kinds = {track.name: track.source.split()[-1] for track in open_store(settings.data)}
+    words = {track.name: track.source.split()[-1] for track in open_store(settings.data)}
+    kinds = {name: word.split("_")[0] for name, word in words.items()}  # of meshes, the category
     runs = json.loads((settings.evaluation / "scores.json").read_text("utf-8"))["runs"]
     methods = [m for run in runs for m in run["methods"] if m["name"] == settings.method]
     completed = _by_kind(methods, kinds, "completions")
