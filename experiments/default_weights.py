@@ -131,15 +131,23 @@ def main(settings: Settings) -> None:
         provenance=provenance(f"python experiments/default_weights.py {settings}"),
     )
     model = fit(run, lambda step, values: print(step, values, flush=True))
-    ship(model, settings.out / "default.safetensors")
+    ship(model, settings)
 
 
-def ship(model: Path, out: Path) -> None:
+def ship(model: Path, settings: Settings) -> None:
     """The same checkpoint in half precision, as the package carries it."""
     network, found = load_checkpoint(model)
-    command = "python experiments/default_weights.py --cad CAD --teacher TEACHER --out RUN"
-    described = replace(found, provenance=found.provenance | {"command": command})
-    save_checkpoint(out, network, described, half=True)
+    described = replace(found, provenance=found.provenance | {"command": command(settings)})
+    save_checkpoint(settings.out / "default.safetensors", network, described, half=True)
+
+
+def command(settings: Settings) -> str:
+    """What makes such weights, without the paths of this machine."""
+    given = ("cad", "teacher", "start")
+    paths = "".join(f" --{name} {name.upper()}" for name in given if getattr(settings, name))
+    rate = "" if settings.lr is None else f" --lr {settings.lr:g}"
+    how = f" --preset {settings.preset} --seed {settings.seed} --tracks {settings.tracks}{rate}"
+    return f"python experiments/default_weights.py{paths}{how} --steps {settings.steps} --out RUN"
 
 
 if __name__ == "__main__":

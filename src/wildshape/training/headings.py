@@ -98,14 +98,15 @@ def agreed_poses(
         profiles.append(profile(fused(sampler, scans, T_steady_can)))
         kept.append(steady)
         progress(done + 1, len(sampler.scans_of))
-    signs = agreed_signs(together(profiles))
+    all_profiles = together(profiles)
+    signs = agreed_signs(all_profiles)
     # Of the two ways that all may look, take the one that most scans look already.
     looks = torch.stack([(s * sign).sum() for s, sign in zip(kept, signs)]).sum()
     signs = signs * torch.where(looks < 0, -1.0, 1.0)
     if settled:
         found = [_end_on(agreed, *one) for one in zip(sampler.scans_of, kept, signs)]
         counts = EndOn(*(torch.cat(parts) for parts in zip(*found)))
-        signs = uncontradicted_signs(together(profiles), signs, counts)
+        signs = uncontradicted_signs(all_profiles, signs, counts)
     for scans, sign in zip(sampler.scans_of, signs):
         rows = torch.from_numpy(scans)
         agreed.rotation[rows] = _turn(agreed.rotation[rows], sign.expand(len(rows)))
