@@ -23,7 +23,8 @@ def true_targets_of(store, cars):
     translation = torch.cat([car.T_sensor_object.translation for car in cars]).float()
     shapes = torch.stack([torch.from_numpy(car.shape) for car in cars])
     sensors = [car.T_sensor_object.inverse().translation[:5].float() for car in cars]
-    return FusedTargets(rotation, translation, shapes, torch.stack(sensors), complete=True)
+    ends = torch.full((len(cars),), 0.05)
+    return FusedTargets(rotation, translation, shapes, torch.stack(sensors), ends, complete=True)
 
 
 def sampler_of(store, cars, mirror=False, **changes):
@@ -127,3 +128,16 @@ def test_half_of_the_scans_are_reflected_where_objects_are_symmetric(car_store, 
     assert all(a != b for a, b in zip(same, reflected))
     assert any(same)
     assert any(reflected)
+
+
+def test_the_end_of_the_view_is_stretched_with_the_object(car_store, cars):
+    """What was seen at the end of the view lies there still, whatever the object's new size."""
+    sampler = sampler_of(car_store, cars)
+    own = 4.0 ** torch.arange(len(cars))  # of every car another, so that it can be told
+    sampler.targets = sampler.targets._replace(view_top=own)
+    batch = sampler.draw(1, 2)
+    car = (batch.view_top.log2() / 2).round().long()
+    factors = batch.shapes.amax(1) / sampler.targets.shapes[car].amax(1)
+    steeper = factors[:, 2] / (factors[:, 0] * factors[:, 1]).sqrt()
+    torch.testing.assert_close(batch.view_top, own[car] * steeper)
+    assert float(steeper.std()) > 0.01

@@ -110,23 +110,34 @@ def brute_force(shape, place, cell=0.25):
     return naive.visible(rays, rays.mean(0), naive.FacingBins(cell))
 
 
+_NO_END = torch.full((1,), math.inf)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_seen_from_equals_brute_force(seed):
     shape = box(count=400, seed=seed)
     sensors = torch.tensor([[6.0, -5.0, 1.5], [-7.0, 4.0, 2.0]])
     expected = sorted({i for place in sensors for i in brute_force(shape, place)})
-    found = seen_from(shape[None], sensors[None], mirror=False)[0]
+    found = seen_from(shape[None], sensors[None], _NO_END, mirror=False)[0]
     assert torch.nonzero(found)[:, 0].tolist() == expected
 
 
 def test_one_side_is_seen_and_with_a_mirror_both():
     shape, sensors = box(count=4000), torch.tensor([[0.5, -8.0, 0.5], [-0.5, -8.0, 0.5]])
     right, left = shape[:, 1] < -0.89, shape[:, 1] > 0.89
-    one = seen_from(shape[None], sensors[None], mirror=False)[0]
+    one = seen_from(shape[None], sensors[None], _NO_END, mirror=False)[0]
     assert float(one[right].float().mean()) > 0.05
     assert float(one[left].float().mean()) < 0.01  # at the rim alone, between points
-    both = seen_from(shape[None], sensors[None], mirror=True)[0]
+    both = seen_from(shape[None], sensors[None], _NO_END, mirror=True)[0]
     assert float(both[left].float().mean()) > 0.05
     assert bool((both | ~one).all())
     reflected = shape * torch.tensor((1.0, -1.0, 1.0))
-    assert torch.equal(seen_from(reflected[None], sensors[None], mirror=True)[0], both)
+    assert torch.equal(seen_from(reflected[None], sensors[None], _NO_END, mirror=True)[0], both)
+
+
+def test_what_lies_above_the_end_of_the_view_was_not_seen():
+    shape, sensors = box(count=4000), torch.tensor([[6.0, -5.0, 0.0], [-7.0, 4.0, 0.0]])
+    every = seen_from(shape[None], sensors[None], _NO_END, mirror=False)[0]
+    level = seen_from(shape[None], sensors[None], torch.zeros(1), mirror=False)[0]
+    assert torch.equal(level, every & (shape[:, 2] <= 0))
+    assert bool((every & (shape[:, 2] > 0)).any())

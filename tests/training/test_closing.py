@@ -39,3 +39,9 @@ def test_a_roof_that_was_measured_is_left_as_it_is():
     x, y = torch.meshgrid(torch.arange(-4, 4.05, 0.1), torch.arange(-1, 1.05, 0.1), indexing="ij")
     top = torch.stack((x.flatten(), y.flatten(), torch.full((x.numel(),), 2.9)), 1)
     assert len(unseen_roof(torch.cat((_walls(3.0), top)), _LOW, mirror=True)) == 0
+
+
+def test_a_side_that_ends_with_the_view_has_no_roof():
+    """From 16 m, a view that ends at 4.6 degrees sees 3 m: the walls may well be higher."""
+    assert len(unseen_roof(_walls(3.0), _LOW, 0.08, mirror=True)) == 0
+    assert len(unseen_roof(_walls(2.0), _LOW, 0.08, mirror=True)) > 200

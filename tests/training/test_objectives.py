@@ -103,6 +103,7 @@ def test_what_is_taught_does_not_depend_on_the_size_of_the_objects():
         torch.manual_seed(1)
         network = ShapePoseNet(replace(SMALLEST.network, scale=2 * unit))
         places = (unit * part for part in (torch.ones(4, 3), shapes, 5 * sensors))
-        batch = FusedBatch(unit * scans, rotation, *places)
+        ends = torch.full((4,), 0.1)
+        batch = FusedBatch(unit * scans, rotation, *places, view_top=ends)
         losses.append(SelfTaught(network, SMALLEST.loss, False, unit=unit)(batch, 0.0).loss)
     torch.testing.assert_close(losses[0], losses[1], atol=1e-3, rtol=1e-3)

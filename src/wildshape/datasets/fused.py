@@ -12,6 +12,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from wildshape.datasets.hiding import partly_hidden
 from wildshape.datasets.views import ViewSampler
 
 _PLACES = 2
@@ -26,6 +27,8 @@ class FusedTargets(NamedTuple):
         translation: of the same, metres.
         shapes: points of each used track's object, canonical frame, metres.
         sensors: places from which each used track was seen, canonical frame, metres.
+        view_top: slope above which those sensors saw nothing (`geometry/field_of_view.py`), or
+            infinite.
         complete: whether the shapes are whole; else only what the sensors saw is known.
     """
 
@@ -33,6 +36,7 @@ class FusedTargets(NamedTuple):
     translation: Float[Tensor, "S 3"]
     shapes: Float[Tensor, "T G 3"]
     sensors: Float[Tensor, "T O 3"]
+    view_top: Float[Tensor, "T"]
     complete: bool = False
 
 
@@ -45,6 +49,7 @@ class FusedBatch(NamedTuple):
         translation: of the same, metres.
         shapes: target shapes, canonical frame.
         sensors: some places from which the track was seen, canonical frame.
+        view_top: slope above which they saw nothing.
     """
 
     scans: Float[Tensor, "B N 3"]
@@ -52,6 +57,7 @@ class FusedBatch(NamedTuple):
     translation: Float[Tensor, "B 3"]
     shapes: Float[Tensor, "B G 3"]
     sensors: Float[Tensor, "B O 3"]
+    view_top: Float[Tensor, "B"]
 
     def to(self, device: torch.device | str) -> "FusedBatch":
         """The same batch on a device."""
@@ -61,9 +67,10 @@ class FusedBatch(NamedTuple):
 class FusedSampler:
     """Draws batches of single scans; a batch depends on its seeds alone.
 
-    Every scan is stretched with its object (see `stretching`), turned as scans to be posed are, and
-    rolled as configured. Where objects are mirror-symmetric, half of the scans are reflected: what
-    is seen of an object's left side could as well be seen of its right.
+    Of some LiDAR scans a part is hidden (`hiding.py`). Every scan is stretched with its object (see
+    `stretching`), turned as scans to be posed are, and rolled as configured. Where objects are
+    mirror-symmetric, half of the scans are reflected: what is seen of an object's left side could
+    as well be seen of its right.
     """
 
     def __init__(self, views: ViewSampler, targets: FusedTargets, *, mirror: bool = False) -> None:
@@ -77,7 +84,7 @@ class FusedSampler:
         scans_of = self.views.scans_of
         tracks = rng.integers(len(scans_of), size=config.tracks * config.views)
         rows = np.asarray([rng.choice(scans_of[track]) for track in tracks])
-        points = torch.stack([self.views.picked(int(scan), rng) for scan in rows])
+        points = torch.stack([self._seen(int(scan), rng) for scan in rows])
         at, chosen = torch.from_numpy(rows), torch.from_numpy(tracks)
         rotation, factors = targets.rotation[at], _factors(len(rows), rng)
         stretch = stretching(rotation, factors)
@@ -86,8 +93,18 @@ class FusedSampler:
         some = torch.from_numpy(rng.integers(targets.sensors.shape[1], size=(len(rows), _PLACES)))
         sensors = targets.sensors[chosen[:, None], some] * factors[:, None]
         shapes = targets.shapes[chosen] * factors[:, None]
-        batch = FusedBatch(scans, turn @ rotation, translation, shapes, sensors)
+        steeper = factors[:, 2] / (factors[:, 0] * factors[:, 1]).sqrt()
+        view_top = targets.view_top[chosen] * steeper
+        batch = FusedBatch(scans, turn @ rotation, translation, shapes, sensors, view_top)
         return reflected(batch, rng.random(len(rows)) < _HALF) if self.mirror else batch
+
+    def _seen(self, scan: int, rng: np.random.Generator) -> Float[Tensor, "n 3"]:
+        """A scan of the store, or a part of it."""
+        points = self.views.picked(scan, rng)
+        config = self.views.config
+        if config.sensor != "lidar":
+            return points
+        return partly_hidden(points, rng, config.min_points)
 
 
 def reflected(batch: FusedBatch, chosen: Bool[np.ndarray, "B"]) -> FusedBatch:
@@ -101,7 +118,8 @@ def reflected(batch: FusedBatch, chosen: Bool[np.ndarray, "B"]) -> FusedBatch:
     rotation = signs[:, :, None] * batch.rotation * signs[:, None]
     across = signs[:, None]
     scans, shapes, sensors = batch.scans * across, batch.shapes * across, batch.sensors * across
-    return FusedBatch(scans, rotation, batch.translation * signs, shapes, sensors)
+    translation = batch.translation * signs
+    return FusedBatch(scans, rotation, translation, shapes, sensors, batch.view_top)
 
 
 def stretching(

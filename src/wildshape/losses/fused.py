@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from wildshape.geometry.field_of_view import within_view
 from wildshape.geometry.visibility import FacingBins, facing_bins
 from wildshape.losses.chamfer import masked_mean
 from wildshape.ops.nearest import nearest_both
@@ -99,13 +100,17 @@ def _distance(source: Tensor, target: Tensor, index: Tensor) -> Tensor:
 
 @torch.no_grad()
 def seen_from(
-    shapes: Float[Tensor, "B P 3"], sensors: Float[Tensor, "B O 3"], mirror: bool
+    shapes: Float[Tensor, "B P 3"],
+    sensors: Float[Tensor, "B O 3"],
+    view_top: Float[Tensor, "B"],
+    mirror: bool,
 ) -> Bool[Tensor, "B P"]:
     """The points of canonical shapes that at least one of the sensors would see.
 
     Args:
-        shapes: predicted, canonical frame.
-        sensors: places in the same frame.
+        shapes: predicted, canonical frame, z up.
+        sensors: places in the same frame, level.
+        view_top: slope above which they see nothing.
         mirror: the object is symmetric in y = 0: what was seen of one side is known of the other.
     """
     seen = torch.zeros(shapes.shape[:2], dtype=torch.bool, device=shapes.device)
@@ -115,5 +120,5 @@ def seen_from(
             at = place * place.new_tensor((1.0, side, 1.0))
             rays = shapes - at[:, None]
             bins = facing_bins(rays, rays.mean(1), FacingBins(_CELL_M))
-            seen |= visible(bins.index, bins.depth, bins.count)
+            seen |= visible(bins.index, bins.depth, bins.count) & within_view(rays, view_top)
     return seen

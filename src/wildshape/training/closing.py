@@ -4,34 +4,44 @@
 
 From below, nothing is seen of the roof of a van or a lorry but its edges. Between the edges of each
 slice across the object a flat roof is put, and what a sensor would have seen of it, had it been
-there, is taken away again.
+there, is taken away again. Where the side itself ends with the sensor's view, so that nobody knows
+how high it goes, there is no roof.
 """
+
+import math
 
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from wildshape.geometry.field_of_view import highest_seen
 from wildshape.geometry.visibility import FacingBins, facing_bins
 
 _SLICE, _EDGE, _STEP, _MEASURED = 0.2, 0.2, 0.15, 0.25
 _FEWEST, _ENDS, _TOP = 4, 0.02, 0.97
 _CELL, _BEHIND, _OFTEN = FacingBins(0.25), 0.1, 0.2
+_CUT_M = 0.3
 
 
 def unseen_roof(
-    shape: Float[Tensor, "G 3"], sensors: Float[Tensor, "O 3"], *, mirror: bool
+    shape: Float[Tensor, "G 3"],
+    sensors: Float[Tensor, "O 3"],
+    view_top: float = math.inf,
+    *,
+    mirror: bool,
 ) -> Float[Tensor, "R 3"]:
     """Points of the flat roof that hardly a sensor could see; none if it was seen.
 
     Args:
         shape: what a track's scans saw together, canonical frame (z up), metres.
         sensors: places from which it was seen, the same frame.
+        view_top: slope above which the sensors saw nothing (`geometry/field_of_view.py`).
         mirror: what was seen of one side of y = 0 is known of the other.
     """
     flat = _flat_roof(shape)
-    if len(flat) == 0:
-        return flat
-    flat = flat[torch.cdist(flat, shape).amin(1) > _MEASURED]
+    flat = flat[flat[:, 2] < highest_seen(flat[:, :2], sensors, view_top) - _CUT_M]
+    if len(flat) > 0:
+        flat = flat[torch.cdist(flat, shape).amin(1) > _MEASURED]
     if len(flat) == 0:
         return flat
     sides = (1.0, -1.0) if mirror else (1.0,)

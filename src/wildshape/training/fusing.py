@@ -8,6 +8,7 @@ a track are then made to fit each other (`inference/joint.py`), headings agreed 
 that a network can be taught from ONE scan of the track. No label enters.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +22,7 @@ from torch import Tensor
 from wildshape.datasets.fused import FusedTargets
 from wildshape.datasets.views import ViewSampler
 from wildshape.errors import BadInputError
+from wildshape.geometry.field_of_view import slope, view_top
 from wildshape.geometry.ground import skirt
 from wildshape.geometry.se3 import SE3
 from wildshape.inference.joint import refine_jointly
@@ -89,12 +91,13 @@ def fused_targets(
     shapes = [
         _shape(sampler, scans, _of(poses, scans), mirror, voxel) for scans in sampler.scans_of
     ]
+    tops = _view_tops(sampler)
     if settings.sensor == "lidar":
         shapes = [
-            _closed(shape, _sensors(poses, scans), mirror)
-            for shape, scans in zip(shapes, sampler.scans_of)
+            _closed(shape, _sensors(poses, scans), top, mirror)
+            for shape, scans, top in zip(shapes, sampler.scans_of, tops)
         ]
-    return _targets(sampler, poses, shapes, complete=False)
+    return _targets(sampler, poses, shapes, tops, complete=False)
 
 
 def _of(poses: AgreedPoses, scans: np.ndarray) -> SE3:
@@ -108,9 +111,20 @@ def _scaled(T_a_b: SE3, factor: float) -> SE3:
     return SE3(T_a_b.rotation, T_a_b.translation * factor)
 
 
-def _closed(shape: np.ndarray, sensors: Tensor, mirror: bool) -> np.ndarray:
+def _view_tops(sampler: ViewSampler) -> list[float]:
+    """Where each track's view ended above; a camera's ends where its image does: not on objects."""
+    if sampler.config.sensor != "lidar":
+        return [math.inf] * len(sampler.scans_of)
+
+    def highest(scan: int) -> float:
+        return float(slope(torch.from_numpy(sampler.store.scan_points(scan))).max())
+
+    return [view_top([highest(int(scan)) for scan in scans]) for scans in sampler.scans_of]
+
+
+def _closed(shape: np.ndarray, sensors: Tensor, top: float, mirror: bool) -> np.ndarray:
     """With the roof that no sensor could see, as many points as before."""
-    roof = unseen_roof(torch.from_numpy(shape), sensors, mirror=mirror)
+    roof = unseen_roof(torch.from_numpy(shape), sensors, top, mirror=mirror)
     return _exactly(np.concatenate((shape, roof.numpy())))
 
 
@@ -140,15 +154,21 @@ def true_targets(sampler: ViewSampler) -> FusedTargets:
             own.translation.float(),
         )
         shapes.append(_exactly(np.asarray(shape)))
-    return _targets(sampler, poses, shapes, complete=True)
+    return _targets(sampler, poses, shapes, [math.inf] * len(shapes), complete=True)
 
 
 def _targets(
-    sampler: ViewSampler, poses: AgreedPoses, shapes: list[np.ndarray], *, complete: bool
+    sampler: ViewSampler,
+    poses: AgreedPoses,
+    shapes: list[np.ndarray],
+    tops: list[float],
+    *,
+    complete: bool,
 ) -> FusedTargets:
-    sensors = [_sensors(poses, scans) for scans in sampler.scans_of]
+    sensors = torch.stack([_sensors(poses, scans) for scans in sampler.scans_of])
     found = torch.from_numpy(np.stack(shapes))
-    return FusedTargets(poses.rotation, poses.translation, found, torch.stack(sensors), complete)
+    ends = torch.tensor(tops)
+    return FusedTargets(poses.rotation, poses.translation, found, sensors, ends, complete=complete)
 
 
 def _sensors(poses: AgreedPoses, scans: np.ndarray) -> Float[Tensor, "O 3"]:

@@ -73,4 +73,5 @@ class SelfTaught(nn.Module):
         """The points that some of the track's views would see; others may be as they like."""
         if self.complete:
             return None
-        return seen_from(shapes.detach(), batch.sensors, self.network.config.mirror)
+        mirror = self.network.config.mirror
+        return seen_from(shapes.detach(), batch.sensors, batch.view_top, mirror)

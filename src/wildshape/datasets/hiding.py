@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Scans of which less is seen: something stands before the object, or the view ends lower.
+
+Beyond the paper, for self-training: what the whole track showed is taught of such a scan too.
+"""
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from wildshape.geometry.field_of_view import slope
+
+_BEFORE, _SHARE = 0.2, (0.1, 0.6)
+_LOWER = 0.3
+
+
+def partly_hidden(
+    points: Float[Tensor, "n 3"], rng: np.random.Generator, fewest: int
+) -> Float[Tensor, "n 3"]:
+    """The points of a LiDAR scan, or as many points of a part of it.
+
+    In a fifth of the scans a vertical strip is missing, from a pole's width to the better half; in
+    three of ten whose object rises above the sensor's horizon, what lies above some elevation.
+
+    Args:
+        points: sensor frame, z up.
+        rng: decides.
+        fewest: points that have to be left; else the scan stays as it is.
+    """
+    kept = torch.ones(len(points), dtype=torch.bool)
+    if rng.random() < _BEFORE:
+        kept &= ~_strip(points, rng)
+    if rng.random() < _LOWER:
+        slopes = slope(points)
+        kept &= slopes <= max(rng.uniform(0.0, 1.0) * float(slopes.max()), 0.0)
+    rows = torch.nonzero(kept)[:, 0]
+    if len(rows) < fewest or len(rows) == len(points):
+        return points
+    return points[rows[torch.from_numpy(rng.integers(len(rows), size=len(points)))]]
+
+
+def _strip(points: Float[Tensor, "n 3"], rng: np.random.Generator) -> Bool[Tensor, "n"]:
+    """Points between two directions of the ground plane."""
+    ahead = points[:, :2].mean(0)
+    along = points[:, :2] @ ahead
+    across = points[:, 1] * ahead[0] - points[:, 0] * ahead[1]
+    azimuth = torch.atan2(across, along)
+    low, high = float(azimuth.min()), float(azimuth.max())
+    width = rng.uniform(*_SHARE)
+    start = rng.uniform(0.0, 1.0) - width / 2
+    place = (azimuth - low) / max(high - low, 1e-9)
+    return (place >= start) & (place <= start + width)

@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is left of a partly hidden scan is a part of it, without a strip or without its top."""
+
+import numpy as np
+import torch
+
+from wildshape.datasets.hiding import partly_hidden
+from wildshape.geometry.field_of_view import slope
+
+
+def _wall(top: float) -> torch.Tensor:
+    """A wall 8 m before the sensor, 4 m wide."""
+    generator = torch.Generator().manual_seed(0)
+    y, z = 4 * torch.rand(2000, generator=generator) - 2, torch.rand(2000, generator=generator)
+    return torch.stack((torch.full_like(y, 8.0), y, -1.5 + (top + 1.5) * z), 1)
+
+
+def _drawn(points: torch.Tensor, fewest: int = 100) -> list[torch.Tensor]:
+    return [partly_hidden(points, np.random.default_rng(seed), fewest) for seed in range(200)]
+
+
+def test_what_is_left_is_of_the_scan_and_as_many_points():
+    points = _wall(1.0)
+    known = {tuple(point) for point in points.tolist()}
+    for part in _drawn(points):
+        assert part.shape == points.shape
+        assert {tuple(point) for point in part.tolist()} <= known
+
+
+def test_a_fifth_of_the_scans_lack_one_strip():
+    points = _wall(-0.2)  # below the horizon: no view ends on it
+    azimuth = torch.atan2(points[:, 1], points[:, 0])
+    ends, width = torch.stack((azimuth.min(), azimuth.max())), azimuth.max() - azimuth.min()
+    parts = [part for part in _drawn(points) if not torch.equal(part, points)]
+    assert 20 <= len(parts) <= 60
+    for part in parts:
+        left = torch.cat((torch.atan2(part[:, 1], part[:, 0]), ends)).sort().values
+        gaps = left.diff().sort().values / width
+        assert 0.05 < float(gaps[-1]) < 0.65
+        assert float(gaps[-2]) < 0.02
+
+
+def test_what_rises_above_the_horizon_is_cut_at_some_elevation():
+    points = _wall(1.5)
+    highest = torch.stack([slope(part).max() for part in _drawn(points)])
+    cut = highest < slope(points).max() - 0.01
+    assert 0.15 < float(cut.float().mean()) < 0.45
+    assert float(highest.min()) > -0.01
+    assert float(highest[cut].std()) > 0.03
+
+
+def test_too_little_is_not_left():
+    points = _wall(1.0)
+    assert all(torch.equal(part, points) for part in _drawn(points, fewest=len(points)))
