@@ -119,7 +119,8 @@ def test_the_heavier_part_says_which_way():
 
 
 def test_turned_each_on_their_own_the_shape_and_the_neighbours_vote():
-    """One scan that the shape is unsure of follows its neighbours; a sure shape is followed."""
+    """One scan that the shape is unsure of follows its neighbours; a sure shape is followed, and
+    where neither says anything, the scan itself, if it is sure."""
     generator = torch.Generator().manual_seed(1)
     rotation = rotation_z(6.28 * torch.rand(5, generator=generator))
     alike = torch.full((4,), 0.1)
@@ -128,7 +129,10 @@ def test_turned_each_on_their_own_the_shape_and_the_neighbours_vote():
     opposed = torch.tensor((0.1, -0.1, -0.1, 0.1))
     assert voted_signs(rotation, unsure, opposed, torch.ones(5)).tolist() == [1, 1, -1, 1, 1]
     alone = torch.zeros(4)
-    assert voted_signs(rotation, unsure, alone, torch.ones(5)).tolist() == [1, 1, -1, 1, 1]
+    assert voted_signs(rotation, unsure, alone, torch.zeros(5)).tolist() == [1, 1, -1, 1, 1]
+    assert voted_signs(rotation, unsure, alone, torch.ones(5)).tolist() == [1.0] * 5
+    sure = torch.tensor((0.05, 0.05, -0.1, 0.05, 0.05))
+    assert voted_signs(rotation, sure, alone, torch.ones(5)).tolist() == [1, 1, -1, 1, 1]
 
 
 def test_scans_posed_alike_lie_on_each_other():
@@ -142,6 +146,17 @@ def test_scans_posed_alike_lie_on_each_other():
         )
         likeness = likeness_of_next(clouds.float(), 0.0, mirror=True)
         assert bool((sign * likeness > 0.01).all())
+
+
+def test_scans_of_opposite_ends_say_little_of_each_other():
+    """Between them the sensor passed by: in neither heading does one lie on the other."""
+    clouds = torch.zeros(2, 100, 3)
+    clouds[0, :, 0], clouds[1, :, 0] = 2.0, -1.5
+    clouds[:, :, 1] = torch.linspace(-0.9, 0.9, 100)
+    one_end = likeness_of_next(clouds, 0.0, mirror=True)
+    assert float(one_end.abs()) < 1e-3
+    clouds[1, :, 0] = 2.0
+    assert float(likeness_of_next(clouds, 0.0, mirror=True)) > 0.5
 
 
 def test_drawn_to_what_was_seen_and_nowhere_else():

@@ -137,9 +137,10 @@ def _voted(
     turned = T_sensor_can @ half_turn(middle)
     stands = track_cost(shape, T_sensor_can, scans, settings)
     gain = track_cost(shape, turned, scans, settings) - stands
-    clouds = _some_of_each(scans, T_sensor_can)
-    likeness = likeness_of_next(clouds, middle, mirror=settings.network.mirror)
-    signs = voted_signs(T_sensor_can.rotation, gain, likeness, weights)
+    unit = unit_of(settings.extent_m[1])
+    clouds = _some_of_each(scans, T_sensor_can) / unit
+    likeness = likeness_of_next(clouds, middle / unit, mirror=settings.network.mirror)
+    signs = voted_signs(T_sensor_can.rotation, gain / unit, likeness, weights)
     back = signs < 0
     return SE3(
         torch.where(back[:, None, None], turned.rotation, T_sensor_can.rotation),

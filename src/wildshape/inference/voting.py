@@ -5,7 +5,8 @@
 What fails in single scans of a near-symmetric object is the half turn. Where the scans of a track
 follow each other, the object does not turn around between them; that is seen from poses that turn
 slowly, half turns aside. Where each scan was turned on its own, the track's mean shape is asked,
-which knows front from back better than that of one scan, and each scan of its neighbour.
+which knows front from back better than that of one scan, and each scan of its neighbour, as far as
+both saw the same. What a scan found for itself counts too, the more the surer it is.
 """
 
 import torch
@@ -16,7 +17,8 @@ from wildshape.geometry.se3 import SE3
 from wildshape.ops.nearest import nearest
 
 _NEIGHBOURS, _FEWEST, _SLOW_DEG = 5, 4, 15.0
-_FAR_M, _SHAPE_VOTES = 0.4, 2.0
+_FAR_M, _SAME_SIDE_M, _SHAPE_VOTES = 0.4, 0.1, 2.0
+_OWN_M, _UNSURE = 0.05, 0.1
 
 
 def half_turn(middle_x: float, dtype: torch.dtype = torch.float64) -> SE3:
@@ -67,23 +69,24 @@ def voted_signs(
         gain: by how much the track's shape costs more in a scan when turned around, metres.
         likeness: by how much each scan lies worse on the next one when one of them is turned
             around, metres; one fewer than scans.
-        weights: how much each scan is worth.
+        weights: how sure each scan is of its own pose, 0 to 1.
     """
     if not slow(rotation):
-        return _agreed(gain, likeness)
+        own = _OWN_M * (weights + _UNSURE)
+        return _agreed(_SHAPE_VOTES * gain + own, likeness)
     signs = steady_signs(rotation)
     return signs if float((signs * weights).sum()) >= 0 else -signs
 
 
-def _agreed(gain: Float[Tensor, "V"], likeness: Float[Tensor, "W"]) -> Float[Tensor, "V"]:
-    """Signs by what the shape says of each scan, and each scan of the next one.
+def _agreed(single: Float[Tensor, "V"], likeness: Float[Tensor, "W"]) -> Float[Tensor, "V"]:
+    """Signs by what the shape says of each single scan, and each scan of the next one.
 
     The shape is one more member of the vote, and is never turned.
     """
-    count = len(gain)
-    votes = gain.new_zeros(count + 1, count + 1)
+    count = len(single)
+    votes = single.new_zeros(count + 1, count + 1)
     row = torch.arange(count)
-    votes[row, count] = _SHAPE_VOTES * gain + 1e-9
+    votes[row, count] = single + 1e-9
     votes[row[:-1], row[1:]] = likeness
     eigenvector = torch.linalg.eigh(votes + votes.T).eigenvectors[:, -1]
     signs = eigenvector[:-1] * eigenvector[-1]
@@ -96,7 +99,8 @@ def likeness_of_next(
     """By how much each scan lies worse on the next one when turned around, and the reverse.
 
     Scans that follow each other see nearly the same side of the object, so that they lie on each
-    other if they are posed alike, and a bonnet on a boot if not.
+    other if they are posed alike, and a bonnet on a boot if not. Where a sensor passed by between
+    them they lie on each other in neither way, and say little.
 
     Args:
         clouds: the scans' points in the object frame, by the pose that each found for itself.
@@ -107,9 +111,15 @@ def likeness_of_next(
     bank = clouds
     if mirror:
         bank = torch.cat((clouds, clouds * clouds.new_tensor((1.0, -1.0, 1.0))), dim=1)
-    there = _misfit(turned[:-1], bank[1:]) - _misfit(clouds[:-1], bank[1:])
-    back = _misfit(turned[1:], bank[:-1]) - _misfit(clouds[1:], bank[:-1])
+    there = _says(_misfit(turned[:-1], bank[1:]), _misfit(clouds[:-1], bank[1:]))
+    back = _says(_misfit(turned[1:], bank[:-1]), _misfit(clouds[1:], bank[:-1]))
     return (there + back).double()
+
+
+def _says(turned: Float[Tensor, "W"], stands: Float[Tensor, "W"]) -> Float[Tensor, "W"]:
+    """The difference of two misfits, worth the more the better one of them is."""
+    better = torch.minimum(turned, stands)
+    return (turned - stands) * torch.exp(-(better / _SAME_SIDE_M).square())
 
 
 def _misfit(points: Float[Tensor, "P n 3"], bank: Float[Tensor, "P m 3"]) -> Float[Tensor, "P"]:
