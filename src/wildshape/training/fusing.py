@@ -3,9 +3,9 @@
 """Self-training: what a trained network and the scans of a whole track teach the next network.
 
 Beyond the paper (METHOD 11.3). A network trained as the paper has it poses every scan; the scans of
-a track are then made to fit each other (`inference/joint.py`), headings agreed on
-(`training/headings.py`), and fused. The fused, reflected cloud and the refined poses are targets
-that a network can be taught from ONE scan of the track. No label enters.
+a track are then made to fit each other (`inference/joint.py`, `inference/pose_graph.py`), headings
+agreed on (`training/headings.py`), and fused. The fused, reflected cloud and the refined poses are
+targets that a network can be taught from ONE scan of the track. No label enters.
 """
 
 import math
@@ -26,11 +26,12 @@ from wildshape.geometry.field_of_view import slope, view_top
 from wildshape.geometry.ground import skirt
 from wildshape.geometry.se3 import SE3
 from wildshape.inference.joint import refine_jointly
+from wildshape.inference.pose_graph import refine_by_graph
 from wildshape.inference.prepare import unit_of
 from wildshape.io.atomic import atomic_write
 from wildshape.losses.multiview import LossConfig
 from wildshape.models.checkpoint import load_checkpoint
-from wildshape.records import SensorKind
+from wildshape.records import Points, SensorKind
 from wildshape.training.closing import unseen_roof
 from wildshape.training.headings import AgreedPoses, agreed_poses
 
@@ -39,6 +40,7 @@ _POINTS, _SENSORS, _SCAN_POINTS = 2048, 8, 640
 # Of vehicles (`unit_of`); a camera's points are dense and need no mean over so many.
 _VOXEL_M: dict[SensorKind, float] = {"lidar": 0.1, "camera": 0.05}
 _NEIGHBOURS, _STRAY = 4, 6.0
+_WITHIN_M, _WITHIN_RAD = 1.5, 0.6
 Progress = Callable[[int, int], None]
 
 
@@ -82,7 +84,7 @@ def fused_targets(
     def refined(scans: np.ndarray, T_sensor_can: SE3) -> SE3:
         clouds = [sampler.store.scan_points(int(scan)) / np.float32(unit) for scan in scans]
         found = refine_jointly(clouds, _scaled(T_sensor_can, 1 / unit), mirror=mirror)
-        return _scaled(found, unit)
+        return _scaled(_chained(clouds, found) if steady else found, unit)
 
     def fused(_: ViewSampler, scans: np.ndarray, T_sensor_can: SE3) -> Tensor:
         return torch.from_numpy(_shape(sampler, scans, T_sensor_can, mirror, voxel))
@@ -98,6 +100,15 @@ def fused_targets(
             for shape, scans, top in zip(shapes, sampler.scans_of, tops)
         ]
     return _targets(sampler, poses, shapes, tops, complete=False)
+
+
+def _chained(scans: list[Points], T_sensor_can: SE3) -> SE3:
+    """Poses that fit their neighbours, unless a scan would jump."""
+    found = refine_by_graph(scans, T_sensor_can)
+    moved = T_sensor_can.inverse() @ found
+    near = bool((moved.angle() < _WITHIN_RAD).all())
+    near = near and bool((moved.translation.norm(dim=-1) < _WITHIN_M).all())
+    return found if near else T_sensor_can
 
 
 def _of(poses: AgreedPoses, scans: np.ndarray) -> SE3:
