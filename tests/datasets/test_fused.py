@@ -9,7 +9,7 @@ import pytest
 import torch
 from tests.strategies import clouds, rotation_about
 
-from wildshape.datasets.fused import FusedSampler, FusedTargets, stretching
+from wildshape.datasets.fused import FusedSampler, FusedTargets, both_ends, stretching
 from wildshape.datasets.views import ViewConfig, ViewSampler
 from wildshape.geometry.se3 import SE3
 from wildshape.geometry.visibility import FacingBins, facing_bins
@@ -141,3 +141,20 @@ def test_the_end_of_the_view_is_stretched_with_the_object(car_store, cars):
     steeper = factors[:, 2] / (factors[:, 0] * factors[:, 1]).sqrt()
     torch.testing.assert_close(batch.view_top, own[car] * steeper)
     assert float(steeper.std()) > 0.01
+
+
+def test_from_one_end_only_one_end_is_seen():
+    front, side, rear = (8.0, 3.0, 1.0), (1.0, -8.0, 1.0), (-9.0, 4.0, 1.0)
+    places = ((front, side, rear), (front, side, front), (rear, side, side), (side, side, side))
+    assert both_ends(torch.tensor(places)).tolist() == [True, False, False, False]
+
+
+def test_tracks_that_saw_both_ends_are_drawn_three_times_as_often(car_store, cars):
+    sampler = sampler_of(car_store, cars, tracks=200)
+    sensors = torch.full_like(sampler.targets.sensors, 5.0)
+    sensors[0, 0, 0], sensors[0, :, 1] = -5.0, 1.0
+    own = 4.0 ** torch.arange(len(cars))
+    targets = sampler.targets._replace(sensors=sensors, view_top=own)
+    batch = FusedSampler(sampler.views, targets).draw(1, 2)
+    drawn = torch.bincount((batch.view_top.log2() / 2).round().long(), minlength=len(cars))
+    assert float(drawn[0] / drawn[1:].double().mean()) == pytest.approx(3.0, rel=0.3)

@@ -5,6 +5,7 @@
 The trainer's reader for self-training (`training/fusing.py` makes the targets) and for the oracle.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from wildshape.datasets.views import ViewSampler
 
 _PLACES = 2
 _LARGER, _AXIS, _HALF = 0.2, 0.08, 0.5
+_END_ON, _OFTENER = math.cos(math.radians(60)), 3.0
 
 
 class FusedTargets(NamedTuple):
@@ -70,19 +72,21 @@ class FusedSampler:
     Of some LiDAR scans a part is hidden (`hiding.py`). Every scan is stretched with its object (see
     `stretching`), turned as scans to be posed are, and rolled as configured. Where objects are
     mirror-symmetric, half of the scans are reflected: what is seen of an object's left side could
-    as well be seen of its right.
+    as well be seen of its right. Tracks that saw both ends of their object are drawn more often.
     """
 
     def __init__(self, views: ViewSampler, targets: FusedTargets, *, mirror: bool = False) -> None:
         """Sample from the sampler's tracks; `mirror`: objects are symmetric in y = 0."""
         self.views, self.targets, self.mirror = views, targets, mirror
+        share = torch.where(both_ends(targets.sensors), _OFTENER, 1.0).double().numpy()
+        self._share = share / share.sum()
 
     def draw(self, *seed: int) -> FusedBatch:
         """The batch of these seeds: as many scans as a batch of views has."""
         rng = np.random.default_rng(seed)
         config, targets = self.views.config, self.targets
         scans_of = self.views.scans_of
-        tracks = rng.integers(len(scans_of), size=config.tracks * config.views)
+        tracks = rng.choice(len(scans_of), config.tracks * config.views, p=self._share)
         rows = np.asarray([rng.choice(scans_of[track]) for track in tracks])
         points = torch.stack([self._seen(int(scan), rng) for scan in rows])
         at, chosen = torch.from_numpy(rows), torch.from_numpy(tracks)
@@ -105,6 +109,19 @@ class FusedSampler:
         if config.sensor != "lidar":
             return points
         return partly_hidden(points, rng, config.min_points)
+
+
+def both_ends(sensors: Float[Tensor, "T O 3"]) -> Bool[Tensor, "T"]:
+    """Which tracks saw their object's front and its rear.
+
+    From one end the length is a guess, and so is the middle, which is the origin: what such tracks
+    teach is what their teacher believed.
+
+    Args:
+        sensors: places, canonical frame (x along the object, z up).
+    """
+    along = torch.nn.functional.normalize(sensors[..., :2], dim=-1)[..., 0]
+    return (along > _END_ON).any(-1) & (along < -_END_ON).any(-1)
 
 
 def reflected(batch: FusedBatch, chosen: Bool[np.ndarray, "B"]) -> FusedBatch:
