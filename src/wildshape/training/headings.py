@@ -71,8 +71,7 @@ def agreed_poses(
         fused: a track's object from its scans and their poses, to be compared with others; by
             default some points of each scan.
         settled: the network has been trained to its end: what it says of a scan is worth something
-            against what all tracks together say (`training/kinds.py`); and of views in no order,
-            which contradict each other weakly, more than they say of each other.
+            against what all tracks together say (`training/kinds.py`).
 
     Raises:
         BadInputError: the network's weights are no longer finite.
@@ -87,8 +86,6 @@ def agreed_poses(
         T_sensor_can = _poses(network, sampler, config, scans)
         if config.steady:
             steady = steady_signs(T_sensor_can.rotation)
-        elif settled:
-            steady = torch.ones(len(scans))
         else:
             clouds = some_of_each(sampler, scans, T_sensor_can)
             sensors = T_sensor_can.inverse().translation
@@ -101,8 +98,6 @@ def agreed_poses(
         profiles.append(profile(fused(sampler, scans, T_steady_can)))
         kept.append(steady)
         progress(done + 1, len(sampler.scans_of))
-    if settled and not config.steady:
-        return agreed
     all_profiles = together(profiles)
     signs = agreed_signs(all_profiles)
     # Of the two ways that all may look, take the one that most scans look already.
