@@ -9,12 +9,6 @@ split `train` are seen as they are and stretched, beside our own procedural shap
 each, no labels. The first stage is trained as the paper has it (preset `views`); a second, left out
 by default, starts from it and is taught by it: it poses and fuses the tracks. The weights, in half
 precision, are OUT/CATEGORY.safetensors.
-
-    python -m experiments.views_weights --category car --cad CAD --lidar default --out runs/car
-
-With --lidar, weights trained on LiDAR scans in metres take the place of the first stage as teacher:
-scans are seen along their own line of sight, so that a network of vehicles poses depth views as
-well, once its lengths are divided by a vehicle's.
 """
 
 import csv
@@ -26,19 +20,16 @@ from typing import Literal
 import numpy as np
 import tyro
 
-from wildshape.inference.shipped import weights_file
 from wildshape.io.provenance import provenance
 from wildshape.io.store import open_store
 from wildshape.io.store_writer import StoreWriter
 from wildshape.models.checkpoint import load_checkpoint, save_checkpoint
-from wildshape.models.shapepose import ShapePoseNet
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.config import Recipe
 from wildshape.training.loop import MODEL, fit, setup
 from wildshape.training.recipes import views
 
 _COPIES, _STRETCH, _VIEWS, _TRUTH_POINTS = 4, 0.2, 10, 2048
-_VEHICLE_M = 5.0
 
 
 @dataclass(frozen=True)
@@ -53,8 +44,6 @@ class Settings:
         taught_steps: of the second; 0 ends with the first.
         taught_lr: learning rate that the second falls from.
         seed: of data and training.
-        lidar: checkpoint of the same objects in metres, or the name of shipped weights; poses and
-            fuses the views for the first stage, which else has no teacher.
     """
 
     out: Path
@@ -64,7 +53,6 @@ class Settings:
     taught_steps: int = 0
     taught_lr: float = 7e-4
     seed: int = 0
-    lidar: str | None = None
 
 
 def train_meshes(settings: Settings, into: Path) -> int:
@@ -112,50 +100,22 @@ def main(settings: Settings) -> None:
         make_data(settings, data)
     recipe = views()
     first = replace(recipe, optim=replace(recipe.optim, steps=settings.steps))
-    teacher = as_camera(settings) if settings.lidar else None
-    model = train(settings, first, "first", teacher)
+    model = train(settings, first, "first")
     if settings.taught_steps:
         optim = replace(recipe.optim, steps=settings.taught_steps, lr=settings.taught_lr)
-        model = train(settings, replace(recipe, optim=optim), "taught", model, model)
+        model = train(settings, replace(recipe, optim=optim), "taught", teacher=model)
     ship(model, settings)
 
 
-def as_camera(settings: Settings) -> Path:
-    """The LiDAR's checkpoint for depth views of objects of unit size."""
-    network, found = load_checkpoint(weights_file(settings.lidar))
-    sizes = replace(network.config, scale=network.config.scale / _VEHICLE_M)
-    rescaled = ShapePoseNet(sizes)
-    rescaled.load_state_dict(network.state_dict())
-    described = replace(
-        found,
-        network=sizes,
-        sensor="camera",
-        projection=views().loss.projection,
-        belief=found.belief / _VEHICLE_M,
-        extent_m=(found.extent_m[0] / _VEHICLE_M, found.extent_m[1] / _VEHICLE_M),
-        cost_m=(found.cost_m[0] / _VEHICLE_M, found.cost_m[1] / _VEHICLE_M),
-        calibration=None,
-    )
-    path = settings.out / "lidar-as-camera.safetensors"
-    save_checkpoint(path, rescaled, described)
-    return path
-
-
-def train(
-    settings: Settings,
-    recipe: Recipe,
-    name: str,
-    teacher: Path | None = None,
-    start: Path | None = None,
-) -> Path:
-    """One stage, with a teacher or without, resumed if it was stopped."""
+def train(settings: Settings, recipe: Recipe, name: str, teacher: Path | None = None) -> Path:
+    """One stage, begun from its teacher if it has one, and resumed if it was stopped."""
     run = setup(
         recipe,
         open_store(settings.out / "data"),
         settings.out / name,
         seed=settings.seed,
         resume=True,
-        start=start,
+        start=teacher,
         teacher=teacher,
         provenance=provenance(f"python -m experiments.views_weights {settings}"),
     )
@@ -166,8 +126,7 @@ def train(
 def ship(model: Path, settings: Settings) -> None:
     """The same checkpoint in half precision, as the package carries it."""
     network, found = load_checkpoint(model)
-    lidar = "" if settings.lidar is None else f" --lidar {Path(settings.lidar).name}"
-    stages = f"--steps {settings.steps} --taught-steps {settings.taught_steps}{lidar}"
+    stages = f"--steps {settings.steps} --taught-steps {settings.taught_steps}"
     what = f"--category {settings.category} --cad CAD --out RUN {stages} --seed {settings.seed}"
     command = {"command": f"python -m experiments.views_weights {what}"}
     described = replace(found, provenance=found.provenance | command)
