@@ -69,9 +69,11 @@ def table(given: Given) -> Table:
     """The rungs, the oracle, and what needs no training."""
     size, data = given.size, given.drives("train")
     top = replace(oracle(size, data), name="oracle of the paper's form")
+    plain = rungs(given)[4]
+    plain = replace(plain, name="7 without the selector", teacher=plain)
     ours = replace(_ours(given), name="oracle of our form", teacher="truth")
     rest = baselines("identity", "one-scan", "local-icp")
-    rows = (*rungs(given), top, ours, *rest)
+    rows = (*rungs(given), plain, top, ours, *rest)
     block = Block("Simulated drives", given.drives("test"), rows, (), ("none", "yaw"))
     note = "Each rung keeps those before it; 8 and 9 are the weights of 7, asked otherwise."
     return Table("From the paper's method to ours", (block,), size.seeds, (note,))
