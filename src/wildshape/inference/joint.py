@@ -22,6 +22,7 @@ from wildshape.records import Points
 _NARROWER = 0.75
 _STEP, _RIDGE, _BLOCK = 0.8, 1e-3, 2048
 _NORMAL_M, _AWAY_M = 0.35, 1e4
+_WITHIN_M, _WITHIN_RAD = 1.5, 0.6
 
 
 class Schedule(NamedTuple):
@@ -89,6 +90,13 @@ def refine_jointly(
         )
     T_object_sensor = _as_a_whole(start, T_object_sensor, points, mirror) @ T_object_sensor
     return T_object_sensor.inverse().to(T_sensor_object.rotation.dtype)
+
+
+def stayed_near(before: SE3, after: SE3) -> bool:
+    """Whether no pose moved farther than a network errs, half turns aside."""
+    moved = before.inverse() @ after
+    turned = bool((moved.angle() < _WITHIN_RAD).all())
+    return turned and bool((moved.translation.norm(dim=-1) < _WITHIN_M).all())
 
 
 def _sampled(scans: list[Points], count: int) -> Float[np.ndarray, "V n 3"]:

@@ -18,7 +18,7 @@ from wildshape.geometry.box import FittedBox
 from wildshape.geometry.outliers import voxel_thin
 from wildshape.geometry.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
-from wildshape.inference.joint import FINE, refine_jointly
+from wildshape.inference.joint import FINE, refine_jointly, stayed_near
 from wildshape.inference.pose_graph import refine_by_graph
 from wildshape.inference.prepare import network_input, unit_of
 from wildshape.inference.refine import denser
@@ -30,7 +30,6 @@ from wildshape.records import Completion, Points
 
 _BATCH, _MOST_POINTS, _VOTING_POINTS = 32, 4096, 192
 _VOXEL_M, _REACH_M, _STIFFNESS = 0.08, 0.12, 0.2
-_WITHIN_M, _WITHIN_RAD = 1.5, 0.6
 
 
 Refine = Literal["joint", "graph"]
@@ -179,9 +178,7 @@ def refine_checked(
     refined = refine_jointly(scans, refined, mirror=mirror)
     refined = refine_jointly(scans, refined, mirror=False, schedule=FINE)
     refined = refine_by_graph(scans, refined) if refine == "graph" else refined
-    moved = voted.inverse() @ refined
-    near = bool((moved.angle() < _WITHIN_RAD).all())
-    near = near and bool((moved.translation.norm(dim=-1) < _WITHIN_M).all())
+    near = stayed_near(voted, refined)
     if near and _disagreement(scans, refined, mirror) < _disagreement(scans, voted, mirror):
         return TrackFit(refined, refined=True)
     return TrackFit(voted, refined=False)

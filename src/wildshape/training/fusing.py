@@ -25,7 +25,7 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.field_of_view import slope, view_top
 from wildshape.geometry.ground import skirt
 from wildshape.geometry.se3 import SE3
-from wildshape.inference.joint import refine_jointly
+from wildshape.inference.joint import refine_jointly, stayed_near
 from wildshape.inference.pose_graph import refine_by_graph
 from wildshape.inference.prepare import unit_of
 from wildshape.io.atomic import atomic_write
@@ -40,7 +40,6 @@ _POINTS, _SENSORS, _SCAN_POINTS = 2048, 8, 640
 # Of vehicles (`unit_of`); a camera's points are dense and need no mean over so many.
 _VOXEL_M: dict[SensorKind, float] = {"lidar": 0.1, "camera": 0.05}
 _NEIGHBOURS, _STRAY = 4, 6.0
-_WITHIN_M, _WITHIN_RAD = 1.5, 0.6
 Progress = Callable[[int, int], None]
 
 
@@ -105,10 +104,7 @@ def fused_targets(
 def _chained(scans: list[Points], T_sensor_can: SE3) -> SE3:
     """Poses that fit their neighbours, unless a scan would jump."""
     found = refine_by_graph(scans, T_sensor_can)
-    moved = T_sensor_can.inverse() @ found
-    near = bool((moved.angle() < _WITHIN_RAD).all())
-    near = near and bool((moved.translation.norm(dim=-1) < _WITHIN_M).all())
-    return found if near else T_sensor_can
+    return found if stayed_near(T_sensor_can, found) else T_sensor_can
 
 
 def _of(poses: AgreedPoses, scans: np.ndarray) -> SE3:
