@@ -11,9 +11,10 @@ from torch import Tensor
 
 from wildshape.inference.prepare import extent
 from wildshape.losses.hindsight import Scores
+from wildshape.models.checkpoint import ModelSettings
 from wildshape.models.confidence import Facts
 from wildshape.models.shapepose import Poses
-from wildshape.records import Points
+from wildshape.records import Points, Sensor
 
 _COVERED_M, _SMALLEST_M = 0.2, 1e-4
 
@@ -66,3 +67,17 @@ def facts_of(scan: Points, cost: float, seen: Float[Tensor, "6"]) -> Facts:
         log_extent=math.log(max(extent(scan), _SMALLEST_M)),
         covered=covered,
     )
+
+
+def warning_of(scan: Points, sensor: Sensor | None, settings: ModelSettings) -> str:
+    """One sentence where the model was not made for such a scan, else nothing."""
+    if sensor is not None and sensor.kind != settings.sensor:
+        return f"a {sensor.kind} scan, but the model was trained on {settings.sensor} scans"
+    low, high = settings.extent_m
+    size = extent(scan)
+    if size < low / 2 or size > 1.5 * high:
+        return (
+            f"extent {size:.3g} m lies outside the {low:.3g} to {high:.3g} m trained on;"
+            " check the unit, or train on such objects"
+        )
+    return ""

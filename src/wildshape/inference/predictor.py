@@ -18,12 +18,11 @@ from wildshape.geometry.ground import skirt
 from wildshape.geometry.se3 import SE3, stack
 from wildshape.inference.boxes import box_seen
 from wildshape.inference.compiled import compiled
-from wildshape.inference.facts import facts_of, seen_facts
+from wildshape.inference.facts import facts_of, seen_facts, warning_of
 from wildshape.inference.prepare import (
     MIN_POINTS,
     NetworkInput,
     as_points,
-    extent,
     in_order,
     network_input,
 )
@@ -38,7 +37,7 @@ from wildshape.models.shapepose import Poses, ShapePoseNet
 from wildshape.records import Completion, Points, Registration, Sensor
 
 _BATCH = 32
-_UPRIGHT_RAD = 0.1
+_UPRIGHT_RAD, _GROUND = 0.1, 0.05
 
 
 class _Found(NamedTuple):
@@ -184,14 +183,30 @@ class Predictor:
 
     @torch.inference_mode()
     def _complete_batch(self, scans: list[Points], sensor: Sensor | None) -> list[Completion]:
-        settings = self.settings
-        given = network_input(scans, settings.input_points, settings.sensor, settings.facing)
-        given = given.to(self.device)
-        found = self._look(given)
-        if settings.facing:
-            found = self._look_again(given, found)
-        found = _Found(*(part.cpu() for part in found))
+        found = self._without_ground(scans, self._found(scans))
         return [self._completion(scan, i, found, sensor) for i, scan in enumerate(scans)]
+
+    def _found(self, scans: list[Points]) -> _Found:
+        """What the network says of scans, on the host."""
+        of = self.settings
+        given = network_input(scans, of.input_points, of.sensor, of.facing).to(self.device)
+        found = self._look(given)
+        if of.facing:
+            found = self._look_again(given, found)
+        return _Found(*(part.cpu() for part in found))
+
+    def _without_ground(self, scans: list[Points], found: _Found) -> _Found:
+        """Scans of which much turns out to be ground are seen once more without it."""
+        clean = [
+            self._off_ground(scan, shape.numpy(), SE3(rotation, translation))
+            for scan, shape, rotation, translation in zip(scans, *found[:3])
+        ]
+        much = [len(kept) < (1 - _GROUND) * len(scan) for kept, scan in zip(clean, scans)]
+        rows = torch.tensor(much).nonzero()[:, 0]
+        if len(rows) == 0:
+            return found
+        again = self._found([clean[int(row)] for row in rows])
+        return _Found(*(old.index_copy(0, rows, new) for old, new in zip(found, again)))
 
     def _look(self, given: NetworkInput) -> _Found:
         """Shapes, and the poses of the branches that speak, from prepared scans."""
@@ -237,11 +252,15 @@ class Predictor:
         shape, T_sensor_can = found.shapes[i], SE3(found.rotation[i], found.translation[i])
         mirror, cost = self.settings.network.mirror, float(found.cost[i])
         exact = self.settings.sensor == "camera"
-        facts, warning = facts_of(scan, cost, found.facts[i]), self._warning(scan, sensor)
+        facts, warning = (
+            facts_of(scan, cost, found.facts[i]),
+            warning_of(scan, sensor, self.settings),
+        )
         seen = self._off_ground(scan, shape.numpy(), T_sensor_can)
         if self.refines:
             shape, T_sensor_can = _refined(seen, shape, T_sensor_can, mirror=mirror)
         points = T_sensor_can.to(torch.float32).apply(shape).numpy()
+        exact = self.settings.sensor == "camera"
         return Completion(
             points=filled(points, scan, exact) if self.refines else points,
             pose=T_sensor_can.to(torch.float64),
@@ -271,21 +290,6 @@ class Predictor:
         if self.settings.calibration is not None:
             return self.settings.calibration.confidence(facts)
         return 1.0 / (1.0 + (math.exp(facts.log_cost) / self.settings.cost_m[1]) ** 2)
-
-    def _warning(self, scan: Points, sensor: Sensor | None) -> str:
-        """One sentence where the model was not made for such a scan, else nothing."""
-        if sensor is not None and sensor.kind != self.settings.sensor:
-            return (
-                f"a {sensor.kind} scan, but the model was trained on {self.settings.sensor} scans"
-            )
-        low, high = self.settings.extent_m
-        size = extent(scan)
-        if size < low / 2 or size > 1.5 * high:
-            return (
-                f"extent {size:.3g} m lies outside the {low:.3g} to {high:.3g} m trained on;"
-                " check the unit, or train on such objects"
-            )
-        return ""
 
 
 def _refined(
