@@ -183,8 +183,16 @@ class Predictor:
 
     @torch.inference_mode()
     def _complete_batch(self, scans: list[Points], sensor: Sensor | None) -> list[Completion]:
-        found = self._without_ground(scans, self._found(scans))
-        return [self._completion(scan, i, found, sensor) for i, scan in enumerate(scans)]
+        found = self._found(scans)
+        seen = self._off_their_ground(scans, found)
+        much = [len(kept) < (1 - _GROUND) * len(scan) for kept, scan in zip(seen, scans)]
+        if any(much):  # the network has seen the ground, too: once more without it
+            rows = torch.tensor(much).nonzero()[:, 0]
+            again = self._found([seen[int(row)] for row in rows])
+            found = _Found(*(old.index_copy(0, rows, new) for old, new in zip(found, again)))
+            seen = self._off_their_ground(scans, found)
+        clouds = zip(scans, seen)
+        return [self._completion(*both, i, found, sensor) for i, both in enumerate(clouds)]
 
     def _found(self, scans: list[Points]) -> _Found:
         """What the network says of scans, on the host."""
@@ -195,18 +203,12 @@ class Predictor:
             found = self._look_again(given, found)
         return _Found(*(part.cpu() for part in found))
 
-    def _without_ground(self, scans: list[Points], found: _Found) -> _Found:
-        """Scans of which much turns out to be ground are seen once more without it."""
-        clean = [
+    def _off_their_ground(self, scans: list[Points], found: _Found) -> list[Points]:
+        """Each scan without the ground beside the object found in it."""
+        return [
             self._off_ground(scan, shape.numpy(), SE3(rotation, translation))
             for scan, shape, rotation, translation in zip(scans, *found[:3])
         ]
-        much = [len(kept) < (1 - _GROUND) * len(scan) for kept, scan in zip(clean, scans)]
-        rows = torch.tensor(much).nonzero()[:, 0]
-        if len(rows) == 0:
-            return found
-        again = self._found([clean[int(row)] for row in rows])
-        return _Found(*(old.index_copy(0, rows, new) for old, new in zip(found, again)))
 
     def _look(self, given: NetworkInput) -> _Found:
         """Shapes, and the poses of the branches that speak, from prepared scans."""
@@ -247,16 +249,14 @@ class Predictor:
         facts = seen_facts(inputs, posed, scores, poses, believed)
         return cost.gather(1, branch[:, None])[:, 0], branch, facts
 
-    def _completion(self, scan: Points, i: int, found: _Found, sensor: Sensor | None) -> Completion:
-        """Scan `i` of those found."""
+    def _completion(
+        self, scan: Points, seen: Points, i: int, found: _Found, sensor: Sensor | None
+    ) -> Completion:
+        """Scan `i` of those found; `seen`: without ground."""
         shape, T_sensor_can = found.shapes[i], SE3(found.rotation[i], found.translation[i])
         mirror, cost = self.settings.network.mirror, float(found.cost[i])
-        exact = self.settings.sensor == "camera"
-        facts, warning = (
-            facts_of(scan, cost, found.facts[i]),
-            warning_of(scan, sensor, self.settings),
-        )
-        seen = self._off_ground(scan, shape.numpy(), T_sensor_can)
+        facts = facts_of(scan, cost, found.facts[i])
+        warning = warning_of(scan, sensor, self.settings)
         if self.refines:
             shape, T_sensor_can = _refined(seen, shape, T_sensor_can, mirror=mirror)
         points = T_sensor_can.to(torch.float32).apply(shape).numpy()
