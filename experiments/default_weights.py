@@ -10,9 +10,9 @@ A second round starts from the first and is taught by it:
         --seed 1 --tracks 2400 --lr 5e-4 --out runs/round2
 
 CAD_FOLDER holds `manifest.csv` (columns category, file, split) and the meshes it names; vehicles of
-split `train` are used, as they are and stretched, besides our own procedural ones. Without --cad
-only the latter. TEACHER is a checkpoint trained as the paper has it (`wildshape train DATA`, no
-teacher); it poses and fuses the tracks that the shipped weights are then trained on.
+split `train` are used, as they are and in other proportions, besides our own procedural ones.
+Without --cad only the latter. TEACHER is a checkpoint trained as the paper has it (`wildshape
+train DATA`, no teacher); it poses and fuses the tracks that the shipped weights are then trained on.
 """
 
 import csv
@@ -32,9 +32,26 @@ from wildshape.training.loop import fit, setup
 from wildshape.training.recipes import PRESETS
 
 STEPS = 22_000
-_COPIES, _STRETCH, _SCANS = 5, np.array((0.12, 0.08, 0.08)), 20
-_VEHICLES = ("car", "truck", "bus")
+_STRETCH, _SCANS = np.array((0.12, 0.08, 0.08)), 20
+_PARTS = ((4, 0.25), (1, 0.0), (3, 0.15))  # along each axis: how many, and the spread of their logs
 _SENSORS = ("hdl64", "hdl64", "hdl32", "os1-128")
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Length, width and height of road vehicles; how many copies; whether any length will do."""
+
+    share: int
+    least_m: tuple[float, float, float]
+    most_m: tuple[float, float, float]
+    any_length: bool = False
+
+
+_VEHICLES = {
+    "car": Sizes(1, (3.4, 1.5, 1.1), (5.3, 2.1, 2.1)),
+    "truck": Sizes(2, (5.0, 1.9, 1.9), (12.0, 2.6, 4.0), any_length=True),
+    "bus": Sizes(4, (7.0, 2.3, 2.7), (13.0, 2.6, 4.3), any_length=True),
+}
 
 
 @dataclass(frozen=True)
@@ -66,43 +83,65 @@ class Settings:
     resume: bool = False
 
 
-def train_meshes(cad: Path, into: Path, seed: int) -> Path:
-    """The vehicles of the train split, each as it is and in four stretched copies, shuffled."""
+def train_meshes(cad: Path, into: Path, count: int, seed: int) -> Path:
+    """`count` vehicles of the train split, lorries and buses oftener than cars, shuffled.
+
+    A mesh's first copy is as it is. The others are stretched, their parts of other lengths, and
+    of sizes that are seen on roads, for many models are toys.
+    """
     import trimesh
 
     with (cad / "manifest.csv").open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["split"] == "train"]
-    files = [cad / row["file"] for row in rows if row["category"] in _VEHICLES]
+    rows = [row for row in rows if row["category"] in _VEHICLES]
+    files = [row for row in rows for _ in range(_VEHICLES[row["category"]].share)]
     rng = np.random.default_rng(seed)
-    order = rng.permutation(len(files) * _COPIES)
-    for place, number in zip(order, range(len(order))):
-        copy, index = divmod(number, len(files))
-        mesh = trimesh.load(files[index], force="mesh", process=False)
-        factors = np.ones(3) if copy == 0 else rng.uniform(1 - _STRETCH, 1 + _STRETCH)
-        mesh.vertices = np.asarray(mesh.vertices) * factors
-        mesh.export(into / f"{place:04d}_{files[index].stem}.ply")
+    drawn = [files[i] for _ in range(-(-count // len(files))) for i in rng.permutation(len(files))]
+    seen: set[str] = set()
+    for place, row in enumerate(drawn[:count]):
+        name, sizes = row["file"], _VEHICLES[row["category"]]
+        mesh = trimesh.load(cad / name, force="mesh", process=False)
+        if name in seen:
+            mesh.vertices = warped(np.asarray(mesh.vertices), sizes, rng)
+        seen.add(name)
+        mesh.export(into / f"{place:04d}_{Path(name).stem}.ply")
     return into
 
 
-def make_data(settings: Settings, path: Path, meshes: Path | None) -> None:
-    """Write the store: every sensor, procedural and CAD vehicles, a third with ground left in."""
+def warped(vertices: np.ndarray, sizes: Sizes, rng: np.random.Generator) -> np.ndarray:
+    """Vertices (N, 3) of another vehicle: stretched, and its parts of other lengths."""
+    low, high = vertices.min(0), vertices.max(0)
+    size = (high - low) * rng.uniform(1 - _STRETCH, 1 + _STRETCH)
+    if sizes.any_length:
+        size[0] = rng.uniform(sizes.least_m[0], sizes.most_m[0])
+    size = np.clip(size, sizes.least_m, sizes.most_m)
+    out = np.empty_like(vertices, dtype=np.float64)
+    for axis, (knots, spread) in enumerate(_PARTS):
+        share = np.exp(rng.uniform(-spread, spread, knots))
+        edges = np.concatenate(((0.0,), np.cumsum(share) / share.sum()))
+        place = (vertices[:, axis] - low[axis]) / max(high[axis] - low[axis], 1e-9)
+        out[:, axis] = np.interp(place, np.linspace(0, 1, knots + 1), edges) * size[axis]
+    return out - (size[0] / 2, size[1] / 2, 0.0)
+
+
+def make_data(settings: Settings, path: Path) -> None:
+    """Write the store: every sensor, procedural and CAD vehicles, a quarter with ground left in."""
     described = provenance(f"python experiments/default_weights.py {settings}")
-    sources = (None, meshes) if meshes is not None else (None,)
-    share = settings.tracks // (len(_SENSORS) * len(sources))
+    share = settings.tracks // (len(_SENSORS) * (1 if settings.cad is None else 2))
     with StoreWriter(path, described) as store:
         for index, sensor in enumerate(_SENSORS):
-            for source in sources:
-                seed = settings.seed + 100 * index + (50 if source else 0)
-                config = SimulationConfig(
-                    tracks=share,
-                    scans=_SCANS,
-                    sensor=sensor,
-                    meshes=source,
-                    ground=index == 1,
-                    shape_points=512,
-                )
-                for track in simulate_tracks(config, seed):
-                    store.add(replace(track, name=f"{sensor}-{seed}-{track.name}"))
+            seed = settings.seed + 100 * index
+            config = SimulationConfig(
+                tracks=share, scans=_SCANS, sensor=sensor, ground=index == 1, shape_points=512
+            )
+            for track in simulate_tracks(config, seed):
+                store.add(replace(track, name=f"{sensor}-{seed}-{track.name}"))
+            if settings.cad is None:
+                continue
+            with TemporaryDirectory() as folder:
+                meshes = train_meshes(settings.cad, Path(folder), share, seed)
+                for track in simulate_tracks(replace(config, meshes=meshes), seed + 50):
+                    store.add(replace(track, name=f"{sensor}-{seed + 50}-{track.name}"))
 
 
 def main(settings: Settings) -> None:
@@ -110,10 +149,7 @@ def main(settings: Settings) -> None:
     data = settings.out / "data"
     settings.out.mkdir(parents=True, exist_ok=True)
     if not data.exists():
-        with TemporaryDirectory() as folder:
-            seed, into = settings.seed, Path(folder)
-            meshes = train_meshes(settings.cad, into, seed) if settings.cad else None
-            make_data(settings, data, meshes)
+        make_data(settings, data)
     recipe = PRESETS[settings.preset]()
     rate = recipe.optim.lr if settings.lr is None else settings.lr
     recipe = replace(recipe, optim=replace(recipe.optim, steps=settings.steps, lr=rate))

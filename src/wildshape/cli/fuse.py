@@ -26,7 +26,7 @@ class Settings:
     unit: Unit = "m"
     device: Device = "auto"
     together: Together = False
-    refine: Refine = "joint"
+    refine: Refine = "auto"
     overwrite: Overwrite = False
     json: AsJson = False
 

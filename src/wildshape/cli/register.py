@@ -48,7 +48,7 @@ class Settings:
     unit: Unit = "m"
     device: Device = "auto"
     together: Together = False
-    refine: Refine = "joint"
+    refine: Refine = "auto"
     format: Format = "auto"
     overwrite: Overwrite = False
     json: AsJson = False

@@ -77,13 +77,13 @@ class LearnedTrack:
     """
 
     predictor: Predictor
-    refine: Refine = "joint"
+    refine: Refine = "auto"
 
     @property
     def about(self) -> str:
         """What sets this row apart."""
-        graph = ", laid on their neighbours by a pose graph" if self.refine == "graph" else ""
-        return f"poses and shape from all scans of the track together{graph}"
+        how = "" if self.refine == "auto" else f", refined by `{self.refine}`"
+        return f"poses and shape from all scans of the track together{how}"
 
     def complete(self, points: Points, sensor: Sensor) -> Points:
         """One scan is a track of one.
