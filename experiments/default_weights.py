@@ -11,8 +11,9 @@ A second round starts from the first and is taught by it:
 
 CAD_FOLDER holds `manifest.csv` (columns category, file, split) and the meshes it names; vehicles of
 split `train` are used, as they are and in other proportions, besides our own procedural ones.
-Without --cad only the latter. TEACHER is a checkpoint trained as the paper has it (`wildshape
-train DATA`, no teacher); it poses and fuses the tracks that the shipped weights are then trained on.
+Without --cad only the latter. TEACHER is a checkpoint trained as the paper has it
+(`wildshape train DATA`, no teacher); it poses and fuses the tracks that the shipped weights are
+then trained on.
 """
 
 import csv

@@ -7,8 +7,10 @@
 CAD_FOLDER holds `manifest.csv` (columns category, file, split) and the meshes it names. Those of
 split `train` are seen as they are and stretched, beside our own procedural shapes; ten views of
 each, no labels. The first stage is trained as the paper has it (preset `views`); a second, left out
-by default, starts from it and is taught by it: it poses and fuses the tracks. The weights, in half
-precision, are OUT/CATEGORY.safetensors.
+by default, starts from it and is taught by it: it poses and fuses the tracks. A car's two ends are
+too alike for views in no order, so that the second stage of cars asks the shipped LiDAR weights
+which way each view looks (`--headings src/wildshape/weights/default.safetensors`). The weights, in
+half precision, are OUT/CATEGORY.safetensors.
 """
 
 import csv
@@ -43,6 +45,7 @@ class Settings:
         steps: gradient steps of the first stage.
         taught_steps: of the second; 0 ends with the first.
         taught_lr: learning rate that the second falls from.
+        headings: checkpoint of LiDAR scans that the second stage asks which way the views look.
         seed: of data and training.
     """
 
@@ -52,6 +55,7 @@ class Settings:
     steps: int = 3500
     taught_steps: int = 0
     taught_lr: float = 7e-4
+    headings: Path | None = None
     seed: int = 0
 
 
@@ -117,6 +121,7 @@ def train(settings: Settings, recipe: Recipe, name: str, teacher: Path | None = 
         resume=True,
         start=teacher,
         teacher=teacher,
+        headings=settings.headings if teacher else None,
         provenance=provenance(f"python -m experiments.views_weights {settings}"),
     )
     fit(run, lambda step, values: print(name, step, values, flush=True))
@@ -127,6 +132,7 @@ def ship(model: Path, settings: Settings) -> None:
     """The same checkpoint in half precision, as the package carries it."""
     network, found = load_checkpoint(model)
     stages = f"--steps {settings.steps} --taught-steps {settings.taught_steps}"
+    stages += " --headings DEFAULT" if settings.headings else ""
     what = f"--category {settings.category} --cad CAD --out RUN {stages} --seed {settings.seed}"
     command = {"command": f"python -m experiments.views_weights {what}"}
     described = replace(found, provenance=found.provenance | command)

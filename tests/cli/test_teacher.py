@@ -29,3 +29,13 @@ def test_a_run_teaches_the_next_one_and_a_repeated_resume_leaves_it_alone(
 def test_a_teacher_that_is_not_there(refused, store, tmp_path):
     order = ("train", store, "--out", tmp_path / "out", "--preset", "tiny", "--steps", 6)
     assert "nobody.safetensors" in refused(*order, "--teacher", tmp_path / "nobody.safetensors")
+
+
+def test_headings_are_asked_of_lidar_weights_for_a_teacher_alone(
+    refused, wildshape, store, trained, tmp_path
+):
+    order = ("train", store, "--out", tmp_path / "run", "--preset", "small", "--steps", 2)
+    assert "--teacher" in refused(*order, "--headings", "shipped")
+    assert "LiDAR" in refused(*order, "--teacher", trained, "--headings", "airplane", "--overwrite")
+    done = wildshape(*order, "--teacher", trained, "--headings", trained, "--overwrite")
+    assert done.code == 0, done.err

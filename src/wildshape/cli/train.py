@@ -60,6 +60,8 @@ class Settings:
         start: fine-tune these weights, a checkpoint of the same preset or `shipped`.
         teacher: train on the poses and fused shapes that this checkpoint (or `shipped`) finds
             for whole tracks, instead of from nothing; `truth` is the oracle.
+        headings: with `--teacher`: ask this LiDAR checkpoint (or `shipped`) which way views look
+            that come in no order, as a camera's do.
     """
 
     data: Data
@@ -71,6 +73,7 @@ class Settings:
     resume: bool = False
     start: Annotated[str | None, arg(metavar="M")] = None
     teacher: Annotated[str | None, arg(metavar="M")] = None
+    headings: Annotated[str | None, arg(metavar="M")] = None
     device: Device = "auto"
     unit: Unit = "m"
     overwrite: Overwrite = False
@@ -102,6 +105,10 @@ def run(settings: Settings) -> None:
         order = DpcOrder.of(vars(settings), device)
         train_dpc(order, _check_folder(settings), partial(open_data, settings))
         return
+    if settings.headings and settings.teacher in (None, "truth"):
+        raise BadInputError(
+            "--headings: decides which way a teacher's tracks look; pass --teacher M, too."
+        )
     output = _check_folder(settings)
     try:
         store = open_data(settings)
@@ -122,6 +129,7 @@ def run(settings: Settings) -> None:
             resume=settings.resume,
             start=_checkpoint(settings.start),
             teacher="truth" if settings.teacher == "truth" else _checkpoint(settings.teacher),
+            headings=_checkpoint(settings.headings),
             provenance=made,
             taught=lambda done, total: bar.at(done, total=total),
             say=say,

@@ -38,7 +38,7 @@ class DpcOrder:
         Raises:
             BadInputError: an option is set that DPC has not.
         """
-        for option in ("encoder", "start", "teacher", "profile"):
+        for option in ("encoder", "start", "teacher", "headings", "profile"):
             if settings[option]:
                 raise BadInputError(f"--{option} is not for preset {settings['preset']}; drop it.")
         own = ("preset", "steps", "seed", "data", "out", "resume", "json")

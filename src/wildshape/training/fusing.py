@@ -27,6 +27,7 @@ from wildshape.geometry.ground import skirt
 from wildshape.geometry.se3 import SE3
 from wildshape.inference.joint import refine_jointly, stayed_near
 from wildshape.inference.pose_graph import refine_by_graph
+from wildshape.inference.predictor import load
 from wildshape.inference.prepare import unit_of
 from wildshape.io.atomic import atomic_write
 from wildshape.losses.multiview import LossConfig
@@ -34,6 +35,7 @@ from wildshape.models.checkpoint import load_checkpoint
 from wildshape.records import Points, SensorKind
 from wildshape.training.closing import unseen_roof
 from wildshape.training.headings import AgreedPoses, agreed_poses
+from wildshape.training.hints import check_hint, hinted_signs
 
 TARGETS = "targets.safetensors"
 _POINTS, _SENSORS, _SCAN_POINTS = 2048, 8, 640
@@ -49,6 +51,7 @@ def fused_targets(
     progress: Progress = lambda *_: None,
     *,
     steady: bool = True,
+    headings: Path | None = None,
 ) -> FusedTargets:
     """Targets for all scans of a sampler, from a checkpoint and the scans alone.
 
@@ -57,9 +60,10 @@ def fused_targets(
         sampler: of the tracks trained on.
         progress: called with the tracks done, and their number.
         steady: the scans of a track follow each other (`LossConfig.steady`).
+        headings: another checkpoint, asked which way each scan looks (`training/hints.py`).
 
     Raises:
-        BadInputError: the checkpoint cannot be used.
+        BadInputError: a checkpoint cannot be used.
     """
     network, settings = load_checkpoint(teacher)
     views = replace(
@@ -80,15 +84,26 @@ def fused_targets(
     unit = unit_of(settings.extent_m[1])
     voxel = unit * _VOXEL_M[settings.sensor]
 
+    def in_units(scans: np.ndarray) -> list[Points]:
+        return [sampler.store.scan_points(int(scan)) / np.float32(unit) for scan in scans]
+
     def refined(scans: np.ndarray, T_sensor_can: SE3) -> SE3:
-        clouds = [sampler.store.scan_points(int(scan)) / np.float32(unit) for scan in scans]
+        clouds = in_units(scans)
         found = refine_jointly(clouds, _scaled(T_sensor_can, 1 / unit), mirror=mirror)
         return _scaled(_chained(clouds, found) if steady else found, unit)
 
     def fused(_: ViewSampler, scans: np.ndarray, T_sensor_can: SE3) -> Tensor:
         return torch.from_numpy(_shape(sampler, scans, T_sensor_can, mirror, voxel))
 
-    poses = agreed_poses(network, asked, loss, refined, progress, fused, settled=True)
+    hinted = None
+    if headings is not None:
+        hint = load(headings, raw=True)
+        check_hint(hint)
+
+        def hinted(scans: np.ndarray, T_sensor_can: SE3) -> Tensor:
+            return hinted_signs(hint, in_units(scans), _scaled(T_sensor_can, 1 / unit))
+
+    poses = agreed_poses(network, asked, loss, refined, progress, fused, hinted, settled=True)
     shapes = [
         _shape(sampler, scans, _of(poses, scans), mirror, voxel) for scans in sampler.scans_of
     ]

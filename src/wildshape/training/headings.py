@@ -57,6 +57,7 @@ def agreed_poses(
     refined: Callable[[np.ndarray, SE3], SE3] = lambda _, pose: pose,
     progress: Callable[[int, int], None] = lambda *_: None,
     fused: Callable[[ViewSampler, np.ndarray, SE3], Tensor] | None = None,
+    hinted: Callable[[np.ndarray, SE3], Tensor] | None = None,
     *,
     settled: bool = False,
 ) -> AgreedPoses:
@@ -70,6 +71,8 @@ def agreed_poses(
         progress: called with the tracks done, and their number.
         fused: a track's object from its scans and their poses, to be compared with others; by
             default some points of each scan.
+        hinted: from a track's scans and their poses to +1 or -1 for each, as someone else would
+            have it look (`training/hints.py`); then nothing need be agreed on.
         settled: the network has been trained to its end: what it says of a scan is worth something
             against what all tracks together say (`training/kinds.py`).
 
@@ -84,7 +87,9 @@ def agreed_poses(
     fused = fused or _fused
     for done, scans in enumerate(sampler.scans_of):
         T_sensor_can = _poses(network, sampler, config, scans)
-        if config.steady:
+        if hinted is not None:
+            steady = hinted(scans, T_sensor_can)
+        elif config.steady:
             steady = steady_signs(T_sensor_can.rotation)
         else:
             clouds = some_of_each(sampler, scans, T_sensor_can)
@@ -98,6 +103,8 @@ def agreed_poses(
         profiles.append(profile(fused(sampler, scans, T_steady_can)))
         kept.append(steady)
         progress(done + 1, len(sampler.scans_of))
+    if hinted is not None:
+        return agreed
     all_profiles = together(profiles)
     signs = agreed_signs(all_profiles)
     # Of the two ways that all may look, take the one that most scans look already.

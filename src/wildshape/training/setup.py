@@ -82,6 +82,7 @@ def setup(
     resume: bool = False,
     start: Path | None = None,
     teacher: Path | Literal["truth"] | None = None,
+    headings: Path | None = None,
     provenance: dict[str, Any] | None = None,
     taught: Taught = lambda *_: None,
     say: Say = _silent,
@@ -98,6 +99,8 @@ def setup(
         start: checkpoint whose weights are fine-tuned, instead of random ones.
         teacher: checkpoint that poses and fuses the tracks to train on (`training/fusing.py`);
             `truth` takes true poses and shapes (the oracle); by default nothing teaches.
+        headings: checkpoint of LiDAR scans that is asked which way the scans look, where the
+            teacher cannot know (`training/hints.py`).
         provenance: written into the run and its checkpoint.
         taught: called with the tracks that the teacher has fused, and their number.
         say: is told what a user should know, a sentence each.
@@ -113,13 +116,15 @@ def setup(
     state = _new_state(recipe, start, seed, processes.device)
     fit_tracks, held_tracks = split_tracks(len(store))
     identity = _identity(recipe, store, seed, processes, start, teacher)
+    if headings is not None:
+        identity["headings"] = _short_hash(headings.read_bytes())
     folder.mkdir(parents=True, exist_ok=True)
     if resume and (folder / STATE).exists():
         load_state(folder, state, identity)
     sampler = ViewSampler(store, fit_tracks, recipe.views)
     held_out = ViewSampler(store, held_tracks, recipe.views)
     steady = recipe.loss.steady or recipe.views.sensor == "lidar"
-    targets = _targets(teacher, sampler, folder, identity, taught, steady)
+    targets = _targets(teacher, headings, sampler, folder, identity, taught, steady)
     views = _views(sampler, targets, seed, processes, recipe, say)
     if state.anchors is not None:
         views.hold(state.anchors)
@@ -170,6 +175,7 @@ def _identity(
 
 def _targets(
     teacher: Path | Literal["truth"] | None,
+    headings: Path | None,
     sampler: ViewSampler,
     folder: Path,
     identity: dict[str, str],
@@ -181,10 +187,10 @@ def _targets(
         return None
     if teacher == "truth":
         return true_targets(sampler)
-    kept = {key: identity[key] for key in ("data", "teacher")}
+    kept = {key: identity[key] for key in ("data", "teacher", "headings") if key in identity}
     found = load_targets(folder, kept)
     if found is None:
-        found = fused_targets(teacher, sampler, taught, steady=steady)
+        found = fused_targets(teacher, sampler, taught, steady=steady, headings=headings)
         save_targets(folder, found, kept)
     return found
 
