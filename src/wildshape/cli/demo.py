@@ -115,7 +115,7 @@ def train(settings: Settings) -> "Predictor":
     from wildshape.cli.demo_data import TRAIN
     from wildshape.cli.models import choose_device
     from wildshape.cli.output import command_line
-    from wildshape.cli.train import fit_with_progress, recipe_for
+    from wildshape.cli.training import fit_with_progress, recipe_for
     from wildshape.inference.predictor import load
     from wildshape.io.provenance import provenance
     from wildshape.io.store import open_store

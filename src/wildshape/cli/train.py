@@ -4,10 +4,10 @@
 
 import os
 import time
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import arg
 
@@ -15,11 +15,8 @@ from wildshape.cli.options import AsJson, Data, Device, Overwrite, Unit
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from wildshape.cli.output import Output
     from wildshape.io.store import Store
-    from wildshape.training.config import Recipe
     from wildshape.training.loop import Run
 
 EXAMPLE = "wildshape train cars.store --out runs/cars --preset small"
@@ -91,6 +88,7 @@ def run(settings: Settings) -> None:
     from wildshape.cli.models import choose_device
     from wildshape.cli.output import command_line
     from wildshape.cli.terminal import progress, say
+    from wildshape.cli.training import fit_with_progress, recipe_for
     from wildshape.io.provenance import provenance
     from wildshape.training.loop import setup
     from wildshape.training.profile import PROFILE
@@ -155,46 +153,6 @@ def _checkpoint(model: str | None) -> Path | None:
     return model_file(None if model == "shipped" else Path(model))
 
 
-def fit_with_progress(
-    run: "Run", *, resume: str = "", adjust: "Callable[[Run], bool] | None" = None
-) -> Path:
-    """`fit` with a bar; a signal stops it between two steps and saves the state.
-
-    Args:
-        run: set up.
-        resume: the command that goes on after a stop, for the message.
-        adjust: called every 25 steps; may change the run's number of steps, and says whether.
-
-    Raises:
-        KeyboardInterrupt: stopped by a signal; its text says how to go on.
-    """
-    from wildshape.cli.interrupt import stop_flag
-    from wildshape.cli.terminal import progress, say
-    from wildshape.training.loop import StopRequested, fit
-
-    first, silent = run.state.step, not run.processes.leads
-    planned = None if adjust else run.recipe.optim.steps
-    with (
-        stop_flag() as stopped,
-        progress("training", planned or 0, silent=silent, start=first) as bar,
-    ):
-
-        def report(step: int, values: dict[str, Any]) -> None:
-            nonlocal planned
-            if adjust is not None and adjust(run):
-                planned = run.recipe.optim.steps
-                say(f"training for {planned} steps, which fit into the time")
-            bar.at(step, _line(values), total=planned)
-
-        try:
-            return fit(run, report, stopped)
-        except StopRequested:
-            raise stopped.error(
-                f"stopped after step {run.state.step} of {run.recipe.optim.steps}, the state is"
-                f" saved; go on with `{resume}`."
-            ) from None
-
-
 def open_data(settings: Settings) -> "Store":
     """The packed store to train on; track folders are packed once into the run's folder.
 
@@ -231,30 +189,6 @@ def open_data(settings: Settings) -> "Store":
     return open_store(packed)
 
 
-def recipe_for(store: "Store", preset: str, steps: int | None) -> "Recipe":
-    """The preset, for the kind of sensor in the store, with another number of steps if asked.
-
-    Raises:
-        BadInputError: a preset of the paper that was made for the other kind of sensor; no steps.
-    """
-    from wildshape.training.recipes import PRESETS
-
-    recipe = PRESETS[preset]()
-    kind = store.sensor_of(0).kind
-    if kind != recipe.views.sensor:
-        if preset.startswith("paper-"):
-            raise BadInputError(
-                f"{store.path}: holds {kind} scans, but preset {preset} is for"
-                f" {recipe.views.sensor} scans; choose another preset."
-            )
-        recipe = replace(recipe, views=replace(recipe.views, sensor=kind))
-    if steps is None:
-        return recipe
-    if steps < 1:
-        raise BadInputError(f"--steps {steps}: expected 1 or more.")
-    return replace(recipe, optim=replace(recipe.optim, steps=steps))
-
-
 def _check_folder(settings: Settings) -> "Output | None":
     """The marker of a new run; processes that do not lead leave the folder alone."""
     from wildshape.cli.output import MARKER, begin, keep_apart
@@ -277,15 +211,6 @@ def _check_folder(settings: Settings) -> "Output | None":
 
 def _flag(settings: Settings) -> str:
     return "" if settings.resume else " --resume"
-
-
-def _line(values: dict[str, Any]) -> str:
-    shares = "/".join(f"{100 * share:.0f}" for share in values["branch_shares"])
-    return (
-        f"loss {values['loss']:.4f} (observation {values['observation']:.4f},"
-        f" projection {values['projection']:.4f}), branches {shares} %,"
-        f" {values['steps_per_second']:.1f} steps/s"
-    )
 
 
 def _conclude(settings: Settings, run: "Run", seconds: float, text: str) -> None:

@@ -22,6 +22,7 @@ from torch import Tensor
 from wildshape.datasets.views import ViewSampler
 from wildshape.errors import BadInputError
 from wildshape.geometry.se3 import SE3
+from wildshape.inference.voting import half_turn
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.losses.multiview import LossConfig
 from wildshape.models.shapepose import ShapePoseNet
@@ -34,7 +35,6 @@ NOT_FINITE = (
     " learning rate, or check the data's units."
 )
 _BATCH, _POINTS, _NEIGHBOURS = 64, 256, 5
-_HALF_TURN = torch.diag(torch.tensor((-1.0, -1.0, 1.0)))
 
 
 class AgreedPoses(NamedTuple):
@@ -83,10 +83,10 @@ def agreed_poses(
         raise BadInputError(NOT_FINITE)
     count = len(sampler.store.scan_sizes)
     agreed = AgreedPoses(torch.zeros(count, 3, 3), torch.zeros(count, 3))
-    profiles, kept = [], []
+    profiles, kept, middles = [], [], []
     fused = fused or _fused
     for done, scans in enumerate(sampler.scans_of):
-        T_sensor_can = _poses(network, sampler, config, scans)
+        T_sensor_can, middle_x = _poses(network, sampler, config, scans)
         if hinted is not None:
             steady = hinted(scans, T_sensor_can)
         elif config.steady:
@@ -94,14 +94,14 @@ def agreed_poses(
         else:
             clouds = some_of_each(sampler, scans, T_sensor_can)
             sensors = T_sensor_can.inverse().translation
-            steady = agreeing_signs(clouds, sensors, mirror=network.config.mirror)
-        T_steady_can = SE3(_turn(T_sensor_can.rotation, steady), T_sensor_can.translation)
-        T_steady_can = refined(scans, T_steady_can)
+            steady = agreeing_signs(clouds, sensors, middle_x, mirror=network.config.mirror)
+        T_steady_can = refined(scans, _turned(T_sensor_can, steady, middle_x))
         rows = torch.from_numpy(scans)
         agreed.rotation[rows] = T_steady_can.rotation
         agreed.translation[rows] = T_steady_can.translation
         profiles.append(profile(fused(sampler, scans, T_steady_can)))
         kept.append(steady)
+        middles.append(middle_x)
         progress(done + 1, len(sampler.scans_of))
     if hinted is not None:
         return agreed
@@ -114,9 +114,11 @@ def agreed_poses(
         found = [_end_on(agreed, *one) for one in zip(sampler.scans_of, kept, signs)]
         counts = EndOn(*(torch.cat(parts) for parts in zip(*found)))
         signs = uncontradicted_signs(all_profiles, signs, counts)
-    for scans, sign in zip(sampler.scans_of, signs):
+    for scans, sign, middle_x in zip(sampler.scans_of, signs, middles):
         rows = torch.from_numpy(scans)
-        agreed.rotation[rows] = _turn(agreed.rotation[rows], sign.expand(len(rows)))
+        given = SE3(agreed.rotation[rows], agreed.translation[rows])
+        turned = _turned(given, sign.expand(len(rows)), middle_x)
+        agreed.rotation[rows], agreed.translation[rows] = turned.rotation, turned.translation
     return agreed
 
 
@@ -129,9 +131,14 @@ def _end_on(
     return end_on(votes, T_sensor_can.inverse().translation, sign)
 
 
-def _turn(rotation: Float[Tensor, "V 3 3"], sign: Float[Tensor, "V"]) -> Float[Tensor, "V 3 3"]:
-    """Those of sign -1 turned by a half turn about the canonical z."""
-    return torch.where(sign[:, None, None] < 0, rotation @ _HALF_TURN, rotation)
+def _turned(T_sensor_can: SE3, sign: Float[Tensor, "V"], middle_x: float) -> SE3:
+    """Those of sign -1 turned by a half turn about the vertical through the object's middle."""
+    back = sign < 0
+    turned = T_sensor_can @ half_turn(middle_x, T_sensor_can.rotation.dtype)
+    return SE3(
+        torch.where(back[:, None, None], turned.rotation, T_sensor_can.rotation),
+        torch.where(back[:, None], turned.translation, T_sensor_can.translation),
+    )
 
 
 def steady_signs(rotation: Float[Tensor, "V 3 3"]) -> Float[Tensor, "V"]:
@@ -147,23 +154,26 @@ def steady_signs(rotation: Float[Tensor, "V 3 3"]) -> Float[Tensor, "V"]:
 
 def _poses(
     network: ShapePoseNet, sampler: ViewSampler, config: LossConfig, scans: np.ndarray
-) -> SE3:
-    """`T_sensor_canonical` of scans as recorded, each under its own shape."""
+) -> tuple[SE3, float]:
+    """`T_sensor_canonical` of scans as recorded, each under its own shape; the shapes' middle x."""
     rng = np.random.default_rng(0)
     device = next(network.parameters()).device
-    found = []
+    found, middles = [], []
     for start in range(0, len(scans), _BATCH):
         rows = [int(s) for s in scans[start : start + _BATCH]]
         inputs, centres, turn = (t.to(device) for t in sampler.gather_as_posed(rows, rng))
         code = network.encode(inputs)
         poses = network.poses(code)
-        posed = poses.apply(network.canonical(code))
+        shapes = network.canonical(code)
+        posed = poses.apply(shapes)
         cost = score_hypotheses(inputs, centres, posed, config.projection).cost(config.beta)
         chosen = poses.choose((cost - config.belief * poses.log_belief).argmin(-1))
         translation = (turn.mT @ (chosen.translation[:, 0] + centres)[..., None])[..., 0]
+        middles.append((shapes[..., 0].amin(1) + shapes[..., 0].amax(1)) / 2)
         found.append(((turn.mT @ chosen.rotation[:, 0]).cpu(), translation.cpu()))
     rotations, translations = zip(*found)
-    return SE3(torch.cat(rotations), torch.cat(translations))
+    middle_x = float(torch.cat(middles).median())
+    return SE3(torch.cat(rotations), torch.cat(translations)), middle_x
 
 
 def _fused(sampler: ViewSampler, scans: np.ndarray, T_sensor_can: SE3) -> Float[Tensor, "n 3"]:

@@ -13,22 +13,28 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from wildshape.inference.voting import half_turn
 from wildshape.ops.nearest import nearest
 
 _FAR, _SMALLEST_M = 0.1, 1e-9
-_HALF_TURN, _ACROSS = (-1.0, -1.0, 1.0), (1.0, -1.0, 1.0)
+_ACROSS = (1.0, -1.0, 1.0)
 
 
 @torch.no_grad()
 def agreeing_signs(
-    clouds: Float[Tensor, "V n 3"], sensors: Float[Tensor, "V 3"], *, mirror: bool
+    clouds: Float[Tensor, "V n 3"],
+    sensors: Float[Tensor, "V 3"],
+    middle_x: float = 0.0,
+    *,
+    mirror: bool,
 ) -> Float[Tensor, "V"]:
-    """+1 or -1 for each view: turn those of -1 about z and none contradicts another.
+    """+1 or -1 for each view: turn those of -1 about the object's middle, none contradicts another.
 
     Args:
         clouds: points of each view in the object frame, by the pose that it found for itself,
             right but for half turns.
         sensors: where each was taken, the same frame.
+        middle_x: of the object's length, there.
         mirror: the object is symmetric in the plane y = 0.
     """
     size = clouds.flatten(0, 1)
@@ -36,7 +42,7 @@ def agreeing_signs(
     seen = clouds
     if mirror:
         seen = torch.cat((clouds, clouds * clouds.new_tensor(_ACROSS)), dim=1)
-    turned = seen * clouds.new_tensor(_HALF_TURN)
+    turned = half_turn(middle_x, clouds.dtype).apply(seen)
     rows = [
         _contradiction(turned, cloud, sensor, far) - _contradiction(seen, cloud, sensor, far)
         for cloud, sensor in zip(clouds, sensors)
