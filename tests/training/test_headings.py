@@ -3,7 +3,8 @@
 import torch
 
 from wildshape.geometry.rotation import rotation_z
-from wildshape.training.headings import steady_signs
+from wildshape.geometry.se3 import SE3
+from wildshape.training.headings import _turned, steady_signs
 from wildshape.training.profiles import agreed_signs, profile, together
 
 
@@ -61,3 +62,13 @@ def test_half_turns_within_a_track_are_found():
     rotation = rotation_z(torch.where(flipped, yaw + torch.pi, yaw))
     signs = steady_signs(rotation)
     assert bool(((signs < 0) == flipped).all()) or bool(((signs > 0) == flipped).all())
+
+
+def test_a_turned_pose_leaves_the_object_s_middle_where_it_was():
+    """The far end takes the near one's place: nothing moves in the sensor's frame but the ends."""
+    yaw = torch.tensor((0.3, 2.0))
+    given = SE3(rotation_z(yaw), torch.tensor(((9.0, 1.0, 0.0), (5.0, -4.0, 0.2))))
+    turned = _turned(given, torch.tensor((1.0, -1.0)), 0.7)
+    ends = torch.tensor(((2.7, 0.0, 0.0), (-1.3, 0.0, 0.0)))
+    torch.testing.assert_close(turned[0].apply(ends), given[0].apply(ends))
+    torch.testing.assert_close(turned[1].apply(ends), given[1].apply(ends).flip(0))

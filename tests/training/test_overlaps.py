@@ -41,5 +41,17 @@ def test_views_turned_at_random_are_found(size, mirror):
     assert bool(((signs < 0) == flipped).all()) or bool(((signs > 0) == flipped).all())
 
 
+def test_objects_are_turned_about_their_middle_wherever_the_origin_lies():
+    """A network's canonical shape may lie beside its origin; turned about that, all would miss."""
+    shift = torch.tensor((0.4, 0.0, 0.0))
+    flipped = torch.tensor([True, False, True, False, True, False])
+    turned = [
+        torch.where(flipped.view(-1, *(1,) * (part.ndim - 1)), part * HALF_TURN, part) + shift
+        for part in views_of_a_wedge(1.0)
+    ]
+    signs = agreeing_signs(*turned, 0.4, mirror=True)
+    assert bool(((signs < 0) == flipped).all()) or bool(((signs > 0) == flipped).all())
+
+
 def test_views_that_agree_are_left_alone():
     assert len(set(agreeing_signs(*views_of_a_wedge(1.0), mirror=True).tolist())) == 1
