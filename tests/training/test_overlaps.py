@@ -29,15 +29,16 @@ def views_of_a_wedge(size):
     return size * torch.stack(clouds), size * torch.stack(sensors)
 
 
+def some_turned(part, flipped):
+    return torch.where(flipped.view(-1, *(1,) * (part.ndim - 1)), part * HALF_TURN, part)
+
+
 @pytest.mark.parametrize("size", [1.0, 0.05])
 @pytest.mark.parametrize("mirror", [False, True])
 def test_views_turned_at_random_are_found(size, mirror):
     flipped = torch.tensor([False, True, True, False, False, True])
-    turned = [
-        torch.where(flipped.view(-1, *(1,) * (part.ndim - 1)), part * HALF_TURN, part)
-        for part in views_of_a_wedge(size)
-    ]
-    signs = agreeing_signs(*turned, mirror=mirror)
+    clouds, sensors = (some_turned(part, flipped) for part in views_of_a_wedge(size))
+    signs = agreeing_signs(clouds, sensors, mirror=mirror)
     assert bool(((signs < 0) == flipped).all()) or bool(((signs > 0) == flipped).all())
 
 
@@ -45,11 +46,8 @@ def test_objects_are_turned_about_their_middle_wherever_the_origin_lies():
     """A network's canonical shape may lie beside its origin; turned about that, all would miss."""
     shift = torch.tensor((0.4, 0.0, 0.0))
     flipped = torch.tensor([True, False, True, False, True, False])
-    turned = [
-        torch.where(flipped.view(-1, *(1,) * (part.ndim - 1)), part * HALF_TURN, part) + shift
-        for part in views_of_a_wedge(1.0)
-    ]
-    signs = agreeing_signs(*turned, 0.4, mirror=True)
+    clouds, sensors = (some_turned(part, flipped) + shift for part in views_of_a_wedge(1.0))
+    signs = agreeing_signs(clouds, sensors, 0.4, mirror=True)
     assert bool(((signs < 0) == flipped).all()) or bool(((signs > 0) == flipped).all())
 
 

@@ -95,15 +95,16 @@ def fused_targets(
     def fused(_: ViewSampler, scans: np.ndarray, T_sensor_can: SE3) -> Tensor:
         return torch.from_numpy(_shape(sampler, scans, T_sensor_can, mirror, voxel))
 
-    hinted = None
-    if headings is not None:
-        hint = load(headings, raw=True)
+    def hinted(scans: np.ndarray, T_sensor_can: SE3) -> Tensor:
+        assert hint is not None
+        return hinted_signs(hint, in_units(scans), _scaled(T_sensor_can, 1 / unit))
+
+    hint = None if headings is None else load(headings, raw=True)
+    if hint is not None:
         check_hint(hint)
-
-        def hinted(scans: np.ndarray, T_sensor_can: SE3) -> Tensor:
-            return hinted_signs(hint, in_units(scans), _scaled(T_sensor_can, 1 / unit))
-
-    poses = agreed_poses(network, asked, loss, refined, progress, fused, hinted, settled=True)
+    poses = agreed_poses(
+        network, asked, loss, refined, progress, fused, hinted if hint else None, settled=True
+    )
     shapes = [
         _shape(sampler, scans, _of(poses, scans), mirror, voxel) for scans in sampler.scans_of
     ]
