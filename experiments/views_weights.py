@@ -44,6 +44,7 @@ class Settings:
         category: of the objects.
         steps: gradient steps of the first stage.
         taught_steps: of the second; 0 ends with the first.
+        rounds: how often the second is run, each time taught by the one before.
         taught_lr: learning rate that the second falls from.
         headings: checkpoint of LiDAR scans that the second stage asks which way the views look.
         seed: of data and training.
@@ -54,6 +55,7 @@ class Settings:
     category: Literal["airplane", "chair", "car"]
     steps: int = 3500
     taught_steps: int = 0
+    rounds: int = 1
     taught_lr: float = 7e-4
     headings: Path | None = None
     seed: int = 0
@@ -105,9 +107,9 @@ def main(settings: Settings) -> None:
     recipe = views()
     first = replace(recipe, optim=replace(recipe.optim, steps=settings.steps))
     model = train(settings, first, "first")
-    if settings.taught_steps:
-        optim = replace(recipe.optim, steps=settings.taught_steps, lr=settings.taught_lr)
-        model = train(settings, replace(recipe, optim=optim), "taught", teacher=model)
+    optim = replace(recipe.optim, steps=settings.taught_steps, lr=settings.taught_lr)
+    for number in range(settings.rounds if settings.taught_steps else 0):
+        model = train(settings, replace(recipe, optim=optim), f"taught{number}", teacher=model)
     ship(model, settings)
 
 
@@ -132,6 +134,7 @@ def ship(model: Path, settings: Settings) -> None:
     """The same checkpoint in half precision, as the package carries it."""
     network, found = load_checkpoint(model)
     stages = f"--steps {settings.steps} --taught-steps {settings.taught_steps}"
+    stages += f" --rounds {settings.rounds}" if settings.rounds > 1 else ""
     stages += " --headings DEFAULT" if settings.headings else ""
     what = f"--category {settings.category} --cad CAD --out RUN {stages} --seed {settings.seed}"
     command = {"command": f"python -m experiments.views_weights {what}"}
