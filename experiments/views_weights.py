@@ -126,7 +126,8 @@ def train(settings: Settings, recipe: Recipe, name: str, teacher: Path | None = 
         headings=settings.headings if teacher else None,
         provenance=provenance(f"python -m experiments.views_weights {settings}"),
     )
-    fit(run, lambda step, values: print(name, step, values, flush=True))
+    if run.state.step < recipe.optim.steps:  # else it is there; made anew, it would teach others
+        fit(run, lambda step, values: print(name, step, values, flush=True))
     return settings.out / name / MODEL
 
 
