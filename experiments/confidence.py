@@ -38,6 +38,7 @@ from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 _VEHICLES, _SCANS = ("car", "truck", "bus"), 12
 _SENSORS: tuple[Literal["hdl64", "hdl32"], ...] = ("hdl64", "hdl32")
 _SEEDS = {"train": 7100, "test": 9300}
+_RIDGES, _FOLDS = (1.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0), 10
 _FITTED_ON = "simulated drives with their truth: procedural vehicles, CAD vehicles of split train"
 
 
@@ -57,7 +58,7 @@ class Settings:
     model: Path = SHIPPED
     cad: Path | None = None
     write: Path | None = None
-    tracks: int = 10
+    tracks: int = 20
 
 
 class Measured(NamedTuple):
@@ -68,12 +69,14 @@ class Measured(NamedTuple):
         plain: confidence that falls with the label-free cost alone.
         cd: true Chamfer distance, metres.
         rotation_deg: angle to the true pose, in the canonical frame that most scans agree on.
+        track: number of each one's track.
     """
 
     facts: list[Facts]
     plain: list[float]
     cd: list[float]
     rotation_deg: list[float]
+    track: list[int]
 
 
 def drives(settings: Settings, split: str) -> Store:
@@ -106,7 +109,7 @@ def _meshes(cad: Path, split: str, into: Path) -> Path:
 
 def measure(predictor: Predictor, store: Store) -> Measured:
     """Complete all scans and hold them against their truth."""
-    found, gauges = Measured([], [], [], []), []
+    found, gauges = Measured([], [], [], [], []), []
     for index in range(len(store)):
         track = turn_track(store.track(index), "yaw", 0)
         truth, shape = track.T_sensor_object, track.shape
@@ -118,6 +121,7 @@ def measure(predictor: Predictor, store: Store) -> Measured:
             found.facts.append(Facts(*item.facts))
             found.plain.append(1 / (1 + (item.cost / predictor.settings.cost_m[1]) ** 2))
             found.cd.append(completion_error(local, shape).cd)
+            found.track.append(index)
         gauges.append(truth.rotation.mT @ stack([item.pose for item in done]).rotation)
         print(f"{index + 1} of {len(store)}", flush=True)
     found.rotation_deg.extend(_from_most(torch.cat(gauges)))
@@ -129,6 +133,21 @@ def _from_most(R_object_canonical: torch.Tensor) -> list[float]:
     trace = torch.einsum("aij,bij->ab", R_object_canonical, R_object_canonical)
     angle = torch.rad2deg(torch.acos(((trace - 1) / 2).clamp(-1, 1)))
     return angle[angle.median(1).values.argmin()].tolist()
+
+
+def best_ridge(found: Measured) -> float:
+    """The ridge whose line orders the scans of tracks best that it was not fitted to."""
+    cd, tracks = np.asarray(found.cd), np.asarray(found.track)
+    order = {}
+    for ridge in _RIDGES:
+        foretold = np.zeros(len(cd))
+        for fold in range(_FOLDS):
+            out = tracks % _FOLDS == fold
+            fitted = [facts for facts, left in zip(found.facts, out) if not left]
+            line = fit_calibration(fitted, cd[~out], ridge=ridge)
+            foretold[out] = [line.expected(found.facts[i]) for i in np.flatnonzero(out)]
+        order[ridge] = rank_correlation(list(-foretold), found.cd) or 0.0
+    return max(order, key=lambda ridge: order[ridge])
 
 
 def figures(confidence: list[float], found: Measured) -> dict[str, object]:
@@ -185,7 +204,8 @@ def main(settings: Settings) -> None:
     """Fit, measure, write."""
     predictor = load(settings.model)
     seen = measure(predictor, drives(settings, "train"))
-    calibration = fit_calibration(seen.facts, np.asarray(seen.cd), _FITTED_ON)
+    ridge = best_ridge(seen)
+    calibration = fit_calibration(seen.facts, np.asarray(seen.cd), _FITTED_ON, ridge)
     test = measure(predictor, drives(settings, "test"))
     after = [calibration.confidence(facts) for facts in test.facts]
     report = {
@@ -197,6 +217,7 @@ def main(settings: Settings) -> None:
         },
         "reliability": reliability(after, test, calibration.within_m),
         "calibration": vars(calibration),
+        "ridge": ridge,
         "scans": len(test.cd),
         "provenance": provenance("python experiments/confidence.py --cad CAD --out OUT"),
     }
