@@ -182,21 +182,3 @@ def test_the_predictor_uses_tracks():
     T_middle_scan = predictor.register_track(scans, track=True)
     torch.testing.assert_close(T_middle_scan[0].matrix, (middle @ done[0].pose.inverse()).matrix)
     assert len(predictor.fuse(scans, track=True)) == sum(map(len, scans))
-
-
-@pytest.mark.parametrize(
-    ("refine", "sensor", "graph"),
-    [
-        ("auto", "lidar", True),
-        ("auto", "camera", False),
-        ("joint", "lidar", False),
-        ("graph", "camera", True),
-    ],
-)
-def test_scans_in_order_are_laid_on_their_neighbours(monkeypatch, refine, sensor, graph):
-    """A LiDAR's are, unless told otherwise; a camera's views may come in no order."""
-    asked = []
-    monkeypatch.setattr(whole, "refine_by_graph", lambda _, pose: asked.append(1) or pose)
-    done, settings = completed(poses_of(TRACK)), replace(SETTINGS, sensor=sensor)
-    whole.complete_together(done, list(TRACK.scans), settings, refine=refine)
-    assert bool(asked) == graph

@@ -52,7 +52,7 @@ class Settings:
     unit: Unit = "m"
     device: Device = "auto"
     together: Together = False
-    refine: Refine = "auto"
+    refine: Refine = "joint"
     mesh: Annotated[bool, arg(help="also write a closed mesh of each shape")] = False
     mesh_format: Annotated[Literal["ply", "obj", "glb"], arg(help="of the meshes")] = "ply"
     mesh_colours: Annotated[

@@ -59,7 +59,7 @@ class Settings:
     max_scans: Annotated[int | None, arg(metavar="N")] = None
     as_seeds: bool = False
     track: bool = False
-    refine: Refine = "auto"
+    refine: Refine = "joint"
     raw: bool = False
     unit: Unit = "m"
     device: Device = "auto"
@@ -274,7 +274,7 @@ def _identity(settings: Settings) -> dict[str, Any]:
     from wildshape.cli.models import fingerprint
 
     names = ("baselines", "rotate", "seeds", "max_scans", "as_seeds", "track", "unit", "raw")
-    names += ("refine",) if settings.refine != "auto" else ()
+    names += ("refine",) if settings.refine != "joint" else ()
     models = [fingerprint(model) for model in settings.model] or [fingerprint(None)]
     chosen = {name: getattr(settings, name) for name in names}
     return {**chosen, "data": str(settings.data.resolve()), "models": models}

@@ -26,7 +26,7 @@ class Settings:
     unit: Unit = "m"
     device: Device = "auto"
     together: Together = False
-    refine: Refine = "auto"
+    refine: Refine = "joint"
     overwrite: Overwrite = False
     json: AsJson = False
 

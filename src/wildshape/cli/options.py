@@ -38,11 +38,8 @@ Layout = Annotated[
     arg(help="one packed store, or track folders with a file a scan"),
 ]
 Refine = Annotated[
-    Literal["auto", "joint", "graph"],
-    arg(
-        help="with --track: all scans onto each other (joint), also each onto its neighbours "
-        "(graph); auto: graph for LiDARs, whose scans follow each other"
-    ),
+    Literal["joint", "graph"],
+    arg(help="with --track: all scans onto each other; graph: also each onto its neighbours"),
 ]
 Together = Annotated[
     bool, arg(name="track", help="use all scans of a track together: one shape, posed in each")

@@ -48,7 +48,7 @@ class Settings:
     unit: Unit = "m"
     device: Device = "auto"
     together: Together = False
-    refine: Refine = "auto"
+    refine: Refine = "joint"
     format: Format = "auto"
     overwrite: Overwrite = False
     json: AsJson = False

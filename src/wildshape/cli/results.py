@@ -73,14 +73,14 @@ class Work:
     track: bool = False
     mesh: MeshOrder | None = None
     boxes: BoxOrder = field(default_factory=BoxOrder)
-    refine: Refine = "auto"
+    refine: Refine = "joint"
 
     def identity(self) -> dict[str, Any]:
         """What decides the output's content."""
         source = str(self.input.resolve())
         found = {"input": source, "unit": self.unit, "model": fingerprint(self.model)}
         uses = {"uses": "track"} if self.track else {}
-        uses |= {"refine": self.refine} if self.refine != "auto" else {}
+        uses |= {"refine": self.refine} if self.refine != "joint" else {}
         mesh = {"mesh": self.mesh.kind} if self.mesh else {}
         colours = {"mesh_colours": "confidence"} if self.mesh and self.mesh.coloured else {}
         return {**found, **uses, **mesh, **colours, **self.boxes.identity()}
@@ -122,7 +122,7 @@ def check_refine(refine: Refine, *, track: bool) -> None:
     Raises:
         BadInputError: the scans are not used together.
     """
-    if refine != "auto" and not track:
+    if refine != "joint" and not track:
         raise BadInputError(f"--refine {refine}: is for scans used together; pass --track, too.")
 
 
@@ -158,7 +158,7 @@ def write_results(
     registers: bool = False,
     together: bool = False,
     mesh: MeshOrder | None = None,
-    refine: Refine = "auto",
+    refine: Refine = "joint",
 ) -> Tally:
     """Complete every scan of every track and write the results, track after track.
 
@@ -219,7 +219,7 @@ def complete_track(
     registers: bool = False,
     together: bool = False,
     mesh: MeshOrder | None = None,
-    refine: Refine = "auto",
+    refine: Refine = "joint",
 ) -> list[Completion]:
     """Complete the scans of a track, writing each into its folder; all but `objects.json`."""
     found: list[Completion] = []

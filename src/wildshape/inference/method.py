@@ -77,13 +77,13 @@ class LearnedTrack:
     """
 
     predictor: Predictor
-    refine: Refine = "auto"
+    refine: Refine = "joint"
 
     @property
     def about(self) -> str:
         """What sets this row apart."""
-        how = "" if self.refine == "auto" else f", refined by `{self.refine}`"
-        return f"poses and shape from all scans of the track together{how}"
+        graph = ", laid on their neighbours by a pose graph" if self.refine == "graph" else ""
+        return f"poses and shape from all scans of the track together{graph}"
 
     def complete(self, points: Points, sensor: Sensor) -> Points:
         """One scan is a track of one.

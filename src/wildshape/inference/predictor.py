@@ -119,7 +119,7 @@ class Predictor:
             yield from (replace(item, seconds=seconds) for item in done)
 
     def complete_track(
-        self, scans: Sequence[object], sensor: Sensor | None = None, *, refine: Refine = "auto"
+        self, scans: Sequence[object], sensor: Sensor | None = None, *, refine: Refine = "joint"
     ) -> list[Completion]:
         """One shape from all scans of a track, in time order, posed in each of them.
 

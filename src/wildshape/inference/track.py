@@ -32,9 +32,8 @@ _BATCH, _MOST_POINTS, _VOTING_POINTS = 32, 4096, 192
 _VOXEL_M, _REACH_M, _STIFFNESS = 0.08, 0.12, 0.2
 
 
-Refine = Literal["auto", "joint", "graph"]
-"""All scans onto each other at once; or, before and after that, each onto its neighbours, which
-`auto` does for a LiDAR alone: a camera's views may come in no order."""
+Refine = Literal["joint", "graph"]
+"""All scans onto each other at once; or, before and after that, each onto its neighbours."""
 
 
 class TrackFit(NamedTuple):
@@ -55,7 +54,7 @@ def complete_together(
     scans: list[Points],
     settings: ModelSettings,
     *,
-    refine: Refine = "auto",
+    refine: Refine = "joint",
 ) -> list[Completion]:
     """Completions of a track's single scans made those of one object.
 
@@ -72,8 +71,7 @@ def complete_together(
     voted = _voted(stack([item.pose for item in done]), shape, weights, scans, settings)
     mirror, unit = settings.network.mirror, unit_of(settings.extent_m[1])
     given, start = _in_units(scans, voted, unit)
-    graph = refine == "graph" or (refine == "auto" and settings.sensor == "lidar")
-    fit = refine_checked(given, start, mirror=mirror, graph=graph)
+    fit = refine_checked(given, start, mirror=mirror, refine=refine)
     shape = unit * drawn_to(shape / unit, _seen(given, fit.T_sensor_object, mirror))
     fit = fit._replace(T_sensor_object=_scaled(fit.T_sensor_object, unit))
     fitted = _box(shape, scans, fit.T_sensor_object, mirror=mirror)
@@ -173,13 +171,13 @@ def track_cost(
 
 
 def refine_checked(
-    scans: list[Points], voted: SE3, *, mirror: bool, graph: bool = False
+    scans: list[Points], voted: SE3, *, mirror: bool, refine: Refine = "joint"
 ) -> TrackFit:
     """Refined poses, kept only if the scans then lie nearer to each other, and near the vote."""
-    refined = refine_by_graph(scans, voted) if graph else voted
+    refined = refine_by_graph(scans, voted) if refine == "graph" else voted
     refined = refine_jointly(scans, refined, mirror=mirror)
     refined = refine_jointly(scans, refined, mirror=False, schedule=FINE)
-    refined = refine_by_graph(scans, refined) if graph else refined
+    refined = refine_by_graph(scans, refined) if refine == "graph" else refined
     near = stayed_near(voted, refined)
     if near and _disagreement(scans, refined, mirror) < _disagreement(scans, voted, mirror):
         return TrackFit(refined, refined=True)
