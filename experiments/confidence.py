@@ -1,13 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Calibrate the confidence of weights, and measure it on drives that it was not fitted to.
+"""Calibrate the confidence of weights, and measure it on scans that it was not fitted to.
 
     python experiments/confidence.py --cad CAD --out confidence --write calibrated.safetensors
+    python experiments/confidence.py --cad CAD --out confidence --category chair --model chair ...
 
-Drives are simulated twice: validation drives (procedural vehicles, and CAD vehicles of split
-`train`) give the calibration, test drives (another seed, CAD vehicles of split `test`) the figures.
-The truth of simulated drives is used, which training never sees; that is said in the checkpoint.
-Writes OUT/confidence.json and .png and, with --write, the weights with their calibration.
+Drives, or a depth camera's views of a category, are simulated twice: once of procedural shapes and
+CAD models of split `train`, which give the calibration, once with another seed and CAD models of
+split `test`, which give the figures. The truth of simulated data is used, which training never
+sees; that is said in the checkpoint. Writes OUT/confidence.json and .png and, with --write, the
+weights with their calibration.
 """
 
 import csv
@@ -26,7 +28,7 @@ from wildshape.evaluation.metrics import completion_error
 from wildshape.evaluation.turning import turn_track
 from wildshape.geometry.se3 import stack
 from wildshape.inference.predictor import Predictor, load
-from wildshape.inference.shipped import SHIPPED
+from wildshape.inference.shipped import SHIPPED, weights_file
 from wildshape.io.atomic import write_json
 from wildshape.io.provenance import provenance
 from wildshape.io.store import Store, open_store
@@ -39,7 +41,7 @@ _VEHICLES, _SCANS = ("car", "truck", "bus"), 12
 _SENSORS: tuple[Literal["hdl64", "hdl32"], ...] = ("hdl64", "hdl32")
 _SEEDS = {"train": 7100, "test": 9300}
 _RIDGES, _FOLDS = (1.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0), 10
-_FITTED_ON = "simulated drives with their truth: procedural vehicles, CAD vehicles of split train"
+_FITTED_ON = "simulated {what} with their truth: procedural {kind}, CAD {kind} of split train"
 
 
 @dataclass(frozen=True)
@@ -48,10 +50,11 @@ class Settings:
 
     Attributes:
         out: folder to write; drives simulated by an earlier call are used again.
-        model: checkpoint; the shipped one by default.
+        model: checkpoint, or the name of weights shipped; the LiDAR's by default.
         cad: folder of CAD meshes with a manifest; without it procedural vehicles alone.
         write: where to write the weights with their calibration.
-        tracks: for each of two sensors and each source.
+        tracks: for each of two sensors and each source; of a depth camera, for each source.
+        category: vehicles, passed by two LiDARs, or what a depth camera sees five times.
     """
 
     out: Path
@@ -59,10 +62,28 @@ class Settings:
     cad: Path | None = None
     write: Path | None = None
     tracks: int = 20
+    category: Literal["vehicle", "airplane", "chair", "car"] = "vehicle"
+
+    @property
+    def meshes(self) -> tuple[str, ...]:
+        """Categories of the manifest."""
+        return _VEHICLES if self.category == "vehicle" else (self.category,)
+
+    def configs(self, source: Path | None) -> list[SimulationConfig]:
+        """What is simulated of procedural shapes, or of meshes."""
+        if self.category == "vehicle":
+            return [
+                SimulationConfig(tracks=self.tracks, scans=_SCANS, sensor=sensor, meshes=source)
+                for sensor in _SENSORS
+            ]
+        camera = SimulationConfig(
+            tracks=self.tracks, sensor="depth-camera", category=self.category, meshes=source
+        )
+        return [camera]
 
 
 class Measured(NamedTuple):
-    """Completions of single scans, each turned by its own yaw.
+    """Completions of single scans; a LiDAR's each turned by its own yaw.
 
     Attributes:
         facts: known without labels.
@@ -84,24 +105,23 @@ def drives(settings: Settings, split: str) -> Store:
     path = settings.out / split
     if not path.exists():
         with TemporaryDirectory() as folder, StoreWriter(path, {}) as store:
-            meshes = _meshes(settings.cad, split, Path(folder)) if settings.cad else None
-            for i, sensor in enumerate(_SENSORS):
-                for source in (None, meshes) if meshes else (None,):
+            meshes = _meshes(settings, split, Path(folder)) if settings.cad else None
+            for source in (None, meshes) if meshes else (None,):
+                for i, config in enumerate(settings.configs(source)):
                     seed = _SEEDS[split] + 7 * i + (50 if source else 0)
-                    config = SimulationConfig(
-                        tracks=settings.tracks, scans=_SCANS, sensor=sensor, meshes=source
-                    )
                     for track in simulate_tracks(config, seed, workers=1):
-                        store.add(replace(track, name=f"{sensor}-{seed}-{track.name}"))
+                        store.add(replace(track, name=f"{config.sensor}-{seed}-{track.name}"))
     return open_store(path)
 
 
-def _meshes(cad: Path, split: str, into: Path) -> Path:
-    """The vehicles of a split, linked into one folder."""
+def _meshes(settings: Settings, split: str, into: Path) -> Path:
+    """The meshes of a split, linked into one folder."""
+    cad = settings.cad
+    assert cad is not None
     with (cad / "manifest.csv").open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["split"] == split]
     for row in rows:
-        if row["category"] in _VEHICLES:
+        if row["category"] in settings.meshes:
             file = (cad / row["file"]).resolve()
             (into / f"{row['category']}_{file.name}").symlink_to(file)
     return into
@@ -111,7 +131,9 @@ def measure(predictor: Predictor, store: Store) -> Measured:
     """Complete all scans and hold them against their truth."""
     found, gauges = Measured([], [], [], [], []), []
     for index in range(len(store)):
-        track = turn_track(store.track(index), "yaw", 0)
+        track = store.track(index)
+        if track.sensor.kind == "lidar":
+            track = turn_track(track, "yaw", 0)
         truth, shape = track.T_sensor_object, track.shape
         assert truth is not None
         assert shape is not None
@@ -202,10 +224,14 @@ def write(model: Path, out: Path, calibration: Calibration) -> None:
 
 def main(settings: Settings) -> None:
     """Fit, measure, write."""
-    predictor = load(settings.model)
+    model = weights_file(settings.model)
+    predictor = load(model)
     seen = measure(predictor, drives(settings, "train"))
+    views = settings.category != "vehicle"
+    kind = f"{settings.category}s"
+    fitted_on = _FITTED_ON.format(what="views" if views else "drives", kind=kind)
     ridge = best_ridge(seen)
-    calibration = fit_calibration(seen.facts, np.asarray(seen.cd), _FITTED_ON, ridge)
+    calibration = fit_calibration(seen.facts, np.asarray(seen.cd), fitted_on, ridge)
     test = measure(predictor, drives(settings, "test"))
     after = [calibration.confidence(facts) for facts in test.facts]
     report = {
@@ -226,7 +252,7 @@ def main(settings: Settings) -> None:
     curves = {name: risk_coverage(order, test.cd) for name, order in orders.items()}
     draw(settings.out / "confidence.png", curves)
     if settings.write is not None:
-        write(settings.model, settings.write, calibration)
+        write(model, settings.write, calibration)
     for name in ("before", "after"):
         found = report[name]
         assert isinstance(found, dict)
