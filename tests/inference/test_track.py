@@ -16,7 +16,14 @@ from wildshape.geometry.se3 import SE3, stack
 from wildshape.inference import track as whole
 from wildshape.inference.boxes import carried, fit_to_scans
 from wildshape.inference.predictor import Predictor
-from wildshape.inference.voting import half_turn, likeness_of_next, slow, steady_signs, voted_signs
+from wildshape.inference.voting import (
+    half_turn,
+    likeness_of_next,
+    nearness_of_next,
+    slow,
+    steady_signs,
+    voted_signs,
+)
 from wildshape.models.shapepose import ShapePoseNet
 from wildshape.records import Completion
 
@@ -182,3 +189,17 @@ def test_the_predictor_uses_tracks():
     T_middle_scan = predictor.register_track(scans, track=True)
     torch.testing.assert_close(T_middle_scan[0].matrix, (middle @ done[0].pose.inverse()).matrix)
     assert len(predictor.fuse(scans, track=True)) == sum(map(len, scans))
+
+
+def test_a_sensor_is_near_where_it_was_before():
+    """Said of each pair of neighbours, whatever the sensor's own turns; a leap says little."""
+    sensors = poses_of(TRACK).inverse().translation
+    links = nearness_of_next(sensors, 0.0)
+    assert bool((links > 0).all())
+    turned = sensors.clone()
+    turned[3] = half_turn(0.4).apply(sensors[3:4])[0]
+    opposed = nearness_of_next(turned, 0.4)
+    assert (opposed < 0).tolist() == [False, False, True, True, False, False]
+    sparse = torch.tensor([(x, 3.0, 0.0) for x in (24.0, 8.0, -8.0, -24.0)], dtype=torch.float64)
+    leap = nearness_of_next(sparse, 0.0)[1]
+    assert abs(float(leap)) < 0.1 * float(links.min())

@@ -22,7 +22,12 @@ from wildshape.inference.joint import FINE, refine_jointly, stayed_near
 from wildshape.inference.pose_graph import refine_by_graph
 from wildshape.inference.prepare import network_input, unit_of
 from wildshape.inference.refine import denser
-from wildshape.inference.voting import half_turn, likeness_of_next, voted_signs
+from wildshape.inference.voting import (
+    half_turn,
+    likeness_of_next,
+    nearness_of_next,
+    voted_signs,
+)
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.models.checkpoint import ModelSettings
 from wildshape.ops.nearest import nearest
@@ -137,9 +142,12 @@ def _voted(
     stands = track_cost(shape, T_sensor_can, scans, settings)
     gain = track_cost(shape, turned, scans, settings) - stands
     unit = unit_of(settings.extent_m[1])
-    clouds = _some_of_each(scans, T_sensor_can) / unit
-    likeness = likeness_of_next(clouds, middle / unit, mirror=settings.network.mirror)
-    signs = voted_signs(T_sensor_can.rotation, gain / unit, likeness, weights)
+    if settings.sensor == "lidar":
+        links = nearness_of_next(T_sensor_can.inverse().translation, middle)
+    else:
+        clouds = _some_of_each(scans, T_sensor_can) / unit
+        links = likeness_of_next(clouds, middle / unit, mirror=settings.network.mirror)
+    signs = voted_signs(T_sensor_can.rotation, gain / unit, links, weights)
     back = signs < 0
     return SE3(
         torch.where(back[:, None, None], turned.rotation, T_sensor_can.rotation),

@@ -4,9 +4,11 @@
 
 What fails in single scans of a near-symmetric object is the half turn. Where the scans of a track
 follow each other, the object does not turn around between them; that is seen from poses that turn
-slowly, half turns aside. Where each scan was turned on its own, the track's mean shape is asked,
-which knows front from back better than that of one scan, and each scan of its neighbour, as far as
-both saw the same. What a scan found for itself counts too, the more the surer it is.
+slowly, half turns aside. However each scan was turned, a LiDAR that moves on is, seen from the
+object, near the place where it was before, and would not be if one of two scans were turned around.
+Of a camera's views, which may come in no order, each is laid on the next, as far as both saw the
+same. The track's mean shape is asked, too, which knows front from back better than that of one
+scan, and what a scan found for itself counts the more the surer it is.
 """
 
 import torch
@@ -17,8 +19,9 @@ from wildshape.geometry.se3 import SE3
 from wildshape.ops.nearest import nearest
 
 _NEIGHBOURS, _FEWEST, _SLOW_DEG = 5, 4, 15.0
+_SMALLEST_M = 1e-9
 _FAR_M, _SAME_SIDE_M, _SHAPE_VOTES = 0.4, 0.1, 2.0
-_OWN_M, _UNSURE = 0.05, 0.1
+_OWN_M, _UNSURE, _NEAR_M, _LEAP = 0.05, 0.1, 1.0, 0.7
 
 
 def half_turn(middle_x: float, dtype: torch.dtype = torch.float64) -> SE3:
@@ -59,7 +62,7 @@ def _trace(matrix: Float[Tensor, "V 3 3"]) -> Float[Tensor, "V"]:
 def voted_signs(
     rotation: Float[Tensor, "V 3 3"],
     gain: Float[Tensor, "V"],
-    likeness: Float[Tensor, "W"],
+    links: Float[Tensor, "W"],
     weights: Float[Tensor, "V"],
 ) -> Float[Tensor, "V"]:
     """+1 or -1 for each scan: turn those of -1 around, and all are posed one way.
@@ -67,18 +70,18 @@ def voted_signs(
     Args:
         rotation: `R_sensor_object`, as each scan found it.
         gain: by how much the track's shape costs more in a scan when turned around, metres.
-        likeness: by how much each scan lies worse on the next one when one of them is turned
-            around, metres; one fewer than scans.
+        links: what speaks for each scan looking as the next one does, metres; one fewer than scans
+            (`nearness_of_next`, `likeness_of_next`).
         weights: how sure each scan is of its own pose, 0 to 1.
     """
     if not slow(rotation):
         own = _OWN_M * (weights + _UNSURE)
-        return _agreed(_SHAPE_VOTES * gain + own, likeness)
+        return _agreed(_SHAPE_VOTES * gain + own, links)
     signs = steady_signs(rotation)
     return signs if float((signs * weights).sum()) >= 0 else -signs
 
 
-def _agreed(single: Float[Tensor, "V"], likeness: Float[Tensor, "W"]) -> Float[Tensor, "V"]:
+def _agreed(single: Float[Tensor, "V"], links: Float[Tensor, "W"]) -> Float[Tensor, "V"]:
     """Signs by what the shape says of each single scan, and each scan of the next one.
 
     The shape is one more member of the vote, and is never turned.
@@ -87,10 +90,33 @@ def _agreed(single: Float[Tensor, "V"], likeness: Float[Tensor, "W"]) -> Float[T
     votes = single.new_zeros(count + 1, count + 1)
     row = torch.arange(count)
     votes[row, count] = single + 1e-9
-    votes[row[:-1], row[1:]] = likeness
+    votes[row[:-1], row[1:]] = links
     eigenvector = torch.linalg.eigh(votes + votes.T).eigenvectors[:, -1]
     signs = eigenvector[:-1] * eigenvector[-1]
     return torch.where(signs < 0, -torch.ones_like(signs), 1.0)
+
+
+def nearness_of_next(sensors: Float[Tensor, "V 3"], middle_x: float) -> Float[Tensor, "W"]:
+    """By how much farther from the next one each sensor would stand if one scan were turned around.
+
+    Between 1 and -1 m, whatever the distances; little where the sensor moved, or usually moves, as
+    far as it stood from the object, for nothing is known of the way between. Turns of the sensor
+    change nothing: where it stood, seen from the object, is the same.
+
+    Args:
+        sensors: where each scan was taken, object frame, by the pose that it found for itself;
+            one after the other in time.
+        middle_x: of the object's length, object frame.
+    """
+    place = sensors - sensors.new_tensor((middle_x, 0.0, 0.0))
+    now, after = place[:-1], place[1:]
+    there = after * after.new_tensor((-1.0, -1.0, 1.0))
+    as_they_are, turned = (now - after).norm(dim=-1), (now - there).norm(dim=-1)
+    away = (now.norm(dim=-1) + after.norm(dim=-1)) / 2
+    least = torch.minimum(as_they_are, turned)
+    moved = torch.maximum(least, least.median()) / away.clamp_min(_SMALLEST_M)
+    clear = (turned - as_they_are) / (turned + as_they_are).clamp_min(_SMALLEST_M)
+    return (_NEAR_M * clear * torch.exp(-(moved / _LEAP).square())).double()
 
 
 def likeness_of_next(
