@@ -15,7 +15,7 @@ from experiments.tables.table import Trained
 from wildshape.cli.interrupt import stop_flag
 from wildshape.cli.models import choose_device
 from wildshape.cli.terminal import progress, say
-from wildshape.cli.train import fit_with_progress
+from wildshape.cli.training import fit_with_progress
 from wildshape.io.atomic import write_json
 from wildshape.io.provenance import provenance
 from wildshape.io.store import Store, open_store
