@@ -4,7 +4,8 @@ import torch
 
 from wildshape.geometry.rotation import rotation_z
 from wildshape.geometry.se3 import SE3
-from wildshape.training.headings import _turned, steady_signs
+from wildshape.inference.voting import steady_signs
+from wildshape.training.headings import _turned
 from wildshape.training.profiles import agreed_signs, profile, together
 
 

@@ -22,7 +22,7 @@ from torch import Tensor
 from wildshape.datasets.views import ViewSampler
 from wildshape.errors import BadInputError
 from wildshape.geometry.se3 import SE3
-from wildshape.inference.voting import half_turn
+from wildshape.inference.voting import half_turn, steady_signs
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.losses.multiview import LossConfig
 from wildshape.models.shapepose import ShapePoseNet
@@ -34,7 +34,7 @@ NOT_FINITE = (
     "training stopped: the loss is not finite; resume from the last checkpoint with a smaller"
     " learning rate, or check the data's units."
 )
-_BATCH, _POINTS, _NEIGHBOURS = 64, 256, 5
+_BATCH, _POINTS = 64, 256
 
 
 class AgreedPoses(NamedTuple):
@@ -89,17 +89,15 @@ def agreed_poses(
         T_sensor_can, middle_x = _poses(network, sampler, config, scans)
         if hinted is not None:
             steady = hinted(scans, T_sensor_can)
-        elif config.steady:
-            steady = steady_signs(T_sensor_can.rotation)
         else:
-            clouds = some_of_each(sampler, scans, T_sensor_can)
-            sensors = T_sensor_can.inverse().translation
-            steady = agreeing_signs(clouds, sensors, middle_x, mirror=network.config.mirror)
+            mirror = network.config.mirror
+            steady = _own_signs(sampler, config, scans, T_sensor_can, middle_x, mirror=mirror)
         T_steady_can = refined(scans, _turned(T_sensor_can, steady, middle_x))
         rows = torch.from_numpy(scans)
         agreed.rotation[rows] = T_steady_can.rotation
         agreed.translation[rows] = T_steady_can.translation
-        profiles.append(profile(fused(sampler, scans, T_steady_can)))
+        if hinted is None:
+            profiles.append(profile(fused(sampler, scans, T_steady_can)))
         kept.append(steady)
         middles.append(middle_x)
         progress(done + 1, len(sampler.scans_of))
@@ -122,6 +120,23 @@ def agreed_poses(
     return agreed
 
 
+def _own_signs(
+    sampler: ViewSampler,
+    config: LossConfig,
+    scans: np.ndarray,
+    T_sensor_can: SE3,
+    middle_x: float,
+    *,
+    mirror: bool,
+) -> Float[Tensor, "V"]:
+    """+1 or -1 for each of a track's scans, so that they look one way, whichever."""
+    if config.steady:
+        return steady_signs(T_sensor_can.rotation)
+    clouds = some_of_each(sampler, scans, T_sensor_can)
+    sensors = T_sensor_can.inverse().translation
+    return agreeing_signs(clouds, sensors, middle_x, mirror=mirror)
+
+
 def _end_on(
     poses: AgreedPoses, scans: np.ndarray, votes: Float[Tensor, "V"], sign: Float[Tensor, ""]
 ) -> EndOn:
@@ -139,17 +154,6 @@ def _turned(T_sensor_can: SE3, sign: Float[Tensor, "V"], middle_x: float) -> SE3
         torch.where(back[:, None, None], turned.rotation, T_sensor_can.rotation),
         torch.where(back[:, None], turned.translation, T_sensor_can.translation),
     )
-
-
-def steady_signs(rotation: Float[Tensor, "V 3 3"]) -> Float[Tensor, "V"]:
-    """+1 or -1 for each pose: turn those of -1 by a half turn and no neighbours are opposed."""
-    count = len(rotation)
-    relative = rotation[:, None].mT @ rotation[None]
-    cosine = (relative.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2
-    order = torch.arange(count)
-    near = (order[:, None] - order).abs() <= _NEIGHBOURS
-    signs = torch.sign(torch.linalg.eigh(cosine * near).eigenvectors[:, -1])
-    return torch.where(signs == 0, torch.ones_like(signs), signs)
 
 
 def _poses(
