@@ -13,14 +13,13 @@ which way each view looks (`--headings src/wildshape/weights/default.safetensors
 half precision, are OUT/CATEGORY.safetensors.
 """
 
-import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Literal
 
-import numpy as np
 import tyro
+from experiments.meshes import Copies, copied
 
 from wildshape.io.provenance import provenance
 from wildshape.io.store import open_store
@@ -31,7 +30,7 @@ from wildshape.training.config import Recipe
 from wildshape.training.loop import MODEL, fit, setup
 from wildshape.training.recipes import views
 
-_COPIES, _STRETCH, _VIEWS, _TRUTH_POINTS = 4, 0.2, 10, 2048
+_STRETCH, _VIEWS, _TRUTH_POINTS = 0.2, 10, 2048
 
 
 @dataclass(frozen=True)
@@ -47,6 +46,8 @@ class Settings:
         rounds: how often the second is run, each time taught by the one before.
         taught_lr: learning rate that the second falls from.
         headings: checkpoint of LiDAR scans that the second stage asks which way the views look.
+        copies: of each mesh, with the mesh itself.
+        parts: copies of cars have parts of other lengths, too.
         seed: of data and training.
     """
 
@@ -58,33 +59,18 @@ class Settings:
     rounds: int = 1
     taught_lr: float = 7e-4
     headings: Path | None = None
+    copies: int = 4
+    parts: bool = False
     seed: int = 0
-
-
-def train_meshes(settings: Settings, into: Path) -> int:
-    """The category's meshes of the train split, as they are and stretched; their number."""
-    import trimesh
-
-    with (settings.cad / "manifest.csv").open(encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["split"] == "train"]
-    files = [settings.cad / row["file"] for row in rows if row["category"] == settings.category]
-    rng = np.random.default_rng(settings.seed)
-    order = rng.permutation(len(files) * _COPIES)
-    for place, number in zip(order, range(len(order))):
-        copy, index = divmod(number, len(files))
-        mesh = trimesh.load(files[index], force="mesh", process=False)
-        factors = rng.uniform(1 - _STRETCH, 1 + _STRETCH, 3) if copy else np.ones(3)
-        mesh.vertices = np.asarray(mesh.vertices) * factors
-        mesh.export(into / f"{place:04d}_{files[index].stem}.ply")
-    return len(files)
 
 
 def make_data(settings: Settings, path: Path) -> None:
     """Write the store: CAD meshes, and half as many procedural shapes, ten views of each."""
     described = provenance(f"python -m experiments.views_weights {settings}")
     with TemporaryDirectory() as folder, StoreWriter(path, described) as store:
-        count = train_meshes(settings, Path(folder))
-        sources = ((Path(folder), _COPIES * count), (None, 2 * count))
+        copies = Copies(settings.copies, _STRETCH, settings.parts)
+        count = copied(settings.cad, Path(folder), settings.category, copies, settings.seed)
+        sources = ((Path(folder), copies.count * count), (None, copies.count * count // 2))
         for seed, (meshes, tracks) in enumerate(sources, start=settings.seed + 1):
             config = SimulationConfig(
                 tracks=tracks,
@@ -137,6 +123,7 @@ def ship(model: Path, settings: Settings) -> None:
     stages = f"--steps {settings.steps} --taught-steps {settings.taught_steps}"
     stages += f" --rounds {settings.rounds}" if settings.rounds > 1 else ""
     stages += " --headings DEFAULT" if settings.headings else ""
+    stages += f" --copies {settings.copies}" + " --parts" * settings.parts
     what = f"--category {settings.category} --cad CAD --out RUN {stages} --seed {settings.seed}"
     command = {"command": f"python -m experiments.views_weights {what}"}
     described = replace(found, provenance=found.provenance | command)

@@ -12,10 +12,9 @@ from wildshape.export.plain import score_plain
 from wildshape.export.trust import confidence_plain, seen_plain
 from wildshape.geometry.centring import scan_centre
 from wildshape.geometry.facing import face, roll, roll_angle
+from wildshape.inference.looking import ROLLS, UPRIGHT_RAD, agreed, quarter_turns
 from wildshape.models.checkpoint import ModelSettings
 from wildshape.models.shapepose import ShapePoseNet
-
-_UPRIGHT_RAD = 0.1
 
 
 class Completed(NamedTuple):
@@ -76,24 +75,29 @@ class CompletionGraph(nn.Module):
         turn, centre = face(scans, sensor_kind=self.settings.sensor)
         first = self._look(sampled @ turn.mT, centre, turn)
         angle = roll_angle(turn @ first[1])
-        tilted = angle.abs() > _UPRIGHT_RAD
+        tilted = angle.abs() > UPRIGHT_RAD
         given = (*first, sampled, turn, centre, angle, tilted)
         if torch.compiler.is_exporting():
             return torch.cond(tilted.any(), self._look_again, _keep, given)
         return self._look_again(*given) if bool(tilted.any()) else first
 
     def _look_again(self, *given: Tensor) -> _Look:
-        """Tilted scans rolled upright and seen once more (`Predictor._look_again`)."""
+        """Tilted scans rolled upright in four ways and seen again (`inference/looking.py`)."""
         sampled, turn, centre, angle, tilted = given[_PARTS:]
-        upright = roll(angle) @ turn
-        again = self._look(sampled @ upright.mT, centre, upright)
+        many, at, towards = _four_times(sampled, centre, turn)
+        towards = roll(quarter_turns(angle)) @ towards
+        first = self._look(many @ towards.mT, at, towards)
+        towards = roll(roll_angle(towards @ first[1])) @ towards
+        seen = self._look(many @ towards.mT, at, towards)
+        best = agreed(seen[1].unflatten(0, (-1, ROLLS)), seen[3].unflatten(0, (-1, ROLLS)))
+        rows = ROLLS * torch.arange(angle.shape[0]) + best
         return tuple(
-            torch.where(tilted.view(-1, *(1,) * (old.ndim - 1)), new, old)
-            for old, new in zip(given[:_PARTS], again)
+            torch.where(tilted.view(-1, *(1,) * (old.ndim - 1)), new.index_select(0, rows), old)
+            for old, new in zip(given[:_PARTS], seen)
         )
 
     def _look(self, turned: Tensor, centre: Tensor, turn: Tensor) -> _Look:
-        """Shapes, and the poses of the branches that speak (`Predictor._look`)."""
+        """Shapes, and the poses of the branches that speak (`inference/looking.py`)."""
         settings, centred = self.settings, turned - centre[:, None]
         shape, rotation, translation, belief = self.network(centred)
         posed = shape[:, None] @ rotation.mT + translation[:, :, None]
@@ -107,6 +111,11 @@ class CompletionGraph(nn.Module):
         moved, cost = (back @ chosen[..., None])[..., 0], costs.gather(1, branch)[:, 0]
         facts = seen_plain(posed, scores, belief, believed)
         return shape, back @ chosen_rotation, moved, cost, branch[:, 0], facts
+
+
+def _four_times(*parts: Tensor) -> tuple[Tensor, ...]:
+    """Every scan as often as there are rolls, one after the other."""
+    return tuple(part.repeat_interleave(ROLLS, dim=0) for part in parts)
 
 
 def _keep(*given: Tensor) -> _Look:

@@ -8,20 +8,18 @@ from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
-from wildshape.geometry.facing import roll_angle
 from wildshape.geometry.ground import skirt
 from wildshape.geometry.se3 import SE3, stack
 from wildshape.inference.boxes import box_seen
 from wildshape.inference.compiled import compiled
-from wildshape.inference.facts import facts_of, seen_facts, warning_of
+from wildshape.inference.facts import facts_of, warning_of
+from wildshape.inference.looking import Found, look, look_well
 from wildshape.inference.prepare import (
     MIN_POINTS,
-    NetworkInput,
     as_points,
     in_order,
     network_input,
@@ -30,25 +28,13 @@ from wildshape.inference.refine import filled, refine
 from wildshape.inference.registering import fuse_scans, inlier_ratio, to_middle
 from wildshape.inference.shipped import weights_file
 from wildshape.inference.track import Refine, complete_together
-from wildshape.losses.hindsight import score_hypotheses
 from wildshape.models.checkpoint import ModelSettings, load_checkpoint
 from wildshape.models.confidence import Facts
-from wildshape.models.shapepose import Poses, ShapePoseNet
+from wildshape.models.shapepose import ShapePoseNet
 from wildshape.records import Completion, Points, Registration, Sensor
 
 _BATCH = 32
-_UPRIGHT_RAD, _GROUND = 0.1, 0.05
-
-
-class _Found(NamedTuple):
-    """What one look at scans gives: shapes, `T_sensor_canonical`, cost, branch, and facts."""
-
-    shapes: Tensor
-    rotation: Tensor
-    translation: Tensor
-    cost: Tensor
-    branch: Tensor
-    facts: Tensor
+_GROUND = 0.05
 
 
 def load(model: str | Path | None = None, device: str = "cpu", *, raw: bool = False) -> "Predictor":
@@ -189,68 +175,27 @@ class Predictor:
         if any(much):  # the network has seen the ground, too: once more without it
             rows = torch.tensor(much).nonzero()[:, 0]
             again = self._found([seen[int(row)] for row in rows])
-            found = _Found(*(old.index_copy(0, rows, new) for old, new in zip(found, again)))
+            found = found.replaced(rows, again)
             seen = self._off_their_ground(scans, found)
         clouds = zip(scans, seen)
         return [self._completion(*both, i, found, sensor) for i, both in enumerate(clouds)]
 
-    def _found(self, scans: list[Points]) -> _Found:
+    def _found(self, scans: list[Points]) -> Found:
         """What the network says of scans, on the host."""
         of = self.settings
         given = network_input(scans, of.input_points, of.sensor, of.facing).to(self.device)
-        found = self._look(given)
-        if of.facing:
-            found = self._look_again(given, found)
-        return _Found(*(part.cpu() for part in found))
+        found = (look_well if of.facing else look)(self.network, of, given)
+        return Found(*(part.cpu() for part in found))
 
-    def _off_their_ground(self, scans: list[Points], found: _Found) -> list[Points]:
+    def _off_their_ground(self, scans: list[Points], found: Found) -> list[Points]:
         """Each scan without the ground beside the object found in it."""
         return [
             self._off_ground(scan, shape.numpy(), SE3(rotation, translation))
             for scan, shape, rotation, translation in zip(scans, *found[:3])
         ]
 
-    def _look(self, given: NetworkInput) -> _Found:
-        """Shapes, and the poses of the branches that speak, from prepared scans."""
-        code = self.network.encode(given.scans)
-        shapes, poses = self.network.canonical(code), self.network.poses(code)
-        cost, branch, facts = self._choose(given.scans, given.centres, shapes, poses)
-        chosen = poses.choose(branch)
-        back = given.turn.mT
-        translation = back @ (chosen.translation[:, 0] + given.centres)[..., None]
-        rotation = back @ chosen.rotation[:, 0]
-        return _Found(shapes, rotation, translation[..., 0], cost, branch, facts)
-
-    def _look_again(self, given: NetworkInput, found: _Found) -> _Found:
-        """Scans that turn out to be tilted are rolled upright and seen once more.
-
-        Turned towards its object, nothing of a scan's rotation is unknown but the roll about the
-        line of sight, and upright is what the network knows best.
-        """
-        angle = roll_angle(given.turn @ found.rotation)
-        rows = torch.nonzero(angle.abs() > _UPRIGHT_RAD)[:, 0]
-        if len(rows) == 0:
-            return found
-        again = self._look(given.part(rows).rolled(angle[rows]))
-        return _Found(*(old.index_copy(0, rows, new) for old, new in zip(found, again)))
-
-    def _choose(
-        self, inputs: Tensor, centres: Tensor, shapes: Tensor, poses: Poses
-    ) -> tuple[Tensor, Tensor, Tensor]:
-        """Cost and index of the branch with the lowest label-free cost (METHOD 3), and facts.
-
-        A selector's belief counts too, `settings.belief` metres a nat.
-        """
-        posed = poses.apply(shapes)
-        scores = score_hypotheses(inputs, centres, posed, self.settings.projection)
-        cost = scores.cost(self.settings.beta)
-        believed = cost - self.settings.belief * poses.log_belief
-        branch = believed.argmin(-1)
-        facts = seen_facts(inputs, posed, scores, poses, believed)
-        return cost.gather(1, branch[:, None])[:, 0], branch, facts
-
     def _completion(
-        self, scan: Points, seen: Points, i: int, found: _Found, sensor: Sensor | None
+        self, scan: Points, seen: Points, i: int, found: Found, sensor: Sensor | None
     ) -> Completion:
         """Scan `i` of those found; `seen`: without ground."""
         shape, T_sensor_can = found.shapes[i], SE3(found.rotation[i], found.translation[i])
