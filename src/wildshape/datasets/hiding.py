@@ -22,7 +22,8 @@ def partly_hidden(
     """The points of a LiDAR scan, or as many points of a part of it.
 
     In a fifth of the scans a vertical strip is missing, from a pole's width to the better half; in
-    three of ten whose object rises above the sensor's horizon, what lies above some elevation.
+    three of ten whose object rises above the sensor's horizon, what lies above some elevation,
+    more often a low one: many sensors hardly look up.
 
     Args:
         points: sensor frame, z up.
@@ -34,7 +35,7 @@ def partly_hidden(
         kept &= ~_strip(points, rng)
     if rng.random() < _LOWER:
         slopes = slope(points)
-        kept &= slopes <= max(rng.uniform(0.0, 1.0) * float(slopes.max()), 0.0)
+        kept &= slopes <= max(rng.uniform(0.0, 1.0) ** 2 * float(slopes.max()), 0.0)
     rows = torch.nonzero(kept)[:, 0]
     if len(rows) < fewest or len(rows) == len(points):
         return points

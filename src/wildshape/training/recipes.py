@@ -104,7 +104,7 @@ def default() -> Recipe:
         name="default",
         network=replace(base.network, points=4096),
         loss=replace(base.loss, projection=FacingBins(0.3), template=1.0, agree_at=(0.07, 0.3)),
-        views=replace(base.views, points=1024, roll=0.25),
+        views=replace(base.views, points=1024, roll=0.4),
         optim=replace(base.optim, steps=30_000, average=0.999, search="bf16"),
         validate_every=1000,
     )
