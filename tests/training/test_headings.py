@@ -4,8 +4,7 @@ import torch
 
 from wildshape.geometry.rotation import rotation_z
 from wildshape.geometry.se3 import SE3
-from wildshape.inference.voting import steady_signs
-from wildshape.training.headings import _turned
+from wildshape.inference.voting import steady_signs, turned_where
 from wildshape.training.profiles import agreed_signs, profile, together
 
 
@@ -69,7 +68,7 @@ def test_a_turned_pose_leaves_the_object_s_middle_where_it_was():
     """The far end takes the near one's place: nothing moves in the sensor's frame but the ends."""
     yaw = torch.tensor((0.3, 2.0))
     given = SE3(rotation_z(yaw), torch.tensor(((9.0, 1.0, 0.0), (5.0, -4.0, 0.2))))
-    turned = _turned(given, torch.tensor((1.0, -1.0)), 0.7)
+    turned = turned_where(given, torch.tensor((1.0, -1.0)), 0.7)
     ends = torch.tensor(((2.7, 0.0, 0.0), (-1.3, 0.0, 0.0)))
     torch.testing.assert_close(turned[0].apply(ends), given[0].apply(ends))
     torch.testing.assert_close(turned[1].apply(ends), given[1].apply(ends).flip(0))

@@ -26,6 +26,7 @@ from wildshape.inference.voting import (
     half_turn,
     likeness_of_next,
     nearness_of_next,
+    turned_where,
     voted_signs,
 )
 from wildshape.losses.hindsight import score_hypotheses
@@ -148,11 +149,7 @@ def _voted(
         clouds = _some_of_each(scans, T_sensor_can) / unit
         links = likeness_of_next(clouds, middle / unit, mirror=settings.network.mirror)
     signs = voted_signs(T_sensor_can.rotation, gain / unit, links, weights)
-    back = signs < 0
-    return SE3(
-        torch.where(back[:, None, None], turned.rotation, T_sensor_can.rotation),
-        torch.where(back[:, None], turned.translation, T_sensor_can.translation),
-    )
+    return turned_where(T_sensor_can, signs, middle)
 
 
 def _some_of_each(scans: list[Points], T_sensor_object: SE3) -> Float[Tensor, "V n 3"]:

@@ -30,6 +30,16 @@ def half_turn(middle_x: float, dtype: torch.dtype = torch.float64) -> SE3:
     return SE3(rotation, torch.tensor((2 * middle_x, 0.0, 0.0), dtype=dtype))
 
 
+def turned_where(T_sensor_object: SE3, sign: Float[Tensor, "V"], middle_x: float) -> SE3:
+    """The poses, those of sign -1 turned by `half_turn`."""
+    back = sign < 0
+    turned = T_sensor_object @ half_turn(middle_x, T_sensor_object.rotation.dtype)
+    return SE3(
+        torch.where(back[:, None, None], turned.rotation, T_sensor_object.rotation),
+        torch.where(back[:, None], turned.translation, T_sensor_object.translation),
+    )
+
+
 def steady_signs(rotation: Float[Tensor, "V 3 3"]) -> Float[Tensor, "V"]:
     """+1 or -1 for each pose: turn those of -1 by a half turn and no neighbours are opposed.
 

@@ -22,7 +22,7 @@ from torch import Tensor
 from wildshape.datasets.views import ViewSampler
 from wildshape.errors import BadInputError
 from wildshape.geometry.se3 import SE3
-from wildshape.inference.voting import half_turn, steady_signs
+from wildshape.inference.voting import steady_signs, turned_where
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.losses.multiview import LossConfig
 from wildshape.models.shapepose import ShapePoseNet
@@ -92,7 +92,7 @@ def agreed_poses(
         else:
             mirror = network.config.mirror
             steady = _own_signs(sampler, config, scans, T_sensor_can, middle_x, mirror=mirror)
-        T_steady_can = refined(scans, _turned(T_sensor_can, steady, middle_x))
+        T_steady_can = refined(scans, turned_where(T_sensor_can, steady, middle_x))
         rows = torch.from_numpy(scans)
         agreed.rotation[rows] = T_steady_can.rotation
         agreed.translation[rows] = T_steady_can.translation
@@ -115,7 +115,7 @@ def agreed_poses(
     for scans, sign, middle_x in zip(sampler.scans_of, signs, middles):
         rows = torch.from_numpy(scans)
         given = SE3(agreed.rotation[rows], agreed.translation[rows])
-        turned = _turned(given, sign.expand(len(rows)), middle_x)
+        turned = turned_where(given, sign.expand(len(rows)), middle_x)
         agreed.rotation[rows], agreed.translation[rows] = turned.rotation, turned.translation
     return agreed
 
@@ -144,16 +144,6 @@ def _end_on(
     rows = torch.from_numpy(scans)
     T_sensor_can = SE3(poses.rotation[rows], poses.translation[rows])
     return end_on(votes, T_sensor_can.inverse().translation, sign)
-
-
-def _turned(T_sensor_can: SE3, sign: Float[Tensor, "V"], middle_x: float) -> SE3:
-    """Those of sign -1 turned by a half turn about the vertical through the object's middle."""
-    back = sign < 0
-    turned = T_sensor_can @ half_turn(middle_x, T_sensor_can.rotation.dtype)
-    return SE3(
-        torch.where(back[:, None, None], turned.rotation, T_sensor_can.rotation),
-        torch.where(back[:, None], turned.translation, T_sensor_can.translation),
-    )
 
 
 def _poses(

@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Training meshes: only of the train split, themselves first, copies in other proportions."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from experiments.meshes import ROAD_SIZES, Copies, copied, other_parts, road_vehicles, warped
+
+
+@pytest.fixture(scope="module")
+def cad(tmp_path_factory):
+    """A car and a bus to train on, and a car of the test split."""
+    folder = tmp_path_factory.mktemp("cad")
+    rows = ["category,file,split"]
+    for category, name, split, size in (
+        ("car", "red", "train", (4.5, 2.9, 3.1)),
+        ("bus", "big", "train", (9.0, 5.0, 2.0)),
+        ("car", "blue", "test", (4.0, 1.8, 1.5)),
+    ):
+        trimesh.creation.box(size).export(folder / f"{name}.ply")
+        rows.append(f"{category},{name}.ply,{split}")
+    (folder / "manifest.csv").write_text("\n".join(rows), encoding="utf-8")
+    return folder
+
+
+def boxes(folder: Path) -> dict[str, list[np.ndarray]]:
+    """Sizes of the meshes in a folder, by the mesh they come from, in order."""
+    found: dict[str, list[np.ndarray]] = {}
+    for path in sorted(folder.iterdir()):
+        size = np.ptp(np.asarray(trimesh.load_mesh(path).vertices), axis=0)
+        found.setdefault(path.stem.split("_", 1)[1], []).append(size)
+    return found
+
+
+@pytest.mark.parametrize("parts", [False, True])
+def test_copies_are_stretched_and_one_is_the_mesh_itself(cad, tmp_path, parts):
+    assert copied(cad, tmp_path, "car", Copies(5, 0.2, parts), seed=3) == 1
+    sizes = boxes(tmp_path)
+    assert set(sizes) == {"red"}
+    assert len(sizes["red"]) == 5
+    shares = np.stack(sizes["red"]) / (4.5, 2.9, 3.1)
+    assert (np.abs(shares - 1).max(axis=1) < 1e-6).sum() == 1
+    assert (np.abs(shares - 1) <= 0.2 + 1e-6).all()
+    assert np.ptp(shares, axis=0).min() > 0.01
+
+
+def test_buses_are_drawn_four_times_as_often_and_copies_fit_on_roads(cad, tmp_path):
+    road_vehicles(cad, tmp_path, 15, seed=0)
+    sizes = boxes(tmp_path)
+    assert {name: len(found) for name, found in sizes.items()} == {"red": 3, "big": 12}
+    own = {"red": (4.5, 2.9, 3.1), "big": (9.0, 5.0, 2.0)}
+    for name, found in sizes.items():
+        low, high = (np.asarray(m) for m in (limits(name).least_m, limits(name).most_m))
+        fits = [bool(((low - 1e-4 <= s) & (s <= high + 1e-4)).all()) for s in found]
+        themselves = [np.allclose(s, own[name], atol=1e-4) for s in found]
+        assert sum(themselves) == 1
+        assert sum(fits) == len(found) - 1
+
+
+def limits(name):
+    return ROAD_SIZES["car" if name == "red" else "bus"]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_parts_keep_their_order(seed):
+    rng = np.random.default_rng(seed)
+    vertices = rng.normal(size=(200, 3))
+    out = other_parts(vertices, rng)
+    np.testing.assert_allclose((out.min(0), out.max(0)), ((0, 0, 0), (1, 1, 1)), atol=1e-12)
+    for axis in range(3):
+        order = np.argsort(vertices[:, axis])
+        assert (np.diff(out[order, axis]) >= 0).all()
+    even = (vertices - vertices.min(0)) / np.ptp(vertices, axis=0)
+    moved = np.abs(out - even).max(axis=0)
+    assert moved[0] > 0.01
+    assert moved[2] > 0.01
+    assert moved[1] < 1e-9
+
+
+def test_a_warped_vehicle_stands_on_the_ground_in_the_middle():
+    vertices = np.random.default_rng(0).uniform((-2, -1, 5), (3, 1, 7), (500, 3))
+    out = warped(vertices, ROAD_SIZES["car"], np.random.default_rng(1))
+    middle = (out.min(0) + out.max(0)) / 2
+    np.testing.assert_allclose((*middle[:2], out[:, 2].min()), 0.0, atol=1e-9)
