@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+COPY_STRETCH = 0.2
 _STRETCH = np.array((0.12, 0.08, 0.08))
 _PARTS = ((4, 0.25), (1, 0.0), (3, 0.15))  # along each axis: how many, and the spread of their logs
 
@@ -66,10 +67,10 @@ def warped(vertices: np.ndarray, sizes: Sizes, rng: np.random.Generator) -> np.n
     if sizes.any_length:
         size[0] = rng.uniform(sizes.least_m[0], sizes.most_m[0])
     size = np.clip(size, sizes.least_m, sizes.most_m)
-    return other_parts(vertices, rng) * size - (size[0] / 2, size[1] / 2, 0.0)
+    return _other_parts(vertices, rng) * size - (size[0] / 2, size[1] / 2, 0.0)
 
 
-def other_parts(vertices: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _other_parts(vertices: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Vertices (N, 3) in their box, 0 to 1, the parts along each axis of other lengths."""
     low, size = vertices.min(0), np.maximum(np.ptp(vertices, axis=0), 1e-9)
     out = np.empty_like(vertices, dtype=np.float64)
@@ -81,35 +82,17 @@ def other_parts(vertices: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return out
 
 
-@dataclass(frozen=True)
-class Copies:
-    """How the copies of a mesh differ from it.
-
-    Attributes:
-        count: of each mesh, with the mesh itself.
-        stretch: by at most this share along each axis.
-        parts: of other lengths, too (vehicles: along x, and of their height).
-    """
-
-    count: int
-    stretch: float
-    parts: bool
-
-
-def copied(cad: Path, into: Path, category: str, copies: Copies, seed: int) -> int:
-    """Write a category's meshes of the train split and copies of them, shuffled; the meshes."""
+def stretched(cad: Path, into: Path, category: str, copies: int, seed: int) -> int:
+    """Write a category's meshes of the train split and stretched copies, shuffled; the meshes."""
     import trimesh
 
     files = [cad / row["file"] for row in train_split(cad, (category,))]
     rng = np.random.default_rng(seed)
-    order = rng.permutation(len(files) * copies.count)
+    order = rng.permutation(len(files) * copies)
     for place, number in zip(order, range(len(order))):
         copy, index = divmod(number, len(files))
         mesh = trimesh.load(files[index], force="mesh", process=False)
-        factors = rng.uniform(1 - copies.stretch, 1 + copies.stretch, 3) if copy else np.ones(3)
-        vertices = np.asarray(mesh.vertices)
-        if copy and copies.parts:
-            vertices = other_parts(vertices, rng) * np.ptp(vertices, axis=0)
-        mesh.vertices = vertices * factors
+        factors = rng.uniform(1 - COPY_STRETCH, 1 + COPY_STRETCH, 3) if copy else np.ones(3)
+        mesh.vertices = np.asarray(mesh.vertices) * factors
         mesh.export(into / f"{place:04d}_{files[index].stem}.ply")
     return len(files)

@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 from typing import Literal
 
 import tyro
-from experiments.meshes import Copies, copied
+from experiments.meshes import stretched
 
 from wildshape.io.provenance import provenance
 from wildshape.io.store import open_store
@@ -30,7 +30,7 @@ from wildshape.training.config import Recipe
 from wildshape.training.loop import MODEL, fit, setup
 from wildshape.training.recipes import views
 
-_STRETCH, _VIEWS, _TRUTH_POINTS = 0.2, 10, 2048
+_COPIES, _VIEWS, _TRUTH_POINTS = 4, 10, 2048
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,6 @@ class Settings:
         rounds: how often the second is run, each time taught by the one before.
         taught_lr: learning rate that the second falls from.
         headings: checkpoint of LiDAR scans that the second stage asks which way the views look.
-        copies: of each mesh, with the mesh itself.
-        parts: copies of cars have parts of other lengths, too.
         seed: of data and training.
     """
 
@@ -59,8 +57,6 @@ class Settings:
     rounds: int = 1
     taught_lr: float = 7e-4
     headings: Path | None = None
-    copies: int = 4
-    parts: bool = False
     seed: int = 0
 
 
@@ -68,9 +64,8 @@ def make_data(settings: Settings, path: Path) -> None:
     """Write the store: CAD meshes, and half as many procedural shapes, ten views of each."""
     described = provenance(f"python -m experiments.views_weights {settings}")
     with TemporaryDirectory() as folder, StoreWriter(path, described) as store:
-        copies = Copies(settings.copies, _STRETCH, settings.parts)
-        count = copied(settings.cad, Path(folder), settings.category, copies, settings.seed)
-        sources = ((Path(folder), copies.count * count), (None, copies.count * count // 2))
+        count = stretched(settings.cad, Path(folder), settings.category, _COPIES, settings.seed)
+        sources = ((Path(folder), _COPIES * count), (None, 2 * count))
         for seed, (meshes, tracks) in enumerate(sources, start=settings.seed + 1):
             config = SimulationConfig(
                 tracks=tracks,
@@ -123,7 +118,6 @@ def ship(model: Path, settings: Settings) -> None:
     stages = f"--steps {settings.steps} --taught-steps {settings.taught_steps}"
     stages += f" --rounds {settings.rounds}" if settings.rounds > 1 else ""
     stages += " --headings DEFAULT" if settings.headings else ""
-    stages += f" --copies {settings.copies}" + " --parts" * settings.parts
     what = f"--category {settings.category} --cad CAD --out RUN {stages} --seed {settings.seed}"
     command = {"command": f"python -m experiments.views_weights {what}"}
     described = replace(found, provenance=found.provenance | command)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from experiments.meshes import ROAD_SIZES, Copies, copied, other_parts, road_vehicles, warped
+from experiments.meshes import COPY_STRETCH, ROAD_SIZES, road_vehicles, stretched, warped
 
 
 @pytest.fixture(scope="module")
@@ -35,15 +35,14 @@ def boxes(folder: Path) -> dict[str, list[np.ndarray]]:
     return found
 
 
-@pytest.mark.parametrize("parts", [False, True])
-def test_copies_are_stretched_and_one_is_the_mesh_itself(cad, tmp_path, parts):
-    assert copied(cad, tmp_path, "car", Copies(5, 0.2, parts), seed=3) == 1
+def test_copies_are_stretched_and_one_is_the_mesh_itself(cad, tmp_path):
+    assert stretched(cad, tmp_path, "car", 5, seed=3) == 1
     sizes = boxes(tmp_path)
     assert set(sizes) == {"red"}
     assert len(sizes["red"]) == 5
     shares = np.stack(sizes["red"]) / (4.5, 2.9, 3.1)
     assert (np.abs(shares - 1).max(axis=1) < 1e-6).sum() == 1
-    assert (np.abs(shares - 1) <= 0.2 + 1e-6).all()
+    assert (np.abs(shares - 1) <= COPY_STRETCH + 1e-6).all()
     assert np.ptp(shares, axis=0).min() > 0.01
 
 
@@ -65,19 +64,17 @@ def limits(name):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_parts_keep_their_order(seed):
+def test_parts_keep_their_order_and_get_other_lengths(seed):
     rng = np.random.default_rng(seed)
-    vertices = rng.normal(size=(200, 3))
-    out = other_parts(vertices, rng)
-    np.testing.assert_allclose((out.min(0), out.max(0)), ((0, 0, 0), (1, 1, 1)), atol=1e-12)
+    vertices = rng.uniform((0, 0, 0), (4.5, 1.8, 1.5), (200, 3))
+    out = warped(vertices, ROAD_SIZES["car"], rng)
     for axis in range(3):
-        order = np.argsort(vertices[:, axis])
-        assert (np.diff(out[order, axis]) >= 0).all()
-    even = (vertices - vertices.min(0)) / np.ptp(vertices, axis=0)
-    moved = np.abs(out - even).max(axis=0)
-    assert moved[0] > 0.01
-    assert moved[2] > 0.01
+        assert (np.diff(out[np.argsort(vertices[:, axis]), axis]) >= 0).all()
+    even, made = (part / np.ptp(part, axis=0) for part in (vertices, out))
+    moved = np.ptp(made - even, axis=0)
+    assert moved[0] > 1e-4
     assert moved[1] < 1e-9
+    assert moved[2] > 1e-4
 
 
 def test_a_warped_vehicle_stands_on_the_ground_in_the_middle():
