@@ -18,7 +18,11 @@ from wildshape.io.tracks import read_poses
 
 _COPIES = 60
 
-PROGRAM = "import torch; torch.set_num_threads(1); from wildshape.cli.main import main; main()"
+# A shell that starts the tests in the background has them ignore Ctrl-C, and all that they start.
+PROGRAM = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
+    " import torch; torch.set_num_threads(1); from wildshape.cli.main import main; main()"
+)
 
 
 @contextmanager
