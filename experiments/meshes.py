@@ -37,9 +37,7 @@ def train_split(cad: Path, categories: tuple[str, ...]) -> list[dict[str, str]]:
     return [row for row in rows if row["category"] in categories]
 
 
-def road_vehicles(
-    cad: Path, into: Path, count: int, seed: int, categories: tuple[str, ...] = tuple(ROAD_SIZES)
-) -> None:
+def road_vehicles(cad: Path, into: Path, count: int, seed: int) -> None:
     """Write `count` vehicles of the train split, lorries and buses oftener than cars, shuffled.
 
     A mesh's first copy is as it is. The others are stretched, their parts of other lengths, and
@@ -47,7 +45,7 @@ def road_vehicles(
     """
     import trimesh
 
-    rows = train_split(cad, categories)
+    rows = train_split(cad, tuple(ROAD_SIZES))
     files = [row for row in rows for _ in range(ROAD_SIZES[row["category"]].share)]
     rng = np.random.default_rng(seed)
     drawn = [files[i] for _ in range(-(-count // len(files))) for i in rng.permutation(len(files))]
@@ -89,7 +87,7 @@ def stretched(cad: Path, into: Path, category: str, copies: int, seed: int) -> i
     files = [cad / row["file"] for row in train_split(cad, (category,))]
     rng = np.random.default_rng(seed)
     order = rng.permutation(len(files) * copies)
-    for place, number in zip(order, range(len(order))):
+    for number, place in enumerate(order):
         copy, index = divmod(number, len(files))
         mesh = trimesh.load(files[index], force="mesh", process=False)
         factors = rng.uniform(1 - COPY_STRETCH, 1 + COPY_STRETCH, 3) if copy else np.ones(3)
