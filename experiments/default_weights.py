@@ -31,7 +31,7 @@ from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.loop import fit, setup
 from wildshape.training.recipes import PRESETS
 
-STEPS = 22_000
+STEPS, TRUTH = 22_000, Path("truth")
 _SCANS = 20
 _SENSORS = ("hdl64", "hdl64", "hdl32", "os1-128")
 
@@ -43,7 +43,8 @@ class Settings:
     Attributes:
         out: folder of the run.
         cad: folder of CAD meshes with a manifest.
-        teacher: checkpoint that fuses the tracks; without one, training begins from nothing.
+        teacher: checkpoint that fuses the tracks; `truth` trains the oracle to compare with;
+            without one, training begins from nothing.
         start: checkpoint whose weights are trained on, instead of random ones.
         tracks: simulated tracks, an eighth for each pair of sensor and source.
         steps: gradient steps.
@@ -100,7 +101,7 @@ def main(settings: Settings) -> None:
         settings.out,
         seed=settings.seed,
         resume=settings.resume,
-        teacher=settings.teacher,
+        teacher="truth" if settings.teacher == TRUTH else settings.teacher,
         start=settings.start,
         taught=lambda done, total: (
             print(f"fused {done} of {total}", flush=True) if done % 100 == 0 else None
@@ -122,6 +123,7 @@ def command(settings: Settings) -> str:
     """What makes such weights, without the paths of this machine."""
     given = ("cad", "teacher", "start")
     paths = "".join(f" --{name} {name.upper()}" for name in given if getattr(settings, name))
+    paths = paths.replace("TEACHER", "truth") if settings.teacher == TRUTH else paths
     rate = "" if settings.lr is None else f" --lr {settings.lr:g}"
     how = f" --preset {settings.preset} --seed {settings.seed} --tracks {settings.tracks}{rate}"
     return f"python -m experiments.default_weights{paths}{how} --steps {settings.steps} --out RUN"
