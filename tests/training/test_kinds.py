@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""A kind that its end-on views contradict is turned, and no other."""
+"""A kind that its end-on views contradict is turned, and no other; a network's own word counts."""
 
 import torch
 
-from wildshape.training.kinds import EndOn, end_on, uncontradicted_signs
+from wildshape.training.kinds import EndOn, end_on, own_signs, uncontradicted_signs
 from wildshape.training.profiles import Profiles
 
 
@@ -53,3 +53,19 @@ def test_only_views_along_the_object_count_and_each_at_its_end():
     turned = end_on(votes, places, torch.tensor(-1.0))
     assert turned.all.tolist() == [[1.0, 2.0]]
     assert turned.opposed.tolist() == [[1.0, 1.0]]
+
+
+def votes(*shares):
+    """Of each track of ten scans, that many say that it looks the way it does."""
+    return [torch.where(torch.arange(10) < share, 1.0, -1.0) for share in shares]
+
+
+def test_a_clear_network_is_believed_where_it_is_clear():
+    said = votes(*[10] * 40, 0, 6, 4)
+    signs = own_signs(torch.tensor([1.0] * 40 + [1.0, -1.0, 1.0]), said)
+    assert signs.tolist() == [1.0] * 40 + [-1.0, -1.0, 1.0]
+
+
+def test_a_network_that_is_not_clear_in_general_is_not_asked():
+    signs = torch.ones(20)
+    assert torch.equal(own_signs(signs, votes(*[8, 2] * 9, 10, 0)), signs)

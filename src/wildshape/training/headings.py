@@ -26,7 +26,7 @@ from wildshape.inference.voting import steady_signs, turned_where
 from wildshape.losses.hindsight import score_hypotheses
 from wildshape.losses.multiview import LossConfig
 from wildshape.models.shapepose import ShapePoseNet
-from wildshape.training.kinds import EndOn, end_on, uncontradicted_signs
+from wildshape.training.kinds import EndOn, end_on, own_signs, uncontradicted_signs
 from wildshape.training.overlaps import agreeing_signs
 from wildshape.training.profiles import agreed_signs, profile, together
 
@@ -111,7 +111,7 @@ def agreed_poses(
     if settled:
         found = [_end_on(agreed, *one) for one in zip(sampler.scans_of, kept, signs)]
         counts = EndOn(*(torch.cat(parts) for parts in zip(*found)))
-        signs = uncontradicted_signs(all_profiles, signs, counts)
+        signs = own_signs(uncontradicted_signs(all_profiles, signs, counts), kept)
     for scans, sign, middle_x in zip(sampler.scans_of, signs, middles):
         rows = torch.from_numpy(scans)
         given = SE3(agreed.rotation[rows], agreed.translation[rows])

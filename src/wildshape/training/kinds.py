@@ -20,6 +20,7 @@ from wildshape.training.profiles import Profiles, difference, reversed_where
 
 _NEIGHBOURS, _SHARE, _TIMES, _FEWEST, _HALF = 20, 0.125, 3.0, 10, 0.5
 _END_ON = 0.9063  # cosine of 25 degrees
+_SETTLED, _CLEAR = 0.08, 0.5
 
 
 class EndOn(NamedTuple):
@@ -32,6 +33,23 @@ class EndOn(NamedTuple):
 
     opposed: Float[Tensor, "J 2"]
     all: Float[Tensor, "J 2"]
+
+
+def own_signs(signs: Float[Tensor, "J"], votes: list[Float[Tensor, "_"]]) -> Float[Tensor, "J"]:
+    """The signs, or the network's own where it is clear about a track, and in general.
+
+    Args:
+        signs: agreed on by profiles, contradicted kinds reversed.
+        votes: of each track, +1 where the network's own heading of a scan is that of the track's
+            frame, else -1. In general clear: at most 8 % of the scans say otherwise than most of
+            their track; clear about a track: at most a quarter.
+    """
+    mean = torch.stack([vote.mean() for vote in votes])
+    scans = torch.tensor([float(len(vote)) for vote in votes])
+    contradicting = float((scans * (1 - mean.abs()) / 2).sum() / scans.sum())
+    if contradicting > _SETTLED:
+        return signs
+    return torch.where(mean.abs() >= _CLEAR, mean.sign().to(signs.dtype), signs)
 
 
 def end_on(
