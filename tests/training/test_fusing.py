@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A teacher's targets: made from scans alone, kept for one run, and what a run makes of them."""
 
+import itertools
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -70,6 +72,15 @@ def test_the_fused_shape_is_its_scans_reflected(car_store, targets):
         points = pose.inverse().apply(torch.from_numpy(car_store.scan_points(scan).copy()))
         for cloud in (points, points * across):
             assert float(torch.cdist(cloud, targets.shapes[track]).amin(1).median()) < 0.08
+
+
+def test_targets_do_not_pitch_against_level_sensors(car_store, targets):
+    """The sensors of the fixture are level; whatever the teacher's frame does."""
+    starts = np.asarray(car_store.track_starts)
+    for first, last in itertools.pairwise(starts):
+        up = targets.rotation[first:last, 2].mean(0)
+        if float(up.norm()) > 0.9 and abs(math.atan2(float(up[0]), float(up[2]))) < 0.5:
+            assert abs(float(up[0])) < 1e-4
 
 
 def test_the_sensors_are_where_the_scans_were_taken(car_store, targets):

@@ -24,6 +24,7 @@ from wildshape.datasets.views import ViewSampler
 from wildshape.errors import BadInputError
 from wildshape.geometry.field_of_view import slope, view_top
 from wildshape.geometry.ground import skirt
+from wildshape.geometry.level import level_turn
 from wildshape.geometry.se3 import SE3
 from wildshape.inference.joint import refine_jointly, stayed_near
 from wildshape.inference.pose_graph import refine_by_graph
@@ -105,6 +106,8 @@ def fused_targets(
     poses = agreed_poses(
         network, asked, loss, refined, progress, fused, hinted if hint else None, settled=True
     )
+    if settings.sensor == "lidar":
+        poses = _levelled(sampler, poses)
     shapes = [
         _shape(sampler, scans, _of(poses, scans), mirror, voxel) for scans in sampler.scans_of
     ]
@@ -115,6 +118,15 @@ def fused_targets(
             for shape, scans, top in zip(shapes, sampler.scans_of, tops)
         ]
     return _targets(sampler, poses, shapes, tops, complete=False)
+
+
+def _levelled(sampler: ViewSampler, poses: AgreedPoses) -> AgreedPoses:
+    """Every track in a frame that does not pitch against its sensors (`geometry/level.py`)."""
+    rotation = poses.rotation.clone()
+    for scans in sampler.scans_of:
+        rows = torch.from_numpy(scans)
+        rotation[rows] = rotation[rows] @ level_turn(rotation[rows])
+    return poses._replace(rotation=rotation)
 
 
 def _chained(scans: list[Points], T_sensor_can: SE3) -> SE3:
