@@ -271,6 +271,24 @@ def test_shipped_weights_have_names(tmp_path, monkeypatch):
     assert weights_file("runs/default") == Path("runs/default")
 
 
+def test_level_sensors_are_taken_at_their_word_unless_told_otherwise(tmp_path):
+    """What the checkpoint calls up is where the poses of scans that are nearly level point."""
+    torch.manual_seed(0)
+    of = dataclasses.replace(SETTINGS, facing=True, up=(0.02, 0.0, 0.9998))
+    path = tmp_path / "model.safetensors"
+    save_checkpoint(path, ShapePoseNet(CONFIG).eval(), of)
+    up = load(path).settings.up
+    assert up == of.up
+    axis = torch.tensor(up, dtype=torch.float64)
+    off = []
+    for level in (True, False):
+        poses = load(path, level=level).poses([scan(i) for i in range(80)])
+        off.append(torch.rad2deg(torch.acos((poses.rotation[:, 2] @ axis).clamp(-1, 1))))
+    near = off[1] < 4
+    assert int(near.sum()) >= 3
+    assert float((off[0] / off[1])[near].mean()) < 0.9
+
+
 def test_load(predictor, tmp_path):
     path = tmp_path / "model.safetensors"
     save_checkpoint(path, predictor.network, SETTINGS)

@@ -12,6 +12,7 @@ from wildshape.inference.refine import denser, drawn_to_scan, filled, refine
 SHAPE = car_surface(4000, seed=5)[0].astype(np.float32)
 STRETCH = np.array((1.07, 0.96, 1.05), np.float32)
 TRACK = drive_by(scans=9, step=2.0, heading=0.3)
+SCANS = TRACK.scans
 
 
 def turn(axis, degrees):
@@ -72,6 +73,39 @@ def test_nothing_moves_where_the_scan_is_elsewhere():
     np.testing.assert_allclose(found.rotation, R, atol=1e-3)
     np.testing.assert_allclose(found.translation, t, atol=1e-3)
     np.testing.assert_allclose(found.shape, SHAPE, atol=1e-2)
+
+
+def test_a_level_sensor_tells_pitch_and_roll():
+    """Of twenty points, and a shape that is not their own; the scans' true tilt is nothing."""
+    up = np.array((0.0, 0.0, 1.0))
+
+    def tilts(**level):
+        few = (scan[:: len(scan) // 20] for scan in SCANS)
+        given = ((scan, SHAPE / STRETCH, *spoilt(i)) for i, scan in enumerate(few))
+        found = [refine(*one, mirror=True, **level) for one in given]
+        return np.degrees([np.arccos(np.clip(one.rotation[2, 2], -1, 1)) for one in found])
+
+    assert tilts(up=up).mean() < 0.85 * tilts().mean()
+    assert tilts(up=up).max() < tilts().max()
+
+
+def test_up_is_said_of_the_canonical_frame():
+    """A frame that leans by two degrees is not stood upright."""
+    lean = turn((0, 1, 0), 2.0)
+    T = poses_of(TRACK)[4]
+    R, t = T.rotation.numpy() @ lean, T.translation.numpy()
+    found = refine(SCANS[4], SHAPE @ lean, R, t, mirror=True, up=lean[2])
+    assert np.degrees(np.arccos(found.rotation[2] @ lean[2])) < 0.2
+
+
+def test_a_sensor_held_askew_is_left_as_it_is():
+    """Far from level nothing is known of it: the answer turns with the scan."""
+    up, R, t = np.array((0.0, 0.0, 1.0)), *spoilt(3)
+    askew = turn((1, 2, 0), 30.0)
+    turned = (SCANS[3] @ askew.T.astype(np.float32), SHAPE, askew @ R, askew @ t)
+    free, held = refine(*turned, mirror=True), refine(*turned, mirror=True, up=up)
+    cosine = (np.trace(free.rotation.T @ held.rotation) - 1) / 2
+    assert np.degrees(np.arccos(np.clip(cosine, -1, 1))) < 0.1
 
 
 @pytest.mark.parametrize("scale", [0.1, 0.01])

@@ -9,6 +9,7 @@ from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -37,7 +38,13 @@ _BATCH = 32
 _GROUND = 0.05
 
 
-def load(model: str | Path | None = None, device: str = "cpu", *, raw: bool = False) -> "Predictor":
+def load(
+    model: str | Path | None = None,
+    device: str = "cpu",
+    *,
+    raw: bool = False,
+    level: bool = True,
+) -> "Predictor":
     """A predictor from a checkpoint; the weights shipped in the package by default.
 
     Args:
@@ -45,12 +52,16 @@ def load(model: str | Path | None = None, device: str = "cpu", *, raw: bool = Fa
         device: cpu or cuda.
         raw: give the network's own answers, not refined against the scan (`inference/refine.py`).
             Networks trained with a `paper-*` preset are never refined.
+        level: LiDARs are held level to about a degree, as on a vehicle. Where a scan comes out
+            within some five degrees of that, its refined pitch and roll are drawn to it; others
+            are taken as tilted on purpose. False draws none: for sensors mounted askew by a few
+            degrees, whose scans are not turned level first.
 
     Raises:
         BadInputError: the checkpoint cannot be used; the sentence says why.
     """
     network, settings = load_checkpoint(weights_file(model))
-    return Predictor(network.to(device), settings, raw=raw)
+    return Predictor(network.to(device), settings, raw=raw, level=level)
 
 
 class Predictor:
@@ -60,13 +71,20 @@ class Predictor:
         network: trained.
         settings: of its training.
         raw: see `load`.
+        level: see `load`.
     """
 
     def __init__(
-        self, network: ShapePoseNet, settings: ModelSettings, *, raw: bool = False
+        self,
+        network: ShapePoseNet,
+        settings: ModelSettings,
+        *,
+        raw: bool = False,
+        level: bool = True,
     ) -> None:
         self.network, self.settings = network, settings
         self.refines = settings.facing and not raw
+        self.up = settings.up if level else None
         self.device = next(network.parameters()).device
 
     def compile(self) -> "Predictor":
@@ -203,7 +221,7 @@ class Predictor:
         facts = facts_of(scan, cost, found.facts[i])
         warning = warning_of(scan, sensor, self.settings)
         if self.refines:
-            shape, T_sensor_can = _refined(seen, shape, T_sensor_can, mirror=mirror)
+            shape, T_sensor_can = _refined(seen, shape, T_sensor_can, mirror=mirror, up=self.up)
         points = T_sensor_can.to(torch.float32).apply(shape).numpy()
         exact = self.settings.sensor == "camera"
         return Completion(
@@ -238,10 +256,16 @@ class Predictor:
 
 
 def _refined(
-    scan: Points, shape: Tensor, T_sensor_canonical: SE3, *, mirror: bool
+    scan: Points,
+    shape: Tensor,
+    T_sensor_canonical: SE3,
+    *,
+    mirror: bool,
+    up: tuple[float, float, float] | None,
 ) -> tuple[Tensor, SE3]:
     """Shape and pose fitted to the scan (`inference/refine.py`)."""
     pose = (T_sensor_canonical.rotation.numpy(), T_sensor_canonical.translation.numpy())
-    found = refine(in_order(scan), shape.numpy(), *pose, mirror=mirror)
+    level = None if up is None else np.array(up)
+    found = refine(in_order(scan), shape.numpy(), *pose, mirror=mirror, up=level)
     rotation, translation = torch.from_numpy(found.rotation), torch.from_numpy(found.translation)
     return torch.from_numpy(found.shape), SE3(rotation, translation)

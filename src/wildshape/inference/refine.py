@@ -6,7 +6,8 @@ Beyond the paper (METHOD 11, test-time refinement). The network knows an object'
 degrees and its size to a few percent, and draws shapes towards what is usual; the scan in hand
 knows better where it saw something. Nine numbers (rotation, translation and a stretch along the
 canonical axes) are fitted by Gauss-Newton, each scan point to the plane of the shape around it; the
-network's answer is the prior. Nothing but the scan is used.
+network's answer is the prior, and that a LiDAR is held level, to a degree, where it nearly is. One
+side of a car tells its heading to a fraction of a degree, but its pitch and roll to one or two.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -24,6 +25,7 @@ _USUAL_M = 5.0
 # Scan points err together, because the shape errs: as much is believed as if there were these many.
 _BELIEVED, _ERROR_M, _KERNEL_M = 300.0, 0.07, 0.3
 _PRIOR_RAD, _PRIOR_M, _PRIOR_STRETCH = np.radians(3.0), 0.05, 0.08
+_LEVEL_RAD, _TILTED_RAD = np.radians((1.0, 5.0))
 _REACH_M, _STIFFNESS, _DRAWN_BY, _VOXEL_M = 0.12, 0.2, 8, 0.08
 _PARTNER, _SMALLEST_M = 5, 1e-6
 
@@ -58,6 +60,7 @@ def refine(
     translation: Float[np.ndarray, "3"],
     *,
     mirror: bool,
+    up: Float[np.ndarray, "3"] | None = None,
 ) -> Refined:
     """Pose and shape after a look at the scan they came from.
 
@@ -67,19 +70,21 @@ def refine(
         rotation: of `T_scan_canonical`, good to some ten degrees.
         translation: of the same, good to some decimetres.
         mirror: what was seen of one side of y = 0 is known of the other.
+        up: canonical direction that the scan's z axis points in, if it was taken level; what is
+            far from it (beyond some 5 degrees) is taken for tilted and left so.
     """
     exact = shape.astype(np.float64)
     unit = min(1.0, float(np.linalg.norm(np.ptp(exact, axis=0))) / _USUAL_M)
     order = np.random.default_rng(0).permutation(len(scan))
     points = scan[order[:_SCAN_POINTS]].astype(np.float64)
-    fitted = _fitted(points / unit, Refined(exact / unit, rotation, translation / unit))
+    fitted = _fitted(points / unit, Refined(exact / unit, rotation, translation / unit), up)
     seen = (points / unit - fitted.translation) @ fitted.rotation
     drawn = drawn_to_scan(fitted.shape, seen, mirror=mirror)
     moved = fitted.translation * unit
     return Refined((drawn * unit).astype(shape.dtype), fitted.rotation, moved)
 
 
-def _fitted(points: Cloud, found: Refined) -> Refined:
+def _fitted(points: Cloud, found: Refined, up: np.ndarray | None) -> Refined:
     """The nine numbers fitted."""
     from scipy.spatial import KDTree
 
@@ -92,7 +97,10 @@ def _fitted(points: Cloud, found: Refined) -> Refined:
         local = (points - t) @ R
         if step in _MATCHED_AT:
             planes = _planes(tree, local / stretch)
-        change = _step(local, planes, stretch, motion)
+        A, b = _fit(local, planes, stretch, motion)
+        if up is not None:
+            A[:3, :3], b[:3] = (a + of for a, of in zip((A[:3, :3], b[:3]), _level(R[2], up)))
+        change = -np.linalg.solve(A, b)
         motion += change
         R = R @ _turn(change[:3]).T
         t = t - R @ change[3:6]
@@ -117,8 +125,13 @@ def _planes(tree: "KDTree", points: Cloud) -> _Planes:
     return _Planes(middle, axes[:, :, 0])
 
 
-def _step(local: Cloud, planes: _Planes, stretch: np.ndarray, motion: np.ndarray) -> np.ndarray:
-    """One Gauss-Newton step of the nine numbers; `motion` is how far they are from the prior."""
+def _fit(
+    local: Cloud, planes: _Planes, stretch: np.ndarray, motion: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """A and b of a Gauss-Newton step, A x = -b, of the nine numbers.
+
+    `motion` is how far they are from the prior.
+    """
     at, normal = planes.at * stretch, planes.normal / stretch
     normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     off = local - at
@@ -129,7 +142,15 @@ def _step(local: Cloud, planes: _Planes, stretch: np.ndarray, motion: np.ndarray
     trust = np.repeat((_PRIOR_RAD, _PRIOR_M, _PRIOR_STRETCH), 3) ** -2
     A = (rows * weight[:, None]).T @ rows + np.diag(trust)
     b = rows.T @ (weight * residual) + trust * motion
-    return -np.linalg.solve(A, b)
+    return A, b
+
+
+def _level(now: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What a level sensor adds for the rotation: `now` is its z axis, canonical frame."""
+    off = now - up
+    weight = _LEVEL_RAD**-2 * (1 + off @ off / _TILTED_RAD**2) ** -2  # Geman-McClure
+    across = -_cross(now)  # of a turn by w, `now` becomes `now` + w x `now`
+    return weight * across.T @ across, weight * across.T @ off
 
 
 def _turn(w: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
@@ -137,9 +158,14 @@ def _turn(w: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
     angle = float(np.linalg.norm(w))
     if angle < 1e-12:
         return np.eye(3)
-    x, y, z = w / angle
-    cross = np.array(((0, -z, y), (z, 0, -x), (-y, x, 0)))
+    cross = _cross(w / angle)
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def _cross(w: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """The matrix of w x."""
+    x, y, z = w
+    return np.array(((0, -z, y), (z, 0, -x), (-y, x, 0)))
 
 
 def drawn_to_scan(shape: Cloud, seen: Cloud, *, mirror: bool) -> Cloud:

@@ -36,6 +36,8 @@ class ModelSettings:
         belief: metres of cost that a nat of the selector's belief is worth.
         extent_m: smallest and largest extent of the scans trained on, metres.
         cost_m: median and 90th percentile of the label-free cost on held-out scans, metres.
+        up: canonical direction that the z axes of the LiDARs trained on have in common; None if
+            they have none (`geometry/level.py`), or for cameras.
         calibration: of the confidence; None if truth never told (`models/confidence.py`).
         provenance: command, commit, data, hardware, seed, steps.
         metrics: held-out figures.
@@ -50,6 +52,7 @@ class ModelSettings:
     belief: float = 0.0
     extent_m: tuple[float, float] = (0.0, float("inf"))
     cost_m: tuple[float, float] = (0.1, 0.2)
+    up: tuple[float, float, float] | None = None
     calibration: Calibration | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
     metrics: dict[str, Any] = field(default_factory=dict)
@@ -113,6 +116,8 @@ def settings_from_dict(values: dict[str, Any]) -> ModelSettings:
     }
     for name in ("extent_m", "cost_m"):
         values[name] = tuple(values[name])
+    if values.get("up") is not None:
+        values["up"] = tuple(values["up"])
     values["calibration"] = _calibration(values.get("calibration"))
     return ModelSettings(network=NetworkConfig(**network), projection=kind(**projection), **values)
 

@@ -17,7 +17,7 @@ from wildshape.training.profile import steps_profiled
 from wildshape.training.setup import Run, setup, split_tracks, step_of
 from wildshape.training.state import save_state
 from wildshape.training.step import Step
-from wildshape.training.validate import Validation, truth_figures, validate
+from wildshape.training.validate import Validation, truth_figures, usual_up, validate
 
 __all__ = ["MODEL", "Progress", "Run", "StopRequested", "fit", "setup", "split_tracks"]
 
@@ -131,6 +131,7 @@ def checkpoint(run: Run) -> dict[str, Any]:
     found = validate(run.state.mean, run.held_out, run.recipe.loss, _VALIDATION_BATCHES, device)
     refuse_not_finite(found.observation, run.state.step)
     settings = model_settings(run, found)
+    settings = replace(settings, up=usual_up(run.state.mean, settings, run.held_out))
     turn = run.recipe.views.turn
     protocol = "yaw" if turn == "facing" else turn  # scans that face their object bear any yaw
     truth = truth_figures(run.state.mean, settings, run.sampler.store, run.held_tracks, protocol)

@@ -14,6 +14,7 @@ from wildshape.datasets.views import Batch, ViewSampler
 from wildshape.evaluation import protocol
 from wildshape.evaluation.results import figures_of
 from wildshape.geometry.centring import scan_centre
+from wildshape.geometry.level import mean_up
 from wildshape.geometry.se3 import SE3
 from wildshape.inference.method import Learned
 from wildshape.inference.predictor import Predictor
@@ -24,7 +25,7 @@ from wildshape.models.checkpoint import ModelSettings
 from wildshape.models.shapepose import Poses, ShapePoseNet
 
 _SEED = 20_200_823
-_TRUTH_TRACKS, _TRUTH_SCANS = 8, 6
+_TRUTH_TRACKS, _TRUTH_SCANS, _LEVEL_TRACKS = 8, 6, 32
 _TRUTH = ("cd", "acc30", "rot_median_deg", "trans_median_m")
 
 
@@ -77,6 +78,24 @@ def truth_figures(
     return {
         f"truth_{name}": float(value) for name in _TRUTH if (value := figures[name]) is not None
     }
+
+
+def usual_up(
+    network: ShapePoseNet, settings: ModelSettings, sampler: ViewSampler
+) -> tuple[float, float, float] | None:
+    """Which way is up in the canonical frame, as LiDARs that are held level say; None if none is.
+
+    Args:
+        network: in evaluation.
+        settings: of the checkpoint.
+        sampler: of held-out tracks; the middle scans of the first few are posed.
+    """
+    if settings.sensor != "lidar" or not settings.facing:
+        return None
+    middles = [int(scans[len(scans) // 2]) for scans in sampler.scans_of[:_LEVEL_TRACKS]]
+    scans = [sampler.store.scan_points(middle) for middle in middles]
+    up = mean_up(Predictor(network, settings, raw=True).poses(scans).rotation)
+    return None if up is None else (float(up[0]), float(up[1]), float(up[2]))
 
 
 @torch.no_grad()
