@@ -71,9 +71,11 @@ def table(given: Given) -> Table:
     top = replace(oracle(size, data), name="oracle of the paper's form")
     plain = rungs(given)[4]
     plain = replace(plain, name="7 without the selector", teacher=plain)
+    student = replace(_with(_ours(given), "network", branches=1), teacher=_ours(given))
+    student = replace(student, name="7 by a student of one branch")
     ours = replace(_ours(given), name="oracle of our form", teacher="truth")
     rest = baselines("identity", "one-scan", "local-icp")
-    rows = (*rungs(given), plain, top, ours, *rest)
+    rows = (*rungs(given), plain, student, top, ours, *rest)
     block = Block("Simulated drives", given.drives("test"), rows, (), ("none", "yaw"))
     note = "Each rung keeps those before it; 8 and 9 are the weights of 7, asked otherwise."
     return Table("From the paper's method to ours", (block,), size.seeds, (note,))

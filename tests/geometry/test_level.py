@@ -40,6 +40,7 @@ def test_a_frame_pitches_no_more(pitch):
     leaning = level_sensors() @ roll @ about_y(pitch)
     levelled = leaning @ level_turn(leaning)
     up = mean_up(levelled)
+    assert up is not None
     assert abs(float(up[0])) < 1e-6
     assert abs(float(up[1]) - float((level_sensors() @ roll)[0, 2, 1])) < 1e-3
 

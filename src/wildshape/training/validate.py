@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Held-out figures: the loss terms and cycle consistency without truth, and with it if there is."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -25,7 +26,7 @@ from wildshape.models.checkpoint import ModelSettings
 from wildshape.models.shapepose import Poses, ShapePoseNet
 
 _SEED = 20_200_823
-_TRUTH_TRACKS, _TRUTH_SCANS, _LEVEL_TRACKS = 8, 6, 32
+_TRUTH_TRACKS, _TRUTH_SCANS, _LEVEL_TRACKS = 8, 6, 128
 _TRUTH = ("cd", "acc30", "rot_median_deg", "trans_median_m")
 
 
@@ -85,6 +86,8 @@ def usual_up(
 ) -> tuple[float, float, float] | None:
     """Which way is up in the canonical frame, as LiDARs that are held level say; None if none is.
 
+    Of a mirror-symmetric network it lies in the mirror plane.
+
     Args:
         network: in evaluation.
         settings: of the checkpoint.
@@ -95,7 +98,12 @@ def usual_up(
     middles = [int(scans[len(scans) // 2]) for scans in sampler.scans_of[:_LEVEL_TRACKS]]
     scans = [sampler.store.scan_points(middle) for middle in middles]
     up = mean_up(Predictor(network, settings, raw=True).poses(scans).rotation)
-    return None if up is None else (float(up[0]), float(up[1]), float(up[2]))
+    if up is None:
+        return None
+    x, y, z = up.tolist()
+    if network.config.mirror:
+        x, y, z = x / math.hypot(x, z), 0.0, z / math.hypot(x, z)
+    return x, y, z
 
 
 @torch.no_grad()
