@@ -76,7 +76,7 @@ def carried(fitted: FittedBox, T_sensor_canonical: SE3) -> Box:
 def _level(shape: Float[Tensor, "P 3"]) -> Float[Tensor, "3 3"]:
     """The small turn about y after which the rectangle around the side view has least area.
 
-    Nothing in training holds the canonical frame level; a degree is 8 cm of a car's length.
+    The canonical frame is level on average, not for each shape; a degree is 8 cm of a car's length.
     """
     steps = round(_LEVEL_DEG / _STEP_DEG)
     angles = torch.deg2rad(torch.arange(-steps, steps + 1, dtype=shape.dtype) * _STEP_DEG)
