@@ -68,6 +68,7 @@ def test_targets_look_as_the_hint_says(car_store, teacher, tmp_path, monkeypatch
 
     monkeypatch.setattr(fusing, "refine_jointly", lambda _scans, pose, **_: pose)
     monkeypatch.setattr(fusing, "_chained", lambda _scans, pose: pose)
+    monkeypatch.setattr(fusing, "_levelled", lambda _sampler, poses: poses)
     sampler = sampler_of(car_store)
     signs = torch.ones(1)
     monkeypatch.setattr(fusing, "hinted_signs", lambda _h, scans, _p: signs.expand(len(scans)))
