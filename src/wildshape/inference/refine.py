@@ -99,7 +99,9 @@ def _fitted(points: Cloud, found: Refined, up: np.ndarray | None) -> Refined:
             planes = _planes(tree, local / stretch)
         A, b = _fit(local, planes, stretch, motion)
         if up is not None:
-            A[:3, :3], b[:3] = (a + of for a, of in zip((A[:3, :3], b[:3]), _level(R[2], up)))
+            tilt = _level(R[2], up)
+            A[:3, :3] += tilt[0]
+            b[:3] += tilt[1]
         change = -np.linalg.solve(A, b)
         motion += change
         R = R @ _turn(change[:3]).T
