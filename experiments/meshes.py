@@ -1,21 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""CAD meshes of the train split for training data: as they are, in other proportions, spliced."""
+"""CAD meshes of the train split, as they are and in other proportions, for training data."""
 
 import csv
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    import trimesh
-
 COPY_STRETCH = 0.2
-SPLICED = 0.5
-# Of the train split, with their bonnets at the end that the manifest calls the rear.
-_BACKWARDS = ("Feb_2017_Bus.ply", "Feb_2017_SchoolBus.ply")
 _STRETCH = np.array((0.12, 0.08, 0.08))
 _PARTS = ((4, 0.25), (1, 0.0), (3, 0.15))  # along each axis: how many, and the spread of their logs
 
@@ -47,10 +40,11 @@ def train_split(cad: Path, categories: tuple[str, ...]) -> list[dict[str, str]]:
 def road_vehicles(cad: Path, into: Path, count: int, seed: int) -> None:
     """Write `count` vehicles of the train split, lorries and buses oftener than cars, shuffled.
 
-    A mesh's first copy is as it is. Half of the others are its front or rear joined to another's,
-    and all are stretched, their parts of other lengths, and of sizes that are seen on roads, for
-    many models are toys.
+    A mesh's first copy is as it is. The others are stretched, their parts of other lengths, and
+    of sizes that are seen on roads, for many models are toys.
     """
+    import trimesh
+
     rows = train_split(cad, tuple(ROAD_SIZES))
     files = [row for row in rows for _ in range(ROAD_SIZES[row["category"]].share)]
     rng = np.random.default_rng(seed)
@@ -58,52 +52,11 @@ def road_vehicles(cad: Path, into: Path, count: int, seed: int) -> None:
     seen: set[str] = set()
     for place, row in enumerate(drawn[:count]):
         name, sizes = row["file"], ROAD_SIZES[row["category"]]
-        mesh = _loaded(cad, name)
+        mesh = trimesh.load(cad / name, force="mesh", process=False)
         if name in seen:
-            if rng.random() < SPLICED:
-                alike = [other for other in rows if _is_car(other) == _is_car(row)]
-                other = _loaded(cad, alike[rng.integers(len(alike))]["file"])
-                mesh = spliced(*((mesh, other) if rng.random() < 0.5 else (other, mesh)), rng)
             mesh.vertices = warped(np.asarray(mesh.vertices), sizes, rng)
         seen.add(name)
         mesh.export(into / f"{place:04d}_{Path(name).stem}.ply")
-
-
-def _is_car(row: dict[str, str]) -> bool:
-    return row["category"] == "car"
-
-
-def _loaded(cad: Path, name: str) -> "trimesh.Trimesh":
-    """A mesh with its front at +x."""
-    import trimesh
-
-    mesh = trimesh.load(cad / name, force="mesh", process=False)
-    assert isinstance(mesh, trimesh.Trimesh)
-    if name.endswith(_BACKWARDS):
-        mesh.vertices = np.asarray(mesh.vertices) * (-1, -1, 1)
-    return mesh
-
-
-def spliced(
-    front: "trimesh.Trimesh", rear: "trimesh.Trimesh", rng: np.random.Generator
-) -> "trimesh.Trimesh":
-    """What lies before a cut about the middle of one, and behind it of another, in one's box."""
-    import trimesh
-    from trimesh.intersections import slice_faces_plane
-
-    cut, size, parts = rng.uniform(0.4, 0.6), np.ptp(np.asarray(front.vertices), axis=0), []
-    for mesh, ahead in ((front, 1.0), (rear, -1.0)):
-        place = _in_box(np.asarray(mesh.vertices, np.float64))
-        cutting = np.array((ahead, 0.0, 0.0)), np.array((cut, 0.0, 0.0))
-        vertices, faces, _ = slice_faces_plane(place, np.asarray(mesh.faces), *cutting)
-        parts.append(trimesh.Trimesh(vertices * size, faces, process=False))
-    return trimesh.util.concatenate(parts)
-
-
-def _in_box(vertices: np.ndarray) -> np.ndarray:
-    """Vertices (N, 3) in their bounding box, 0 to 1 along each axis."""
-    low, size = vertices.min(0), np.maximum(np.ptp(vertices, axis=0), 1e-9)
-    return (vertices - low) / size
 
 
 def warped(vertices: np.ndarray, sizes: Sizes, rng: np.random.Generator) -> np.ndarray:
@@ -117,12 +70,13 @@ def warped(vertices: np.ndarray, sizes: Sizes, rng: np.random.Generator) -> np.n
 
 def _other_parts(vertices: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Vertices (N, 3) in their box, 0 to 1, the parts along each axis of other lengths."""
-    inside = _in_box(vertices)
+    low, size = vertices.min(0), np.maximum(np.ptp(vertices, axis=0), 1e-9)
     out = np.empty_like(vertices, dtype=np.float64)
     for axis, (knots, spread) in enumerate(_PARTS):
         share = np.exp(rng.uniform(-spread, spread, knots))
         edges = np.concatenate(((0.0,), np.cumsum(share) / share.sum()))
-        out[:, axis] = np.interp(inside[:, axis], np.linspace(0, 1, knots + 1), edges)
+        place = (vertices[:, axis] - low[axis]) / size[axis]
+        out[:, axis] = np.interp(place, np.linspace(0, 1, knots + 1), edges)
     return out
 
 

@@ -7,14 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from experiments.meshes import (
-    COPY_STRETCH,
-    ROAD_SIZES,
-    road_vehicles,
-    spliced,
-    stretched,
-    warped,
-)
+from experiments.meshes import COPY_STRETCH, ROAD_SIZES, road_vehicles, stretched, warped
 
 
 @pytest.fixture(scope="module")
@@ -89,24 +82,3 @@ def test_a_warped_vehicle_stands_on_the_ground_in_the_middle():
     out = warped(vertices, ROAD_SIZES["car"], np.random.default_rng(1))
     middle = (out.min(0) + out.max(0)) / 2
     np.testing.assert_allclose((*middle[:2], out[:, 2].min()), 0.0, atol=1e-9)
-
-
-def wedge(high_at_front: bool) -> trimesh.Trimesh:
-    """Three long, two wide, one high at one end and flat at the other, from x = -1."""
-    profile = np.array(((0, 0, 0), (3, 0, 0), (3 if high_at_front else 0, 0, 1.0)))
-    vertices = np.concatenate((profile, profile + (0, 2, 0))) - (1, 1, 0)
-    return trimesh.Trimesh(vertices, trimesh.convex.convex_hull(vertices).faces, process=False)
-
-
-@pytest.mark.parametrize(("front_high", "rear_high"), [(True, True), (False, False), (True, False)])
-def test_a_splice_has_the_front_of_one_and_the_rear_of_the_other(front_high, rear_high):
-    rng = np.random.default_rng(0)
-    mesh = spliced(wedge(front_high), wedge(not rear_high), rng)
-    points = np.asarray(mesh.vertices)
-    np.testing.assert_allclose(np.ptp(points, axis=0)[:2], (3, 2), atol=1e-6)
-    x = (points[:, 0] - points[:, 0].min()) / 3
-    ends = [points[at, 2].max() - points[:, 2].min() for at in (x > 0.99, x < 0.01)]
-    np.testing.assert_allclose(ends, (front_high, rear_high), atol=1e-6)
-    between = points[(x > 0.01) & (x < 0.99)]
-    assert len(between), "cut between the ends"
-    assert ((x > 0.39) & (x < 0.61)).sum() == len(between), "and only about the middle"

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 import torch
 
+from wildshape.geometry.level import levelness
 from wildshape.geometry.rotation import random_rotation, rotation_z
 from wildshape.geometry.se3 import SE3
-from wildshape.inference.looking import ROLLS, agreed, quarter_turns
+from wildshape.inference.looking import ROLLS, agreed, halved_if_level, quarter_turns
 from wildshape.inference.predictor import load
 
 SCAN = Path(__file__).parents[2] / "examples" / "scan.npy"
@@ -55,3 +56,48 @@ def test_the_shipped_weights_know_a_car_at_any_roll():
     for turn, done in zip(turns, predictor.complete_many(scans)):
         off = (turn @ upright.rotation).mT @ done.pose.rotation
         assert torch.rad2deg(torch.acos(((off.trace() - 1) / 2).clamp(-1, 1))) < 10
+
+
+UP = (0.0, 0.6, 0.8)
+
+
+def turned_by(degrees: float) -> torch.Tensor:
+    """`R_sensor_canonical` of sensors that stand some degrees off level, at any heading."""
+    level = face_up(torch.tensor(UP))
+    lean = math.radians(degrees)
+    tilt = torch.tensor(
+        (
+            (1.0, 0.0, 0.0),
+            (0.0, math.cos(lean), -math.sin(lean)),
+            (0.0, math.sin(lean), math.cos(lean)),
+        )
+    )
+    return tilt @ rotation_z(torch.linspace(0, 5, 7)) @ level
+
+
+def face_up(up: torch.Tensor) -> torch.Tensor:
+    """A rotation whose last row is `up`."""
+    across = torch.linalg.cross(up, torch.tensor((1.0, 0.0, 0.0)))
+    across = across / across.norm()
+    return torch.stack((torch.linalg.cross(across, up), across, up))
+
+
+def test_levelness_is_one_on_the_level_a_quarter_at_ten_degrees_and_nothing_upside_down():
+    at = {degrees: levelness(turned_by(degrees), UP) for degrees in (0, 2, 10, 90, 180)}
+    torch.testing.assert_close(at[0], torch.ones(7))
+    torch.testing.assert_close(at[10], torch.full((7,), 0.25), atol=2e-3, rtol=0)
+    assert (at[2] > 0.9).all()
+    assert max(at[90].max(), at[180].max()) < 1e-3
+
+
+def test_of_like_answers_the_level_one_speaks_and_of_tilted_ones_all_are_as_before():
+    rotation = torch.stack([turned_by(lean)[0] for lean in (170, 3, 100, 60)])[None]
+    cost = torch.tensor([[0.20, 0.25, 0.21, 0.22]])
+    assert agreed(rotation, cost)[0] == 0
+    assert agreed(rotation, halved_if_level(cost, rotation, UP))[0] == 1
+    assert agreed(rotation, halved_if_level(cost, rotation, None))[0] == 0
+    far = torch.tensor([[0.20, 0.55, 0.21, 0.22]])
+    assert agreed(rotation, halved_if_level(far, rotation, UP))[0] == 0
+    without = rotation[:, [0, 2, 3]]
+    tilted = halved_if_level(cost[:, [0, 2, 3]], without, UP)
+    torch.testing.assert_close(tilted, cost[:, [0, 2, 3]], rtol=1e-3, atol=0)

@@ -12,7 +12,14 @@ from wildshape.export.plain import score_plain
 from wildshape.export.trust import confidence_plain, seen_plain
 from wildshape.geometry.centring import scan_centre
 from wildshape.geometry.facing import face, roll, roll_angle
-from wildshape.inference.looking import ROLLS, UPRIGHT_RAD, agreed, quarter_turns
+from wildshape.inference.looking import (
+    ROLLS,
+    UPRIGHT_RAD,
+    agreed,
+    halved_if_level,
+    level_bonus,
+    quarter_turns,
+)
 from wildshape.models.checkpoint import ModelSettings
 from wildshape.models.shapepose import ShapePoseNet
 
@@ -89,7 +96,8 @@ class CompletionGraph(nn.Module):
         first = self._look(many @ towards.mT, at, towards)
         towards = roll(roll_angle(towards @ first[1])) @ towards
         seen = self._look(many @ towards.mT, at, towards)
-        best = agreed(seen[1].unflatten(0, (-1, ROLLS)), seen[3].unflatten(0, (-1, ROLLS)))
+        cost = halved_if_level(seen[3], seen[1], self.settings.up)
+        best = agreed(seen[1].unflatten(0, (-1, ROLLS)), cost.unflatten(0, (-1, ROLLS)))
         rows = ROLLS * torch.arange(angle.shape[0]) + best
         return tuple(
             torch.where(tilted.view(-1, *(1,) * (old.ndim - 1)), new.index_select(0, rows), old)
@@ -103,11 +111,12 @@ class CompletionGraph(nn.Module):
         posed = shape[:, None] @ rotation.mT + translation[:, :, None]
         scores = score_plain(centred, centre, posed, settings.projection)
         costs = scores.observation + settings.beta * scores.projection
-        believed = costs - settings.belief * belief
+        back = turn.mT
+        bonus = level_bonus(settings, back[:, None] @ rotation, settings.up)
+        believed = costs - settings.belief * belief - bonus
         branch = believed.argmin(-1, keepdim=True)
         chosen_rotation = rotation.gather(1, branch[..., None, None].expand(-1, 1, 3, 3))[:, 0]
         chosen = translation.gather(1, branch[..., None].expand(-1, 1, 3))[:, 0] + centre
-        back = turn.mT
         moved, cost = (back @ chosen[..., None])[..., 0], costs.gather(1, branch)[:, 0]
         facts = seen_plain(posed, scores, belief, believed)
         return shape, back @ chosen_rotation, moved, cost, branch[:, 0], facts

@@ -12,7 +12,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-_TOGETHER, _PITCHED = 0.9, math.radians(30.0)
+_TOGETHER, _PITCHED, _NEAR = 0.9, math.radians(30.0), math.radians(10.0)
 
 
 def mean_up(R_sensor_object: Float[Tensor, "V 3 3"]) -> Float[Tensor, "3"] | None:
@@ -24,6 +24,14 @@ def mean_up(R_sensor_object: Float[Tensor, "V 3 3"]) -> Float[Tensor, "3"] | Non
     mean = R_sensor_object[:, 2].mean(0)
     length = float(mean.norm())
     return mean / length if length > _TOGETHER else None
+
+
+def levelness(
+    R_sensor_object: Float[Tensor, "*B 3 3"], up: tuple[float, float, float]
+) -> Float[Tensor, "*B"]:
+    """How level sensors stand: 1 where their z axis is `up`, object frame; 1/4 at ten degrees."""
+    off = R_sensor_object[..., 2, :] - R_sensor_object.new_tensor(up)
+    return (1 + off.square().sum(-1) / _NEAR**2) ** -2
 
 
 def level_turn(R_sensor_object: Float[Tensor, "V 3 3"]) -> Float[Tensor, "3 3"]:

@@ -202,7 +202,7 @@ class Predictor:
         """What the network says of scans, on the host."""
         of = self.settings
         given = network_input(scans, of.input_points, of.sensor, of.facing).to(self.device)
-        found = (look_well if of.facing else look)(self.network, of, given)
+        found = (look_well if of.facing else look)(self.network, of, given, self.up)
         return Found(*(part.cpu() for part in found))
 
     def _off_their_ground(self, scans: list[Points], found: Found) -> list[Points]:
