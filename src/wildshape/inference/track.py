@@ -17,6 +17,7 @@ from torch import Tensor
 from wildshape.geometry.box import FittedBox
 from wildshape.geometry.outliers import voxel_thin
 from wildshape.geometry.se3 import SE3, stack
+from wildshape.inference.astray import steadied
 from wildshape.inference.boxes import carried, fit_to_scans
 from wildshape.inference.joint import FINE, refine_jointly, stayed_near
 from wildshape.inference.pose_graph import refine_by_graph
@@ -137,7 +138,7 @@ def _voted(
     scans: list[Points],
     settings: ModelSettings,
 ) -> SE3:
-    """The same poses, all looking one way."""
+    """The same poses, all looking one way and none astray."""
     middle = float(shape[:, 0].amin() + shape[:, 0].amax()) / 2
     turned = T_sensor_can @ half_turn(middle)
     stands = track_cost(shape, T_sensor_can, scans, settings)
@@ -149,7 +150,7 @@ def _voted(
         clouds = _some_of_each(scans, T_sensor_can) / unit
         links = likeness_of_next(clouds, middle / unit, mirror=settings.network.mirror)
     signs = voted_signs(T_sensor_can.rotation, gain / unit, links, weights)
-    return turned_where(T_sensor_can, signs, middle)
+    return steadied(turned_where(T_sensor_can, signs, middle))
 
 
 def _some_of_each(scans: list[Points], T_sensor_object: SE3) -> Float[Tensor, "V n 3"]:

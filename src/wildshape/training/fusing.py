@@ -26,6 +26,7 @@ from wildshape.geometry.field_of_view import slope, view_top
 from wildshape.geometry.ground import skirt
 from wildshape.geometry.level import level_turn
 from wildshape.geometry.se3 import SE3
+from wildshape.inference.astray import steadied
 from wildshape.inference.joint import refine_jointly, stayed_near
 from wildshape.inference.pose_graph import refine_by_graph
 from wildshape.inference.predictor import load
@@ -90,7 +91,8 @@ def fused_targets(
 
     def refined(scans: np.ndarray, T_sensor_can: SE3) -> SE3:
         clouds = in_units(scans)
-        found = refine_jointly(clouds, _scaled(T_sensor_can, 1 / unit), mirror=mirror)
+        start = _scaled(steadied(T_sensor_can) if steady else T_sensor_can, 1 / unit)
+        found = refine_jointly(clouds, start, mirror=mirror)
         return _scaled(_chained(clouds, found) if steady else found, unit)
 
     def fused(_: ViewSampler, scans: np.ndarray, T_sensor_can: SE3) -> Tensor:
