@@ -181,7 +181,7 @@ def test_another_teacher_is_another_run(car_store, teacher, tmp_path):
 
 def test_what_is_taught_is_learned(car_store, tmp_path):
     """The oracle's loss on its own cars falls."""
-    recipe = replace(TAUGHT, optim=replace(TAUGHT.optim, steps=60, lr=3e-3), validate_every=1000)
+    recipe = replace(TAUGHT, optim=replace(TAUGHT.optim, steps=120, lr=3e-3), validate_every=1000)
     losses = []
     fit(
         setup(recipe, car_store, tmp_path, seed=3, teacher="truth"),

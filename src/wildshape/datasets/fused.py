@@ -19,6 +19,7 @@ from wildshape.datasets.views import ViewSampler
 _PLACES = 2
 _LARGER, _AXIS, _HALF = 0.2, 0.08, 0.5
 _END_ON, _OFTENER = math.cos(math.radians(60)), 3.0
+_CLOSE_M, _CLOSER = 8.0, 4.0
 
 
 class FusedTargets(NamedTuple):
@@ -72,7 +73,8 @@ class FusedSampler:
     Of some LiDAR scans a part is hidden (`hiding.py`). Every scan is stretched with its object (see
     `stretching`), turned as scans to be posed are, and rolled as configured. Where objects are
     mirror-symmetric, half of the scans are reflected: what is seen of an object's left side could
-    as well be seen of its right. Tracks that saw both ends of their object are drawn more often.
+    as well be seen of its right. Tracks that saw both ends of their object are drawn more often,
+    and of a LiDAR's scans those from close by, which are few and show an object like no others.
     """
 
     def __init__(self, views: ViewSampler, targets: FusedTargets, *, mirror: bool = False) -> None:
@@ -87,7 +89,8 @@ class FusedSampler:
         config, targets = self.views.config, self.targets
         scans_of = self.views.scans_of
         tracks = rng.choice(len(scans_of), config.tracks * config.views, p=self._share)
-        rows = np.asarray([rng.choice(scans_of[track]) for track in tracks])
+        drawn = (scans_of[track] for track in tracks)
+        rows = np.asarray([rng.choice(scans, p=self._shares_in(scans)) for scans in drawn])
         points = torch.stack([self._seen(int(scan), rng) for scan in rows])
         at, chosen = torch.from_numpy(rows), torch.from_numpy(tracks)
         rotation, factors = targets.rotation[at], _factors(len(rows), rng)
@@ -101,6 +104,14 @@ class FusedSampler:
         view_top = targets.view_top[chosen] * steeper
         batch = FusedBatch(scans, turn @ rotation, translation, shapes, sensors, view_top)
         return reflected(batch, rng.random(len(rows)) < _HALF) if self.mirror else batch
+
+    def _shares_in(self, scans: np.ndarray) -> np.ndarray | None:
+        """How likely each scan of a track is drawn; None: alike."""
+        if self.views.config.sensor != "lidar":
+            return None
+        away = self.targets.translation[torch.from_numpy(scans)].norm(dim=-1).double()
+        share = ((_CLOSE_M / away.clamp_min(1e-9)) ** 2).clamp(1.0, _CLOSER).numpy()
+        return share / share.sum()
 
     def _seen(self, scan: int, rng: np.random.Generator) -> Float[Tensor, "n 3"]:
         """A scan of the store, or a part of it."""

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Scans of which less is seen: something stands before the object, or the view ends lower.
+"""Scans of which less is seen: something stands before the object, or fewer beams look at it.
 
 Beyond the paper, for self-training: what the whole track showed is taught of such a scan too.
 """
@@ -13,7 +13,8 @@ from torch import Tensor
 from wildshape.geometry.field_of_view import slope
 
 _BEFORE, _SHARE = 0.2, (0.1, 0.6)
-_LOWER = 0.3
+_LOWER, _HIGHER, _FEET = 0.3, 0.1, 0.5
+_FEWER, _RING_DEG, _APART_DEG = 0.2, 0.25, (0.7, 2.2)
 
 
 def partly_hidden(
@@ -23,7 +24,9 @@ def partly_hidden(
 
     In a fifth of the scans a vertical strip is missing, from a pole's width to the better half; in
     three of ten whose object rises above the sensor's horizon, what lies above some elevation,
-    more often a low one: many sensors hardly look up.
+    more often a low one: many sensors hardly look up; in one of ten up to the lower half, behind
+    something low; of a fifth there are rings of beams alone, as far apart as a sensor of sixteen
+    to fifty has them.
 
     Args:
         points: sensor frame, z up.
@@ -36,6 +39,10 @@ def partly_hidden(
     if rng.random() < _LOWER:
         slopes = slope(points)
         kept &= slopes <= max(rng.uniform(0.0, 1.0) ** 2 * float(slopes.max()), 0.0)
+    if rng.random() < _HIGHER:
+        kept &= _elevation_place(points) >= rng.uniform(0.0, _FEET)
+    if rng.random() < _FEWER:
+        kept &= _rings(points, rng)
     rows = torch.nonzero(kept)[:, 0]
     if len(rows) < fewest or len(rows) == len(points):
         return points
@@ -53,3 +60,17 @@ def _strip(points: Float[Tensor, "n 3"], rng: np.random.Generator) -> Bool[Tenso
     start = rng.uniform(0.0, 1.0) - width / 2
     place = (azimuth - low) / max(high - low, 1e-9)
     return (place >= start) & (place <= start + width)
+
+
+def _elevation_place(points: Float[Tensor, "n 3"]) -> Float[Tensor, "n"]:
+    """0 where the scan's lowest elevation is, 1 at its highest."""
+    slopes = slope(points)
+    low, high = float(slopes.min()), float(slopes.max())
+    return (slopes - low) / max(high - low, 1e-9)
+
+
+def _rings(points: Float[Tensor, "n 3"], rng: np.random.Generator) -> Bool[Tensor, "n"]:
+    """Points of beams at even elevations, a quarter of a degree high each."""
+    apart = rng.uniform(*_APART_DEG)
+    elevation = torch.rad2deg(torch.atan(slope(points)))
+    return (elevation - rng.uniform(0.0, apart)).remainder(apart) < _RING_DEG
