@@ -22,7 +22,6 @@ from wildshape.inference.prepare import unit_of
 from wildshape.io.store import Store
 from wildshape.models.checkpoint import load_checkpoint
 from wildshape.models.shapepose import Encoding, ShapePoseNet
-from wildshape.models.widen import can_widen, widened
 from wildshape.ops.allocator import keep_memory
 from wildshape.ops.processor import multiplies_bf16
 from wildshape.training.capture import Captured
@@ -253,19 +252,16 @@ def _records(run: Run) -> bool:
 
 
 def _network(recipe: Recipe, start: Path | None) -> ShapePoseNet:
-    """A new network, or the checkpoint's, made wider where the recipe is."""
+    """A new network, or the checkpoint's."""
     if start is None:
         return ShapePoseNet(recipe.network)
     network, settings = load_checkpoint(start)
-    if settings.network == recipe.network:
-        return network.train()
-    if can_widen(settings.network, recipe.network):
-        return widened(network, recipe.network).train()
-    raise BadInputError(
-        f"{start}: its sizes are not those of the preset {recipe.name}, nor smaller widths of the"
-        f" same form: expected {recipe.network}, found {settings.network}; choose the preset it was"
-        " trained with."
-    )
+    if settings.network != recipe.network:
+        raise BadInputError(
+            f"{start}: its sizes are not those of the preset {recipe.name}: expected"
+            f" {recipe.network}, found {settings.network}; choose the preset it was trained with."
+        )
+    return network.train()
 
 
 def split_tracks(count: int) -> tuple[np.ndarray, np.ndarray]:
