@@ -12,6 +12,7 @@ set -eu
 meshes=$1 kitti=$2 out=$3
 mkdir -p "$out"
 wildshape simulate "$out/procedural" --tracks 30 --seed 9001
+wildshape simulate "$out/more" --tracks 150 --seed 9031
 wildshape simulate "$out/cad" --tracks 168 --scans 12 --seed 9002 --meshes "$meshes"
 wildshape simulate "$out/hdl32" --tracks 30 --seed 9011 --sensor hdl32
 wildshape simulate "$out/os1" --tracks 30 --seed 9012 --sensor os1-128
@@ -24,6 +25,11 @@ for data in procedural cad kitti; do
             --seeds "$seeds" --max-scans 8 --baselines identity,one-scan,local-icp $more
     done
     wildshape evaluate "$out/$data" --out "$out/$data-raw" --max-scans 8 --baselines none --raw
+done
+wildshape evaluate "$out/more" --out "$out/more-none" --max-scans 8 --baselines none --track
+for rotate in yaw so3; do
+    wildshape evaluate "$out/more" --out "$out/more-$rotate" --rotate "$rotate" --max-scans 8 \
+        --baselines none
 done
 for data in hdl32 os1; do
     wildshape evaluate "$out/$data" --out "$out/$data-yaw" --rotate yaw --max-scans 8 --track \
