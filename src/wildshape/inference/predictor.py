@@ -54,8 +54,9 @@ def load(
             Networks trained with a `paper-*` preset are never refined.
         level: LiDARs are held level to about a degree, as on a vehicle. Where a scan comes out
             within some five degrees of that, its refined pitch and roll are drawn to it; others
-            are taken as tilted on purpose. False draws none: for sensors mounted askew by a few
-            degrees, whose scans are not turned level first.
+            are taken as tilted on purpose, and answers that are level are preferred to others of
+            like cost. False: neither, for sensors mounted askew by a few degrees, whose scans are
+            not turned level first.
 
     Raises:
         BadInputError: the checkpoint cannot be used; the sentence says why.
