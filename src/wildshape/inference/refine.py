@@ -26,6 +26,7 @@ _USUAL_M = 5.0
 _BELIEVED, _ERROR_M, _KERNEL_M = 300.0, 0.07, 0.3
 _PRIOR_RAD, _PRIOR_M, _PRIOR_STRETCH = np.radians(3.0), 0.05, 0.08
 _LEVEL_RAD, _TILTED_RAD = np.radians((1.0, 5.0))
+_WORSE = 1.1  # what bringing a sensor level may cost of the fit
 _REACH_M, _STIFFNESS, _DRAWN_BY, _VOXEL_M = 0.12, 0.2, 8, 0.08
 _PARTNER, _SMALLEST_M = 5, 1e-6
 
@@ -107,7 +108,8 @@ def _fitted(points: Cloud, found: Refined, up: np.ndarray | None) -> Refined:
         R = R @ _turn(change[:3]).T
         t = t - R @ change[3:6]
     stretch = np.exp(motion[6:])
-    if _off(tree, (points - t) @ R / stretch) > before:
+    askew = up is not None and float(np.linalg.norm(found.rotation[2] - up)) > _LEVEL_RAD
+    if _off(tree, (points - t) @ R / stretch) > before * (_WORSE if askew else 1.0):
         return found
     return Refined(found.shape * stretch, R, t)
 
