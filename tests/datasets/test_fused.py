@@ -160,3 +160,17 @@ def test_tracks_that_saw_both_ends_are_drawn_three_times_as_often(car_store, car
     batch = FusedSampler(sampler.views, targets).draw(1, 2)
     drawn = torch.bincount((batch.view_top.log2() / 2).round().long(), minlength=len(cars))
     assert float(drawn[0] / drawn[1:].double().mean()) == pytest.approx(3.0, rel=0.3)
+
+
+def test_scans_from_close_by_are_drawn_up_to_four_times_as_often(car_store, cars):
+    """Twice as often from 8 m over the root of 2, four times from 4 m and less, alike beyond 8."""
+    sampler = sampler_of(car_store, cars)
+    scans = sampler.views.scans_of[0][:5]
+    away = torch.tensor((20.0, 8.0, 8 / 2**0.5, 4.0, 1.0))
+    placed = sampler.targets.translation.clone()
+    placed[torch.from_numpy(scans)] = away[:, None] * torch.tensor((0.6, 0.8, 0.0))
+    sampler.targets = sampler.targets._replace(translation=placed)
+    shares = sampler._shares_in(scans)
+    assert shares is not None
+    np.testing.assert_allclose(shares / shares[0], (1, 1, 2, 4, 4), rtol=1e-5)
+    assert abs(shares.sum() - 1) < 1e-12
