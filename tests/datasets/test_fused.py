@@ -68,7 +68,7 @@ def test_the_sensor_stays_where_it_was_seen_from(car_store, cars):
         first.apply(one_place)[:, 0], torch.zeros(len(cars), 3), atol=1e-4, rtol=0
     )
     sampler.views.scans_of = [scans[:1] for scans in sampler.views.scans_of]
-    batch = sampler.draw(4)
+    batch = FusedSampler(sampler.views, sampler.targets).draw(4)
     centres = batch.scans.new_zeros(len(batch.scans), 3)
     seen = SE3(batch.rotation, batch.translation).apply(batch.sensors)
     hit = seen.norm(dim=-1).amin(1)  # from the scan's centre to its sensor
@@ -169,7 +169,7 @@ def test_scans_from_close_by_are_drawn_up_to_four_times_as_often(car_store, cars
     away = torch.tensor((20.0, 8.0, 8 / 2**0.5, 4.0, 1.0))
     placed = sampler.targets.translation.clone()
     placed[torch.from_numpy(scans)] = away[:, None] * torch.tensor((0.6, 0.8, 0.0))
-    sampler.targets = sampler.targets._replace(translation=placed)
+    sampler = FusedSampler(sampler.views, sampler.targets._replace(translation=placed))
     shares = sampler._shares_in(scans)
     assert shares is not None
     np.testing.assert_allclose(shares / shares[0], (1, 1, 2, 4, 4), rtol=1e-5)

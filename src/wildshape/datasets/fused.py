@@ -82,6 +82,7 @@ class FusedSampler:
         self.views, self.targets, self.mirror = views, targets, mirror
         share = torch.where(both_ends(targets.sensors), _OFTENER, 1.0).double().numpy()
         self._share = share / share.sum()
+        self._shares = [self._shares_in(scans) for scans in views.scans_of]
 
     def draw(self, *seed: int) -> FusedBatch:
         """The batch of these seeds: as many scans as a batch of views has."""
@@ -89,8 +90,7 @@ class FusedSampler:
         config, targets = self.views.config, self.targets
         scans_of = self.views.scans_of
         tracks = rng.choice(len(scans_of), config.tracks * config.views, p=self._share)
-        drawn = (scans_of[track] for track in tracks)
-        rows = np.asarray([rng.choice(scans, p=self._shares_in(scans)) for scans in drawn])
+        rows = np.asarray([rng.choice(scans_of[track], p=self._shares[track]) for track in tracks])
         points = torch.stack([self._seen(int(scan), rng) for scan in rows])
         at, chosen = torch.from_numpy(rows), torch.from_numpy(tracks)
         rotation, factors = targets.rotation[at], _factors(len(rows), rng)
