@@ -12,7 +12,8 @@ from torch import Tensor
 
 from wildshape.geometry.field_of_view import slope
 
-_BEFORE, _SHARE = 0.2, (0.1, 0.6)
+_BEFORE, _STRIP = 0.2, (0.1, 0.6)
+_BESIDE, _SIDE, _LEFT = 0.2, (0.2, 0.7), 0.5
 _LOWER, _HIGHER, _FEET = 0.3, 0.1, 0.5
 _FEWER, _RING_DEG, _APART_DEG = 0.2, 0.25, (0.7, 2.2)
 
@@ -23,10 +24,10 @@ def partly_hidden(
     """The points of a LiDAR scan, or as many points of a part of it.
 
     In a fifth of the scans a vertical strip is missing, from a pole's width to the better half; in
-    three of ten whose object rises above the sensor's horizon, what lies above some elevation,
-    more often a low one: many sensors hardly look up; in one of ten up to the lower half, behind
-    something low; of a fifth there are rings of beams alone, as far apart as a sensor of sixteen
-    to fifty has them.
+    a fifth what lies left or right of some direction, up to two thirds; in three of ten whose
+    object rises above the sensor's horizon, what lies above some elevation, more often a low one:
+    many sensors hardly look up; in one of ten up to the lower half, behind something low; of a
+    fifth there are rings of beams alone, as far apart as a sensor of sixteen to fifty has them.
 
     Args:
         points: sensor frame, z up.
@@ -36,6 +37,8 @@ def partly_hidden(
     kept = torch.ones(len(points), dtype=torch.bool)
     if rng.random() < _BEFORE:
         kept &= ~_strip(points, rng)
+    if rng.random() < _BESIDE:
+        kept &= _one_side(points, rng)
     if rng.random() < _LOWER:
         slopes = slope(points)
         kept &= slopes <= max(rng.uniform(0.0, 1.0) ** 2 * float(slopes.max()), 0.0)
@@ -51,15 +54,27 @@ def partly_hidden(
 
 def _strip(points: Float[Tensor, "n 3"], rng: np.random.Generator) -> Bool[Tensor, "n"]:
     """Points between two directions of the ground plane."""
+    place = _azimuth_place(points)
+    width = rng.uniform(*_STRIP)
+    start = rng.uniform(0.0, 1.0) - width / 2
+    return (place >= start) & (place <= start + width)
+
+
+def _one_side(points: Float[Tensor, "n 3"], rng: np.random.Generator) -> Bool[Tensor, "n"]:
+    """Points left, or right, of a direction of the ground plane."""
+    hidden = rng.uniform(*_SIDE)
+    place = _azimuth_place(points)
+    return place <= 1 - hidden if rng.random() < _LEFT else place >= hidden
+
+
+def _azimuth_place(points: Float[Tensor, "n 3"]) -> Float[Tensor, "n"]:
+    """0 where the scan ends to the right, 1 where it ends to the left."""
     ahead = points[:, :2].mean(0)
     along = points[:, :2] @ ahead
     across = points[:, 1] * ahead[0] - points[:, 0] * ahead[1]
     azimuth = torch.atan2(across, along)
     low, high = float(azimuth.min()), float(azimuth.max())
-    width = rng.uniform(*_SHARE)
-    start = rng.uniform(0.0, 1.0) - width / 2
-    place = (azimuth - low) / max(high - low, 1e-9)
-    return (place >= start) & (place <= start + width)
+    return (azimuth - low) / max(high - low, 1e-9)
 
 
 def _elevation_place(points: Float[Tensor, "n 3"]) -> Float[Tensor, "n"]:
