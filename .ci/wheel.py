@@ -11,7 +11,6 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-import tarfile
 import tempfile
 from pathlib import Path
 
@@ -32,8 +31,7 @@ def sources(folder: Path) -> Path:
     hatch = (sys.executable, "-m", "hatchling", "build", "--target", "sdist", "-d", str(folder))
     subprocess.run(hatch, check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
     (archive,) = folder.glob("*.tar.gz")
-    with tarfile.open(archive) as opened:
-        opened.extractall(folder / "sdist", filter="data")
+    shutil.unpack_archive(archive, folder / "sdist")
     return next((folder / "sdist").iterdir())
 
 
