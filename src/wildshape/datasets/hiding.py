@@ -24,8 +24,8 @@ def partly_hidden(
     """The points of a LiDAR scan, or as many points of a part of it.
 
     In a fifth of the scans a vertical strip is missing, from a pole's width to the better half; in
-    a fifth what lies left or right of some direction, up to two thirds; in three of ten whose
-    object rises above the sensor's horizon, what lies above some elevation, more often a low one:
+    a fifth what lies left or right of some direction, up to 70 %; in three of ten whose object
+    rises above the sensor's horizon, what lies above some elevation, more often a low one:
     many sensors hardly look up; in one of ten up to the lower half, behind something low; of a
     fifth there are rings of beams alone, as far apart as a sensor of sixteen to fifty has them.
 
