@@ -22,6 +22,11 @@ def _drawn(points: torch.Tensor, fewest: int = 100) -> list[torch.Tensor]:
     return [partly_hidden(points, np.random.default_rng(seed), fewest) for seed in range(200)]
 
 
+def _wide_gaps(part: torch.Tensor) -> int:
+    """Elevations between which there is no point for as long as between two beams."""
+    return int((torch.rad2deg(torch.atan(slope(part))).unique().diff() > 0.35).sum())
+
+
 def test_what_is_left_is_of_the_scan_and_as_many_points():
     points = _wall(1.0)
     known = {tuple(point) for point in points.tolist()}
@@ -50,9 +55,12 @@ def test_a_fifth_of_the_scans_lack_a_strip_and_a_fifth_one_side():
 
 def test_what_rises_above_the_horizon_is_cut_at_some_elevation():
     points = _wall(1.5)
-    highest = torch.stack([slope(part).max() for part in _drawn(points)])
+    parts = _drawn(points)
+    highest = torch.stack([slope(part).max() for part in parts])
+    rings = torch.tensor([_wide_gaps(part) >= 3 for part in parts])
     cut = highest < slope(points).max() - 0.01
     assert 0.15 < float(cut.float().mean()) < 0.45
+    assert float(highest[~rings].min()) > -0.01
     assert float(highest.min()) > -0.01 - math.tan(math.radians(2.2))  # the next ring below
     assert float(highest[cut].std()) > 0.03
 
@@ -69,9 +77,7 @@ def test_a_fifth_show_rings_alone_and_some_no_feet():
     for part in _drawn(points, fewest=16):
         seen = torch.rad2deg(torch.atan(slope(part))).unique()
         highs.append(float(seen.min() - elevation.min()))
-        gaps = seen.diff()
-        wide = gaps[gaps > 0.35]  # without a point for as long as between two beams
-        rings += len(wide) >= 3
+        rings += _wide_gaps(part) >= 3
     assert 20 <= rings <= 60
     lifted = torch.tensor(highs) > 0.6 * 0.25 * float(elevation.max() - elevation.min())
     assert 4 <= int(lifted.sum()) <= 30
