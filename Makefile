@@ -4,6 +4,8 @@
 #   make demo [DATA=folder]   the whole way in five minutes, ending in demo/report.html
 #   make test                 lint, types, import floors, tests
 #   make bench                everything timed beside the alternatives, in five minutes; all bars
+#   make smoke                every benchmark at its smallest: whether it runs and agrees, no times
+#   make fuzz                 20,000 damaged files for all readers, in three minutes
 #   make wheel                wheels built, installed in fresh environments, tried
 #   make docs                 the site of docs/, in site/index.html
 #
@@ -29,7 +31,7 @@ DOCUMENTED := $(VENV)/.installed-docs
 # The package is installed in place: only these make another installation necessary.
 SOURCES := pyproject.toml constraints.txt hatch_build.py $(wildcard src/wildshape/ops/native/*.[ch])
 
-.PHONY: demo test bench wheel docs clean
+.PHONY: demo test bench smoke fuzz wheel docs clean
 .DELETE_ON_ERROR:
 
 demo: $(INSTALLED)
@@ -44,6 +46,12 @@ test: $(TESTED)
 
 bench: $(BENCHED)
 	@$(BIN)/python benchmarks/run.py
+
+smoke: $(BENCHED)
+	@$(BIN)/python benchmarks/run.py --smoke
+
+fuzz: $(TESTED)
+	@$(BIN)/python tests/fuzz/run.py --inputs 20000 --workers 2
 
 wheel: $(TESTED)
 	$(BIN)/python .ci/wheel.py

@@ -15,7 +15,7 @@ from importlib.metadata import distribution
 from pathlib import Path
 
 import wildshape
-from wildshape.io.ply import read_ply
+from wildshape.io.scans.ply import read_ply
 from wildshape.ops.library import library
 
 

@@ -2,22 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """How fast a sequence of SemanticKITTI becomes tracks, on one core, and in how much memory.
 
-python benchmarks/bench_convert.py [--frames N] [--sequence DIR --labels FOLDER]
+python benchmarks/bench_convert.py [--frames N] [--small] [--sequence DIR --labels FOLDER]
 
 Replays the scans of a sequence (or made-up ones of the same size) as a long one: every 50 frames
 the cars get new numbers. Memory must not grow with --frames.
 """
 
-import argparse
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
-import torch
 from machine import header, peak_mib, verdict
+from turns import begin, options
 
-from wildshape.datasets.semantic_kitti import SemanticKitti
+from wildshape.datasets.semantic_kitti.reader import SemanticKitti
 
 _POINTS, _CARS, _ON_CAR, _BLOCK = 124_000, 8, 1000, 50
 
@@ -58,22 +57,23 @@ def replay(source: Path, labels: str, folder: Path, frames: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--frames", type=int, default=300)
+    parser = options(__doc__)
+    parser.set_defaults(threads=1)
+    parser.add_argument("--frames", type=int, help="300; small: 100")
     parser.add_argument("--sequence", type=Path)
     parser.add_argument("--labels", default="labels")
-    arguments = parser.parse_args()
-    torch.set_num_threads(1)
+    arguments = begin(parser)
+    frames = arguments.frames or (6 if arguments.smoke else 100 if arguments.small else 300)
     print(header("bench_convert"))
     with tempfile.TemporaryDirectory() as scratch:
         source = arguments.sequence or made_up(Path(scratch) / "made_up")
-        replay(source, arguments.labels, Path(scratch) / "00", arguments.frames)
+        replay(source, arguments.labels, Path(scratch) / "00", frames)
         began, tracks, scans = time.perf_counter(), 0, 0
         for track in SemanticKitti(Path(scratch) / "00").tracks_of("00"):
             tracks, scans = tracks + 1, scans + len(track.scans)
         seconds = time.perf_counter() - began
-    print(f"{arguments.frames} frames, {tracks} tracks, {scans} scans in {seconds:.1f} s")
-    print(verdict("frames a second", arguments.frames / seconds, 10, least=True))
+    print(f"{frames} frames, {tracks} tracks, {scans} scans in {seconds:.1f} s")
+    print(verdict("frames a second", frames / seconds, 10, least=True, kind="clock"))
     print(verdict("peak memory, MiB", peak_mib(), 1024))
 
 

@@ -21,9 +21,9 @@ from plain import gradients_as_ours, twin_of
 from torch import Tensor
 from turns import begin, options, take_turns
 
-from wildshape.models.pcn_winners import encode_winners
-from wildshape.models.shapepose import ShapePoseNet
-from wildshape.ops.allocator import keep_memory
+from wildshape.method.encoders.pcn_winners import encode_winners
+from wildshape.method.network import ShapePoseNet
+from wildshape.ops.device import keep_memory
 from wildshape.training.recipes import PRESETS
 
 GRADIENT_BAR = 1e-10
@@ -100,7 +100,7 @@ def main() -> None:
     keep_memory()
     print(header("bench_encoder.py"))
     outcome = Outcome("encoder")
-    for preset in ("paper-lidar", "small"):
+    for preset in ("small",) if arguments.smoke else ("paper-lidar", "small"):
         measure(outcome, preset, 5.0 if arguments.small else 30.0)
     outcome.publish(arguments.out, small=arguments.small)
 

@@ -17,8 +17,8 @@ from machine import header
 from outcome import Outcome
 from turns import begin, options, take_turns
 
-from wildshape.export.onnx import describe, trace, write_onnx
-from wildshape.export.verify import Runner, compare, open_exported, prepared
+from wildshape.inference.export.onnx import describe, trace, write_onnx
+from wildshape.inference.export.verify import Runner, compare, open_exported, prepared
 from wildshape.inference.predictor import Predictor, load
 from wildshape.records import Points
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
@@ -45,7 +45,7 @@ def main() -> None:
     print(header("bench_export.py"))
     outcome, predictor = Outcome("export"), load(raw=True)
     runner = exported(predictor, arguments.threads)
-    scans = simulated(48 if arguments.small else 1000)
+    scans = simulated(8 if arguments.smoke else 48 if arguments.small else 1000)
     found = compare(runner, predictor, scans)
     outcome.bar(
         f"largest difference over {found.scans} scans, m", found.largest_m, DIFFERENCE_BAR_M

@@ -4,7 +4,7 @@
 
     python benchmarks/bench_gpu.py                     # five minutes
     python benchmarks/bench_gpu.py --small             # one
-    python benchmarks/bench_gpu.py --device cpu --tiny # the same lines on a CPU, no measurement
+    python benchmarks/bench_gpu.py --smoke             # the same lines, also on a CPU: tried
 
 `captured` is the step as `wildshape train` runs it; `eager` the same, not recorded as a CUDA graph;
 `plain` the twin of `plain.py`, cdist and all, on the same batches. `side by side` are runs of other
@@ -27,15 +27,14 @@ from no_wait import NoWait
 from outcome import Outcome
 from plain import plain_loss, twin_of
 from torch import Tensor
-from turns import options
+from turns import begin, options
 
-from wildshape.io.store import Store, open_store
+from wildshape.io.store.store import Store, open_store
 from wildshape.ops.nearest import nearest
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
-from wildshape.training.config import Recipe
-from wildshape.training.meter import Meter
+from wildshape.training.config import Recipe, learning_rate, template_weight
 from wildshape.training.recipes import PRESETS
-from wildshape.training.schedule import learning_rate, template_weight
+from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.setup import Run, setup, step_of
 
 STEP_BARS_MS = {"paper-lidar": 1.2, "paper-views": 2.0}
@@ -132,11 +131,12 @@ def steps(outcome: Outcome, recipe: Recipe, store: Store, size: Size, device: st
     outcome.add(case, times)
     if recipe.name in STEP_BARS_MS:
         bar = STEP_BARS_MS[recipe.name]
-        outcome.bar(f"{case}, ms", outcome.median(case, "captured"), bar)
+        outcome.bar(f"{case}, ms", outcome.median(case, "captured"), bar, kind="clock")
     if recipe.name == "paper-lidar":
         outcome.at_least(case, "captured", "plain", PLAIN_BAR)
         minutes = (start + took * PRESETS["paper-lidar"]().optim.steps) / 60
-        outcome.bar("paper-lidar: the whole schedule, min", minutes, SCHEDULE_BAR_MIN)
+        name = "paper-lidar: the whole schedule, min"
+        outcome.bar(name, minutes, SCHEDULE_BAR_MIN, kind="clock")
 
 
 def launches(trainer: Trainer) -> str:
@@ -199,7 +199,8 @@ def side_by_side(outcome: Outcome, recipe: Recipe, store: Store, size: Size, dev
     case = f"{recipe.name}: a step of any seed"
     outcome.add(case, {f"{k} side by side": [1e3 / rate] for k, rate in rates.items()})
     ratio = rates[size.seeds] / rates[1]
-    outcome.bar(f"{case}: throughput of {size.seeds} / 1", ratio, SIDE_BY_SIDE_BAR, least=True)
+    name = f"{case}: throughput of {size.seeds} / 1"
+    outcome.bar(name, ratio, SIDE_BY_SIDE_BAR, least=True, kind="measured")
 
 
 def search(outcome: Outcome, shape: tuple[int, int, int], device: str) -> None:
@@ -214,7 +215,7 @@ def search(outcome: Outcome, shape: tuple[int, int, int], device: str) -> None:
     case = f"nearest neighbours, {B} x {N} x {M}"
     outcome.add(case, times, best_tera_pairs_a_second=pairs)
     found = B * N * M / outcome.median(case, "ours") * 1e3
-    outcome.bar(f"{case}: pairs a second", found, PAIRS_BAR, least=True)
+    outcome.bar(f"{case}: pairs a second", found, PAIRS_BAR, least=True, kind="clock")
     outcome.at_least(case, "ours", "cdist", CDIST_BAR)
 
 
@@ -242,7 +243,7 @@ def completion(outcome: Outcome, preset: str, size: Size, device: str) -> None:
     rate = {name: 1e3 / min(found) for name, found in each.items()}
     outcome.add(case, each, best_scans_a_second=rate)
     found = 1e3 / outcome.median(case, "with branch scores")
-    outcome.bar(f"{case}: scans a second", found, SCANS_BAR, least=True)
+    outcome.bar(f"{case}: scans a second", found, SCANS_BAR, least=True, kind="clock")
 
 
 def smallest() -> Recipe:
@@ -253,30 +254,29 @@ def smallest() -> Recipe:
 
 def main() -> None:
     parser = options(__doc__)
-    parser.add_argument("--device", choices=("cuda", "cpu"), default="cuda")
-    parser.add_argument("--tiny", action="store_true", help="the smallest sizes: no measurement")
-    arguments = parser.parse_args()
+    parser.add_argument("--device", choices=("cuda", "cpu"))
+    arguments = begin(parser)
+    arguments.device = arguments.device or ("cpu" if arguments.smoke else "cuda")
     if arguments.device == "cuda" and not torch.cuda.is_available():
         print("No GPU here: bench_gpu.py measures nothing.")
         return
-    torch.set_num_threads(arguments.threads)
     print(header("bench_gpu.py"))
-    size = TINY if arguments.tiny else SMALL if arguments.small else FULL
+    size = TINY if arguments.smoke else SMALL if arguments.small else FULL
     recipes = [PRESETS[name]() for name in ("paper-lidar", "paper-views", "default")]
-    if arguments.tiny:
+    if arguments.smoke:
         recipes = [smallest()]
     outcome, device = Outcome("gpu"), arguments.device
     with TemporaryDirectory() as folder:
-        write_cars(Path(folder) / "cars", tracks=2 if arguments.tiny else 64)
+        write_cars(Path(folder) / "cars", tracks=2 if arguments.smoke else 64)
         store = open_store(Path(folder) / "cars")
         for recipe in recipes:
             steps(outcome, recipe, store, size, device)
         agreement(outcome, recipes[0], store, min(size.steps, AGREE), device)
         side_by_side(outcome, recipes[0], store, size, device)
     search(outcome, size.nearest, device)
-    for preset in ("tiny",) if arguments.tiny else ("paper-lidar", "default"):
+    for preset in ("tiny",) if arguments.smoke else ("paper-lidar", "default"):
         completion(outcome, preset, size, device)
-    outcome.publish(arguments.out, small=arguments.small or arguments.tiny)
+    outcome.publish(arguments.out, small=arguments.small)
 
 
 if __name__ == "__main__":

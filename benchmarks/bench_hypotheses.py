@@ -20,11 +20,11 @@ from plain import apart, explain
 from torch import Tensor
 from turns import begin, options, take_turns
 
-from wildshape.datasets.views import Batch
-from wildshape.geometry.rotation import rotation_from_6d
-from wildshape.losses.hindsight import score_hypotheses
-from wildshape.losses.multiview import LossConfig, multiview_loss
-from wildshape.ops.allocator import keep_memory
+from wildshape.geometry.transforms.rotation import rotation_from_6d
+from wildshape.method.hindsight import score_hypotheses
+from wildshape.method.multiview import LossConfig, multiview_loss
+from wildshape.ops.device import keep_memory
+from wildshape.training.batches.views import Batch
 from wildshape.training.recipes import PRESETS
 
 LOSS_BAR, GRADIENT_BAR = 1e-5, 1e-4

@@ -22,8 +22,8 @@ from turns import begin, options, take_turns
 
 from wildshape.ops.library import library
 from wildshape.ops.nearest import Neighbours, nearest_distance
-from wildshape.ops.nearest_native import nearest_both_native
-from wildshape.ops.nearest_torch import nearest_blocked, nearest_reference
+from wildshape.ops.nearest.nearest_native import nearest_both_native
+from wildshape.ops.nearest.nearest_torch import nearest_blocked, nearest_reference
 
 Index = Callable[[Tensor, Tensor], Tensor]
 Step = Callable[[Tensor, Tensor], Tensor]
@@ -37,6 +37,7 @@ BARS = [  # shape, ours, theirs, times faster
     (BARRED[2], "native", "pykdtree", 1.5),
     (BARRED[0], "torch", "torch.cdist", 4.0),
 ]
+LOSS_BAR = 1e-5
 COMPETITORS = ("scipy", "pykdtree", "small_gicp", "pykeops")
 
 
@@ -136,6 +137,8 @@ def measure(outcome: Outcome, methods: dict[str, Step], shape: tuple, seconds: f
     off = {name: abs(loss - first) / first for name, loss in losses.items()}
     times = take_turns({name: partial(turn, step, a, b) for name, step in methods.items()}, seconds)
     outcome.add(case(shape), times, loss_off=off)
+    mine = max(off[name] for name in ("native", "torch", "reference") if name in off)
+    outcome.bar(f"{case(shape)}: losses of our own ways off each other", mine, LOSS_BAR)
 
 
 def case(shape: tuple[int, int, int]) -> str:

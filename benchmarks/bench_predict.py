@@ -23,10 +23,10 @@ from torch import Tensor
 from turns import begin, options, set_clock, take_turns, timed
 
 from wildshape.inference.predictor import Predictor
-from wildshape.io.ply_writer import write_ply
-from wildshape.losses.hindsight import score_hypotheses
-from wildshape.models.checkpoint import ModelSettings, save_checkpoint
-from wildshape.models.shapepose import ShapePoseNet
+from wildshape.io.scans.ply_writer import write_ply
+from wildshape.method.checkpoint import ModelSettings, save_checkpoint
+from wildshape.method.hindsight import score_hypotheses
+from wildshape.method.network import ShapePoseNet
 from wildshape.records import Points
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.recipes import PRESETS
@@ -79,8 +79,9 @@ def one_scan(outcome: Outcome, preset: str, scan: Points, seconds: float) -> Non
     outcome.add(case, take_turns(works, seconds))
     if preset in NETWORK_BARS_MS:
         bar = NETWORK_BARS_MS[preset]
-        outcome.bar(f"{preset}: network, ms", outcome.median(case, "network"), bar)
-    outcome.bar(f"{preset}: complete, ms", outcome.median(case, "complete"), COMPLETE_BAR_MS)
+        outcome.bar(f"{preset}: network, ms", outcome.median(case, "network"), bar, kind="clock")
+    complete = outcome.median(case, "complete")
+    outcome.bar(f"{preset}: complete, ms", complete, COMPLETE_BAR_MS, kind="clock")
 
 
 def many_scans(outcome: Outcome, preset: str, scans: list[Points], seconds: float) -> None:
@@ -97,8 +98,8 @@ def many_scans(outcome: Outcome, preset: str, scans: list[Points], seconds: floa
     outcome.add(case, times, best_scans_a_second=rate)
 
 
-def starts(outcome: Outcome, scan: Points, repeats: int) -> None:
-    """A fresh process each time; files are in the system's cache after the first."""
+def starts(outcome: Outcome, scan: Points, warm: int, repeats: int) -> None:
+    """A fresh process each time; files are in the system's cache after the first ones."""
     with TemporaryDirectory() as name:
         folder = Path(name)
         write_ply(folder / "scan.ply", scan)
@@ -113,7 +114,7 @@ def starts(outcome: Outcome, scan: Points, repeats: int) -> None:
             "python": ("-c", "pass"),
         }
         times = {
-            label: [timed(partial(start, arguments, folder)) for _ in range(repeats + 1)][1:]
+            label: [timed(partial(start, arguments, folder)) for _ in range(warm + repeats)][warm:]
             for label, arguments in commands.items()
         }
     outcome.add("cold start", times)
@@ -130,12 +131,14 @@ def main() -> None:
     tracks = simulate_tracks(SimulationConfig(tracks=4), seed=0, workers=1)
     scans = [scan for track in tracks for scan in track.scans]
     seconds = 1.5 if arguments.small else 10.0
+    count = 4 if arguments.smoke else 32 if arguments.small else 128
     for preset in SIZES:
         one_scan(outcome, preset, scans[0], seconds)
     for preset in SIZES:
-        many_scans(outcome, preset, scans[: 32 if arguments.small else 128], seconds)
+        many_scans(outcome, preset, scans[:count], seconds)
     set_clock(cpu=False)  # other processes' time is not ours
-    starts(outcome, scans[0], 2 if arguments.small else 7)
+    repeats = 1 if arguments.smoke else 2 if arguments.small else 7
+    starts(outcome, scans[0], 0 if arguments.smoke else 1, repeats)
     outcome.publish(arguments.out, small=arguments.small)
 
 

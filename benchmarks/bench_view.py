@@ -3,7 +3,7 @@
 """The viewer on a track of 200 scans: until the first picture, and whether it stutters.
 
     python benchmarks/bench_view.py            # plays the whole track
-    python benchmarks/bench_view.py --small    # 60 scans of it
+    python benchmarks/bench_view.py --small    # 50 scans of it
 
 A headless Chromium draws it, without a GPU. `page served` is from the start of `wildshape view` to
 its address, `first picture` from there to the first orange point of a scan in the browser, which is
@@ -51,9 +51,9 @@ def wildshape(*arguments: object, **how: Any) -> subprocess.Popen:
     return subprocess.Popen(command, text=True, **how)
 
 
-def completed_track(folder: Path) -> Path:
-    """200 scans of several drives as one track, and what `complete` made of it."""
-    config = SimulationConfig(tracks=SCANS // DRIVE, scans=DRIVE)
+def completed_track(folder: Path, count: int) -> Path:
+    """So many scans of several drives as one track, and what `complete` made of it."""
+    config = SimulationConfig(tracks=count // DRIVE, scans=DRIVE)
     drives = list(simulate_tracks(config, seed=2, workers=1))
     scans = tuple(scan for drive in drives for scan in drive.scans)
     names = tuple(f"{i:06d}" for i in range(len(scans)))
@@ -111,22 +111,22 @@ def main() -> None:
     if tools["CHROMIUM"] is None:
         print("not measured: no chromium on PATH to open the viewer with")
         return
-    outcome = Outcome("view")
+    outcome, count = Outcome("view"), DRIVE if arguments.smoke else SCANS
     with TemporaryDirectory() as name, tools["browser"](Path(name) / "profile") as tab:
-        folder = completed_track(Path(name))
+        folder = completed_track(Path(name), count)
         served, drawn, viewer = first_picture(tab, folder)
-        found = pauses(tab, 60 if arguments.small else SCANS)
+        found = pauses(tab, count // 4 if arguments.small else count)
         if arguments.picture:
             save(arguments.picture, tab.shot())
         viewer.terminate()
         viewer.wait()
     start = {"page served": [1e3 * served], "first picture": [1e3 * drawn]}
-    outcome.add(f"start, {SCANS} scans", start)
+    outcome.add(f"start, {count} scans", start)
     outcome.add(f"playing, one scan every {DUE_MS:g} ms", {"pause": found})
-    outcome.bar("first picture after start, s", served + drawn, PICTURE_BAR_S)
-    outcome.bar(
-        f"pause while playing, median {median(found):.0f}, 95 %, ms", p95(found), PAUSE_BAR_MS
-    )
+    first = served + drawn
+    outcome.bar("first picture after start, s", first, PICTURE_BAR_S, kind="clock")
+    name = f"pause while playing, median {median(found):.0f}, 95 %, ms"
+    outcome.bar(name, p95(found), PAUSE_BAR_MS, kind="clock")
     outcome.publish(arguments.out, small=arguments.small)
 
 

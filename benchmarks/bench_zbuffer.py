@@ -14,8 +14,8 @@ from torch import Tensor
 from turns import begin, options, take_turns
 
 from wildshape.ops.library import library
-from wildshape.ops.zbuffer_native import visible_native
-from wildshape.ops.zbuffer_torch import visible_reference
+from wildshape.ops.zbuffer.zbuffer_native import visible_native
+from wildshape.ops.zbuffer.zbuffer_torch import visible_reference
 
 SHAPES = [(128, 512, 131072), (128, 2048, 131072), (128, 2048, 4096), (1, 8192, 16384)]
 SMALL = SHAPES[1:3]

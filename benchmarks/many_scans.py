@@ -18,8 +18,8 @@ from functools import cache
 import numpy as np
 import torch
 
-from wildshape.geometry.rotation import rotation_z
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.rotation import rotation_z
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import torch
 from figure import draw
-from machine import header, p95, verdict
+from machine import Kind, header, p95, verdict
 from turns import clock_name
 
 from wildshape.io.atomic import write_json, write_text
@@ -68,12 +68,14 @@ class Outcome:
         """A bar: in this case `fast` is so many times faster than `slow`."""
         ratio = self.median(case, slow) / self.median(case, fast)
         if ratio == ratio:
-            self.bar(f"{case}: {slow} / {fast}", ratio, times, least=True)
+            self.bar(f"{case}: {slow} / {fast}", ratio, times, least=True, kind="measured")
         else:
             self.note(f"not measured: {case}: {slow} / {fast} >= {times:g}")
 
-    def bar(self, name: str, value: float, bar: float, *, least: bool = False) -> None:
-        self.bars.append(verdict(name, value, bar, least=least))
+    def bar(
+        self, name: str, value: float, bar: float, *, least: bool = False, kind: Kind = "exact"
+    ) -> None:
+        self.bars.append(verdict(name, value, bar, least=least, kind=kind))
 
     def publish(self, folder: Path, *, small: bool) -> None:
         """Print the bars; write NAME.csv, NAME.json (provenance) and NAME.svg."""

@@ -12,13 +12,13 @@ from collections.abc import Iterator
 import torch
 from torch import Tensor, nn
 
-from wildshape.datasets.views import Batch
-from wildshape.geometry.rotation import rotation_from_6d
-from wildshape.geometry.visibility import Projection, bin_points
-from wildshape.losses.multiview import LossConfig
-from wildshape.losses.steady import turning_handicap
-from wildshape.losses.template import template_deviation
-from wildshape.models.shapepose import NetworkConfig, ShapePoseNet
+from wildshape.geometry.projection.visibility import Projection, bin_points
+from wildshape.geometry.transforms.rotation import rotation_from_6d
+from wildshape.method.multiview import LossConfig
+from wildshape.method.network import NetworkConfig, ShapePoseNet
+from wildshape.training.batches.views import Batch
+from wildshape.training.heading_continuity import turning_handicap
+from wildshape.training.template import template_deviation
 
 _SMALLEST = 1e-12
 _MODES = {False: "use_mm_for_euclid_dist_if_necessary", True: "donot_use_mm_for_euclid_dist"}
@@ -125,7 +125,7 @@ def handicap(
     batch: Batch, rotation: Tensor, cost: Tensor, log_belief: Tensor, config: LossConfig
 ) -> Tensor:
     """`(B, K)` metres that keep a track from turning around between its scans."""
-    if not config.steady:
+    if not config.time_ordered:
         return torch.zeros_like(cost)
     anchor = batch.anchor
     if not anchor.any():

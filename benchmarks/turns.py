@@ -9,9 +9,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import torch
+from machine import judge_speed
 
 _MOST_IN_A_ROUND = 5
 _state: dict[str, Callable[[], float]] = {"clock": time.perf_counter}
+_once = {"wanted": False}
 
 
 def options(doc: str | None) -> argparse.ArgumentParser:
@@ -20,6 +22,9 @@ def options(doc: str | None) -> argparse.ArgumentParser:
         description=doc, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--small", action="store_true", help="the form that `make bench` runs")
+    parser.add_argument(
+        "--smoke", action="store_true", help="seconds: whether it runs and agrees, not how fast"
+    )
     parser.add_argument("--threads", type=int, default=torch.get_num_threads())
     parser.add_argument(
         "--cpu-time", action="store_true", help="where others use the machine too; one thread"
@@ -29,8 +34,11 @@ def options(doc: str | None) -> argparse.ArgumentParser:
 
 
 def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
-    """Read the command line and set threads and clock by it."""
+    """Read the command line and set threads, clock and size by it; `smoke` is `small`, too."""
     arguments = parser.parse_args()
+    arguments.small |= arguments.smoke
+    _once["wanted"] = arguments.smoke
+    judge_speed(wanted=not arguments.smoke)
     if arguments.cpu_time:
         arguments.threads = 1
     torch.set_num_threads(arguments.threads)
@@ -59,8 +67,11 @@ def take_turns(
 ) -> dict[str, list[float]]:
     """Milliseconds of every call of each method, round by round after one to warm up.
 
-    Fast methods are called several times a round, at most as long as the slowest one takes.
+    Fast methods are called several times a round, at most as long as the slowest one takes. In the
+    smoke form each is called once.
     """
+    if _once["wanted"]:
+        return {name: [timed(work)] for name, work in methods.items()}
     calls = _calls_a_round({name: timed(work) for name, work in methods.items()})
     found: dict[str, list[float]] = {name: [] for name in methods}
     end, rounds = time.perf_counter() + seconds, 0

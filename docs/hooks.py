@@ -13,8 +13,14 @@ from typing import Any
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
+_RESULTS = ("shipped-weights", "depth-views", "demo", "paper-tables", "speed")
 COPIES = "repository"  # where files from outside of docs/ lie on the site
-WRITTEN = ("benchmarks/RESULTS.md", "CHANGELOG.md", "CONTRIBUTING.md")
+WRITTEN = (
+    "benchmarks/RESULTS.md",
+    *(f"benchmarks/results/{name}.md" for name in _RESULTS),
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+)
 HELP = "commands.md"
 _LINK = re.compile(r"(\]\()([^)#\s]+)((?:#[^)]*)?\))")
 _FENCE = re.compile(r"(^```.*?^```)", re.DOTALL | re.MULTILINE)

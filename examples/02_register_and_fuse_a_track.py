@@ -8,8 +8,8 @@ python examples/02_register_and_fuse_a_track.py [TRACK [FUSED.ply]]
 import sys
 
 import wildshape
-from wildshape.inference.registering import fuse_scans
-from wildshape.io.ply_writer import write_ply
+from wildshape.inference.registration import fuse_scans
+from wildshape.io.scans.ply_writer import write_ply
 from wildshape.io.tracks import read_track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import wildshape
 from wildshape.io.inputs import open_tracks
-from wildshape.io.store import StoreWriter, open_store
+from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.loop import fit, setup
 from wildshape.training.recipes import PRESETS

@@ -18,7 +18,7 @@ from PIL import Image
 from wildshape.evaluation.boxes import box_score, true_box
 from wildshape.inference.boxes import carried
 from wildshape.inference.predictor import load
-from wildshape.io.detections import pose_of
+from wildshape.io.boxes.detections import pose_of
 from wildshape.records import Box
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
@@ -49,7 +49,7 @@ def main(settings: Settings) -> None:
     model, i = load(), settings.scan
     pose, truth = track.T_sensor_object[i], true_box(track.shape)
     one = model.complete(track.scans[i], track.sensor)
-    whole = model.complete_track(track.scans, track.sensor, refine="graph")[i]
+    whole = model.complete_track(track.scans, track.sensor)[i]
     boxes = (
         ("truth", carried(truth, pose), _TRUTH),
         (f"one scan, IoU {box_score(one.box, truth, pose).iou:.2f}", one.box, _ONE),

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import tyro
 
-from wildshape.io.store import open_store
+from wildshape.io.store.store import open_store
 
 
 @dataclass(frozen=True)

@@ -26,15 +26,15 @@ from safetensors import safe_open
 from wildshape.evaluation.confidence import RiskCoverage, rank_correlation, risk_coverage
 from wildshape.evaluation.metrics import completion_error
 from wildshape.evaluation.turning import turn_track
-from wildshape.geometry.se3 import stack
+from wildshape.geometry.transforms.se3 import stack
 from wildshape.inference.predictor import Predictor, load
-from wildshape.inference.shipped import SHIPPED, weights_file
+from wildshape.inference.shipped_weights import SHIPPED, weights_file
 from wildshape.io.atomic import write_json
 from wildshape.io.provenance import provenance
-from wildshape.io.store import Store, open_store
-from wildshape.io.store_writer import StoreWriter
-from wildshape.models.checkpoint import load_checkpoint, save_checkpoint
-from wildshape.models.confidence import Calibration, Facts, fit_calibration
+from wildshape.io.store.store import Store, open_store
+from wildshape.io.store.writer import StoreWriter
+from wildshape.method.checkpoint import load_checkpoint, save_checkpoint
+from wildshape.method.confidence import Calibration, Facts, fit_calibration
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
 _VEHICLES, _SCANS = ("car", "truck", "bus"), 12

@@ -24,9 +24,9 @@ import tyro
 from experiments.meshes import road_vehicles
 
 from wildshape.io.provenance import provenance
-from wildshape.io.store import open_store
-from wildshape.io.store_writer import StoreWriter
-from wildshape.models.checkpoint import load_checkpoint, save_checkpoint
+from wildshape.io.store.store import open_store
+from wildshape.io.store.writer import StoreWriter
+from wildshape.method.checkpoint import load_checkpoint, save_checkpoint
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.loop import fit, setup
 from wildshape.training.recipes import PRESETS

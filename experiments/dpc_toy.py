@@ -29,9 +29,13 @@ from typing import Any
 import numpy as np
 import torch
 
-from wildshape.baselines.dpc import Dpc
-from wildshape.geometry.rotation import rotation_angle
-from wildshape.geometry.viewing_volume import (
+from wildshape.baselines.dpc.checkpoint import DpcSettings
+from wildshape.baselines.dpc.completer import Dpc
+from wildshape.baselines.dpc.objective import PRESETS, DpcRecipe
+from wildshape.baselines.dpc.occupancy import project
+from wildshape.baselines.dpc.silhouette import image_costs
+from wildshape.baselines.dpc.training import DpcRun, fit_dpc, setup_dpc
+from wildshape.baselines.dpc.viewing_volume import (
     ahead,
     coarser,
     offsets,
@@ -39,16 +43,12 @@ from wildshape.geometry.viewing_volume import (
     scan_image,
     to_volume,
 )
+from wildshape.geometry.transforms.rotation import rotation_angle
 from wildshape.io.atomic import write_json
 from wildshape.io.provenance import provenance
-from wildshape.io.store import Store, StoreWriter, open_store
-from wildshape.losses.occupancy import project
-from wildshape.losses.silhouette import image_costs
-from wildshape.models.dpc_checkpoint import DpcSettings
+from wildshape.io.store.store import Store, StoreWriter, open_store
 from wildshape.records import Points, Track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
-from wildshape.training.dpc import PRESETS, DpcRecipe
-from wildshape.training.dpc_loop import DpcRun, fit_dpc, setup_dpc
 
 TRAINED, TESTED, BATCH, POINTS, STRENGTH, SIGMA = 1500, 100, 16, 500, 0.5, 0.5
 CLOSE_DEG, EVERY, ALIGNED = 15.0, 300, 200

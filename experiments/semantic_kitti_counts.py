@@ -13,14 +13,14 @@ Reads labels alone (data_odometry_labels.zip, 179 MB); minutes. What `convert` w
 import sys
 from pathlib import Path
 
-from wildshape.datasets.semantic_kitti import SPLITS, SemanticKitti
-from wildshape.datasets.semantic_kitti_labels import (
+from wildshape.datasets.semantic_kitti.labels import (
     VEHICLES,
     count_points,
     kinds_of,
     label_files,
 )
-from wildshape.datasets.semantic_kitti_sequence import find_sequences
+from wildshape.datasets.semantic_kitti.reader import SPLITS, SemanticKitti
+from wildshape.datasets.semantic_kitti.sequence import find_sequences
 
 PAPER = {"train": (659, 51186), "test": (229, 16299)}
 MEAN = 512

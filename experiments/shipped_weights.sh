@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
 #
-# The figures of the shipped weights in benchmarks/RESULTS.md: simulated drives of procedural and of
+# The figures of the shipped weights in benchmarks/RESULTS.md and results/: simulated drives of procedural and of
 # CAD vehicles that no training has seen, and real KITTI cars; three rotation protocols each.
 #
 #   experiments/shipped_weights.sh CAD_TEST_MESHES KITTI_RAW OUT [WEIGHTS ...]

@@ -22,9 +22,9 @@ import tyro
 from experiments.meshes import stretched
 
 from wildshape.io.provenance import provenance
-from wildshape.io.store import open_store
-from wildshape.io.store_writer import StoreWriter
-from wildshape.models.checkpoint import load_checkpoint, save_checkpoint
+from wildshape.io.store.store import open_store
+from wildshape.io.store.writer import StoreWriter
+from wildshape.method.checkpoint import load_checkpoint, save_checkpoint
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.config import Recipe
 from wildshape.training.loop import MODEL, fit, setup

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from wildshape.geometry.rotation import rotation_z
-from wildshape.geometry.se3 import SE3, stack
+from wildshape.geometry.transforms.rotation import rotation_z
+from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.records import Track
 
 _BODY = ((-2.1, -0.85, -0.6), (2.1, 0.85, 0.1))

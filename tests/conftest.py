@@ -6,7 +6,7 @@ import pytest
 import torch
 from hypothesis import settings
 
-from wildshape.io.store import StoreWriter, open_store
+from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
 settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=40)

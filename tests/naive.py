@@ -7,7 +7,7 @@ import math
 import torch
 from torch.nn.functional import linear, relu
 
-from wildshape.geometry.visibility import FacingBins, PolarBins
+from wildshape.geometry.projection.visibility import FacingBins, PolarBins
 
 
 def encode(encoder, points):

@@ -7,7 +7,7 @@ import math
 import torch
 from hypothesis import strategies as st
 
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 
 _small = st.sampled_from([0.0, 1e-12, 1e-9, 1e-7, 1e-4])
 _coordinate = st.floats(-1, 1, allow_subnormal=False)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wildshape.io.points import read_points
+from wildshape.io.scans.points import read_points
 from wildshape.io.tracks import write_track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 

@@ -2,7 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Results turn into objects of other libraries, and come back as scans."""
 
+import math
+import re
+import subprocess
 import sys
+from dataclasses import replace
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
@@ -10,9 +14,9 @@ import pytest
 import torch
 
 import wildshape
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.prepare import as_points
-from wildshape.records import Box, Completion, Registration, Track
+from wildshape.records import Box, Completion, Intrinsics, Registration, Sensor, Track
 
 
 @pytest.fixture
@@ -74,6 +78,77 @@ def test_every_public_name_is_there():
         assert getattr(wildshape, name).__doc__
     with pytest.raises(AttributeError, match="no attribute 'lode'"):
         _ = wildshape.lode
+
+
+def test_public_names_show_before_anything_heavy_is_imported():
+    program = (
+        "import sys, wildshape, io, contextlib\n"
+        "assert not {'torch', 'numpy'} & set(sys.modules)\n"
+        "assert set(wildshape.__all__) <= set(dir(wildshape))\n"
+        "assert not {'torch', 'numpy'} & set(sys.modules)\n"
+        "print(__import__('pydoc').render_doc(wildshape, renderer=__import__('pydoc').plaintext))\n"
+    )
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert found.returncode == 0, found.stderr
+    for heading in ("class Completion(", "class Predictor(", "    load(", "    save("):
+        assert heading in found.stdout, heading
+
+
+# Turned a quarter about z (x to y), then tipped forward by 30 degrees about its own y.
+TURNED = (math.cos(math.pi / 4), 0.0, 0.0, math.sin(math.pi / 4))
+TIPPED = (
+    math.cos(math.pi / 4) * math.cos(math.pi / 12),
+    -math.sin(math.pi / 4) * math.sin(math.pi / 12),
+    math.cos(math.pi / 4) * math.sin(math.pi / 12),
+    math.sin(math.pi / 4) * math.cos(math.pi / 12),
+)
+
+
+def test_corners_of_a_box_are_in_the_order_that_is_documented():
+    corners = Box((10.0, 5.0, 1.0), (4.0, 2.0, 1.5), TURNED).corners
+    rear_right_bottom, front_left_top = (11.0, 3.0, 0.25), (9.0, 7.0, 1.75)
+    np.testing.assert_allclose(corners[[0, 7]], (rear_right_bottom, front_left_top), atol=1e-12)
+    np.testing.assert_allclose(corners[4] - corners[0], (0.0, 4.0, 0.0), atol=1e-12)
+    np.testing.assert_allclose(corners[2] - corners[0], (-2.0, 0.0, 0.0), atol=1e-12)
+    np.testing.assert_allclose(corners[1] - corners[0], (0.0, 0.0, 1.5), atol=1e-12)
+
+
+@pytest.mark.parametrize("wxyz", [TURNED, TIPPED, tuple(-part for part in TURNED)])
+def test_yaw_of_a_box_is_where_its_x_axis_points_seen_from_above(wxyz):
+    box = Box((10.0, 5.0, 1.0), (4.0, 2.0, 1.5), wxyz)
+    assert box.yaw == pytest.approx(math.pi / 2)
+    flat = Box(box.centre, (0.0, 0.0, 0.0), wxyz)
+    assert flat.yaw == pytest.approx(box.yaw), "the heading does not depend on the size"
+
+
+def test_records_say_in_a_line_what_they_hold(done):
+    track = Track("a", (done.points,) * 3, tuple("xyz"), category="car", shape=done.points)
+    found = Registration(done.pose, inlier_ratio=0.75, confidence=0.9, warning="too large.")
+    said = {
+        "Box(4.00 x 2.00 x 1.50 m, centre (0.00, 0.00, 0.00), yaw 0.0 degrees)": done.box,
+        f"Completion(40 points, confidence 0.90, {done.box!r})": done,
+        "Track('a', 3 scans of 40 to 40 points, car, true shape)": track,
+        "Track('b', 0 scans of 0 to 0 points, lidar)": Track("b", (), ()),
+        "SE3(moves by (0.00, 0.00, 0.00) m, turns by 180.0 degrees)": done.pose,
+        "SE3(5 x 2 transforms)": SE3.identity(5, 2),
+        "Sensor(lidar)": Sensor(),
+        "Sensor(lidar, 0.1 x 0.4 degrees)": Sensor("lidar", (0.1, 0.4)),
+        "Sensor(camera, 4 x 3 pixels)": Sensor(
+            "camera", None, Intrinsics(1.0, 1.0, 2.0, 2.0, 4, 3)
+        ),
+    }
+    for text, record in said.items():
+        assert repr(record) == text
+    doubtful = replace(done, reasons=("unsure", "flat"))
+    assert repr(doubtful) == repr(done)[:-1] + ", not to be trusted: unsure, flat)"
+    assert repr(found) == (
+        f"Registration({done.pose!r}, inlier ratio 0.75, confidence 0.90, warning: too large.)"
+    )
+    model = wildshape.load("chair")
+    assert re.fullmatch(
+        r"Predictor\(camera, objects of [\d.]+ to [\d.]+ m, [\d.]+ million weights, on cpu\)",
+        repr(model),
+    )
 
 
 @pytest.mark.parametrize("posed", [True, False])

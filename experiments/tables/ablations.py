@@ -60,7 +60,7 @@ def _ours_drives(given: Given) -> Block:
         changed(base, "default, w/o facing: turned in yaw", "views", turn="yaw", roll=0.0),
         changed(base, "default, w/o mirror", "network", mirror=False),
         changed(base, "default, w/o template", "loss", template=0.0, template_end=0.0),
-        changed(base, "default, w/o agreed headings", "loss", steady=False, agree_at=()),
+        changed(base, "default, w/o agreed headings", "loss", time_ordered=False, agree_at=()),
         changed(plain, plain.name, "loss", belief=0.0),
         replace(base, name="default, taught by the full one", teacher=base),
     )

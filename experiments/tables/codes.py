@@ -20,7 +20,7 @@ from wildshape.evaluation.figures import project
 from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.prepare import network_input
 from wildshape.io.atomic import atomic_write
-from wildshape.io.store import open_store
+from wildshape.io.store.store import open_store
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,12 +12,12 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
+from wildshape.cli.conversion.sources import open_source
 from wildshape.cli.packing import write_tracks
-from wildshape.cli.sources import open_source
 from wildshape.cli.terminal import progress, say
-from wildshape.datasets.source import all_tracks
+from wildshape.datasets.tracks.source import all_tracks
 from wildshape.errors import BadInputError
-from wildshape.io.store import is_store
+from wildshape.io.store.store import is_store
 from wildshape.records import Track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 

@@ -15,7 +15,7 @@ from experiments.tables.size import sized
 from experiments.tables.table import Block, Table, Trained
 from experiments.tables.train import Workshop, model_of
 
-from wildshape.cli.reading import Reading
+from wildshape.cli.input.tracks import Reading
 from wildshape.evaluation.cases import Case, prepare
 from wildshape.evaluation.examples import pick
 from wildshape.evaluation.figures import draw_panel
@@ -38,7 +38,7 @@ def rungs(given: Given) -> tuple[Trained, ...]:
     template = _with(mirror, "network", start=goal.network.start)
     loss = goal.loss
     template = _with(template, "loss", template=loss.template, template_end=loss.template_end)
-    headings = _with(template, "loss", steady=loss.steady, agree_at=loss.agree_at)
+    headings = _with(template, "loss", time_ordered=loss.time_ordered, agree_at=loss.agree_at)
     ours = _ours(given)
     taught = replace(ours, teacher=ours)
     return (

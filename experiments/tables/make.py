@@ -17,7 +17,7 @@ from wildshape.errors import BadInputError
 from wildshape.evaluation.turning import Rotate
 from wildshape.io.atomic import write_json, write_text
 from wildshape.io.provenance import provenance
-from wildshape.models.checkpoint import load_checkpoint
+from wildshape.method.checkpoint import load_checkpoint
 from wildshape.training.config import Recipe
 
 # Writes a picture to a path, and says what is on it.

@@ -10,11 +10,12 @@ from experiments.tables.data import key, store_of
 from experiments.tables.table import Baseline, Block, Row, Shipped, Trained
 from experiments.tables.train import Model, Workshop, model_of
 
-from wildshape.baselines import dpc
+from wildshape.baselines.dpc import completer as dpc
+from wildshape.baselines.dpc.checkpoint import is_dpc
 from wildshape.baselines.named import baseline
-from wildshape.cli.evaluate import evaluate_once
+from wildshape.cli.evaluation import evaluate_once
+from wildshape.cli.input.tracks import Reading
 from wildshape.cli.models import choose_device, fingerprint, load_model
-from wildshape.cli.reading import Reading
 from wildshape.cli.terminal import say
 from wildshape.errors import MissingExtraError
 from wildshape.evaluation.boxes import BoxScore
@@ -28,10 +29,9 @@ from wildshape.evaluation.results import (
 )
 from wildshape.evaluation.skipped import Skipped
 from wildshape.evaluation.turning import Rotate
-from wildshape.inference.method import Learned, LearnedTrack
+from wildshape.inference.evaluated import Learned, LearnedTrack
 from wildshape.io.atomic import write_json
 from wildshape.io.provenance import provenance
-from wildshape.models.dpc_checkpoint import is_dpc
 
 
 @dataclass(frozen=True)

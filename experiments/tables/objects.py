@@ -18,11 +18,11 @@ from experiments.tables.table import Block, Row, Shipped, Trained
 from experiments.tables.train import Workshop
 
 from wildshape.baselines.local_icp import LocalIcp
+from wildshape.cli.input.tracks import Reading
 from wildshape.cli.models import load_model
-from wildshape.cli.reading import Reading
 from wildshape.evaluation.examples import Example, gather
 from wildshape.evaluation.figures import draw_examples
-from wildshape.inference.method import Learned
+from wildshape.inference.evaluated import Learned
 from wildshape.io.atomic import atomic_write
 from wildshape.simulate.config import Category
 

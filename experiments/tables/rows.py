@@ -6,7 +6,7 @@ from experiments.tables.data import Data
 from experiments.tables.size import Size, sized, sized_dpc
 from experiments.tables.table import Baseline, Trained
 
-from wildshape.training.dpc import dpc, dpc_dagger, dpc_lidar
+from wildshape.baselines.dpc.objective import dpc, dpc_dagger, dpc_lidar
 from wildshape.training.recipes import default, paper_lidar, paper_views
 
 REGISTERING = (

@@ -5,9 +5,9 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from wildshape.baselines.dpc.objective import DpcRecipe
+from wildshape.baselines.dpc.objective import small as small_dpc
 from wildshape.training.config import Recipe
-from wildshape.training.dpc import DpcRecipe
-from wildshape.training.dpc import small as small_dpc
 from wildshape.training.recipes import small, tiny
 
 Like = Literal["tiny", "small"]

@@ -7,10 +7,10 @@ from typing import Literal
 
 from experiments.tables.data import Data, key
 
+from wildshape.baselines.dpc.objective import DpcRecipe
 from wildshape.evaluation.paper import PaperRow
 from wildshape.evaluation.turning import Rotate
 from wildshape.training.config import Recipe
-from wildshape.training.dpc import DpcRecipe
 
 Answer = Literal["raw", "refined", "track"]
 PROTOCOLS: tuple[Rotate, ...] = ("none", "yaw", "so3")

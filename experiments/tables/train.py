@@ -12,16 +12,16 @@ from typing import Any
 from experiments.tables.data import store_of
 from experiments.tables.table import Trained
 
+from wildshape.baselines.dpc.objective import DpcRecipe
+from wildshape.baselines.dpc.training import fit_dpc, setup_dpc
 from wildshape.cli.interrupt import stop_flag
 from wildshape.cli.models import choose_device
 from wildshape.cli.terminal import progress, say
-from wildshape.cli.training import fit_with_progress
+from wildshape.cli.training.recipe import fit_with_progress
 from wildshape.io.atomic import write_json
 from wildshape.io.provenance import provenance
-from wildshape.io.store import Store, open_store
+from wildshape.io.store.store import Store, open_store
 from wildshape.training.config import Recipe
-from wildshape.training.dpc import DpcRecipe
-from wildshape.training.dpc_loop import fit_dpc, setup_dpc
 from wildshape.training.loop import MODEL, setup
 
 _TRAINED = "trained.json"

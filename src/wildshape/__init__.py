@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from wildshape.errors import BadInputError, MissingExtraError
     from wildshape.inference.predictor import Predictor, load
-    from wildshape.io.cloud_writer import save
+    from wildshape.io.scans.cloud_writer import save
     from wildshape.records import Box, Completion, Registration, Sensor, Track
 
 __version__ = "0.1.0"
@@ -29,8 +29,13 @@ _HOME = {
     "MissingExtraError": "wildshape.errors",
     "Predictor": "wildshape.inference.predictor",
     "load": "wildshape.inference.predictor",
-    "save": "wildshape.io.cloud_writer",
+    "save": "wildshape.io.scans.cloud_writer",
 }
+
+
+def __dir__() -> list[str]:
+    """The public names, imported or not, for completion and `help`."""
+    return sorted({*globals(), *__all__})
 
 
 def __getattr__(name: str) -> Any:

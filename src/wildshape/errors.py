@@ -1,14 +1,30 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The two ways in which Wildshape refuses: one sentence that names the cause and the cure."""
+"""The ways in which Wildshape refuses: one sentence that names the cause and the cure."""
+
+_LONGEST = 1600
 
 
 class BadInputError(ValueError):
     """Input that cannot be used; the message is one sentence naming the file and the cure.
 
-    The command line prints the message alone and exits with code 2.
+    The command line prints the message alone and exits with code 2. What a file or its name brings
+    into the message cannot steer a terminal or fill it: characters that are not printable are spelt
+    out, and the middle of a very long message is left out.
     """
+
+    def __init__(self, message: str) -> None:
+        text = "".join(map(_visible, message))
+        super().__init__(text if len(text) <= _LONGEST else f"{text[:1200]} ... {text[-300:]}")
+
+
+class SharedInputError(BadInputError):
+    """What all parts of a data set need cannot be used: going on to the next one is in vain."""
 
 
 class MissingExtraError(ImportError):
     """An optional library is absent; the message names the extra that brings it."""
+
+
+def _visible(character: str) -> str:
+    return character if character.isprintable() else ascii(character)[1:-1]

@@ -5,15 +5,18 @@
 Points are numpy float32 `(n, 3)`; poses are `SE3` over float64 tensors on the CPU.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import torch
 from jaxtyping import Float
 
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.box import SIGNS, box_axes
+from wildshape.geometry.transforms.se3 import SE3
 
 if TYPE_CHECKING:
     import laspy
@@ -22,6 +25,20 @@ if TYPE_CHECKING:
 
 Points = Float[np.ndarray, "_ 3"]
 SensorKind = Literal["lidar", "camera"]
+
+
+def as_text(name: str) -> str:
+    r"""A name that can be written everywhere.
+
+    Bytes of a file's name that are no UTF-8 are spelt out, such as `caf\xe9`, and so are halves of
+    characters that JSON may hold.
+    """
+    if name.isascii():
+        return name
+    try:
+        return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+    except UnicodeEncodeError:
+        return name.encode("utf-8", "backslashreplace").decode()
 
 
 @dataclass(frozen=True)
@@ -50,6 +67,12 @@ class Sensor:
     resolution_deg: tuple[float, float] | None = None
     intrinsics: Intrinsics | None = None
 
+    def __repr__(self) -> str:
+        step, camera = self.resolution_deg, self.intrinsics
+        steps = f", {step[0]:.3g} x {step[1]:.3g} degrees" if step else ""
+        pixels = f", {camera.width} x {camera.height} pixels" if camera else ""
+        return f"Sensor({self.kind}{steps}{pixels})"
+
 
 @dataclass(frozen=True)
 class Track:
@@ -74,6 +97,19 @@ class Track:
     source: str = ""
     T_sensor_object: SE3 | None = None
     shape: Points | None = None
+
+    def __post_init__(self) -> None:
+        """Names are text, whatever the file system holds."""
+        object.__setattr__(self, "scan_names", tuple(map(as_text, self.scan_names)))
+        for kept in ("name", "category", "source"):
+            object.__setattr__(self, kept, as_text(getattr(self, kept)))
+
+    def __repr__(self) -> str:
+        counts = sorted(len(scan) for scan in self.scans) or [0]
+        scans = f"{len(self.scans)} scans of {counts[0]} to {counts[-1]} points"
+        truth = {"poses": self.T_sensor_object, "shape": self.shape}
+        known = [f", true {name}" for name, value in truth.items() if value is not None]
+        return f"Track({self.name!r}, {scans}, {self.category or self.sensor.kind}{''.join(known)})"
 
     @property
     def middle(self) -> int:
@@ -105,6 +141,33 @@ class Box:
     size: tuple[float, float, float]
     quaternion_wxyz: tuple[float, float, float, float]
 
+    def __repr__(self) -> str:
+        length, width, height = self.size
+        centre = ", ".join(f"{value:.2f}" for value in self.centre)
+        sides = f"{length:.2f} x {width:.2f} x {height:.2f} m"
+        return f"Box({sides}, centre ({centre}), yaw {math.degrees(self.yaw):.1f} degrees)"
+
+    @property
+    def corners(self) -> Float[np.ndarray, "8 3"]:
+        """The corners in the sensor frame, metres, float64.
+
+        Corner `4 i + 2 j + k`: i is 0 at the rear (low x of the box), 1 in front; j is 0 on the
+        right (low y), 1 on the left; k is 0 at the bottom, 1 on top.
+        """
+        axes = box_axes(self.quaternion_wxyz)
+        return SIGNS * np.asarray(self.size) / 2 @ axes.T + np.asarray(self.centre)
+
+    @property
+    def yaw(self) -> float:
+        """Where the box's x axis points about the sensor's z axis: radians, -pi to pi.
+
+        0 is the sensor's x, pi / 2 its y. Of a tilted box it is the direction of the x axis seen
+        along z, its length left out of account; of one that stands upright on its end it means
+        nothing. In a camera's frame z looks ahead, and this is no heading.
+        """
+        ahead = box_axes(self.quaternion_wxyz)[:, 0]
+        return math.atan2(ahead[1], ahead[0])
+
 
 @dataclass(frozen=True)
 class Completion:
@@ -122,8 +185,10 @@ class Completion:
         cost: its label-free cost, metres (METHOD 6).
         refined: whether the pose was refined against the scan.
         warning: empty, or one sentence (for example a size outside the training range).
+        reasons: why it is not to be trusted, in short names; empty where nothing speaks against
+            it. `inference/reasons.py` and docs/formats.md say what each means.
         seconds: time spent on this scan.
-        facts: what the confidence is made from (`models/confidence.py`).
+        facts: what the confidence is made from (`method/confidence.py`).
     """
 
     points: Points
@@ -134,8 +199,32 @@ class Completion:
     cost: float
     refined: bool = False
     warning: str = ""
+    reasons: tuple[str, ...] = ()
     seconds: float = 0.0
     facts: tuple[float, ...] = ()
+
+    def __repr__(self) -> str:
+        said = ", refined" if self.refined else ""
+        said += f", not to be trusted: {', '.join(self.reasons)}" if self.reasons else ""
+        said += f", warning: {self.warning}" if self.warning else ""
+        points = f"{len(self.points)} points"
+        return f"Completion({points}, confidence {self.confidence:.2f}, {self.box!r}{said})"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: points and box in 3D, in one piece that needs no network."""
+        from wildshape.geometry.figure import embedded
+
+        return embedded(self.points, self.box.corners, repr(self))
+
+    def show(self) -> Path:
+        """Open points and box in the browser, in 3D.
+
+        Returns:
+            The page, a temporary file that needs no network.
+        """
+        from wildshape.geometry.figure import opened
+
+        return opened(self.points, self.box.corners, repr(self))
 
     def __array__(self, dtype: "DTypeLike | None" = None, copy: bool | None = None) -> np.ndarray:
         """The points."""
@@ -151,19 +240,19 @@ class Completion:
         Raises:
             MissingExtraError: Open3D is not installed.
         """
-        from wildshape.geometry.foreign import open3d_cloud
+        from wildshape.geometry.other_libraries import open3d_cloud
 
         return open3d_cloud(self.points)
 
     def to_trimesh(self) -> "trimesh.PointCloud":
         """The points as a `trimesh.PointCloud`; see also `mesh`."""
-        from wildshape.geometry.foreign import trimesh_cloud
+        from wildshape.geometry.other_libraries import trimesh_cloud
 
         return trimesh_cloud(self.points)
 
     def to_laspy(self) -> "laspy.LasData":
         """The points as a `laspy.LasData`, a tenth of a millimetre fine."""
-        from wildshape.geometry.foreign import las_cloud
+        from wildshape.geometry.other_libraries import las_cloud
 
         return las_cloud(self.points)
 
@@ -172,14 +261,14 @@ class Completion:
 
         Args:
             scan: the points completed, sensor frame; the mesh is then coloured by confidence, and
-                has the vertex attribute `confidence` (`geometry/trusting.py`).
+                has the vertex attribute `confidence` (`geometry/mesh_confidence.py`).
         """
         from wildshape.geometry.meshing import closed_mesh
 
         mesh = closed_mesh(self.pose.inverse().apply_numpy(self.points))
         mesh.apply_transform(self.pose.matrix.numpy())
         if scan is not None:
-            from wildshape.geometry.trusting import colour_by_confidence
+            from wildshape.geometry.mesh_confidence import colour_by_confidence
 
             colour_by_confidence(mesh, scan, self.confidence)
         return mesh
@@ -197,12 +286,19 @@ class Registration:
             where that is less) of a target point.
         confidence: 0 to 1, the smaller of the two completions'.
         warning: empty, or one sentence (see `Completion.warning`).
+        reasons: those of both completions (see `Completion.reasons`).
     """
 
     T_target_source: SE3
     inlier_ratio: float
     confidence: float
     warning: str = ""
+    reasons: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        shares = f"inlier ratio {self.inlier_ratio:.2f}, confidence {self.confidence:.2f}"
+        said = f", warning: {self.warning}" if self.warning else ""
+        return f"Registration({self.T_target_source!r}, {shares}{said})"
 
     def __array__(self, dtype: "DTypeLike | None" = None, copy: bool | None = None) -> np.ndarray:
         """`T_target_source` as a 4x4 matrix, row-major, metres."""

@@ -19,8 +19,8 @@ from wildshape.baselines.pairs import chain
 from wildshape.errors import MissingExtraError
 from wildshape.evaluation.metrics import registration_error
 from wildshape.evaluation.turning import turn_track
-from wildshape.geometry.rotation import rotation_z
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.rotation import rotation_z
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Sensor
 
 LIDAR = Sensor()

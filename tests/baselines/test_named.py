@@ -8,7 +8,8 @@ from importlib.abc import MetaPathFinder
 import pytest
 
 from wildshape.baselines.named import NAMES, baseline
-from wildshape.cli.evaluate import BASELINES, load_models
+from wildshape.cli.commands.evaluate import BASELINES
+from wildshape.cli.models import load_models
 from wildshape.errors import BadInputError, MissingExtraError
 
 

@@ -30,7 +30,7 @@ def test_without_a_gpu_it_says_so():
 
 
 def test_every_path_of_it_runs_on_a_cpu(tmp_path):
-    printed = output("--device", "cpu", "--tiny", "--out", str(tmp_path))
+    printed = output("--smoke", "--out", str(tmp_path))
     for name in ("captured", "eager", "plain", "2 side by side", "ours", "cdist", "complete_many"):
         assert f"\n{name} " in printed, name
     assert "operations that are no views, a step" in printed

@@ -30,7 +30,12 @@ def test_bars_follow_from_the_medians(load, capsys):
     made.at_least("case", "ours", "theirs", 2.0)
     made.at_least("case", "ours", "theirs", 2.1)
     made.at_least("case", "ours", "absent", 2.0)
-    assert [bar.split()[-1] for bar in made.bars] == ["met", "MISSED"]
+    made.bar("a time, ms", 2.0, 1.0, kind="clock")
+    assert [bar.rpartition(": ")[2].split(" ", 1)[1] for bar in made.bars] == [
+        "met",
+        "MISSED",
+        "MISSED by this machine",
+    ]
     assert made.notes == ["not measured: case: absent / ours >= 2"]
     assert "ratio" in capsys.readouterr().out
     assert [row["ratio"] for row in made.rows] == [1.0, 2.0]
@@ -68,15 +73,72 @@ def test_turns_leave_out_the_first_and_repeat_the_fast(load):
     assert len(found["fast"]) == calls["fast"] - 1
 
 
-def test_the_runner_goes_on_after_a_failure_and_says_so(load, monkeypatch, capsys, tmp_path):
-    run = load("run")
-    (tmp_path / "bench_a.py").write_text("raise SystemExit(3)")
-    (tmp_path / "bench_b.py").write_text(
-        "print('bar: b <= 1: 0 met')\nprint('bar: c <= 1: 2 MISSED')"
-    )
-    monkeypatch.setattr(run, "HERE", tmp_path)
-    monkeypatch.setattr(sys, "argv", ["run.py"])
+def test_small_enough_to_try_only_what_is_exact_is_judged(load, capsys):
+    """Nothing is called oftener than needed, and no time of it is held against the machine."""
+    calls: list[str] = []
+    turns, outcome = load("turns"), load("outcome")
+    parser = turns.options("made")
+    parser.set_defaults(smoke=True, threads=1)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["bench_made.py"])
+        assert turns.begin(parser).small
+    times = turns.take_turns({"a": lambda: calls.append("a"), "b": lambda: None}, seconds=60.0)
+    assert (calls, len(times["a"]), len(times["b"])) == (["a"], 1, 1)
+    made = outcome.Outcome("made")
+    made.add("case", {"ours": [1.0], "theirs": [1.0]})
+    made.at_least("case", "ours", "theirs", 2.0)
+    made.bar("a time, ms", 2.0, 1.0, kind="clock")
+    made.bar("off", 2.0, 1.0)
+    assert [bar.endswith("not judged at this size") for bar in made.bars] == [True, True, False]
+    assert made.bars[-1].endswith(" MISSED")
+
+
+@pytest.mark.parametrize(
+    ("scripts", "status", "said"),
+    [
+        (["bar: b <= 1: 0 met"], 0, "1 of 1 bars met"),
+        (["bar: b <= 1: 0 met", "bar: c <= 1: 2 MISSED"], 1, "1 of 2 bars met"),
+        (["bar: b <= 1: 0 met", "bar: c <= 1: 2 MISSED by this machine"], 0, "1 missed by the"),
+        (["bar: b <= 1: 0 met", "nothing"], 1, "FAILED: bench_1.py: it printed no bar"),
+        (["bar: b <= 1: 0 met", "not measured: no browser"], 0, "1 of 1 bars met"),
+    ],
+    ids=["met", "missed", "missed by the clock", "silent", "excused"],
+)
+def test_the_runner_ends_with_what_counts(load, runner, scripts, status, said, capsys):
+    run, folder = runner
+    for i, line in enumerate(scripts):
+        (folder / f"bench_{i}.py").write_text(f"print({line!r})")
+    assert run.main() == status
+    assert said in capsys.readouterr().out
+
+
+def test_the_runner_goes_on_after_a_failure_and_says_so(runner, capsys):
+    run, folder = runner
+    (folder / "bench_a.py").write_text("raise SystemExit(3)")
+    (folder / "bench_b.py").write_text("print('bar: b <= 1: 0 met')")
     assert run.main() == 1
     said = capsys.readouterr().out
-    assert "FAILED: bench_a.py" in said
-    assert said.strip().endswith("1 of 2 bars met")
+    assert "FAILED: bench_a.py: exit status 3" in said
+    assert said.strip().endswith("1 of 1 bars met")
+
+
+@pytest.fixture
+def runner(load, monkeypatch, tmp_path):
+    """`run.py` in a folder of its own."""
+    run = load("run")
+    monkeypatch.setattr(run, "HERE", tmp_path)
+    monkeypatch.setattr(sys, "argv", ["run.py"])
+    return run, tmp_path
+
+
+def test_the_smoke_form_keeps_no_results_and_leaves_none_out(runner, monkeypatch, capsys):
+    run, folder = runner
+    for name in ("a", next(iter(run.LEFT_OUT)).removeprefix("bench_").removesuffix(".py")):
+        (folder / f"bench_{name}.py").write_text(
+            "import sys; print('bar:', *sys.argv[1:], '<= 1: 0 met')"
+        )
+    monkeypatch.setattr(sys, "argv", ["run.py", "--smoke"])
+    assert run.main() == 0
+    given = [line for line in capsys.readouterr().out.splitlines() if line.startswith("bar:")]
+    assert len(given) == 2
+    assert all("--smoke" in line and "--out" in line and "results" not in line for line in given)

@@ -9,9 +9,9 @@ import pytest
 import torch
 from benchmarks.plain import gradients_as_ours, plain_loss, twin_of  # pyright: ignore
 
-from wildshape.datasets.views import ViewSampler
-from wildshape.geometry.visibility import PolarBins
-from wildshape.models.shapepose import ShapePoseNet
+from wildshape.geometry.projection.visibility import PolarBins
+from wildshape.method.network import ShapePoseNet
+from wildshape.training.batches.views import ViewSampler
 from wildshape.training.objectives import WeaklySupervised
 from wildshape.training.recipes import tiny
 
@@ -22,7 +22,7 @@ def test_same_loss_and_gradients(car_store, ours_beyond_the_paper):
     network, loss = recipe.network, recipe.loss
     if not ours_beyond_the_paper:
         network, weight = replace(network, mirror=False, selector=False), 0.0
-        loss = replace(loss, projection=PolarBins(), belief=0.0, steady=False)
+        loss = replace(loss, projection=PolarBins(), belief=0.0, time_ordered=False)
     batch = ViewSampler(car_store, np.arange(len(car_store)), recipe.views).draw(0, 0)
     torch.manual_seed(0)
     ours = ShapePoseNet(network)

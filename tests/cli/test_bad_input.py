@@ -11,8 +11,8 @@ import pytest
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
-from wildshape.cli import results
-from wildshape.io.points import read_points, write_ply
+from wildshape.cli.results import write as results
+from wildshape.io.scans.points import read_points, write_ply
 
 
 @pytest.fixture
@@ -56,6 +56,43 @@ def test_unit_cures(wildshape, scan, trained, tmp_path):
     assert found.code == 0
     completed = read_points(out / "mm" / "completed" / "mm.ply")
     assert np.linalg.norm(completed.mean(0) - scan.mean(0)) < 5.0
+
+
+def test_scans_in_a_map_are_refused_until_their_sensor_is_known(
+    wildshape, refused, dataset, trained, tmp_path
+):
+    """Every command that reads a user's scans: refused without --origin, exactly cured with it."""
+    utm = (412_345.5, 5_312_345.25, -421.125)
+    for file in sorted((dataset / "000000" / "scans").iterdir()):
+        scan = read_points(file).astype(np.float64)
+        for name, points in (("here", scan), ("map", scan + utm)):
+            (tmp_path / name).mkdir(exist_ok=True)
+            np.save(tmp_path / name / f"{file.stem}.npy", points)
+    origin = f"--origin={','.join(map(str, utm))}"
+    model = ("--model", trained)
+    for i, command in enumerate(
+        (
+            ("complete", "{}", "--out", "{}-c", *model),
+            ("register", "{}/000000.npy", "{}/000005.npy", *model, "--json"),
+            ("register", "{}", "--out", "{}-r", *model),
+            ("fuse", "{}", "--out", "{}-f.ply", *model),
+            ("info", "{}", "--json"),
+            ("convert", "folder", "{}", "{}-s"),
+            ("train", "{}", "--out", "{}-t", "--preset", "tiny", "--steps", "1"),
+        )
+    ):
+        here, there = (
+            [str(word).format(tmp_path / name) for word in command] for name in ("here", "map")
+        )
+        found = wildshape(*there)
+        assert (found.code, "--origin X,Y,Z" in found.err + found.out) == (2, True), (i, found)
+        expected, cured = wildshape(*here), wildshape(*there, origin)
+        assert (expected.code, cured.code) == (0, 0), (i, cured)
+        if "--json" in command:
+            assert cured.out.replace("map", "here") == expected.out
+    for made in ("c/{}/completed/000003.ply", "r/{}/poses.txt", "f.ply"):
+        one, other = (tmp_path / f"{n}-{made.format(n)}" for n in ("here", "map"))
+        assert one.read_bytes() == other.read_bytes()
 
 
 def test_a_dataset_goes_on_without_bad_scans(wildshape, dataset, trained, tmp_path):

@@ -11,9 +11,9 @@ from tests.datasets.street import street
 from tests.datasets.write_argoverse2 import T_EGO_UP, write_log
 from tests.datasets.write_kitti_tracking import EYE, write_sequence
 
-from wildshape.datasets.argoverse2_log import read_boxes as read_argoverse2
-from wildshape.datasets.kitti_tracking_labels import read_boxes as read_kitti
-from wildshape.io.detections import pose_of
+from wildshape.datasets.argoverse2.log import read_boxes as read_argoverse2
+from wildshape.datasets.kitti.tracking_labels import read_boxes as read_kitti
+from wildshape.io.boxes.detections import pose_of
 from wildshape.records import Box
 
 FORMATS = ("json", "kitti", "nuscenes", "argoverse2")

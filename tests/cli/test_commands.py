@@ -1,13 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
 import json
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 import torch
 
-from wildshape.io.points import read_points
-from wildshape.io.store import open_store
+from wildshape.inference.config import InferenceConfig
+from wildshape.io.scans.points import read_points
+from wildshape.io.store.store import open_store
 from wildshape.io.tracks import read_poses, read_track
 
 
@@ -44,6 +46,7 @@ def test_complete_a_dataset(wildshape, dataset, trained, tmp_path):
         )
         assert len(poses) == len(track.scans) == len(objects["scans"])
         assert objects["together"] is False
+        assert objects["inference"] == json.loads(json.dumps(asdict(InferenceConfig())))
         for i, entry in enumerate(objects["scans"]):
             assert entry["scan"] == track.scan_names[i]
             shape = read_points(out / "completed" / f"{entry['scan']}.ply")

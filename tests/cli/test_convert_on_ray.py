@@ -13,8 +13,8 @@ from contextlib import contextmanager
 import pytest
 from tests.cli.interrupted_source import Waiting
 
-from wildshape.cli.conversion import Order, convert
-from wildshape.io.store import open_store
+from wildshape.cli.conversion.work import Order, convert
+from wildshape.io.store.store import open_store
 
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("ray") is None, reason="Ray is not installed: not run"
@@ -23,7 +23,7 @@ PROGRAM = """
 import sys
 from pathlib import Path
 from tests.cli.interrupted_source import Waiting
-from wildshape.cli.conversion import Order, convert
+from wildshape.cli.conversion.work import Order, convert
 root, out = map(Path, sys.argv[1:])
 convert(Order("waiting", Waiting(root), out, "packed", None, {}, workers=2, ray="local"))
 """

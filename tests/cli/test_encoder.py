@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`wildshape train --encoder`: another point network, trained, kept, and known for what it is."""
 
-from wildshape.models.checkpoint import load_checkpoint
+from wildshape.method.checkpoint import load_checkpoint
 
 
 def test_train_with_another_encoder(wildshape, refused, store, tmp_path):

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Processes that are killed: finished work stays, and the same command goes on."""
 
+import json
 import os
 import shutil
 import signal
@@ -10,10 +11,11 @@ import sys
 import time
 from contextlib import contextmanager
 
+import pytest
 import torch
 from safetensors.torch import load_file
 
-from wildshape.io.points import read_points
+from wildshape.io.scans.points import read_points
 from wildshape.io.tracks import read_poses
 
 _COPIES = 60
@@ -62,7 +64,8 @@ def test_a_killed_complete_goes_on(wildshape, dataset, trained, tmp_path):
     }
     found = wildshape(*command)
     assert found.code == 0
-    assert f"{len(finished)} tracks had been finished before" in found.out
+    plural = "s" if len(finished) > 1 else ""
+    assert f"{len(finished)} track{plural} had been finished before" in found.out
     assert all(file.stat().st_mtime_ns == when for file, when in kept.items())
     assert len(list(out.glob("*/objects.json"))) == 6
     for folder in out.glob("0*"):
@@ -114,3 +117,82 @@ def test_a_half_written_store_is_begun_again(wildshape, refused, tmp_path):
     found = wildshape(*arguments)
     assert found.code == 0
     assert "again" in found.err
+
+
+def test_two_writers_of_one_output_do_not_mix(wildshape, dataset, trained, tmp_path):
+    """The second is refused while the first works; before, it removed the first one's files."""
+    out = tmp_path / "c"
+    command = ("complete", dataset, "--out", out, "--model", trained)
+    with running(*command) as process:
+        wait_for(lambda: any(out.glob("*/completed/*.ply")), process)
+        process.send_signal(signal.SIGSTOP)
+        second = wildshape(*command)
+        process.send_signal(signal.SIGCONT)
+        assert process.wait(60) == 0
+    assert second.code == 2
+    assert "another process is writing there" in second.err
+    assert len(list(out.glob("*/objects.json"))) == 6
+
+
+@pytest.mark.parametrize("command", ["complete", "train"])
+def test_killed_while_the_marker_was_written(
+    wildshape, dataset, trained, short_run, tmp_path, command
+):
+    """Nothing but a `.part` file was there: that is no foreign folder, and it is removed."""
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / ".wildshape.json.x1y2.part").write_text("{")
+    lines = {
+        "complete": ("complete", dataset, "--out", out, "--model", trained),
+        "train": (*short_run(out), "--resume"),
+    }
+    assert wildshape(*lines[command]).code == 0
+    assert not list(out.glob(".*"))
+
+
+def test_a_killed_training_leaves_no_half_written_files(wildshape, short_run, trained, tmp_path):
+    out = tmp_path / "run"
+    with running(*short_run(out)) as process:
+        wait_for(lambda: (out / "run.json").exists(), process)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    json.loads((out / "run.json").read_text())
+    (out / ".state.safetensors.x1y2.part").write_bytes(b"half")
+    assert wildshape(*short_run(out), "--resume").code == 0
+    assert not list(out.glob(".*"))
+    resumed, whole = (load_file(f / "model.safetensors") for f in (out, trained))
+    assert all(torch.equal(resumed[name], whole[name]) for name in whole)
+
+
+@pytest.mark.parametrize("stopped_at", [1, 2])
+def test_a_conversion_to_folders_killed_at_its_end(
+    wildshape, dataset, tmp_path, monkeypatch, stopped_at
+):
+    """While the parts are removed: their tracks had moved, and were made and moved again."""
+    remove, out, calls = shutil.rmtree, tmp_path / "out", []
+
+    def removed_in_part(path, **options):
+        calls.append(path)
+        if path.name == ".parts" and len(calls) >= stopped_at:
+            for result in path.glob("*/part.json"):
+                result.unlink()
+            raise KeyboardInterrupt
+        remove(path, **options)
+
+    command = ("convert", "folder", dataset, out, "--layout", "folders", "--workers", 1)
+    with monkeypatch.context() as patched:
+        patched.setattr("wildshape.cli.conversion.output.shutil.rmtree", removed_in_part)
+        assert wildshape(*command).code == 130
+    again = wildshape(*command)
+    assert again.code == 0 or "--overwrite" in again.err
+    assert not list(out.glob(".*"))
+    assert json.loads((out / "wildshape.json").read_text())["status"] == "finished"
+    assert len(list(out.glob("*/scans/*.ply"))) == len(list(dataset.glob("*/scans/*.ply")))
+
+
+def test_a_store_killed_while_its_first_file_was_written(wildshape, tmp_path):
+    out = tmp_path / "s.store"
+    out.mkdir()
+    (out / ".writing.json.x1y2.part").write_text("{")
+    assert wildshape("simulate", out, "--tracks", 2, "--scans", 2, "--workers", 1).code == 0
+    assert not list(out.glob(".*"))

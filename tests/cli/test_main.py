@@ -1,14 +1,44 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
+import errno
 import shlex
 import subprocess
 import sys
 from importlib import import_module
+from pathlib import Path
+from typing import Any, get_type_hints
 
 import pytest
 import tyro
 
+from wildshape.baselines.dpc import objective as dpc
+from wildshape.cli.commands import train
 from wildshape.cli.main import COMMANDS
+from wildshape.training import recipes
+
+ROOT = Path(__file__).parents[2]
+MANY_USES = ("complete", "register", "convert", "train", "evaluate", "simulate")
+LISTS = {
+    "complete": {"boxes"},
+    "convert": {"categories", "range_m"},
+    "evaluate": {"model", "baselines"},
+    "view": {"allow_host"},
+}
+
+
+NEEDED = {
+    "complete": ("in",),
+    "convert": ("folder", "in", "out"),
+    "evaluate": ("--out=x", "in"),
+    "view": ("in",),
+}
+ONE_WORD = {"categories", "baselines"}
+
+
+def settings_of(command, *arguments) -> Any:
+    """What the command line's parser makes of the arguments."""
+    settings = import_module(f"wildshape.cli.commands.{command}").Settings
+    return tyro.cli(settings, args=arguments, config=(tyro.conf.FlagCreatePairsOff,))
 
 
 def python(program):
@@ -49,15 +79,90 @@ def test_help_of_no_command_imports_torch():
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_help_ends_with_an_example_that_can_be_typed(wildshape, command):
+def test_help_ends_with_examples_that_can_be_typed(wildshape, command):
     found = wildshape(command, "--help")
     assert found.code == 0
-    heading, example = found.out.rstrip().splitlines()[-2:]
-    assert heading == "example:"
-    words = shlex.split(example)
-    assert words[:2] == ["wildshape", command]
-    settings = tyro.cli(import_module(f"wildshape.cli.{command}").Settings, args=words[2:])
-    assert settings is not None
+    help_text, said = found.out.split("\nexamples:\n")
+    examples = [shlex.split(line.split(" < ")[0]) for line in said.splitlines()]
+    assert len(examples) >= (3 if command in MANY_USES else 1)
+    for words in examples:
+        assert {"wildshape", "wildshape.cli"} & set(words[: words.index(command)])
+        given = words[words.index(command) + 1 :]
+        assert settings_of(command, *given) is not None
+        assert all(word in help_text for word in given if word.startswith("--"))
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_shows_no_default_where_there_is_none(wildshape, command):
+    said = " ".join(wildshape(command, "--help").out.replace("│", " ").split())
+    assert "None" not in said
+    assert "(default: )" not in said
+    assert "(default: '')" not in said
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_values_of_every_list_may_stand_with_commas_or_spaces(wildshape, command):
+    hints = get_type_hints(import_module(f"wildshape.cli.commands.{command}").Settings)
+    lists = {name for name, hint in hints.items() if "tuple" in str(hint)}
+    lists.discard("origin")  # always X,Y,Z
+    assert lists == LISTS.get(command, set())
+    for name in lists:
+        option = f"--{name.replace('_', '-')}"
+        together = [(option, "2,50"), (option, "2, 50"), (f"{option}=2,50",)]
+        apart = [] if name in ONE_WORD else [(option, "2", "50")]
+        found = [
+            getattr(settings_of(command, *NEEDED[command], *words), name)
+            for words in together + apart
+        ]
+        assert len(found[0]) == 2
+        assert set(found) == {found[0]}
+        after = ("--overwrite",) if name in ONE_WORD else ()
+        first = settings_of(command, *together[0], *NEEDED[command], *after)
+        assert getattr(first, name) == found[0], "positionals may follow"
+        assert f"{option} " in wildshape(command, "--help").out
+
+
+def test_a_file_whose_name_holds_a_comma_is_one_model(tmp_path):
+    (tmp_path / "a,b.safetensors").touch()
+    models = (str(tmp_path / "a,b.safetensors"), "car,chair")
+    found = settings_of("evaluate", "in", "--out", "x", "--model", *models)
+    assert found.model == (Path(models[0]), Path("car"), Path("chair"))
+
+
+def test_every_preset_of_train_has_a_line_that_explains_it(wildshape):
+    said = [line.strip("│ ") for line in wildshape("train", "--help").out.splitlines()]
+    presets = {*recipes.PRESETS, *dpc.PRESETS}
+    assert set(train.PRESETS) == presets
+    for preset in presets:
+        assert f"{preset}: {train.PRESETS[preset]}" in said
+        assert settings_of("train", "in", "--out", "x", "--preset", preset).preset == preset
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("complete", "examples/scan.npy", "--out", "x", "--model", "buss"),
+        ("evaluate", "in", "--out", "x", "--model", "car,buss"),
+        ("export", "buss"),
+    ],
+)
+def test_an_unknown_model_lists_the_shipped_ones(refused, store, tmp_path, monkeypatch, arguments):
+    scan = (ROOT / "examples/scan.npy").read_bytes()
+    monkeypatch.chdir(tmp_path)
+    Path("examples").mkdir()
+    Path("examples/scan.npy").write_bytes(scan)
+    Path("in").symlink_to(store)
+    said = refused(*arguments)
+    assert "buss: no such checkpoint" in said
+    assert "airplane, car, chair, default" in said
+
+
+def test_an_unknown_list_value_names_the_known_ones(refused, store, tmp_path):
+    out = ("--out", tmp_path / "x")
+    assert "json, kitti, nuscenes, argoverse2" in refused(
+        "complete", store, *out, "--boxes", "json,kiti"
+    )
+    assert "identity, one-scan" in refused("evaluate", store, *out, "--baselines", "identity,icp")
 
 
 def test_unknown_command_and_usage(wildshape, refused):
@@ -70,3 +175,36 @@ def test_unknown_command_and_usage(wildshape, refused):
 
 def test_version(wildshape):
     assert wildshape("--version").out.strip().count(".") == 2
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError(),
+        OSError(errno.ENOMEM, "Cannot allocate memory"),
+        RuntimeError("DefaultCPUAllocator: can't allocate memory: you tried to allocate 9 bytes."),
+        RuntimeError("can't start new thread"),
+        ImportError("libtorch_cpu.so: failed to map segment from shared object"),
+    ],
+    ids=repr,
+)
+def test_without_memory_there_is_one_sentence(error, wildshape, monkeypatch):
+    """As a library, numpy, torch, a thread or the loader say that memory ran out."""
+
+    def run(settings):
+        raise error
+
+    monkeypatch.setattr("wildshape.cli.commands.info.run", run)
+    found = wildshape("info", "anything")
+    assert found.code == 1
+    assert found.err.startswith("wildshape: not enough memory; ")
+    assert found.err.count("\n") == 1
+
+
+def test_other_errors_of_ours_are_not_hidden(wildshape, monkeypatch):
+    def run(settings):
+        raise RuntimeError("a mistake")
+
+    monkeypatch.setattr("wildshape.cli.commands.info.run", run)
+    with pytest.raises(RuntimeError, match="a mistake"):
+        wildshape("info", "anything")

@@ -19,7 +19,9 @@ def refuse(constant):
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_json(command):
-    assert "json" in {f.name for f in fields(import_module(f"wildshape.cli.{command}").Settings)}
+    assert "json" in {
+        f.name for f in fields(import_module(f"wildshape.cli.commands.{command}").Settings)
+    }
 
 
 def test_commands_say_one_object(wildshape, dataset, store, trained, tmp_path):

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from wildshape.io.points import read_points
+from wildshape.io.scans.points import read_points
 from wildshape.io.trajectories import read_tum
 
 
@@ -67,12 +67,11 @@ def test_evaluate_gives_it_a_row(wildshape, store, trained, tmp_path):
     assert (tmp_path / "found" / "confidence.png").is_file()
 
 
-def test_a_pose_graph_is_another_output_and_wants_scans_used_together(
+def test_a_track_registered_together_has_its_trajectory(
     refused, wildshape, first_track, trained, tmp_path
 ):
     order = ("register", first_track, "--out", tmp_path / "out", "--model", trained)
-    assert "--track" in refused(*order, "--refine", "graph")
-    done = wildshape(*order, "--track", "--refine", "graph")
+    done = wildshape(*order, "--track")
     assert done.code == 0, done.err
     folder = tmp_path / "out" / first_track.name
     times, poses = read_tum(folder / "trajectory.tum")
@@ -81,7 +80,6 @@ def test_a_pose_graph_is_another_output_and_wants_scans_used_together(
     found = json.loads((folder / "trajectory.json").read_text("utf-8"))
     assert [row["time"] for row in found["poses"]] == times
     assert found["smoothness"]["translation_p95_m"] >= 0
-    refused(*order, "--track")
+    refused(*order)
     fused = ("fuse", first_track, "--out", tmp_path / "fused.ply", "--model", trained)
-    assert "--track" in refused(*fused, "--refine", "graph")
-    assert wildshape(*fused, "--track", "--refine", "graph").code == 0
+    assert wildshape(*fused, "--track").code == 0

@@ -10,10 +10,10 @@ import torch
 from tests.cars import poses_of
 
 from wildshape.baselines.local_icp import LocalIcp
-from wildshape.datasets.accumulate import fuse_by_truth
-from wildshape.datasets.argoverse2 import Argoverse2, find_logs
-from wildshape.datasets.argoverse2_log import read_boxes, read_sensor_pose, read_sweep, taken_by
-from wildshape.datasets.boxes import Crop, points_in_box
+from wildshape.datasets.argoverse2.log import read_boxes, read_sensor_pose, read_sweep, taken_by
+from wildshape.datasets.argoverse2.reader import Argoverse2, find_logs
+from wildshape.datasets.tracks.accumulation import fuse_by_truth
+from wildshape.datasets.tracks.box_crop import Crop, points_in_box
 from wildshape.errors import BadInputError
 
 ROOT = Path(__file__).parents[2].parent / "shared" / "data" / "real" / "argoverse2"

@@ -10,12 +10,12 @@ from tests.cars import known
 
 from wildshape.baselines.identity import Identity, OneScan
 from wildshape.baselines.local_icp import LocalIcp
-from wildshape.datasets.accumulate import fuse_by_truth, shape_mirrored
-from wildshape.datasets.boxes import Crop, points_in_box
-from wildshape.datasets.kitti_raw import KittiRaw
-from wildshape.datasets.selection import Selection
-from wildshape.datasets.source import all_tracks
-from wildshape.datasets.tracklets import read_tracklets
+from wildshape.datasets.kitti.raw import KittiRaw
+from wildshape.datasets.kitti.tracklets import read_tracklets
+from wildshape.datasets.tracks.accumulation import fuse_by_truth, shape_mirrored
+from wildshape.datasets.tracks.box_crop import Crop, points_in_box
+from wildshape.datasets.tracks.selection import Selection
+from wildshape.datasets.tracks.source import all_tracks
 from wildshape.evaluation.protocol import run
 from wildshape.evaluation.results import figures_of
 
@@ -42,7 +42,7 @@ def test_twelve_cars_nine_with_enough_scans(tracks):
 
 
 def test_cut_frames_hold_the_same_points_as_full_scans(tracks):
-    from wildshape.datasets.kitti_raw import read_velodyne
+    from wildshape.datasets.kitti.raw import read_velodyne
 
     tracklet = read_tracklets(DRIVE / "tracklet_labels.xml")[0]
     for frame in range(5):

@@ -10,9 +10,9 @@ import torch
 from tests.cars import poses_of
 
 from wildshape.baselines.local_icp import LocalIcp
-from wildshape.datasets.accumulate import fuse_by_truth, shape_partial
-from wildshape.datasets.boxes import Crop
-from wildshape.datasets.kitti_tracking import KittiTracking
+from wildshape.datasets.kitti.tracking import KittiTracking
+from wildshape.datasets.tracks.accumulation import fuse_by_truth, shape_partial
+from wildshape.datasets.tracks.box_crop import Crop
 
 ROOT = Path(__file__).parents[2].parent / "shared" / "data" / "real" / "kitti_tracking"
 TRAINING = ROOT / "training"

@@ -11,11 +11,11 @@ import torch
 from tests.cars import poses_of
 from tests.datasets.write_semantic_kitti import row
 
-from wildshape.datasets.accumulate import fuse_by_truth, shape_mirrored, shape_partial
-from wildshape.datasets.kitti_raw import read_velodyne
-from wildshape.datasets.semantic_kitti import PAPER, SemanticKitti
-from wildshape.datasets.semantic_kitti_sequence import open_sequence
-from wildshape.geometry.se3 import SE3
+from wildshape.datasets.kitti.raw import read_velodyne
+from wildshape.datasets.semantic_kitti.reader import PAPER, SemanticKitti
+from wildshape.datasets.semantic_kitti.sequence import open_sequence
+from wildshape.datasets.tracks.accumulation import fuse_by_truth, shape_mirrored, shape_partial
+from wildshape.geometry.transforms.se3 import SE3
 
 ROOT = Path(__file__).parents[2].parent / "shared" / "data" / "real" / "semantickitti"
 SEQUENCE = ROOT / "sequences" / "00"
@@ -111,6 +111,7 @@ def test_a_frame_with_moving_cars_and_a_truck(tmp_path):
 def test_odometry_agrees_with_whole_scans_within_what_it_is_good_for(steps):
     """The benchmark's poses are 0.2 m a frame off here; a step is 0.86 m, a wrong chain 1.2."""
     T_velo_world = open_sequence(SEQUENCE, "00", "labels_derived", {}).T_velo_world
+    assert T_velo_world is not None
     for i, step in enumerate(steps):
         difference = step.inverse() @ (T_velo_world[i + 1] @ T_velo_world[i].inverse())
         assert float(difference.translation.norm()) < 0.2

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from tests.cars import drive_by
 
-from wildshape.datasets.folder import Folder
-from wildshape.datasets.kitti_raw import KittiRaw
-from wildshape.datasets.packed import Packed
-from wildshape.datasets.source import Source, all_tracks
+from wildshape.datasets.kitti.raw import KittiRaw
+from wildshape.datasets.tracks.folder import Folder
+from wildshape.datasets.tracks.packed import Packed
+from wildshape.datasets.tracks.source import Source, all_tracks
 from wildshape.errors import BadInputError
-from wildshape.io.store import StoreWriter
+from wildshape.io.store.store import StoreWriter
 from wildshape.io.tracks import write_track
 
 
@@ -27,7 +27,7 @@ def test_folder_yields_tracks_in_order_and_counts_bad_scans(tmp_path):
     assert tracks[0].scan_names == ("000000", "000002")
     assert source.rejected == {
         "scan: the PLY header line 'broken' makes no sense; write it again.": 1,
-        "scan: expected a numpy array (n, 3), found another kind of file.": 1,
+        "scan: is empty (0 bytes); write or copy it again.": 1,
         "object: no scan that can be used": 1,
     }
     assert [track.name for track in all_tracks(Folder(tmp_path / "b"))] == ["b"]

@@ -247,6 +247,48 @@ def _links(tokens, i):
     }
 
 
+RELATIVES = {  # folder of tables, channel, folder in the tables, folder on the disk, suffix
+    "lyft": ("train_data", "LIDAR_TOP", "lidar", "train_lidar", ".bin"),
+    "truckscenes": ("v1.0-mini", "LIDAR_LEFT", "{}/LIDAR_LEFT", "{}/LIDAR_LEFT", ".pcd"),
+    "t4": ("annotation", "LIDAR_CONCAT", "data/LIDAR_CONCAT", "data/LIDAR_CONCAT", ".pcd.bin"),
+}
+
+
+def write_relative(root, kind, scenes):
+    """The same scenes as a data set that took over nuScenes' tables lays them out."""
+    tables, channel, said, there, suffix = RELATIVES[kind]
+    write_nuscenes(root, scenes)
+    for file in sorted(root.glob("s*s/LIDAR_TOP/*.pcd.bin")):
+        place = root / there.format(file.parts[-3]) / file.name.replace(".pcd.bin", suffix)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        if suffix == ".pcd":
+            _write_pcd(place, np.fromfile(file, "<f4").reshape(-1, 5))
+        else:
+            place.write_bytes(file.read_bytes())
+        file.unlink()
+    (root / "v1.0-mini").rename(root / tables)
+    for name in ("sensor", "sample_data"):
+        rows = json.loads((root / tables / f"{name}.json").read_text())
+        for row in rows:
+            if row.get("channel") == "LIDAR_TOP":
+                row["channel"] = channel
+            if "LIDAR_TOP" in row.get("filename", ""):
+                folder, _, file = row["filename"].split("/")
+                renamed = file.replace(".pcd.bin", suffix)
+                row["filename"] = f"{said.format(folder)}/{renamed}"
+        (root / tables / f"{name}.json").write_text(json.dumps(rows))
+    return root
+
+
+def _write_pcd(path, rows):
+    head = (
+        "VERSION 0.7\nFIELDS x y z intensity timestamp\nSIZE 4 4 4 4 4\nTYPE F F F F F\n"
+        f"COUNT 1 1 1 1 1\nWIDTH {len(rows)}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\n"
+        f"POINTS {len(rows)}\nDATA binary\n"
+    )
+    path.write_bytes(head.encode() + rows.astype("<f4").tobytes())
+
+
 def picture_scene(root):
     """A small car, passed; what the documentation shows."""
     keys = tuple(range(8))

@@ -127,6 +127,6 @@ _LARGE = {"fx": 560.0, "fy": 560.0, "cx": 319.2, "cy": 239.6, "width": 640, "hei
 
 
 def _chair():
-    from wildshape.simulate.unit_shapes import chair
+    from wildshape.simulate.shapes.unit_shapes import chair
 
     return chair(np.random.default_rng(1)).centred(1.0)

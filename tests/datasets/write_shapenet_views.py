@@ -66,7 +66,7 @@ def write_truth(root, model, kind="downsampled"):
 
 def picture_scene(root):
     """For docs/datasets: chairs of the simulator's own."""
-    from wildshape.simulate.unit_shapes import chair
+    from wildshape.simulate.shapes.unit_shapes import chair
 
     for seed in range(3):
         solid = chair(np.random.default_rng(seed)).centred(1.0)

@@ -15,8 +15,8 @@ from wildshape.evaluation.protocol import run
 from wildshape.evaluation.results import figures_of, write_metrics
 from wildshape.evaluation.tables import markdown
 from wildshape.geometry.box import FittedBox
-from wildshape.geometry.rotation import random_rotation, rotation_z
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.rotation import random_rotation, rotation_z
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.boxes import carried
 
 SHAPE = np.array([[x, y, z] for x in (-2, 2) for y in (-1, 1) for z in (0, 1)], np.float32)

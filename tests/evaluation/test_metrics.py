@@ -12,8 +12,8 @@ from wildshape.evaluation.metrics import (
     hull_area,
     registration_error,
 )
-from wildshape.geometry.rotation import random_rotation, rotation_z
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.rotation import random_rotation, rotation_z
+from wildshape.geometry.transforms.se3 import SE3
 
 
 def naive_chamfer(predicted, truth):

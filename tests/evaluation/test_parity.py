@@ -17,7 +17,7 @@ from wildshape.evaluation.metrics import completion_error, registration_error
 from wildshape.evaluation.protocol import run
 from wildshape.evaluation.results import figures_of, summarise
 from wildshape.evaluation.turning import turn_track
-from wildshape.geometry.se3 import SE3, stack
+from wildshape.geometry.transforms.se3 import SE3, stack
 
 
 def parts(T):

@@ -14,8 +14,8 @@ from wildshape.evaluation.protocol import run
 from wildshape.evaluation.results import figures_of
 from wildshape.evaluation.skipped import Skipped, by_reason
 from wildshape.evaluation.turning import turn_track
-from wildshape.geometry.rotation import random_rotation
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.rotation import random_rotation
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Sensor
 
 

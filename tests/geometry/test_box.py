@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wildshape.geometry.box import fit_box
-from wildshape.geometry.rotation import rotation_angle, rotation_z
+from wildshape.geometry.transforms.rotation import rotation_angle, rotation_z
 
 
 def filled_box(size, yaw, centre, count=600, seed=0):

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from tests.strategies import clouds
 
 from wildshape.geometry.centring import box_centre, frustum_centre, scan_centre
-from wildshape.geometry.rotation import rotation_z
-from wildshape.geometry.spherical import Spherical, from_spherical
+from wildshape.geometry.projection.spherical import Spherical, from_spherical
+from wildshape.geometry.transforms.rotation import rotation_z
 
 
 def turned(points, yaw):

@@ -7,8 +7,8 @@ import math
 import pytest
 import torch
 
-from wildshape.geometry.rotation import rotation_from_quaternion
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.rotation import rotation_from_quaternion
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.boxes import box_seen, carried, fit_to_scans
 
 SIZE = torch.tensor((4.0, 1.8, 1.5), dtype=torch.float64)

@@ -14,7 +14,7 @@ _PROGRAM = """
 import json, warnings
 import torch
 from wildshape.inference.compiled import compiled
-from wildshape.models.shapepose import NetworkConfig, ShapePoseNet
+from wildshape.method.network import NetworkConfig, ShapePoseNet
 
 torch.manual_seed(0)
 sizes = {"encoder": (8, 8, 16, 16), "decoder": (16, 16), "pose": (8, 8), "points": 40}

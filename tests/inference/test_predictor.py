@@ -12,15 +12,15 @@ import torch
 from tests.strategies import rotation_about
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.rotation import rotation_from_quaternion
-from wildshape.geometry.se3 import SE3
-from wildshape.geometry.visibility import FacingBins
+from wildshape.geometry.projection.visibility import FacingBins
+from wildshape.geometry.transforms.rotation import rotation_from_quaternion
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.predictor import Predictor, load
-from wildshape.inference.registering import inlier_ratio
-from wildshape.inference.shipped import weights_file
-from wildshape.models.checkpoint import ModelSettings, save_checkpoint
-from wildshape.models.confidence import Facts
-from wildshape.models.shapepose import NetworkConfig, ShapePoseNet
+from wildshape.inference.registration import inlier_ratio
+from wildshape.inference.shipped_weights import weights_file
+from wildshape.method.checkpoint import ModelSettings, save_checkpoint
+from wildshape.method.confidence import Facts
+from wildshape.method.network import NetworkConfig, ShapePoseNet
 from wildshape.records import Sensor
 
 CONFIG = NetworkConfig(
@@ -219,13 +219,31 @@ def test_tracks_are_registered_to_and_fused_in_the_middle_scan(predictor, count)
     np.testing.assert_allclose(parts[0], T_middle_scan[0].apply_numpy(scans[0]), atol=2e-4)
 
 
-@pytest.mark.parametrize("factor", [1000.0, 0.01])
+@pytest.mark.parametrize("factor", [20.0, 0.01])
 def test_a_scan_of_another_scale_is_flagged(predictor, factor):
     done = predictor.complete(scan() * np.float32(factor))
     assert done.confidence == 0
     assert "extent" in done.warning
     assert "unit" in done.warning
     assert np.isfinite(done.points).all()
+
+
+@pytest.mark.parametrize("kind", [np.float64, torch.float64, np.float32, np.int64])
+def test_a_scan_far_from_its_sensor_is_refused_in_any_precision(predictor, kind):
+    far = scan().astype(np.float64) + np.array([4e5, 5e6, 100])
+    given = torch.from_numpy(far) if kind is torch.float64 else far.astype(kind)
+    for call in (predictor.complete, lambda points: predictor.register(scan(), points)):
+        with pytest.raises(BadInputError, match=r"5\.016e\+06 m from the origin.*float64"):
+            call(given)
+
+
+def test_a_scan_moved_to_its_own_centre_is_flagged(predictor):
+    moved = scan() - scan().mean(0)
+    done = predictor.complete(moved)
+    assert done.confidence == 0
+    assert "no sensor can have stood" in done.warning
+    assert "sensor_inside" in done.reasons
+    assert predictor.register(scan(), moved).warning == done.warning
 
 
 def test_another_kind_of_sensor_is_flagged(predictor):
@@ -267,8 +285,9 @@ def test_shipped_weights_have_names(tmp_path, monkeypatch):
     assert weights_file("default") == weights_file(Path("default")) == shipped
     (tmp_path / "default").write_text("a file of the user's")
     assert weights_file("default") == Path("default")
-    assert weights_file("zeppelin") == Path("zeppelin")
-    assert weights_file("runs/default") == Path("runs/default")
+    for missing in ("zeppelin", "runs/default"):
+        with pytest.raises(BadInputError, match=f"{missing}: no such .* airplane, car, chair, def"):
+            weights_file(missing)
 
 
 def test_level_sensors_are_taken_at_their_word_unless_told_otherwise(tmp_path):

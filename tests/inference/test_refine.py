@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial import KDTree
 from tests.cars import car_surface, drive_by, poses_of
 
+from wildshape.inference.config import InferenceConfig, RefineConfig
 from wildshape.inference.predictor import load
 from wildshape.inference.refine import denser, drawn_to_scan, filled, refine
 
@@ -177,3 +178,12 @@ def test_levelling_may_cost_a_trace_of_the_fit():
     ]
     assert leans[0] > 1.8
     assert leans[1] < 1.4
+
+
+def test_its_numbers_can_be_set_from_python():
+    scan = np.load(Path(__file__).parents[2] / "examples" / "scan.npy")
+    still = InferenceConfig(refine=RefineConfig(iterations=0))
+    raw, unmoved, usual = load(raw=True), load(config=still), load()
+    poses = [predictor.complete(scan).pose.matrix for predictor in (raw, unmoved, usual)]
+    np.testing.assert_allclose(poses[1], poses[0], atol=1e-6)
+    assert float((poses[2] - poses[0]).abs().max()) > 1e-3

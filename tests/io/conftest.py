@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import torch
 
-from wildshape.geometry.rotation import random_rotation
-from wildshape.geometry.se3 import SE3
-from wildshape.io.points import write_ply
+from wildshape.geometry.transforms.rotation import random_rotation
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.scans.points import write_ply
 from wildshape.records import Intrinsics, Sensor, Track
 
 _LISTS = """ply

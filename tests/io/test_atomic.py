@@ -47,3 +47,37 @@ def test_json_is_real_json(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="not JSON compliant"):
         write_json(tmp_path / "b.json", {"a": float("nan")})
     assert not (tmp_path / "b.json").exists()
+
+
+def test_the_longest_name_can_be_written(tmp_path: Path) -> None:
+    longest = tmp_path / ("n" * 255)
+    write_text(longest, "whole")
+    assert longest.read_text() == "whole"
+
+
+@pytest.mark.parametrize("name", ["n" * 256, "n" * 300 + ".json"])
+def test_a_name_that_is_too_long_is_named_before_anything_is_written(name, tmp_path: Path) -> None:
+    def write() -> None:
+        with atomic_write(tmp_path / name):
+            written.append(1)
+
+    written = []
+    with pytest.raises(OSError, match="too long") as refused:
+        write()
+    assert refused.value.filename == str(tmp_path / name)
+    assert ".part" not in str(refused.value)
+    assert written == []
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_in_the_way_is_named(tmp_path: Path) -> None:
+    (tmp_path / "taken" / "by").mkdir(parents=True)
+    with pytest.raises(OSError, match="taken") as refused:
+        write_text(tmp_path / "taken", "")
+    assert ".part" not in str(refused.value)
+    assert [file.name for file in tmp_path.iterdir()] == ["taken"]
+
+
+def test_names_that_are_no_utf8_are_spelt_out(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.html", "caf\udce9")
+    assert (tmp_path / "a.html").read_text("utf-8") == "caf\\udce9"

@@ -15,19 +15,19 @@ from tests.datasets.write_argoverse2 import LOG, STAMPS, write_log
 from tests.datasets.write_kitti_tracking import EYE, write_sequence
 from tests.datasets.write_nuscenes import Scene, Thing, ego_pose, sensor_pose, write_nuscenes
 
-from wildshape.datasets.argoverse2 import Argoverse2
-from wildshape.datasets.argoverse2_log import read_boxes as read_argoverse2
-from wildshape.datasets.argoverse2_log import read_sensor_pose
-from wildshape.datasets.kitti_calibration import read_calibration, rigid
-from wildshape.datasets.kitti_tracking import KittiTracking
-from wildshape.datasets.kitti_tracking_labels import read_boxes
-from wildshape.datasets.nuscenes import NuScenes
-from wildshape.errors import MissingExtraError
-from wildshape.geometry.rotation import quaternion_from_rotation
-from wildshape.io.argoverse2_boxes import write_argoverse2_boxes
-from wildshape.io.detections import Detection, number_of, write_box_list
-from wildshape.io.kitti_labels import KittiCamera, camera_at_the_lidar, write_kitti_labels
-from wildshape.io.nuscenes_boxes import write_nuscenes_boxes
+from wildshape.datasets.argoverse2.log import read_boxes as read_argoverse2
+from wildshape.datasets.argoverse2.log import read_sensor_pose
+from wildshape.datasets.argoverse2.reader import Argoverse2
+from wildshape.datasets.kitti.calibration import read_calibration, rigid
+from wildshape.datasets.kitti.tracking import KittiTracking
+from wildshape.datasets.kitti.tracking_labels import read_boxes
+from wildshape.datasets.nuscenes.reader import NuScenes
+from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.geometry.transforms.rotation import quaternion_from_rotation
+from wildshape.io.boxes.argoverse2 import write_argoverse2_boxes
+from wildshape.io.boxes.detections import Detection, number_of, read_detections, write_box_list
+from wildshape.io.boxes.kitti import KittiCamera, camera_at_the_lidar, write_kitti_labels
+from wildshape.io.boxes.nuscenes import write_nuscenes_boxes
 from wildshape.records import Box
 
 
@@ -191,3 +191,35 @@ def test_leaning_boxes_stand_upright_in_kitti(tmp_path):
     (found,) = read_boxes(file)
     assert found.T_rect_object.translation.tolist() == pytest.approx((0, 1, 10), abs=1e-5)
     assert found.T_rect_object.rotation[1].tolist() == [0, 0, -1]
+
+
+_BOX = '{"centre": [1, 2, 3], "size": [4, 2, 1], "quaternion_wxyz": [1, 0, 0, 0]}'
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"car-1"', "\udcff"),
+        ('"car-1"', '"\\ud800"'),
+        ('"track"', '"name"'),
+        ('"car-1"', '"../car-1"'),
+        ("[1, 2, 3]", "[1, 2]"),
+        ("[4, 2, 1]", "[4, 2, 1e400]"),
+        ('"lidar"', '"radar"'),
+        ("0.5", "null"),
+        ("0.5", "NaN"),
+        (_BOX, "7"),
+    ],
+)
+def test_damaged_results_are_named_before_a_box_is_written(old, new, tmp_path):
+    text = f'{{"track": "car-1", "sensor": "lidar", "scans": [{{"scan": "7", "box": {_BOX},'
+    text += ' "confidence": 0.5}]}'
+    path = tmp_path / "car-1" / "objects.json"
+    path.parent.mkdir()
+    path.write_text(text)
+    (whole,) = read_detections(tmp_path)
+    assert (whole.track, whole.scan_number, whole.score) == ("car-1", 7, 0.5)
+    assert whole.box.size == (4, 2, 1)
+    path.write_bytes(text.replace(old, new).encode(errors="surrogateescape"))
+    with pytest.raises(BadInputError, match=r"objects\.json: expected what complete"):
+        read_detections(tmp_path)

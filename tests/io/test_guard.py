@@ -10,7 +10,7 @@ import pytest
 
 from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
-from wildshape.io.points import read_points
+from wildshape.io.scans.points import read_points
 
 _ALLOWED_GROWTH_KIB = 200_000
 

@@ -8,8 +8,8 @@ import pytest
 
 from wildshape.errors import BadInputError
 from wildshape.io.inputs import open_tracks
-from wildshape.io.points import write_ply
-from wildshape.io.store import StoreWriter
+from wildshape.io.scans.points import Coordinates, write_ply
+from wildshape.io.store.store import StoreWriter
 from wildshape.io.tracks import NoUsableScanError, write_track
 from wildshape.records import Track
 
@@ -117,7 +117,9 @@ def test_nothing_recognisable(tmp_path: Path) -> None:
 
 def test_unit(dataset: Path, tmp_path: Path, cloud: np.ndarray) -> None:
     np.savetxt(tmp_path / "a.xyz", cloud.astype(np.float64) * 1000)
-    np.testing.assert_allclose(open_tracks(tmp_path / "a.xyz", "mm")[0].scans[0], cloud, rtol=1e-6)
+    np.testing.assert_allclose(
+        open_tracks(tmp_path / "a.xyz", Coordinates("mm"))[0].scans[0], cloud, rtol=1e-6
+    )
     with pytest.raises(BadInputError, match="--unit mm"):
         open_tracks(tmp_path / "a.xyz")[0]
 

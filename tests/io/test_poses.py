@@ -36,6 +36,7 @@ def test_row_major_order(tmp_path: Path) -> None:
         (f"{_ROW}\n1 2 3\n", r"line 2: expected 12 finite numbers"),
         (f"{_ROW}\n{_ROW} 1\n", r"line 2: expected 12"),
         (f"{_ROW}\nnan{_ROW[1:]}\n", r"line 2: expected 12 finite"),
+        (f"{_ROW}\n{_ROW.rpartition(' ')[0]} 1e200\n", r"line 2: expected 12 finite"),
         (f"{_ROW}\n{_ROW.replace('1', '2')}\n", r"line 2: .*determinant 8\.0000"),
         (f"{_ROW}\n-{_ROW}\n", r"line 2: .*determinant -1\.0000"),
         (f"{_ROW}\n1 0.1{_ROW[3:]}\n", r"line 2: .*determinant 1\.0000"),

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from wildshape.errors import BadInputError
-from wildshape.io.points import write_ply
+from wildshape.io.scans.points import Coordinates, write_ply
 from wildshape.io.tracks import NoUsableScanError, read_track, read_track_file, write_track
 from wildshape.records import Sensor, Track
 
@@ -87,13 +87,19 @@ def test_units_apply_to_everything(said_by: str, track: Track, tmp_path: Path) -
         info.write_text(info.read_text().replace('"unit": "m"', '"unit": "mm"'))
         found = read_track(tmp_path / track.name)
     else:
-        found = read_track(tmp_path / track.name, "mm")
+        found = read_track(tmp_path / track.name, Coordinates("mm"))
     for scan, truth in zip(found.scans, track.scans):
         np.testing.assert_allclose(scan, truth, rtol=1e-6)
     assert found.shape is not None
     np.testing.assert_allclose(found.shape, track.shape, rtol=1e-6)
     assert found.T_sensor_object is not None
     torch.testing.assert_close(found.T_sensor_object.matrix, poses.matrix)
+
+
+def _camera(key: str, value: str) -> str:
+    """track.json of a camera with one value replaced."""
+    values = dict.fromkeys(("fx", "fy", "cx", "cy", "width", "height"), "7") | {key: value}
+    return '{"intrinsics": {' + ", ".join(f'"{k}": {v}' for k, v in values.items()) + "}}"
 
 
 @pytest.mark.parametrize(
@@ -108,6 +114,12 @@ def test_units_apply_to_everything(said_by: str, track: Track, tmp_path: Path) -
         ('{"resolution_deg": ["a", 1]}', "resolution_deg"),
         ('{"resolution_deg": [0.2, NaN]}', "no angles"),
         ('{"intrinsics": {"fx": 1}}', "intrinsics"),
+        (_camera("fx", "NaN"), "no camera"),
+        (_camera("fy", "-1"), "no camera"),
+        (_camera("cx", "1e400"), "no camera"),
+        (_camera("width", "0"), "no camera"),
+        (_camera("width", "1" + 400 * "0"), "no camera"),
+        (_camera("height", "Infinity"), "OverflowError"),
     ],
 )
 def test_a_damaged_track_json(text: str, said: str, track: Track, tmp_path: Path) -> None:

@@ -10,9 +10,9 @@ import pytest
 import torch
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.rotation import rotation_from_quaternion, rotation_z
-from wildshape.geometry.se3 import SE3
-from wildshape.geometry.trajectory import smoothness
+from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.geometry.transforms.smoothness import smoothness
 from wildshape.io.trajectories import read_tum, times_of, write_trajectory, write_tum
 
 
@@ -37,7 +37,9 @@ def test_tum_comes_back(tmp_path):
     assert words == pytest.approx([4, 2, 5, -1, 0, 0, half, half])
 
 
-@pytest.mark.parametrize("line", ["1 2 3", "0 1 2 3 0 0 0 9", "0 1 2 nan 0 0 0 1", "a b"])
+@pytest.mark.parametrize(
+    "line", ["", "1 2 3", "1 2 3 4\n5 6 7 8", "0 1 2 3 0 0 0 9", "0 1 2 nan 0 0 0 1", "a b"]
+)
 def test_what_is_no_tum_is_refused(line, tmp_path):
     (tmp_path / "t.tum").write_text(line + "\n")
     with pytest.raises(BadInputError, match="time x y z"):

@@ -9,9 +9,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wildshape.ops.column_argmax import column_argmax
-from wildshape.ops.column_argmax_native import column_argmax_native
-from wildshape.ops.column_argmax_torch import column_argmax_torch
+from wildshape.ops.column_argmax import column_argmax, column_argmax_native, column_argmax_torch
 from wildshape.ops.library import library
 
 needs_library = pytest.mark.skipif(library() is None, reason="native library not built")

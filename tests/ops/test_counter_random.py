@@ -5,7 +5,7 @@
 import pytest
 import torch
 
-from wildshape.geometry.rotation import rotation_angle, rotation_from_uniform
+from wildshape.geometry.transforms.rotation import rotation_angle, rotation_from_uniform
 from wildshape.ops.counter_random import integers, random_bits, uniform
 
 COUNT = 20_000

@@ -14,8 +14,8 @@ from wildshape.errors import BadInputError
 from wildshape.ops import nearest as door
 from wildshape.ops.library import library
 from wildshape.ops.nearest import Neighbours, nearest, nearest_both, nearest_distance
-from wildshape.ops.nearest_native import nearest_native
-from wildshape.ops.nearest_torch import nearest_blocked, nearest_reference
+from wildshape.ops.nearest.nearest_native import nearest_native
+from wildshape.ops.nearest.nearest_torch import nearest_blocked, nearest_reference
 
 needs_library = pytest.mark.skipif(library() is None, reason="native library not built")
 
@@ -110,6 +110,22 @@ def test_far_and_broken_points_keep_indices_legal(backend):
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("count", [2, 16, 40])
+def test_points_that_are_not_finite_find_nothing_and_are_never_found(backend, count):
+    """Where inf - inf was taken for a distance of zero, memory past the clouds was searched."""
+    query, target = clouds(1, count, 16)
+    query[0, 0], query[0, 1, 2] = torch.inf, -torch.inf
+    target[0, 3], target[0, 9, 1], target[0, 5] = -torch.inf, torch.inf, torch.nan
+    found = backend(query, target)
+    assert found.distance_squared[0, :2].tolist() == [torch.inf, torch.inf]
+    assert found.index[0, :2].tolist() == [0, 0]
+    legal = [i for i in range(16) if i not in (3, 5, 9)]
+    squared, index = naive.nearest(query[:, 2:], target[:, legal])
+    torch.testing.assert_close(found.distance_squared[:, 2:].double(), squared)
+    assert torch.equal(found.index[:, 2:], torch.tensor(legal)[index])
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
 @settings(max_examples=25, deadline=None)
 @given(st.integers(1, 3), st.integers(1, 40), st.integers(1, 140), st.integers(0, 999))
 def test_backends_agree_with_the_reference_in_float64(backend, B, N, M, seed):
@@ -196,6 +212,25 @@ def test_gradient_at_zero_distance_in_padding_and_without_target_is_zero(forced,
     assert not query.grad[2].any()
     assert not target.grad[[0, 2]].any()
     assert query.grad[1, :2].norm(dim=-1).allclose(torch.ones(2))
+
+
+@pytest.mark.parametrize("forced", ["torch", "native"])
+def test_gradient_of_points_that_are_not_finite_is_zero(forced, monkeypatch):
+    if forced == "native" and library() is None:
+        pytest.skip("native library not built")
+    monkeypatch.setenv("WILDSHAPE_NEAREST", forced)
+    query, target = (x.requires_grad_() for x in clouds(1, 6, 8))
+    with torch.no_grad():
+        query[0, 0], query[0, 1, 1], target[0, 0] = torch.inf, torch.nan, -torch.inf
+    distance = nearest_distance(query, target)
+    assert distance[0, :2].isinf().all()
+    distance[0, 2:].sum().backward()
+    assert query.grad is not None
+    assert target.grad is not None
+    assert not query.grad[0, :2].any()
+    assert query.grad[0, 2:].norm(dim=-1).allclose(torch.ones(4))
+    assert target.grad.isfinite().all()
+    assert not target.grad[0, 0].any()
 
 
 def test_gradcheck_in_float64():

@@ -11,8 +11,8 @@ import torch
 
 from wildshape.ops.library import library
 from wildshape.ops.nearest import nearest, nearest_both, nearest_distance
-from wildshape.ops.nearest_native import nearest_both_native, nearest_native
-from wildshape.ops.nearest_torch import nearest_reference
+from wildshape.ops.nearest.nearest_native import nearest_both_native, nearest_native
+from wildshape.ops.nearest.nearest_torch import nearest_reference
 
 pytestmark = pytest.mark.skipif(library() is None, reason="native library not built")
 

@@ -11,10 +11,10 @@ import pytest
 
 PROGRAM = """
 import torch
-from wildshape.ops.nearest_torch import nearest_reference
-from wildshape.ops.nearest_triton import nearest_triton
-from wildshape.ops.zbuffer_torch import visible_reference
-from wildshape.ops.zbuffer_triton import visible_triton
+from wildshape.ops.nearest.nearest_torch import nearest_reference
+from wildshape.ops.nearest.nearest_triton import nearest_triton
+from wildshape.ops.zbuffer.zbuffer_torch import visible_reference
+from wildshape.ops.zbuffer.zbuffer_triton import visible_triton
 
 random = torch.Generator().manual_seed(0)
 for B, N, M in [(1, 1, 1), (2, 3, 33), (2, 70, 65), (0, 3, 3), (2, 0, 3), (2, 3, 0)]:

@@ -10,8 +10,8 @@ from tests.ops import naive
 
 from wildshape.ops.library import library
 from wildshape.ops.zbuffer import visible
-from wildshape.ops.zbuffer_native import visible_native
-from wildshape.ops.zbuffer_torch import visible_reference
+from wildshape.ops.zbuffer.zbuffer_native import visible_native
+from wildshape.ops.zbuffer.zbuffer_torch import visible_reference
 
 needs_library = pytest.mark.skipif(library() is None, reason="native library not built")
 BACKENDS = [

@@ -10,10 +10,10 @@ import pytest
 import torch
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.rotation import rotation_z
-from wildshape.geometry.se3 import SE3
-from wildshape.io.points import write_ply
+from wildshape.geometry.transforms.rotation import rotation_z
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.poses import write_poses
+from wildshape.io.scans.points import write_ply
 from wildshape.io.tracks import write_track
 from wildshape.records import Track
 from wildshape.report.folder import report_from_folder
@@ -94,6 +94,15 @@ def test_without_truth_the_least_confident_come_first(tmp_path: Path) -> None:
     assert [row[0] for row in report.index[0].rows] == ["car1", "car2", "car0"]
     assert "least confidence" in report.index[0].title
     assert any("median confidence of 0.40; 6 of them" in line for line in report.findings)
+
+
+def test_what_is_not_to_be_trusted_says_why(tmp_path: Path) -> None:
+    entries = [_entry(name) for name in NAMES]
+    entries[2] |= {"confidence": 0.01, "reasons": ["poor_fit", "low_confidence"]}
+    _completed(tmp_path / "wall", _track(), {"input": "", "scans": entries})
+    report = report_from_folder(tmp_path)
+    assert report.index[0].rows[0][-1] == "poor fit, low confidence"
+    assert any("Results not to be trusted: 1;" in line for line in report.findings)
 
 
 def test_an_evaluation_s_objects_by_our_error(tmp_path: Path) -> None:
@@ -181,7 +190,9 @@ def test_metrics_and_log_become_table_and_curves(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "content", [None, "{", "[]", '{"methods": 3}'], ids=["empty", "broken", "a list", "other"]
+    "content",
+    [None, "{", "[]", '{"methods": 3}', "[" * 100_000],
+    ids=["empty", "broken", "a list", "other", "deep"],
 )
 def test_folder_without_anything_to_report_is_refused(tmp_path: Path, content: str | None) -> None:
     if content is not None:
@@ -195,9 +206,30 @@ def test_missing_folder_is_refused(tmp_path: Path) -> None:
         report_from_folder(tmp_path / "absent")
 
 
-@pytest.mark.parametrize("scans", [7, [{"scan": "000001", "box": {"size": 3}}]])
+@pytest.mark.parametrize(
+    "scans",
+    [7, [{"scan": "000001", "box": {"size": 3}}], [{"scan": "000001", "reasons": 0.5}]],
+)
 def test_damaged_objects_are_named(tmp_path: Path, scans: object) -> None:
     objects = {"input": str(tmp_path / "gone"), "scans": scans}
     _completed(tmp_path / "0007", _track(), objects)
     with pytest.raises(BadInputError, match=r"objects\.json"):
+        report_from_folder(tmp_path)
+
+
+@pytest.mark.parametrize("value", ["null", "[1]", '"x"', "1" + "0" * 400, "NaN", "[0.5, null]"])
+def test_a_log_s_foreign_values_are_left_out(tmp_path: Path, value: str) -> None:
+    good = '{"step": 1, "loss": 0.5, "branch_shares": [0.5, 0.5]}\n'
+    bad = "[" * 100_000 + "\n"
+    bad += f'{{"step": 2, "loss": {value}, "branch_shares": {value}}}\n{{"step": {value}}}\n'
+    (tmp_path / "log.jsonl").write_text(good + bad, encoding="utf-8")
+    series = {c.title: c.series for c in report_from_folder(tmp_path).curves}
+    assert series["Loss"] == (("loss", [1.0], [0.5]),)
+
+
+@pytest.mark.parametrize("made", [[1], 3.0, "x"])
+def test_a_damaged_record_of_a_command_is_named(tmp_path: Path, made: object) -> None:
+    _completed(tmp_path / "0007", _track(), {"scans": []})
+    (tmp_path / "wildshape.json").write_text(json.dumps({"provenance": made}), encoding="utf-8")
+    with pytest.raises(BadInputError, match=r"wildshape\.json: expected what a command says"):
         report_from_folder(tmp_path)

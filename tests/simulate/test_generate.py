@@ -12,7 +12,7 @@ from wildshape.errors import BadInputError
 from wildshape.records import Track
 from wildshape.simulate.config import SensorName
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
-from wildshape.simulate.solid import box
+from wildshape.simulate.shapes.solid import box
 
 
 def _bytes(track: Track) -> bytes:
@@ -105,6 +105,25 @@ def test_a_users_meshes(tmp_path: Path) -> None:
         trimesh.Trimesh(brick.vertices, brick.faces).export(tmp_path / name)
     config = SimulationConfig(tracks=3, scans=3, meshes=tmp_path)
     assert [t.source.split()[-1] for t in _tracks(config)] == ["b", "a", "b"]
+
+
+@pytest.mark.parametrize("corner", [-1, 8, 3_000_000_000])
+def test_triangles_without_their_corners_are_refused(tmp_path: Path, corner: int) -> None:
+    import trimesh
+
+    text = str(trimesh.creation.box((4, 2, 1)).export(file_type="off"))
+    head = text.rstrip().rpartition(" ")[0]
+    (tmp_path / "car.off").write_text(f"{head} {corner}\n")
+    with pytest.raises(BadInputError, match=r"car\.off"):
+        _tracks(SimulationConfig(tracks=1, meshes=tmp_path))
+
+
+def test_triangles_that_a_file_cannot_hold_are_refused(tmp_path: Path) -> None:
+    head = "ply\nformat binary_little_endian 1.0\nelement face 100000\n"
+    head += "property list uchar int vertex_indices\nend_header\n"
+    (tmp_path / "car.ply").write_bytes(head.encode() + bytes(100_000))
+    with pytest.raises(BadInputError, match=r"car\.ply promises 100000 triangles"):
+        _tracks(SimulationConfig(tracks=1, meshes=tmp_path))
 
 
 @pytest.mark.parametrize(

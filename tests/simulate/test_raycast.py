@@ -9,8 +9,8 @@ import pytest
 
 from wildshape.errors import MissingExtraError
 from wildshape.simulate.raycast import Scene
-from wildshape.simulate.solid import Solid, box
-from wildshape.simulate.vehicle import vehicle
+from wildshape.simulate.shapes.solid import Solid, box
+from wildshape.simulate.shapes.vehicle import vehicle
 
 
 def _brute(solid: Solid, origin: np.ndarray, direction: np.ndarray) -> float:

@@ -9,8 +9,8 @@ import trimesh
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.scan import Returns, rays, scan, window
 from wildshape.simulate.sensor import HDL32, HDL64, OS1_128, SpinningLidar
-from wildshape.simulate.solid import Solid, box
-from wildshape.simulate.vehicle import vehicle
+from wildshape.simulate.shapes.solid import Solid, box
+from wildshape.simulate.shapes.vehicle import vehicle
 
 _LIDARS = (HDL64, HDL32, OS1_128)
 _CLEAN = Returns(noise_m=0.0, dropout=0.0, glass=1.0, ground=False)

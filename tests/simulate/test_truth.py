@@ -7,7 +7,7 @@ import pytest
 
 from wildshape.errors import BadInputError
 from wildshape.simulate.raycast import Scene
-from wildshape.simulate.solid import Solid, box, union
+from wildshape.simulate.shapes.solid import Solid, box, union
 from wildshape.simulate.truth import visible_surface
 
 

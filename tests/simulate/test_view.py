@@ -7,8 +7,8 @@ import pytest
 
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.sensor import DEPTH_CAMERA
-from wildshape.simulate.solid import box
-from wildshape.simulate.unit_shapes import airplane
+from wildshape.simulate.shapes.solid import box
+from wildshape.simulate.shapes.unit_shapes import airplane
 from wildshape.simulate.view import back_project, depth_image, random_pose, view
 
 

@@ -5,20 +5,20 @@
 import pytest
 import torch
 
-from wildshape.geometry.rotation import (
-    rotation_angle,
-    rotation_from_quaternion,
-    rotation_z,
-)
-from wildshape.geometry.viewing_volume import (
+from wildshape.baselines.dpc.occupancy import project
+from wildshape.baselines.dpc.silhouette import Rendering, hindsight
+from wildshape.baselines.dpc.viewing_volume import (
     PinholeVolume,
     PolarVolume,
     ahead,
     place,
     to_volume,
 )
-from wildshape.losses.occupancy import project
-from wildshape.losses.silhouette import Rendering, hindsight
+from wildshape.geometry.transforms.rotation import (
+    rotation_angle,
+    rotation_from_quaternion,
+    rotation_z,
+)
 
 SIZE = 16
 

@@ -12,20 +12,20 @@ import pytest
 import torch
 from tests.training.test_step import RECIPES, step_of, take
 
-from wildshape.datasets.resident import ResidentViews, _Scans
-from wildshape.geometry.facing import Facing
-from wildshape.losses import hindsight
-from wildshape.ops.neighbours import Neighbours
+from wildshape.geometry.projection.line_of_sight import Facing
+from wildshape.method import hindsight
+from wildshape.ops.nearest.neighbours import Neighbours
+from wildshape.training.batches.resident import ResidentViews, _Scans
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = """
 import sys
 import torch
 from tests.training.test_step import RECIPES, step_of, take
-from wildshape.io.store import open_store
-from wildshape.losses import hindsight
+from wildshape.io.store.store import open_store
+from wildshape.method import hindsight
 from wildshape.ops import nearest
-from wildshape.ops.zbuffer_triton import visible_triton
+from wildshape.ops.zbuffer.zbuffer_triton import visible_triton
 
 store = open_store(sys.argv[1])
 for recipe, encoding, off in ((RECIPES[0], "bf16", 2e-2), (RECIPES[2], "static", 1e-4)):

@@ -13,7 +13,7 @@ from safetensors.torch import load_file, save_file
 from tests.training.worker import SMALLEST
 
 from wildshape.errors import BadInputError
-from wildshape.models.checkpoint import load_checkpoint
+from wildshape.method.checkpoint import load_checkpoint
 from wildshape.training.loop import StopRequested, fit, setup, split_tracks
 from wildshape.training.state import STATE
 
@@ -122,6 +122,31 @@ def test_resume_refuses_what_is_no_state(car_store, undisturbed, tmp_path, conte
         whole = (undisturbed / STATE).read_bytes()
         path.write_bytes(b"no state" if content == "garbage" else whole[: len(whole) // 2])
     with pytest.raises(BadInputError, match=r"state\.safetensors: cannot be resumed from"):
+        setup(SMALLEST, car_store, tmp_path, seed=3, resume=True)
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("network.shape.layer1.bias", lambda t: t * math.nan),
+        ("mean.shape.layer1.bias", lambda t: t[1:]),
+        ("adam.0.exp_avg", lambda t: t[None]),
+        ("adam.0.exp_avg_sq", lambda t: t / 0),
+        ("adam.3.step", lambda _: None),
+        ("adam.99.step", lambda _: torch.zeros(())),
+        ("anchors", lambda _: torch.zeros(2, 3, 3)),
+        ("network.pose.bias2", lambda t: t.int()),
+    ],
+)
+def test_resume_refuses_a_state_that_does_not_fit(car_store, undisturbed, tmp_path, name, change):
+    with safe_open(undisturbed / STATE, framework="pt") as file:
+        metadata = file.metadata()
+    tensors = load_file(undisturbed / STATE)
+    changed = change(tensors.pop(name, None))
+    save_file(
+        tensors if changed is None else {**tensors, name: changed}, tmp_path / STATE, metadata
+    )
+    with pytest.raises(BadInputError, match=r"state\.safetensors: .*(fit|no numbers)"):
         setup(SMALLEST, car_store, tmp_path, seed=3, resume=True)
 
 

@@ -9,15 +9,15 @@ import pytest
 import torch
 from tests.training.worker import SMALLEST
 
-from wildshape.datasets.fused import FusedBatch
-from wildshape.datasets.views import ViewSampler
-from wildshape.geometry.rotation import random_rotation
-from wildshape.losses.hindsight import score_hypotheses
-from wildshape.losses.steady import turning_handicap
-from wildshape.models.shapepose import Poses, ShapePoseNet
+from wildshape.geometry.transforms.rotation import random_rotation
+from wildshape.method.hindsight import score_hypotheses
+from wildshape.method.network import Poses, ShapePoseNet
 from wildshape.training import objectives
+from wildshape.training.batches.fused import FusedBatch
+from wildshape.training.batches.views import ViewSampler
+from wildshape.training.heading_continuity import turning_handicap
 from wildshape.training.objectives import WeaklySupervised, own_anchor
-from wildshape.training.selftaught import SelfTaught
+from wildshape.training.self_training.objective import SelfTaught
 
 VIEWS = replace(SMALLEST.views, tracks=4, views=3)
 
@@ -82,7 +82,7 @@ def test_the_least_cost_of_the_reference_scan_decides(batch):
 def test_views_in_no_order_are_held_to_what_was_agreed_on_alone(batch):
     torch.manual_seed(0)
     network = ShapePoseNet(SMALLEST.network)
-    loss = replace(SMALLEST.loss, steady=False, agree_at=(0.5,))
+    loss = replace(SMALLEST.loss, time_ordered=False, agree_at=(0.5,))
     objective = WeaklySupervised(network, loss)
     poses = network.poses(network.encode(batch.scans))
     agreed = torch.arange(len(batch.scans)) % 2 == 0

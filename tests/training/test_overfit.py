@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from wildshape.geometry.rotation import random_yaw, rotation_angle
+from wildshape.geometry.transforms.rotation import random_yaw, rotation_angle
 from wildshape.inference.predictor import load
 from wildshape.training.loop import fit, setup
 from wildshape.training.objectives import WeaklySupervised

@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 import torch
 
-from wildshape.datasets.views import ViewSampler
-from wildshape.geometry.visibility import PixelBins, PolarBins
-from wildshape.models.shapepose import ShapePoseNet
+from wildshape.geometry.projection.visibility import PixelBins, PolarBins
+from wildshape.method.network import ShapePoseNet
+from wildshape.training.batches.views import ViewSampler
+from wildshape.training.config import learning_rate
 from wildshape.training.objectives import WeaklySupervised
 from wildshape.training.recipes import PRESETS, paper_lidar, paper_views
-from wildshape.training.schedule import learning_rate
 
 
 @pytest.mark.parametrize("recipe", [paper_lidar(), paper_views()])

@@ -4,9 +4,8 @@ import math
 
 import pytest
 
-from wildshape.losses.multiview import LossConfig
-from wildshape.training.config import OptimConfig
-from wildshape.training.schedule import learning_rate, template_weight
+from wildshape.method.multiview import LossConfig
+from wildshape.training.config import OptimConfig, learning_rate, template_weight
 
 
 def test_warmup_rises_linearly_to_the_full_rate():

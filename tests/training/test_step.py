@@ -13,13 +13,13 @@ from benchmarks.no_wait import NoWait, WaitError  # pyright: ignore
 from benchmarks.plain import plain_loss, twin_of  # pyright: ignore
 from tests.training.worker import SMALLEST
 
-from wildshape.datasets.resident import ResidentViews
-from wildshape.datasets.views import ViewSampler
-from wildshape.models.shapepose import Encoding, ShapePoseNet
-from wildshape.training.meter import Meter
+from wildshape.method.network import Encoding, ShapePoseNet
+from wildshape.training.batches.resident import ResidentViews
+from wildshape.training.batches.views import ViewSampler
+from wildshape.training.config import learning_rate, template_weight
 from wildshape.training.objectives import WeaklySupervised
 from wildshape.training.recipes import default, paper_lidar, paper_views
-from wildshape.training.schedule import learning_rate, template_weight
+from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.state import TrainState
 from wildshape.training.step import Step, average_one_by_one, average_together
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import torch
 from safetensors.torch import save_file
 
-from wildshape.datasets.views import ViewConfig
-from wildshape.io.store import open_store
-from wildshape.models.shapepose import NetworkConfig
+from wildshape.io.store.store import open_store
+from wildshape.method.network import NetworkConfig
+from wildshape.training.batches.views import ViewConfig
 from wildshape.training.config import OptimConfig
 from wildshape.training.loop import fit, setup
 from wildshape.training.recipes import tiny

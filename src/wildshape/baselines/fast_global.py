@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from wildshape.baselines.pairs import about_centroids
-from wildshape.geometry.foreign import load_open3d
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.other_libraries import load_open3d
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 
 

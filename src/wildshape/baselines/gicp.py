@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wildshape.baselines.pairs import Cloud, about_centroids, chain, fuse
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor
 
 

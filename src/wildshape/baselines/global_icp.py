@@ -10,7 +10,7 @@ from wildshape.baselines.icp import point_to_point
 from wildshape.baselines.kiss_matcher import KissMatcher
 from wildshape.baselines.pairs import Cloud, chain, from_here, fuse
 from wildshape.errors import MissingExtraError
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor
 
 

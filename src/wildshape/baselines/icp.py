@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wildshape.baselines.pairs import Cloud
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from wildshape.baselines.pairs import centroid, fuse
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from wildshape.baselines.pairs import about_centroids, chain, fuse
 from wildshape.errors import MissingExtraError
 from wildshape.geometry.outliers import radius_inliers, voxel_thin
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor
 
 # The library's radius of a normal, in voxels; and how many features, on how many points each.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from wildshape.baselines.icp import point_to_point
 from wildshape.baselines.pairs import Cloud, about_centroids, chain, fuse
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor
 
 

@@ -12,8 +12,8 @@ import torch
 from wildshape.baselines.icp import Fit, point_to_point
 from wildshape.baselines.pairs import Cloud, about_centroids, chain, fuse
 from wildshape.geometry.outliers import voxel_thin
-from wildshape.geometry.rotation import rotation_z
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.rotation import rotation_z
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor, SensorKind
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from wildshape.geometry.se3 import SE3, stack
+from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.records import Points
 
 Cloud = Float[np.ndarray, "_ 3"]

@@ -11,6 +11,7 @@ from types import ModuleType
 
 from wildshape.cli.interrupt import Terminated, terminable
 from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.io.single_writer import release_folders
 
 COMMANDS = {
     "demo": "the whole way on simulated scans, or on yours, in five minutes on a CPU",
@@ -28,7 +29,18 @@ COMMANDS = {
 }
 _HELP = ("-h", "--help")
 _BAD_INPUT, _FAILED, _INTERRUPTED, _TERMINATED = 2, 1, 130, 143
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_NO_MEMORY = (
+    "not enough memory; end other programs, raise the limit (ulimit -v) or hand in less at once;"
+    " what is finished stays valid, and the same command goes on from it."
+)
+_MEMORY_WORDS = (
+    "out of memory",
+    "allocate memory",
+    "bad_alloc",
+    "start new thread",
+    "failed to map segment",
+)
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -55,9 +67,11 @@ def main(argv: Sequence[str] | None = None) -> None:
     # Threads that wait must sleep: where another program has one of two cores, spinning ones made
     # training twenty times slower. Read when torch is imported, hence here.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
-    module = import_module(f"wildshape.cli.{arguments[0]}")
     with terminable():
-        _guarded(module, arguments[0], arguments[1:])
+        try:
+            _guarded(arguments[0], arguments[1:])
+        finally:
+            release_folders()
 
 
 def overview() -> str:
@@ -82,16 +96,17 @@ def overview() -> str:
 
 
 def _print_completion(shell: str = "") -> None:
-    from wildshape.cli.completion import SHELLS, script
+    from wildshape.cli.shell_completion import SHELLS, script
 
     if shell not in SHELLS:
         _leave(f"--print-completion {shell}: expected {' or '.join(SHELLS)}.", _BAD_INPUT)
     print(script(shell, COMMANDS), end="")
 
 
-def _guarded(module: ModuleType, command: str, arguments: list[str]) -> None:
+def _guarded(command: str, arguments: list[str]) -> None:
     """Run a command; what a user can cure becomes one sentence and an exit code."""
     try:
+        module = import_module(f"wildshape.cli.commands.{command}")
         module.run(_parse(module, command, arguments))
     except (BadInputError, MissingExtraError) as error:
         _leave(str(error), _BAD_INPUT)
@@ -102,8 +117,20 @@ def _guarded(module: ModuleType, command: str, arguments: list[str]) -> None:
     except BrokenPipeError:
         sys.stderr.close()  # the reader of our output has gone; nothing is left to say
         raise SystemExit(_FAILED) from None
-    except OSError as error:
+    except (MemoryError, RuntimeError, ImportError, OSError) as error:
+        if lacks_memory(error):
+            _leave(_NO_MEMORY, _FAILED)
+        if not isinstance(error, OSError):
+            raise
         _leave(_system_sentence(error), _FAILED if error.errno in _NO_ROOM else _BAD_INPUT)
+
+
+def lacks_memory(error: BaseException) -> bool:
+    """Whether memory or threads ran out, in the words of Python, numpy, torch or the system."""
+    if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
+        return True
+    said = str(error).lower()
+    return any(words in said for words in _MEMORY_WORDS)
 
 
 def _parse(module: ModuleType, command: str, arguments: list[str]) -> object:
@@ -118,7 +145,7 @@ def _parse(module: ModuleType, command: str, arguments: list[str]) -> object:
         )
     except SystemExit as leaving:
         if leaving.code in (0, None):
-            print(f"\nexample:\n  {module.EXAMPLE}")
+            print("\n".join(("", "examples:", *(f"  {line}" for line in module.EXAMPLES))))
         raise
 
 

@@ -3,13 +3,20 @@
 """Which model and which device a command uses."""
 
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import torch
 
 from wildshape.errors import BadInputError
 from wildshape.inference.predictor import Predictor, load
-from wildshape.inference.shipped import weights_file
+from wildshape.inference.shipped_weights import weights_file
+
+if TYPE_CHECKING:
+    from wildshape.baselines.dpc.completer import Dpc
+
+OURS = "wildshape"
 
 
 def model_file(model: Path | None) -> Path:
@@ -28,6 +35,39 @@ def load_model(model: Path | None, device: str = "auto", *, raw: bool = False) -
         BadInputError: no such checkpoint, or none that can be used.
     """
     return load(model_file(model), choose_device(device), raw=raw)
+
+
+def load_models(
+    models: Sequence[Path], device: str, *, raw: bool = False
+) -> "dict[str, Predictor | Dpc]":
+    """Models by the name of their row, ours or DPC's; the shipped weights if none is named.
+
+    Raises:
+        BadInputError: a checkpoint that cannot be used, two of one name, or a baseline's name.
+    """
+    from wildshape.baselines.named import NAMES
+    from wildshape.training.loop import MODEL
+
+    if not models:
+        return {OURS: load_model(None, device, raw=raw)}
+    found: dict[str, Predictor | Dpc] = {}
+    for model in models:
+        file = model_file(model)
+        name = file.resolve().parent.name if file.name == MODEL else file.stem
+        if name in found:
+            raise BadInputError(f"{model}: another --model is called {name} too; rename one.")
+        if name in NAMES:
+            raise BadInputError(f"{model}: {name} is the name of a baseline; rename the model.")
+        found[name] = _dpc(file, device) or load_model(model, device, raw=raw)
+    return found
+
+
+def _dpc(file: Path, device: str) -> "Dpc | None":
+    """The trained DPC in a file, if it is one."""
+    from wildshape.baselines.dpc import completer as dpc
+    from wildshape.baselines.dpc.checkpoint import is_dpc
+
+    return dpc.load(file, choose_device(device)) if is_dpc(file) else None
 
 
 def fingerprint(model: Path | None) -> str:

@@ -2,10 +2,60 @@
 # SPDX-License-Identifier: Apache-2.0
 """Options that several commands share, as types; nothing heavy is imported here."""
 
+from collections.abc import Callable, Sequence
+from functools import partial
+from math import isfinite, nan
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
+from tyro.constructors import PrimitiveConstructorSpec
+
+
+def _hint(default: str) -> str:
+    """Nothing where nothing is the default."""
+    return "" if default in ("None", "", "''") else f"(default: {default})"
+
+
+option = partial(arg, help_behavior_hint=_hint)
+
+
+def listed(
+    metavar: str,
+    read: Callable[[str], Any] = str,
+    *,
+    count: int | None = None,
+    words: Literal[1, "*"] = "*",
+) -> PrimitiveConstructorSpec[Any]:
+    """An option of several values with commas between them.
+
+    Args:
+        metavar: how they are shown; with commas.
+        read: makes a value of a word.
+        count: how many values there must be; None: any number.
+        words: `*`: they may stand apart, too, where no positional argument follows.
+    """
+
+    def values(given: Sequence[str]) -> tuple[Any, ...]:
+        found = tuple(read(word) for word in _apart(given))
+        if count not in (None, len(found)):
+            raise ValueError(f"expected {count} values, got {len(found)}")
+        return found
+
+    return PrimitiveConstructorSpec(
+        nargs=words,
+        metavar=metavar,
+        instance_from_str=values,
+        is_instance=lambda value: value is None or isinstance(value, tuple),
+        str_from_instance=lambda value: [",".join(map(str, value or ()))],
+    )
+
+
+def _apart(words: Sequence[str]) -> list[str]:
+    """Words apart at their commas; a file whose name holds one is a word."""
+    parts = [[word] if Path(word).exists() else word.split(",") for word in words]
+    return [part.strip() for words in parts for part in words if part.strip()]
+
 
 Input = Annotated[
     Path,
@@ -23,11 +73,39 @@ Data = Annotated[
 OutFolder = Annotated[Path, arg(metavar="DIR", help="folder to write")]
 Model = Annotated[
     Path | None,
-    arg(
+    option(
         metavar="M", help="checkpoint, folder of a run, or name of shipped weights; else `default`"
     ),
 ]
 Unit = Annotated[Literal["m", "cm", "mm"], arg(help="of the coordinates in the files")]
+Place = tuple[float, float, float]
+
+
+def _place(words: list[str]) -> Place:
+    try:
+        x, y, z = (float(word) for word in words[0].split(","))
+    except ValueError:
+        x = y = z = nan
+    if not all(map(isfinite, (x, y, z))):
+        raise ValueError(f"expected three numbers X,Y,Z, found '{words[0]}'")
+    return x, y, z
+
+
+Origin = Annotated[
+    Place,
+    PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="X,Y,Z",
+        instance_from_str=_place,
+        is_instance=lambda value: isinstance(value, tuple),
+        str_from_instance=lambda place: [",".join(f"{number:g}" for number in place)],
+    ),
+    arg(
+        help="the sensor's position in the files, of scans that were moved into a map; results are"
+        " in the sensor's frame"
+    ),
+]
+AT_ORIGIN: Place = (0.0, 0.0, 0.0)
 Overwrite = Annotated[bool, arg(help="replace an earlier output")]
 AsJson = Annotated[bool, arg(name="json", help="one JSON object on stdout, for machines")]
 Device = Annotated[
@@ -36,10 +114,6 @@ Device = Annotated[
 Layout = Annotated[
     Literal["packed", "folders"],
     arg(help="one packed store, or track folders with a file a scan"),
-]
-Refine = Annotated[
-    Literal["joint", "graph"],
-    arg(help="with --track: all scans onto each other; graph: also each onto its neighbours"),
 ]
 Together = Annotated[
     bool, arg(name="track", help="use all scans of a track together: one shape, posed in each")

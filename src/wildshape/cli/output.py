@@ -18,8 +18,10 @@ from wildshape.cli.terminal import say
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import write_json
 from wildshape.io.provenance import provenance
+from wildshape.io.single_writer import lock_folder
 
 MARKER = "wildshape.json"
+_LEFTOVER = ".*.part"  # as `io/atomic.py` names what it has not finished
 
 
 @dataclass(frozen=True)
@@ -65,14 +67,17 @@ def begin(
         overwrite: remove an earlier output first.
 
     Raises:
-        BadInputError: something else is there, or a finished output without `overwrite`.
+        BadInputError: something else is there, or a finished output without `overwrite`, or
+            another process is writing there.
     """
     settings = json.loads(json.dumps(settings, default=str))
     resumed = False
     if path.exists() and not path.is_dir():
         raise BadInputError(f"{path}: is a file; --out names a folder to write.")
-    if path.is_dir() and any(path.iterdir()):
+    lock_folder(path)
+    if is_begun(path):
         resumed = _existing(path, command, settings, overwrite=overwrite)
+    remove_leftovers(path)
     record = {
         "command": command,
         "status": "running",
@@ -93,6 +98,19 @@ def keep_apart(source: Path, out: Path) -> None:
     source, target = source.resolve(), out.resolve()
     if target == source or target in source.parents:
         raise BadInputError(f"{out}: holds the input {source}; choose another place to write.")
+
+
+def is_begun(path: Path) -> bool:
+    """Whether a folder holds anything but what a process left that was killed while writing."""
+    leftovers = set(path.glob(_LEFTOVER)) if path.is_dir() else set()
+    return path.is_dir() and any(entry not in leftovers for entry in path.iterdir())
+
+
+def remove_leftovers(path: Path) -> None:
+    """Remove what a process left that was killed while writing; no other may be at work."""
+    for leftover in path.rglob(_LEFTOVER):
+        if leftover.is_file():
+            leftover.unlink()
 
 
 def unfinished(path: Path, command: str) -> bool:
@@ -137,9 +155,6 @@ def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: 
             f"{path}: holds the unfinished output of `{record.get('command')}` with other"
             " settings; repeat it as it was, pass --overwrite, or choose another --out."
         )
-    for leftover in path.rglob(".*.part"):  # of a process that was killed while writing
-        if leftover.is_file():
-            leftover.unlink()
     say(f"going on with the unfinished output in {path}")
     return True
 

@@ -12,12 +12,13 @@ from typing import Any
 
 from wildshape.cli.options import Layout
 from wildshape.cli.output import begin, command_line
-from wildshape.cli.results import file_name
+from wildshape.cli.results.write import file_name
 from wildshape.cli.terminal import say
 from wildshape.errors import BadInputError
 from wildshape.io.provenance import provenance
-from wildshape.io.store import StoreWriter
-from wildshape.io.store_format import INDEX_JSON, WRITING_JSON
+from wildshape.io.single_writer import lock_folder
+from wildshape.io.store.layout import INDEX_JSON, WRITING_JSON
+from wildshape.io.store.store import StoreWriter
 from wildshape.io.tracks import write_track
 from wildshape.records import Track
 
@@ -80,12 +81,14 @@ def _packed(
 ) -> Iterator[Track]:
     """Into a packed store, which cannot be gone on with: a half-written one is begun again."""
     made = {**provenance(command_line()), "made_by": command, "settings": settings}
-    again = _half_written(out, made)
-    if again:
-        say(f"beginning the half-written store {out} again")
     first, tracks = _first(tracks)
     if not first:
         return  # nothing half-written stays behind
+    if not out.is_file():
+        lock_folder(out)
+    again = _half_written(out, made)
+    if again:
+        say(f"beginning the half-written store {out} again")
     with StoreWriter(out, made, overwrite=overwrite or again) as writer:
         for track in chain(first, tracks):
             writer.add(track)

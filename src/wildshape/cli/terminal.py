@@ -26,7 +26,8 @@ def printable(text: str) -> str:
 
 def answer(text: str, data: Mapping[str, Any], *, as_json: bool) -> None:
     """The result of a command: a text, or with `--json` one JSON object, null for NaN."""
-    print(json.dumps(_finite(data), allow_nan=False) if as_json else text, flush=True)
+    said = json.dumps(_finite(data), allow_nan=False) if as_json else text
+    print(said.encode("utf-8", "backslashreplace").decode(), flush=True)
 
 
 def _finite(data: Any) -> Any:
@@ -47,6 +48,11 @@ def say_skipped(skipped: Sequence[tuple[str, str]]) -> None:
         say(f"  {what}: {reason}")
     if len(skipped) > _LISTED:
         say(f"  and {len(skipped) - _LISTED} more, all of them in wildshape.json")
+
+
+def counted(count: int, what: str) -> str:
+    """For example `1 scan`, `2 scans`."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def duration(seconds: float) -> str:

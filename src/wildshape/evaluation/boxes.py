@@ -11,9 +11,9 @@ import torch
 
 from wildshape.evaluation.metrics import ACCURATE_DEG
 from wildshape.geometry.box import FittedBox
-from wildshape.geometry.overlap import box_iou
-from wildshape.geometry.rotation import rotation_from_quaternion
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.box_overlap import box_iou
+from wildshape.geometry.transforms.rotation import rotation_from_quaternion
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Box, Points
 
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wildshape.datasets.accumulate import shape_mirrored, shape_partial
+from wildshape.datasets.tracks.accumulation import shape_mirrored, shape_partial
 from wildshape.evaluation.boxes import true_box
 from wildshape.evaluation.metrics import hull_area
 from wildshape.evaluation.skipped import Skipped
 from wildshape.evaluation.turning import Rotate, turn_track
 from wildshape.geometry.box import FittedBox
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor, Track
 
 MIN_POINTS = 16

@@ -8,7 +8,7 @@ None of them is handed anything but points and the kind of sensor (METHOD 8).
 from collections.abc import Iterable
 from typing import Protocol, runtime_checkable
 
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Box, Points, Sensor
 
 

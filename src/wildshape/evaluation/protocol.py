@@ -32,7 +32,7 @@ from wildshape.evaluation.results import (
 )
 from wildshape.evaluation.skipped import Skipped
 from wildshape.evaluation.turning import Rotate
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Box, Points, Track
 
 Progress = Callable[[int, str], None]

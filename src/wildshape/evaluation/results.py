@@ -13,8 +13,7 @@ import numpy as np
 
 from wildshape.evaluation.boxes import BoxScore, box_figures
 from wildshape.evaluation.confidence import confidence_figures, risk_coverage_curves
-from wildshape.evaluation.metrics import ACCURATE_DEG, CompletionError
-from wildshape.evaluation.names import NAMES, UNITS
+from wildshape.evaluation.metrics import ACCURATE_DEG, NAMES, UNITS, CompletionError
 from wildshape.evaluation.skipped import Skipped, by_reason, with_rows
 from wildshape.evaluation.turning import Rotate
 from wildshape.io.atomic import write_json

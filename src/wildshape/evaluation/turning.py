@@ -10,8 +10,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from wildshape.geometry.rotation import random_rotation, random_yaw
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.rotation import random_rotation, random_yaw
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Sensor, Track
 
 Rotate = Literal["none", "yaw", "so3"]

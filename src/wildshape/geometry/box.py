@@ -4,12 +4,16 @@
 
 from typing import NamedTuple
 
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from wildshape.geometry.rotation import rotation_z
+from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
 
+# A box of edge 2 about the origin; its edges join corners that differ in one coordinate.
+SIGNS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
+EDGES = [(i, j) for i in range(8) for j in range(i) if np.abs(SIGNS[i] - SIGNS[j]).sum() == 2]
 _ANGLES, _TRIM = 90, 0.002
 
 
@@ -25,6 +29,11 @@ class FittedBox(NamedTuple):
     centre: Float[Tensor, "3"]
     size: Float[Tensor, "3"]
     rotation: Float[Tensor, "3 3"]
+
+
+def box_axes(quaternion_wxyz: tuple[float, ...]) -> Float[np.ndarray, "3 3"]:
+    """A box's own axes as columns, in the frame that its rotation leads to, float64."""
+    return rotation_from_quaternion(torch.tensor(quaternion_wxyz, dtype=torch.float64)).numpy()
 
 
 def fit_box(points: Float[Tensor, "n 3"]) -> FittedBox:

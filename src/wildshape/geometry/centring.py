@@ -6,7 +6,12 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from wildshape.geometry.spherical import Spherical, from_spherical, to_spherical, wrap_angle
+from wildshape.geometry.projection.spherical import (
+    Spherical,
+    from_spherical,
+    to_spherical,
+    wrap_angle,
+)
 
 
 def _middle(values: Float[Tensor, "*batch n"]) -> Float[Tensor, "*batch"]:

@@ -14,26 +14,35 @@ from jaxtyping import Float
 from torch import Tensor
 
 from wildshape.geometry.box import FittedBox, fit_box
-from wildshape.geometry.rotation import quaternion_from_rotation
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.rotation import quaternion_from_rotation
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.config import BoxConfig
 from wildshape.records import Box, Points
 
-_STRAYS = 2
-_REACH = 0.08
-_SCANS_A_WITNESS = 8
-_LEVEL_DEG, _STEP_DEG = 4.0, 0.25
+_DEFAULT = BoxConfig()
 
 
 def box_seen(
-    shape: Float[Tensor, "P 3"], T_sensor_canonical: SE3, scan: Points, *, mirror: bool
+    shape: Float[Tensor, "P 3"],
+    T_sensor_canonical: SE3,
+    scan: Points,
+    *,
+    mirror: bool,
+    config: BoxConfig = _DEFAULT,
 ) -> Box:
     """The box of the shape of one scan; see `fit_to_scans`."""
     T = T_sensor_canonical.to(torch.float64)
     seen = T.inverse().apply(torch.from_numpy(scan).double())
-    return carried(fit_to_scans(shape, [seen], mirror=mirror), T)
+    return carried(fit_to_scans(shape, [seen], mirror=mirror, config=config), T)
 
 
-def fit_to_scans(shape: Float[Tensor, "P 3"], seen: Sequence[Tensor], *, mirror: bool) -> FittedBox:
+def fit_to_scans(
+    shape: Float[Tensor, "P 3"],
+    seen: Sequence[Tensor],
+    *,
+    mirror: bool,
+    config: BoxConfig = _DEFAULT,
+) -> FittedBox:
     """The box around a shape and what scans saw of it, in the canonical frame.
 
     The heading is the canonical frame's x where the network is mirror-symmetric, else that of the
@@ -44,11 +53,12 @@ def fit_to_scans(shape: Float[Tensor, "P 3"], seen: Sequence[Tensor], *, mirror:
         seen: points `(n, 3)` of each scan in that frame. Those far outside the shape's own box are
             strays. Of every eight scans the one that reaches furthest is not believed.
         mirror: the object is symmetric in the plane y = 0.
+        config: what is not believed.
     """
     exact = shape.double()
-    axes = _level(exact) if mirror else fit_box(exact).rotation
-    low, high = _ends(_rows(exact, axes))
-    reach = _REACH * (high - low).norm()
+    axes = _level(exact, config) if mirror else fit_box(exact).rotation
+    low, high = _ends(_rows(exact, axes), config.strays)
+    reach = config.reach * (high - low).norm()
     lows, highs = [low], [high]
     for points in seen:
         rows = _rows(points.double(), axes)
@@ -58,7 +68,7 @@ def fit_to_scans(shape: Float[Tensor, "P 3"], seen: Sequence[Tensor], *, mirror:
         if near.shape[1]:
             highs.append(near.amax(1))
             lows.append(_reflected(near.amin(1), highs[-1]) if mirror else near.amin(1))
-    rank = min(len(seen) // _SCANS_A_WITNESS, len(lows) - 1)
+    rank = min(len(seen) // config.scans_a_witness, len(lows) - 1)
     low = torch.minimum(low, torch.stack(lows).sort(0).values[rank])
     high = torch.maximum(high, torch.stack(highs).sort(0).values[-1 - rank])
     return FittedBox(axes @ ((low + high) / 2), high - low, axes)
@@ -73,18 +83,19 @@ def carried(fitted: FittedBox, T_sensor_canonical: SE3) -> Box:
     return Box((x, y, z), (length, width, height), (qw, qx, qy, qz))
 
 
-def _level(shape: Float[Tensor, "P 3"]) -> Float[Tensor, "3 3"]:
+def _level(shape: Float[Tensor, "P 3"], config: BoxConfig) -> Float[Tensor, "3 3"]:
     """The small turn about y after which the rectangle around the side view has least area.
 
     The canonical frame is level on average, not for each shape; a degree is 8 cm of a car's length.
     """
-    steps = round(_LEVEL_DEG / _STEP_DEG)
-    angles = torch.deg2rad(torch.arange(-steps, steps + 1, dtype=shape.dtype) * _STEP_DEG)
+    steps = round(config.level_deg / config.step_deg)
+    angles = torch.deg2rad(torch.arange(-steps, steps + 1, dtype=shape.dtype) * config.step_deg)
     angles = angles[angles.abs().argsort(stable=True)]  # of equals the smallest
     cos, sin = angles.cos()[:, None], angles.sin()[:, None]
     x, _, z = shape.T.contiguous()
     sides = torch.stack((x * cos - z * sin, x * sin + z * cos))
-    ends = sides.topk(_STRAYS + 1, dim=-1), sides.topk(_STRAYS + 1, dim=-1, largest=False)
+    count = config.strays + 1
+    ends = sides.topk(count, dim=-1), sides.topk(count, dim=-1, largest=False)
     across = ends[0].values[..., -1] - ends[1].values[..., -1]
     best = angles[(across[0] * across[1]).argmin()]
     c, s = best.cos(), best.sin()
@@ -96,9 +107,9 @@ def _rows(points: Float[Tensor, "n 3"], axes: Float[Tensor, "3 3"]) -> Float[Ten
     return axes.mT @ points.T.contiguous()
 
 
-def _ends(rows: Float[Tensor, "3 n"]) -> tuple[Tensor, Tensor]:
-    """Where a shape begins and ends, without its outermost point and that one's reflection."""
-    count = min(_STRAYS + 1, rows.shape[1])
+def _ends(rows: Float[Tensor, "3 n"], strays: int) -> tuple[Tensor, Tensor]:
+    """Where a shape begins and ends, without its outermost points: a stray and its reflection."""
+    count = min(strays + 1, rows.shape[1])
     low = rows.topk(count, dim=1, largest=False).values[:, -1]
     return low, rows.topk(count, dim=1).values[:, -1]
 

@@ -10,7 +10,7 @@ from typing import Any
 import torch
 from torch import nn
 
-from wildshape.models.shapepose import ShapePoseNet
+from wildshape.method.network import ShapePoseNet
 
 _BATCHES = (1, 2)  # torch compiles a batch of one by itself, and all others together
 

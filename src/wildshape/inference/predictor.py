@@ -14,28 +14,31 @@ import torch
 from torch import Tensor
 
 from wildshape.geometry.ground import skirt
-from wildshape.geometry.se3 import SE3, stack
+from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import box_seen
+from wildshape.inference.choose_hypothesis import Found, look, look_twice
 from wildshape.inference.compiled import compiled
-from wildshape.inference.facts import facts_of, warning_of
-from wildshape.inference.looking import Found, look, look_well
+from wildshape.inference.config import InferenceConfig, RefineConfig
+from wildshape.inference.evidence import facts_of
 from wildshape.inference.prepare import (
     MIN_POINTS,
     as_points,
     in_order,
     network_input,
 )
+from wildshape.inference.reasons import reasons_of_result, reasons_of_scan, warning_of
 from wildshape.inference.refine import filled, refine
-from wildshape.inference.registering import fuse_scans, inlier_ratio, to_middle
-from wildshape.inference.shipped import weights_file
-from wildshape.inference.track import Refine, complete_together
-from wildshape.models.checkpoint import ModelSettings, load_checkpoint
-from wildshape.models.confidence import Facts
-from wildshape.models.shapepose import ShapePoseNet
+from wildshape.inference.registration import fuse_scans, inlier_ratio, to_middle
+from wildshape.inference.shipped_weights import weights_file
+from wildshape.inference.tracks.complete_track import complete_together
+from wildshape.method.checkpoint import ModelSettings, load_checkpoint
+from wildshape.method.confidence import Facts
+from wildshape.method.network import ShapePoseNet
 from wildshape.records import Completion, Points, Registration, Sensor
 
 _BATCH = 32
 _GROUND = 0.05
+_DEFAULT = InferenceConfig()
 
 
 def load(
@@ -44,25 +47,26 @@ def load(
     *,
     raw: bool = False,
     level: bool = True,
+    config: InferenceConfig = _DEFAULT,
 ) -> "Predictor":
     """A predictor from a checkpoint; the weights shipped in the package by default.
 
     Args:
         model: checkpoint, or the name of other weights shipped (docs/models.md).
         device: cpu or cuda.
-        raw: give the network's own answers, not refined against the scan (`inference/refine.py`).
+        raw: give the network's own answers, not refined against the scan (`refine.py`).
             Networks trained with a `paper-*` preset are never refined.
         level: LiDARs are held level to about a degree, as on a vehicle. Where a scan comes out
             within some five degrees of that, its refined pitch and roll are drawn to it; others
-            are taken as tilted on purpose, and answers that are level are preferred to others of
-            like cost. False: neither, for sensors mounted askew by a few degrees, whose scans are
-            not turned level first.
+            are taken as tilted on purpose. False: not so, for sensors mounted askew by a few
+            degrees, whose scans are not turned level first.
+        config: the numbers that decide a result besides the checkpoint.
 
     Raises:
         BadInputError: the checkpoint cannot be used; the sentence says why.
     """
     network, settings = load_checkpoint(weights_file(model))
-    return Predictor(network.to(device), settings, raw=raw, level=level)
+    return Predictor(network.to(device), settings, raw=raw, level=level, config=config)
 
 
 class Predictor:
@@ -73,6 +77,7 @@ class Predictor:
         settings: of its training.
         raw: see `load`.
         level: see `load`.
+        config: see `load`.
     """
 
     def __init__(
@@ -82,11 +87,18 @@ class Predictor:
         *,
         raw: bool = False,
         level: bool = True,
+        config: InferenceConfig = _DEFAULT,
     ) -> None:
-        self.network, self.settings = network, settings
+        self.network, self.settings, self.config = network, settings, config
         self.refines = settings.facing and not raw
         self.up = settings.up if level else None
         self.device = next(network.parameters()).device
+
+    def __repr__(self) -> str:
+        count = sum(weights.numel() for weights in self.network.parameters())
+        low, high = self.settings.extent_m
+        objects = f"{self.settings.sensor}, objects of {low:.1f} to {high:.1f} m"
+        return f"Predictor({objects}, {count / 1e6:.1f} million weights, on {self.device})"
 
     def compile(self) -> "Predictor":
         """The same with its network compiled by `torch.compile`, ready when this returns.
@@ -118,18 +130,20 @@ class Predictor:
         for start in range(0, len(scans), _BATCH):
             began = time.perf_counter()
             names = range(start, len(scans))
-            batch = [as_points(s, f"scan {i}") for i, s in zip(names, scans[start:][:_BATCH])]
+            batch = [
+                as_points(s, f"scan {i}") for i, s in zip(names, scans[start : start + _BATCH])
+            ]
             done = self._complete_batch(batch, sensor)
             seconds = (time.perf_counter() - began) / len(batch)
             yield from (replace(item, seconds=seconds) for item in done)
 
     def complete_track(
-        self, scans: Sequence[object], sensor: Sensor | None = None, *, refine: Refine = "joint"
+        self, scans: Sequence[object], sensor: Sensor | None = None
     ) -> list[Completion]:
         """One shape from all scans of a track, in time order, posed in each of them.
 
         Headings are voted, poses refined against each other (`Completion.refined`), and the shape
-        is drawn to what the scans saw (`inference/track.py`, where `refine` is explained).
+        is drawn to what the scans saw (`complete_track.py`).
 
         Raises:
             BadInputError: a scan is not `(n, 3)`, or has fewer than 16 finite points.
@@ -141,7 +155,7 @@ class Predictor:
             self._off_ground(cloud, done.pose.inverse().apply_numpy(done.points), done.pose)
             for cloud, done in zip(clouds, alone)
         ]
-        done = complete_together(alone, clouds, self.settings, refine=refine)
+        done = complete_together(alone, clouds, self.settings, self.config)
         seconds = (time.perf_counter() - began) / max(len(done), 1)
         return [replace(item, seconds=seconds) for item in done]
 
@@ -155,7 +169,8 @@ class Predictor:
         ratio = inlier_ratio(T_target_source, *pair)
         confidence = min(done_source.confidence, done_target.confidence)
         warning = done_source.warning or done_target.warning
-        return Registration(T_target_source, ratio, confidence, warning)
+        reasons = tuple(dict.fromkeys((*done_source.reasons, *done_target.reasons)))
+        return Registration(T_target_source, ratio, confidence, warning, reasons)
 
     def register_track(
         self, scans: Sequence[object], sensor: Sensor | None = None, *, track: bool = False
@@ -203,7 +218,10 @@ class Predictor:
         """What the network says of scans, on the host."""
         of = self.settings
         given = network_input(scans, of.input_points, of.sensor, of.facing).to(self.device)
-        found = (look_well if of.facing else look)(self.network, of, given, self.up)
+        if of.facing:
+            found = look_twice(self.network, of, given, self.config.hypothesis)
+        else:
+            found = look(self.network, of, given)
         return Found(*(part.cpu() for part in found))
 
     def _off_their_ground(self, scans: list[Points], found: Found) -> list[Points]:
@@ -221,19 +239,24 @@ class Predictor:
         mirror, cost = self.settings.network.mirror, float(found.cost[i])
         facts = facts_of(scan, cost, found.facts[i])
         warning = warning_of(scan, sensor, self.settings)
+        confidence = 0.0 if warning else self.confidence(facts)
+        of_result = reasons_of_result(cost, confidence, self.settings)
         if self.refines:
-            shape, T_sensor_can = _refined(seen, shape, T_sensor_can, mirror=mirror, up=self.up)
+            shape, T_sensor_can = _refined(
+                seen, shape, T_sensor_can, self.config.refine, mirror=mirror, up=self.up
+            )
         points = T_sensor_can.to(torch.float32).apply(shape).numpy()
         exact = self.settings.sensor == "camera"
         return Completion(
             points=filled(points, scan, exact) if self.refines else points,
             pose=T_sensor_can.to(torch.float64),
-            box=box_seen(shape, T_sensor_can, seen, mirror=mirror),
-            confidence=0.0 if warning else self.confidence(facts),
+            box=box_seen(shape, T_sensor_can, seen, mirror=mirror, config=self.config.box),
+            confidence=confidence,
             branch=int(found.branch[i]),
             cost=cost,
             refined=self.refines,
             warning=warning,
+            reasons=(*reasons_of_scan(scan, sensor, self.settings), *of_result),
             facts=facts,
         )
 
@@ -246,7 +269,7 @@ class Predictor:
         return kept if len(kept) >= MIN_POINTS else scan
 
     def confidence(self, facts: Facts) -> float:
-        """0 to 1: as the weights are calibrated (`models/confidence.py`).
+        """0 to 1: as the weights are calibrated (`method/confidence.py`).
 
         Without a calibration it falls with the label-free cost, and is 1/2 at the held-out 90th
         percentile.
@@ -260,13 +283,14 @@ def _refined(
     scan: Points,
     shape: Tensor,
     T_sensor_canonical: SE3,
+    config: RefineConfig,
     *,
     mirror: bool,
     up: tuple[float, float, float] | None,
 ) -> tuple[Tensor, SE3]:
-    """Shape and pose fitted to the scan (`inference/refine.py`)."""
+    """Shape and pose fitted to the scan (`refine.py`)."""
     pose = (T_sensor_canonical.rotation.numpy(), T_sensor_canonical.translation.numpy())
     level = None if up is None else np.array(up)
-    found = refine(in_order(scan), shape.numpy(), *pose, mirror=mirror, up=level)
+    found = refine(in_order(scan), shape.numpy(), *pose, mirror=mirror, up=level, config=config)
     rotation, translation = torch.from_numpy(found.rotation), torch.from_numpy(found.translation)
     return torch.from_numpy(found.shape), SE3(rotation, translation)

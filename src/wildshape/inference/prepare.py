@@ -13,8 +13,8 @@ from torch import Tensor
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.centring import scan_centre
-from wildshape.geometry.facing import face, roll
-from wildshape.io.points import read_scan
+from wildshape.geometry.projection.line_of_sight import face, roll
+from wildshape.io.scans.points import check_near, drop_nonfinite, read_scan
 from wildshape.records import Points, SensorKind
 
 MIN_POINTS = 16
@@ -32,12 +32,14 @@ def as_points(scan: object, name: str = "scan") -> Points:
         name: for the error.
 
     Raises:
-        BadInputError: not `(n, 3)`, fewer than 16 finite points, or all points equal.
+        BadInputError: not `(n, 3)`, fewer than 16 finite points, all points equal, or farther than
+            1 km from the origin.
     """
     if isinstance(scan, str | Path):
         return read_scan(scan).points
     try:
-        points = np.asarray(_coordinates(scan), dtype=np.float32)
+        points = np.asarray(_coordinates(scan))
+        points = points if points.dtype.kind == "f" else points.astype(np.float64)
     except (TypeError, ValueError) as error:
         raise BadInputError(f"{name}: no array of numbers ({error}); pass (n, 3).") from error
     if points.ndim != 2 or points.shape[1] != 3:
@@ -45,7 +47,8 @@ def as_points(scan: object, name: str = "scan") -> Points:
             f"{name}: expected points of shape (n, 3), found {points.shape};"
             " pass x, y, z columns in metres."
         )
-    points = points[np.isfinite(points).all(1)]
+    check_near(points, name)
+    points = drop_nonfinite(points).points
     if len(points) < MIN_POINTS:
         raise BadInputError(
             f"{name}: {len(points)} finite points; at least {MIN_POINTS} are needed."

@@ -15,20 +15,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from wildshape.inference.config import RefineConfig
+from wildshape.inference.prepare import unit_of
+
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
-_ITERATIONS, _MATCHED_AT = 6, (0, 2, 4)
-_PLANE_POINTS, _SCAN_POINTS = 8, 512
-# Lengths are for an object of five metres or more; those of a smaller one are smaller.
-_USUAL_M = 5.0
-# Scan points err together, because the shape errs: as much is believed as if there were these many.
-_BELIEVED, _ERROR_M, _KERNEL_M = 300.0, 0.07, 0.3
-_PRIOR_RAD, _PRIOR_M, _PRIOR_STRETCH = np.radians(3.0), 0.05, 0.08
-_LEVEL_RAD, _TILTED_RAD = np.radians((1.0, 5.0))
-_WORSE = 1.1  # what bringing a sensor level may cost of the fit
-_REACH_M, _STIFFNESS, _DRAWN_BY, _VOXEL_M = 0.12, 0.2, 8, 0.08
 _PARTNER, _SMALLEST_M = 5, 1e-6
+_DEFAULT = RefineConfig()
 
 Cloud = Float[np.ndarray, "_ 3"]
 
@@ -62,6 +56,7 @@ def refine(
     *,
     mirror: bool,
     up: Float[np.ndarray, "3"] | None = None,
+    config: RefineConfig = _DEFAULT,
 ) -> Refined:
     """Pose and shape after a look at the scan they came from.
 
@@ -72,35 +67,37 @@ def refine(
         translation: of the same, good to some decimetres.
         mirror: what was seen of one side of y = 0 is known of the other.
         up: canonical direction that the scan's z axis points in, if it was taken level; what is
-            far from it (beyond some 5 degrees) is taken for tilted and left so.
+            far from it (`tilted_deg`) is taken for tilted and left so.
+        config: how it is fitted.
     """
     exact = shape.astype(np.float64)
-    unit = min(1.0, float(np.linalg.norm(np.ptp(exact, axis=0))) / _USUAL_M)
+    unit = unit_of(float(np.linalg.norm(np.ptp(exact, axis=0))))
     order = np.random.default_rng(0).permutation(len(scan))
-    points = scan[order[:_SCAN_POINTS]].astype(np.float64)
-    fitted = _fitted(points / unit, Refined(exact / unit, rotation, translation / unit), up)
+    points = scan[order[: config.scan_points]].astype(np.float64)
+    start = Refined(exact / unit, rotation, translation / unit)
+    fitted = _fitted(points / unit, start, up, config)
     seen = (points / unit - fitted.translation) @ fitted.rotation
-    drawn = drawn_to_scan(fitted.shape, seen, mirror=mirror)
+    drawn = drawn_to_scan(fitted.shape, seen, mirror=mirror, config=config)
     moved = fitted.translation * unit
     return Refined((drawn * unit).astype(shape.dtype), fitted.rotation, moved)
 
 
-def _fitted(points: Cloud, found: Refined, up: np.ndarray | None) -> Refined:
+def _fitted(points: Cloud, found: Refined, up: np.ndarray | None, config: RefineConfig) -> Refined:
     """The nine numbers fitted."""
     from scipy.spatial import KDTree
 
     tree = KDTree(found.shape, balanced_tree=False)
-    before = _off(tree, (points - found.translation) @ found.rotation)
+    before = _off(tree, (points - found.translation) @ found.rotation, config.kernel_m)
     motion, planes = np.zeros(9), _Planes(points, points)
     R, t = (part.astype(np.float64) for part in found[1:])
-    for step in range(_ITERATIONS):
+    for step in range(config.iterations):
         stretch = np.exp(motion[6:])
         local = (points - t) @ R
-        if step in _MATCHED_AT:
-            planes = _planes(tree, local / stretch)
-        A, b = _fit(local, planes, stretch, motion)
+        if step in config.matched_at:
+            planes = _planes(tree, local / stretch, config.plane_points)
+        A, b = _fit(local, planes, stretch, motion, config)
         if up is not None:
-            tilt = _level(R[2], up)
+            tilt = _level(R[2], up, config)
             A[:3, :3] += tilt[0]
             b[:3] += tilt[1]
         change = -np.linalg.solve(A, b)
@@ -108,20 +105,22 @@ def _fitted(points: Cloud, found: Refined, up: np.ndarray | None) -> Refined:
         R = R @ _turn(change[:3]).T
         t = t - R @ change[3:6]
     stretch = np.exp(motion[6:])
-    askew = up is not None and float(np.linalg.norm(found.rotation[2] - up)) > _LEVEL_RAD
-    if _off(tree, (points - t) @ R / stretch) > before * (_WORSE if askew else 1.0):
+    level_rad = np.radians(config.level_deg)
+    askew = up is not None and float(np.linalg.norm(found.rotation[2] - up)) > level_rad
+    allowed = before * (config.level_may_cost if askew else 1.0)
+    if _off(tree, (points - t) @ R / stretch, config.kernel_m) > allowed:
         return found
     return Refined(found.shape * stretch, R, t)
 
 
-def _off(tree: "KDTree", points: Cloud) -> float:
-    """Mean distance of points to a shape, each at most the kernel's width."""
-    return float(np.minimum(tree.query(points)[0], _KERNEL_M).mean())
+def _off(tree: "KDTree", points: Cloud, most_m: float) -> float:
+    """Mean distance of points to a shape, each at most so many metres."""
+    return float(np.minimum(tree.query(points)[0], most_m).mean())
 
 
-def _planes(tree: "KDTree", points: Cloud) -> _Planes:
-    """Planes through the shape's points around each of these, unstretched canonical frame."""
-    _, index = tree.query(points, k=_PLANE_POINTS)
+def _planes(tree: "KDTree", points: Cloud, count: int) -> _Planes:
+    """Planes through `count` of the shape's points around each point, unstretched frame."""
+    _, index = tree.query(points, k=count)
     around = tree.data[index]
     middle = around.mean(axis=1)
     off = around - middle[:, None]
@@ -130,7 +129,11 @@ def _planes(tree: "KDTree", points: Cloud) -> _Planes:
 
 
 def _fit(
-    local: Cloud, planes: _Planes, stretch: np.ndarray, motion: np.ndarray
+    local: Cloud,
+    planes: _Planes,
+    stretch: np.ndarray,
+    motion: np.ndarray,
+    config: RefineConfig,
 ) -> tuple[np.ndarray, np.ndarray]:
     """A and b of a Gauss-Newton step, A x = -b, of the nine numbers.
 
@@ -140,19 +143,21 @@ def _fit(
     normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     off = local - at
     residual = (off * normal).sum(axis=1)
-    kernel = (1 + (off**2).sum(axis=1) / _KERNEL_M**2) ** -2  # Geman-McClure
-    weight = kernel * _BELIEVED / len(local) / _ERROR_M**2
+    kernel = (1 + (off**2).sum(axis=1) / config.kernel_m**2) ** -2  # Geman-McClure
+    weight = kernel * config.effective_points / len(local) / config.error_m**2
     rows = np.concatenate((np.cross(local, normal), normal, -normal * at), axis=1)
-    trust = np.repeat((_PRIOR_RAD, _PRIOR_M, _PRIOR_STRETCH), 3) ** -2
+    prior = (np.radians(config.prior_deg), config.prior_m, config.prior_stretch)
+    trust = np.repeat(prior, 3) ** -2
     A = (rows * weight[:, None]).T @ rows + np.diag(trust)
     b = rows.T @ (weight * residual) + trust * motion
     return A, b
 
 
-def _level(now: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _level(now: np.ndarray, up: np.ndarray, config: RefineConfig) -> tuple[np.ndarray, np.ndarray]:
     """What a level sensor adds for the rotation: `now` is its z axis, canonical frame."""
     off = now - up
-    weight = _LEVEL_RAD**-2 * (1 + off @ off / _TILTED_RAD**2) ** -2  # Geman-McClure
+    level, tilted = np.radians((config.level_deg, config.tilted_deg))
+    weight = level**-2 * (1 + off @ off / tilted**2) ** -2  # Geman-McClure
     across = -_cross(now)  # of a turn by w, `now` becomes `now` + w x `now`
     return weight * across.T @ across, weight * across.T @ off
 
@@ -172,27 +177,30 @@ def _cross(w: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
     return np.array(((0, -z, y), (z, 0, -x), (-y, x, 0)))
 
 
-def drawn_to_scan(shape: Cloud, seen: Cloud, *, mirror: bool) -> Cloud:
+def drawn_to_scan(
+    shape: Cloud, seen: Cloud, *, mirror: bool, config: RefineConfig = _DEFAULT
+) -> Cloud:
     """The shape's points drawn to the mean of what was seen around them; the others stay.
 
     Args:
         shape: canonical frame.
         seen: the scan, the same frame.
         mirror: draw to its reflection in y = 0 too.
+        config: how far, and how stiffly.
     """
     from scipy.spatial import KDTree
 
     from wildshape.geometry.outliers import voxel_thin
 
     both = np.concatenate((seen, seen * (1, -1, 1))) if mirror else seen
-    thin = voxel_thin(both.astype(np.float32), _VOXEL_M).astype(np.float64)
-    most = min(_DRAWN_BY, len(thin))
-    apart, index = KDTree(thin).query(shape, k=most, distance_upper_bound=2.5 * _REACH_M)
+    thin = voxel_thin(both.astype(np.float32), config.voxel_m).astype(np.float64)
+    most = min(config.drawn_by, len(thin))
+    apart, index = KDTree(thin).query(shape, k=most, distance_upper_bound=2.5 * config.reach_m)
     apart, index = apart.reshape(-1, most), index.reshape(-1, most)
-    weight = np.exp(-((apart / _REACH_M) ** 2))  # beyond the bound: 0
+    weight = np.exp(-((apart / config.reach_m) ** 2))  # beyond the bound: 0
     near = thin[np.minimum(index, len(thin) - 1)]
-    total = weight.sum(axis=1, keepdims=True) + _STIFFNESS
-    return ((weight[..., None] * near).sum(axis=1) + _STIFFNESS * shape) / total
+    total = weight.sum(axis=1, keepdims=True) + config.stiffness
+    return ((weight[..., None] * near).sum(axis=1) + config.stiffness * shape) / total
 
 
 def denser(points: Cloud) -> Cloud:

@@ -12,6 +12,8 @@ from wildshape.errors import BadInputError
 MAX_POINTS = 100_000_000
 """More points in one scan of one object are taken for a damaged header."""
 
+_FREE_UNPACKED, _MOST_UNPACKED = 32_000_000, 100
+
 
 @contextmanager
 def reading(path: Path, expected: str) -> Iterator[None]:
@@ -45,6 +47,24 @@ def first_line(error: BaseException, limit: int = 160) -> str:
     """The start of an error's message, on one line."""
     text = " ".join(str(error).split())
     return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def check_unpacked(path: Path, unpacked: int, packed: int) -> None:
+    """Refuse a compressed file that unpacks to far more than any scan does.
+
+    Args:
+        path: named in the error.
+        unpacked: bytes that it promises.
+        packed: bytes that it holds.
+
+    Raises:
+        BadInputError: over a hundred times as many, and over 32 MB.
+    """
+    if unpacked > _FREE_UNPACKED + _MOST_UNPACKED * packed:
+        raise BadInputError(
+            f"{path}: {packed} bytes unpack to {unpacked}, which no scan does: damaged, or made to"
+            " fill the memory; write it again."
+        )
 
 
 def check_promise(path: Path, what: str, promised: int, least: int, present: int) -> None:

@@ -3,12 +3,12 @@
 """Whatever a user points at, as tracks: a packed store, a DATASET, a TRACK, scans, or one scan."""
 
 from collections.abc import Callable, Iterator
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 
 from wildshape.errors import BadInputError
-from wildshape.io.points import SUFFIXES, Unit, is_scan_file, read_scan
-from wildshape.io.store import is_store, open_store
+from wildshape.io.scans.points import SENSOR_METRES, SUFFIXES, Coordinates, is_scan_file, read_scan
+from wildshape.io.store.store import is_store, open_store
 from wildshape.io.tracks import (
     NoUsableScanError,
     TrackFile,
@@ -18,7 +18,7 @@ from wildshape.io.tracks import (
     scan_files,
     track_of_files,
 )
-from wildshape.records import Track
+from wildshape.records import Track, as_text
 
 _NO_SCANS = ("poses.txt", "shape.ply")  # truth beside scans, not scans
 _CURE = (
@@ -42,13 +42,24 @@ class TrackSource:
         self.path = path
         self.names = names
         self._read = read
-        self._skipped: dict[str, str] = {}
+        self._skipped: dict[str, tuple[tuple[str, str], ...]] = {}  # by track
         self._dropped: dict[str, int] = {}
 
     @property
     def skipped(self) -> tuple[tuple[str, str], ...]:
         """`track/scan file` and reason of each scan skipped in the tracks read until now."""
-        return tuple(self._skipped.items())
+        return tuple(
+            (f"{name}/{s}", why) for name in self._skipped for s, why in self.skipped_in(name)
+        )
+
+    def skipped_in(self, name: str) -> tuple[tuple[str, str], ...]:
+        """Scan file and reason of each scan skipped in a track that has been read."""
+        return self._skipped.get(name, ())
+
+    @cached_property
+    def numbers(self) -> dict[str, int]:
+        """The number of each track, by its name; the first, where two have one name."""
+        return {name: number for number, name in reversed(list(enumerate(self.names)))}
 
     @property
     def dropped_nonfinite(self) -> tuple[tuple[str, int], ...]:
@@ -73,9 +84,9 @@ class TrackSource:
         try:
             found = self._read(index)
         except NoUsableScanError as error:
-            self._skipped |= {f"{name}/{scan}": reason for scan, reason in error.skipped}
+            self._skipped[name] = error.skipped
             raise
-        self._skipped |= {f"{name}/{scan}": reason for scan, reason in found.skipped}
+        self._skipped[name] = found.skipped
         self._dropped |= {f"{name}/{scan}": count for scan, count in found.dropped_nonfinite}
         return found.track
 
@@ -98,62 +109,68 @@ class TrackSource:
             raise last
 
 
-def open_tracks(path: Path | str, unit: Unit = "m") -> TrackSource:
+def open_tracks(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> TrackSource:
     """The tracks at `path`, lazily.
 
     Args:
         path: a packed store; a DATASET folder, whose subfolders have scans/; a TRACK folder, which
             has scans/; a folder of scan files (one track); or a scan file (a track of one scan).
-        unit: of the files' coordinates; a packed store is in metres always.
+        coordinates: of the files; a packed store is in metres and its sensors' frames always.
 
     Raises:
-        BadInputError: nothing is there, or nothing that can be recognised.
+        BadInputError: nothing is there, or nothing that can be recognised; or a packed store that
+            is to be read otherwise.
     """
     path = Path(path)
     if not path.exists():
         raise BadInputError(f"{path}: no such file or folder; {_CURE}.")
     if path.is_file():
-        return _single_scan(path, unit)
+        return _single_scan(path, coordinates)
     if is_store(path):
+        if coordinates != SENSOR_METRES:
+            raise BadInputError(
+                f"{path}: a packed store is in metres and its sensors' frames already; leave --unit"
+                " and --origin away, and give them to `convert`."
+            )
         store = open_store(path)
         return TrackSource(path, store.names, lambda index: TrackFile(store.track(index)))
     if (path / "scans").is_dir():
         scan_files(path / "scans")
-        return TrackSource(path, (_name(path),), lambda _: read_track_file(path, unit))
-    return _folder(path, unit)
+        return TrackSource(path, (_name(path),), lambda _: read_track_file(path, coordinates))
+    return _folder(path, coordinates)
 
 
-def _single_scan(path: Path, unit: Unit) -> TrackSource:
+def _single_scan(path: Path, coordinates: Coordinates) -> TrackSource:
     if not is_scan_file(path):
         raise BadInputError(f"{path}: no scan file; expected one of {' '.join(SUFFIXES)}.")
-    return TrackSource(path, (path.stem,), lambda _: _read_single(path, unit))
+    return TrackSource(path, (as_text(path.stem),), lambda _: _read_single(path, coordinates))
 
 
-def _read_single(path: Path, unit: Unit) -> TrackFile:
+def _read_single(path: Path, coordinates: Coordinates) -> TrackFile:
     """One scan; where it lies in a TRACK folder, of the unit and sensor that track.json says."""
     beside = path.parent.parent / "track.json" if path.parent.name == "scans" else path / "none"
     info = read_info(beside)
-    scan = read_scan(path, info["unit"] if unit == "m" else unit)
+    scan = read_scan(path, coordinates.in_unit(info["unit"]))
     dropped = ((path.name, scan.dropped_nonfinite),) if scan.dropped_nonfinite else ()
     track = Track(path.stem, (scan.points,), (path.stem,), sensor=info["sensor"])
     return TrackFile(track, (), dropped)
 
 
-def _folder(path: Path, unit: Unit) -> TrackSource:
+def _folder(path: Path, coordinates: Coordinates) -> TrackSource:
     """A DATASET, or a plain folder of scan files."""
     entries = sorted(path.iterdir(), key=lambda entry: entry.name)
     shown = [entry for entry in entries if not entry.name.startswith(".")]
     folders = [entry for entry in shown if (entry / "scans").is_dir()]
     if folders:
-        names = tuple(folder.name for folder in folders)
-        return TrackSource(path, names, lambda index: read_track_file(folders[index], unit))
+        names = tuple(as_text(folder.name) for folder in folders)
+        return TrackSource(path, names, lambda index: read_track_file(folders[index], coordinates))
     files = [f for f in entries if is_scan_file(f) and f.name not in _NO_SCANS]
     if not files:
         found = f"{len(entries)} other entries" if entries else "an empty folder"
         raise BadInputError(f"{path}: found no scans ({found}); {_CURE}.")
-    read = partial(track_of_files, files, _name(path), unit)
+    read = partial(track_of_files, files, _name(path), coordinates)
     return TrackSource(path, (_name(path),), lambda _: read())
 
 
 def _name(path: Path) -> str:
-    return folder_name(path) or "track"
+    return as_text(folder_name(path)) or "track"

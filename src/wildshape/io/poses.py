@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import write_text
 from wildshape.io.guard import reading
 
 _ORTHONORMAL = 1e-3
+_FARTHEST_M = 1e9  # no drive goes farther, and squares of far larger numbers overflow
 
 
 def read_poses(path: Path | str, expected: int | None = None) -> SE3:
@@ -42,7 +43,7 @@ def _parse(line: str, number: int, path: Path) -> np.ndarray:
         values = np.array([float(word) for word in line.replace(",", " ").split()])
     except ValueError:
         values = np.empty(0)
-    if len(values) != 12 or not np.isfinite(values).all():
+    if len(values) != 12 or not (np.abs(values) < _FARTHEST_M).all():
         raise BadInputError(
             f"{path}, line {number}: expected 12 finite numbers (3x4 row-major), found "
             f"'{line.strip()[:60]}'; write one pose a line."

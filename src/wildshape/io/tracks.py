@@ -3,6 +3,7 @@
 """Track folders: scans/ and, if known, poses.txt, shape.ply, track.json (DESIGN, Track folder)."""
 
 import json
+import math
 import shutil
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -13,12 +14,19 @@ from jaxtyping import Float32
 from numpy import ndarray
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import reading
-from wildshape.io.ply_writer import ply_bytes, write_ply
-from wildshape.io.points import METRES, Unit, is_scan_file, read_points, read_scan
 from wildshape.io.poses import read_poses, write_poses
+from wildshape.io.scans.ply_writer import ply_bytes, write_ply
+from wildshape.io.scans.points import (
+    METRES,
+    SENSOR_METRES,
+    Coordinates,
+    is_scan_file,
+    read_points,
+    read_scan,
+)
 from wildshape.records import Intrinsics, Sensor, Track
 
 __all__ = [
@@ -33,6 +41,8 @@ __all__ = [
 ]
 
 Skipped = tuple[tuple[str, str], ...]
+
+_MOST_PIXELS = 1e9
 
 
 @dataclass(frozen=True)
@@ -59,18 +69,19 @@ class NoUsableScanError(BadInputError):
         super().__init__(f"{folder}: none of {len(skipped)} scans can be used; the first: {reason}")
 
 
-def read_track(folder: Path | str, unit: Unit = "m") -> Track:
+def read_track(folder: Path | str, coordinates: Coordinates = SENSOR_METRES) -> Track:
     """The track in a folder; scans that cannot be used are left out (see `read_track_file`)."""
-    return read_track_file(folder, unit).track
+    return read_track_file(folder, coordinates).track
 
 
-def read_track_file(folder: Path | str, unit: Unit = "m") -> TrackFile:
+def read_track_file(folder: Path | str, coordinates: Coordinates = SENSOR_METRES) -> TrackFile:
     """The track in a folder with the list of the scans that had to be skipped.
 
     Args:
         folder: holds scans/, and perhaps poses.txt, shape.ply, track.json.
-        unit: of scans, shape and the poses' translations; the "unit" of track.json goes before
-            the default `m`. Everything returned is in metres.
+        coordinates: the unit is that of scans, shape and the poses' translations; the "unit" of
+            track.json goes before the default `m`. The origin is subtracted from scans and poses.
+            Everything returned is in metres.
 
     Raises:
         BadInputError: no scans, none of them usable, or damaged poses, shape or track.json.
@@ -78,9 +89,10 @@ def read_track_file(folder: Path | str, unit: Unit = "m") -> TrackFile:
     folder = Path(folder)
     files = scan_files(folder / "scans")
     info = read_info(folder / "track.json")
-    unit = info["unit"] if unit == "m" else unit
-    kept, skipped, dropped = _read_scans(files, folder, unit)
-    poses = _read_truth(folder / "poses.txt", len(files), [files.index(f) for f in kept], unit)
+    coordinates = coordinates.in_unit(info["unit"])
+    kept, skipped, dropped = _read_scans(files, folder, coordinates)
+    rows = [row for row, file in enumerate(files) if file in kept]
+    poses = _read_truth(folder / "poses.txt", len(files), rows, coordinates)
     track = Track(
         name=folder_name(folder),
         scans=tuple(kept.values()),
@@ -89,18 +101,20 @@ def read_track_file(folder: Path | str, unit: Unit = "m") -> TrackFile:
         category=info["category"],
         source=info["source"],
         T_sensor_object=poses,
-        shape=_read_shape(folder / "shape.ply", unit),
+        shape=_read_shape(folder / "shape.ply", Coordinates(coordinates.unit)),
     )
     return TrackFile(track, skipped, dropped)
 
 
-def track_of_files(files: list[Path], name: str, unit: Unit = "m") -> TrackFile:
+def track_of_files(
+    files: list[Path], name: str, coordinates: Coordinates = SENSOR_METRES
+) -> TrackFile:
     """Scan files of a plain folder as one track, in the order given.
 
     Raises:
         NoUsableScanError: none of them can be used.
     """
-    kept, skipped, dropped = _read_scans(files, files[0].parent, unit)
+    kept, skipped, dropped = _read_scans(files, files[0].parent, coordinates)
     track = Track(name, tuple(kept.values()), _stems(list(kept)))
     return TrackFile(track, skipped, dropped)
 
@@ -125,12 +139,12 @@ def scan_files(folder: Path) -> list[Path]:
 
 
 def _read_scans(
-    files: list[Path], folder: Path, unit: Unit
+    files: list[Path], folder: Path, coordinates: Coordinates
 ) -> tuple[dict[Path, Float32[ndarray, "n 3"]], Skipped, tuple[tuple[str, int], ...]]:
     kept, skipped, dropped = {}, [], []
     for file in files:
         try:
-            scan = read_scan(file, unit)
+            scan = read_scan(file, coordinates)
         except BadInputError as error:
             skipped.append((file.name, str(error)))
             continue
@@ -148,16 +162,17 @@ def _stems(files: list[Path]) -> tuple[str, ...]:
     return stems if len(set(stems)) == len(stems) else tuple(file.name for file in files)
 
 
-def _read_truth(path: Path, count: int, kept: list[int], unit: Unit) -> SE3 | None:
+def _read_truth(path: Path, count: int, kept: list[int], coordinates: Coordinates) -> SE3 | None:
     """Truth poses of the scans that were kept."""
     if not path.exists():
         return None
     poses = read_poses(path, count)[torch.tensor(kept)]
-    return SE3(poses.rotation, poses.translation * METRES[unit])
+    moved = poses.translation - poses.translation.new_tensor(coordinates.origin)
+    return SE3(poses.rotation, moved * METRES[coordinates.unit])
 
 
-def _read_shape(path: Path, unit: Unit) -> Float32[ndarray, "n 3"] | None:
-    return read_points(path, unit) if path.exists() else None
+def _read_shape(path: Path, coordinates: Coordinates) -> Float32[ndarray, "n 3"] | None:
+    return read_points(path, coordinates) if path.exists() else None
 
 
 def read_info(path: Path) -> dict[str, Any]:
@@ -207,7 +222,7 @@ def sensor_from_json(raw: dict[str, Any], path: Path) -> Sensor:
             resolution_deg=(azimuth, elevation) if steps else None,
             intrinsics=_parse_intrinsics(intrinsics) if intrinsics else None,
         )
-    except (TypeError, ValueError, KeyError) as error:
+    except (TypeError, ValueError, KeyError, OverflowError) as error:
         raise BadInputError(
             f"{path}: expected resolution_deg [azimuth, elevation] or intrinsics "
             f"{{fx, fy, cx, cy, width, height}}, found {type(error).__name__}: {error}."
@@ -216,7 +231,15 @@ def sensor_from_json(raw: dict[str, Any], path: Path) -> Sensor:
 
 def _parse_intrinsics(raw: dict[str, Any]) -> Intrinsics:
     numbers = {key: float(raw[key]) for key in ("fx", "fy", "cx", "cy")}
-    return Intrinsics(**numbers, width=int(raw["width"]), height=int(raw["height"]))
+    sizes = {key: int(raw[key]) for key in ("width", "height")}
+    lengths = (numbers["fx"], numbers["fy"], *sizes.values())
+    if (
+        not all(map(math.isfinite, numbers.values()))
+        or min(lengths) <= 0
+        or max(lengths) > _MOST_PIXELS
+    ):
+        raise ValueError(f"{numbers | sizes}, which is no camera")
+    return Intrinsics(**numbers, width=sizes["width"], height=sizes["height"])
 
 
 def sensor_to_json(sensor: Sensor) -> dict[str, Any]:

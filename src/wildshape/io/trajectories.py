@@ -14,9 +14,12 @@ import numpy as np
 import torch
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.rotation import quaternion_from_rotation, rotation_from_quaternion
-from wildshape.geometry.se3 import SE3
-from wildshape.geometry.trajectory import smoothness
+from wildshape.geometry.transforms.rotation import (
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+)
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.geometry.transforms.smoothness import smoothness
 from wildshape.io.atomic import write_json, write_text
 from wildshape.io.guard import reading
 
@@ -49,8 +52,8 @@ def read_tum(path: Path) -> tuple[list[float], SE3]:
     with reading(path, "8 numbers a line: time x y z qx qy qz qw"):
         lines = path.read_text("utf-8").splitlines()
         rows = np.array([line.split() for line in lines if line[:1] not in ("", "#")], np.float64)
-    numbers = torch.from_numpy(rows.reshape(len(rows), -1))
-    good = numbers.shape[1] == 8 and bool(numbers.isfinite().all())
+    numbers = torch.from_numpy(rows)
+    good = rows.ndim == 2 and rows.shape[1] == 8 and bool(numbers.isfinite().all())
     if not good or bool(((numbers[:, 4:].norm(dim=-1) - 1).abs() > 1e-3).any()):
         raise BadInputError(f"{path}: expected lines of time x y z qx qy qz qw; write them so.")
     wxyz = numbers[:, [7, 4, 5, 6]]

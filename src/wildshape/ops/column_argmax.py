@@ -1,14 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Row of the maximum of each column: the one door. Backends lie beside it."""
+"""Row of the maximum of each column, by torch or by the compiled kernel."""
 
 import torch
-from jaxtyping import Float, Int64
+from jaxtyping import Float, Float32, Int64
 from torch import Tensor
 
-from wildshape.ops.column_argmax_native import column_argmax_native
-from wildshape.ops.column_argmax_torch import column_argmax_torch
-from wildshape.ops.library import library
+from wildshape.errors import BadInputError
+from wildshape.ops.library import check_memory, library
 
 
 def column_argmax(values: Float[Tensor, "n c"]) -> Int64[Tensor, "c"]:
@@ -21,3 +20,32 @@ def column_argmax(values: Float[Tensor, "n c"]) -> Int64[Tensor, "c"]:
     if values.device.type == "cpu" and values.dtype == torch.float32 and library():
         return column_argmax_native(values)
     return column_argmax_torch(values)
+
+
+def column_argmax_torch(values: Float[Tensor, "n c"]) -> Int64[Tensor, "c"]:
+    """Several times faster than `values.argmax(0)` on a CPU (PERFORMANCE 0.3)."""
+    order = torch.arange(len(values), 0, -1, dtype=torch.int32, device=values.device)
+    first = (values == values.amax(0)).int().mul_(order[:, None]).amax(0).clamp_min_(1)
+    return (len(values) - first).long()
+
+
+WIDEST = -1
+
+
+def column_argmax_native(values: Float32[Tensor, "n c"], level: int = WIDEST) -> Int64[Tensor, "c"]:
+    """One pass over the values; `level` 0 is the portable form.
+
+    Raises:
+        BadInputError: not a matrix of float32 with a row.
+        RuntimeError: the library is not built.
+    """
+    loaded = library()
+    if loaded is None:
+        raise RuntimeError("the native library is not built; use the torch backend.")
+    check_memory("column_argmax", values, torch.float32)
+    if values.ndim != 2 or not 0 < len(values) < 2**31:
+        raise BadInputError(f"column_argmax: expected (n, c) with n >= 1, found {values.shape}.")
+    values = values.contiguous()
+    row = torch.empty(values.shape[1], dtype=torch.int64)
+    loaded.wildshape_column_argmax(values.data_ptr(), *values.shape, row.data_ptr(), level)
+    return row

@@ -6,6 +6,10 @@ import ctypes
 from functools import cache
 from pathlib import Path
 
+import torch
+
+from wildshape.errors import BadInputError
+
 _ABI = 2
 _PATH = Path(__file__).parent / "native" / "libwildshape_ops.so"
 
@@ -37,3 +41,16 @@ def library() -> ctypes.CDLL | None:
     except (OSError, AttributeError):
         return None
     return loaded if loaded.wildshape_abi() == _ABI else None
+
+
+def check_memory(name: str, tensor: torch.Tensor, expected: torch.dtype) -> None:
+    """Refuse what the kernels cannot read: they take addresses on trust.
+
+    Raises:
+        BadInputError: another type, or not in this machine's memory.
+    """
+    if tensor.dtype != expected or tensor.device.type != "cpu":
+        raise BadInputError(
+            f"{name}: the native kernel takes {expected} on the CPU, found {tensor.dtype} on"
+            f" {tensor.device}."
+        )

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import reading
-from wildshape.io.points import read_points
-from wildshape.records import Track
+from wildshape.io.scans.points import read_points
+from wildshape.records import Track, as_text
 from wildshape.report.content import Cloud, Figure, Report, ReportObject, Table
 from wildshape.report.parts import is_ours, metrics_table, track_object, training_curves
 from wildshape.report.ranking import (
@@ -36,6 +36,7 @@ from wildshape.report.results import (
     Inputs,
     TrackResult,
     box_of,
+    doubt_of,
     find,
     read_object,
     read_result,
@@ -71,7 +72,7 @@ def report_from_folder(folder: Path, inputs: Path | None = None) -> Report:
     ranked = worst_first(_judged(track, where) for track in tracks[:MAX_JUDGED])
     drawn = ranked[:MAX_OBJECTS]
     return Report(
-        title=f"Wildshape report: {folder.resolve().name}",
+        title=f"Wildshape report: {as_text(folder.resolve().name)}",
         summary=_summary(folder, metrics, len(tracks), len(curves)),
         findings=tuple(_findings(metrics, ranked)),
         tables=tuple(_checked_table(*entry) for entry in metrics),
@@ -102,9 +103,15 @@ def _summary(folder: Path, metrics: Metrics, tracks: int, curves: int) -> str:
     """What there is, and the commands that made it."""
     counted = ((tracks, "track"), (len(metrics), "evaluation"), (curves, "training curve"))
     parts = [f"{n} {what}{'s' if n > 1 else ''}" for n, what in counted if n]
-    records = [read_object(path) for path in find(folder, MARKER)] + [m for _, m in metrics]
-    runs = dict.fromkeys(line for record in records if (line := of_run(record)))
+    records = [(path, read_object(path)) for path in find(folder, MARKER)] + metrics
+    runs = dict.fromkeys(line for record in records if (line := _of_run(*record)))
     return "\n\n".join((f"Found here: {', '.join(parts)}.", *runs))
+
+
+def _of_run(path: Path, record: dict[str, Any]) -> str:
+    """`of_run`, a damaged record named."""
+    with reading(path, "what a command says of itself"):
+        return of_run(record)
 
 
 def _findings(metrics: Metrics, ranked: Sequence[Judged]) -> Iterator[str]:
@@ -117,7 +124,7 @@ def _findings(metrics: Metrics, ranked: Sequence[Judged]) -> Iterator[str]:
     )
     entries = [entry for one in ranked for entry in one.result.said.get("scans") or ()]
     known = [float(e["confidence"]) for e in entries if e.get("confidence") is not None]
-    yield from of_confidences(known, sum(bool(entry.get("warning")) for entry in entries))
+    yield from of_confidences(known, sum(bool(doubt_of(entry)) for entry in entries))
 
 
 def _index(ranked: Sequence[Judged], drawn: int, metrics: Metrics) -> Iterator[Table]:
@@ -217,6 +224,7 @@ def _facts(entry: dict[str, Any]) -> tuple[tuple[str, str], ...]:
         "refined": lambda value: "yes" if value else "no",
         "seconds": lambda value: f"{1000 * value:.0f} ms",
         "warning": str,
+        "reasons": ", ".join,
     }
-    wanted = [key for key in known if entry.get(key) not in (None, "")]
+    wanted = [key for key in known if entry.get(key) not in (None, "", [])]
     return tuple(("time" if k == "seconds" else k, known[k](entry[k])) for k in wanted)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wildshape.datasets.statistics import Quantity, Statistics
 from wildshape.report.content import BLUE, GREY, ORANGE
+from wildshape.report.statistics.statistics import Quantity, Statistics
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

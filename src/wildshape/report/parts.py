@@ -3,6 +3,7 @@
 """A report's parts from what the rest of the project hands over: tracks, metrics, a run's log."""
 
 import json
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from wildshape.baselines.named import NAMES
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Box, Points, Track
 from wildshape.report.content import Cell, Cloud, Curve, ReportObject, Table
 
@@ -165,9 +166,9 @@ def _entries(log: Path) -> Iterable[dict[str, Any]]:
     for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
         try:
             entry = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             continue
-        if isinstance(entry, dict) and isinstance(entry.get("step"), int | float):
+        if isinstance(entry, dict) and _is_number(entry.get("step")):
             yield entry
 
 
@@ -177,11 +178,7 @@ def _series(
     """One series a key that has a number other than zero anywhere."""
     series = []
     for key in keys:
-        pairs = [
-            (float(e["step"]), float(e[key]))
-            for e in entries
-            if isinstance(e.get(key), int | float)
-        ]
+        pairs = [(float(e["step"]), float(e[key])) for e in entries if _is_number(e.get(key))]
         if any(y != 0 for _, y in pairs):
             name = key.removeprefix(_VALIDATION).removesuffix("_deg")
             series.append((name, [x for x, _ in pairs], [y for _, y in pairs]))
@@ -191,10 +188,19 @@ def _series(
 def _shares(
     entries: Sequence[Mapping[str, Any]],
 ) -> tuple[tuple[str, list[float], list[float]], ...]:
-    rows = [e for e in entries if isinstance(e.get("branch_shares"), list)]
+    rows = [e for e in entries if _are_numbers(e.get("branch_shares"))]
     branches = min((len(row["branch_shares"]) for row in rows), default=0)
     steps = [float(row["step"]) for row in rows]
     return tuple(
         (f"branch {i}", steps, [float(row["branch_shares"][i]) for row in rows])
         for i in range(branches)
     )
+
+
+def _are_numbers(value: object) -> bool:
+    return isinstance(value, list) and all(map(_is_number, value))
+
+
+def _is_number(value: object) -> bool:
+    """Whether it is a finite number that a float can hold; a JSON integer has no largest."""
+    return isinstance(value, int | float) and abs(value) <= sys.float_info.max

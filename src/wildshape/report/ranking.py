@@ -12,11 +12,11 @@ import numpy as np
 import torch
 
 from wildshape.evaluation.metrics import completion_error, registration_error
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import reading
 from wildshape.records import Track
 from wildshape.report.content import Cell, Table
-from wildshape.report.results import TrackResult
+from wildshape.report.results import TrackResult, doubt_of
 from wildshape.report.scene import thin
 
 _TRUTH_POINTS = 4096
@@ -42,9 +42,9 @@ class Judged:
 
     @property
     def warning(self) -> str:
-        """The first warning of its scans, or nothing."""
-        entries = self.result.said.get("scans") or ()
-        return next((str(e["warning"]) for e in entries if e.get("warning")), "")
+        """Why the first of its scans that is in doubt is not to be trusted, or nothing."""
+        doubts = map(doubt_of, self.result.said.get("scans") or ())
+        return next(filter(None, doubts), "")
 
 
 def judge(result: TrackResult) -> Judged:
@@ -186,10 +186,10 @@ def _counts(track: Track | None) -> dict[str, int]:
 
 
 def _more(entry: dict[str, Any]) -> tuple[str, str]:
-    """Size of the box, and the warning."""
+    """Size of the box, and why the result is not to be trusted."""
     box = entry.get("box") or {}
     size = " \N{MULTIPLICATION SIGN} ".join(f"{side:.2f}" for side in box.get("size") or ())
-    return size, str(entry.get("warning") or "")
+    return size, doubt_of(entry)
 
 
 def _cd_of(row: dict[str, Any]) -> float:

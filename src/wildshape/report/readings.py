@@ -77,7 +77,8 @@ def of_confidences(confidences: Sequence[float], flagged: int) -> list[str]:
     ]
     if flagged:
         lines.append(
-            f"{flagged:,} scans carry a warning and confidence 0: the model was not made for them."
+            f"Results not to be trusted: {flagged:,}; the tables name the reasons of each "
+            "(docs/formats.md)."
         )
     return lines
 

@@ -3,16 +3,18 @@
 """What `complete` and `register` left of a track, read back: objects.json and what is beside."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import reading
 from wildshape.io.inputs import TrackSource, open_tracks
-from wildshape.io.points import METRES, Unit, read_points
 from wildshape.io.poses import read_poses
+from wildshape.io.scans.points import METRES, SENSOR_METRES, Coordinates, read_points
 from wildshape.records import Box, Points, Track
 
 MARKER, OBJECTS, METRICS, SCORES = "wildshape.json", "objects.json", "metrics.json", "scores.json"
@@ -39,8 +41,11 @@ class TrackResult:
 
     def entry(self, scan: str) -> dict[str, Any]:
         """What objects.json says of a scan."""
-        entries = self.said.get("scans") or ()
-        return next((entry for entry in entries if entry.get("scan") == scan), {})
+        return self._entries.get(scan, {})
+
+    @cached_property
+    def _entries(self) -> dict[str, dict[str, Any]]:
+        return {str(entry["scan"]): entry for entry in reversed(self.said.get("scans") or ())}
 
     def completed(self, scan: str) -> Points | None:
         """The completed shape, in that scan's sensor frame, metres."""
@@ -66,7 +71,7 @@ class Inputs:
     """
 
     place: Path | None = None
-    opened: dict[tuple[Path, Unit], TrackSource] = field(default_factory=dict)
+    opened: dict[tuple[Path, Coordinates], TrackSource] = field(default_factory=dict)
 
     def track(self, folder: Path, said: dict[str, Any]) -> Track | None:
         """The track that `folder` is about; None if the scans have moved, changed or lost it."""
@@ -74,15 +79,15 @@ class Inputs:
         if named is None:
             return None
         try:
-            source = self._open(named, _unit(folder.parent / MARKER))
-            return source[source.names.index(str(said.get("track") or folder.name))]
-        except (BadInputError, ValueError):
+            source = self._open(named, coordinates_of(_settings(folder.parent / MARKER)))
+            return source[source.numbers[str(said.get("track") or folder.name)]]
+        except (BadInputError, KeyError, ValueError):
             return None
 
-    def _open(self, path: Path, unit: Unit) -> TrackSource:
-        if (path, unit) not in self.opened:
-            self.opened[path, unit] = open_tracks(path, unit)
-        return self.opened[path, unit]
+    def _open(self, path: Path, coordinates: Coordinates) -> TrackSource:
+        if (path, coordinates) not in self.opened:
+            self.opened[path, coordinates] = open_tracks(path, coordinates)
+        return self.opened[path, coordinates]
 
 
 def find(folder: Path, name: str) -> list[Path]:
@@ -99,7 +104,7 @@ def read_object(path: Path) -> dict[str, Any]:
     """
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         data = error
     if isinstance(data, dict):
         return data
@@ -120,7 +125,14 @@ def read_result(folder: Path, inputs: Inputs) -> TrackResult:
         found = TrackResult(folder, said, inputs.track(folder, said))
         for scan in found.scans:
             box_of(found.entry(scan))
+            doubt_of(found.entry(scan))
     return found
+
+
+def doubt_of(entry: Mapping[str, Any]) -> str:
+    """Why a scan's result is not to be trusted: its warning, or its reasons in plain words."""
+    reasons = ", ".join(str(reason).replace("_", " ") for reason in entry.get("reasons") or ())
+    return str(entry.get("warning") or reasons)
 
 
 def box_of(entry: dict[str, Any]) -> Box | None:
@@ -133,7 +145,12 @@ def box_of(entry: dict[str, Any]) -> Box | None:
     return Box((x, y, z), (length, width, height), (qw, qx, qy, qz))
 
 
-def _unit(marker: Path) -> Unit:
-    settings = read_object(marker).get("settings") or {} if marker.exists() else {}
-    unit: Unit = settings.get("unit", "m")
-    return unit if unit in METRES else "m"
+def coordinates_of(settings: dict[str, Any]) -> Coordinates:
+    """How the scans were read, by the settings in a `wildshape.json` or `metrics.json`."""
+    unit, origin = settings.get("unit", "m"), settings.get("origin") or SENSOR_METRES.origin
+    x, y, z = (float(value) for value in origin)
+    return Coordinates(unit if unit in METRES else "m", (x, y, z))
+
+
+def _settings(marker: Path) -> dict[str, Any]:
+    return read_object(marker).get("settings") or {} if marker.exists() else {}

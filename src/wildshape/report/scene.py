@@ -9,18 +9,15 @@ becomes (x, z, -y). Metres throughout; the page and the README's picture draw th
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from jaxtyping import Float
 
-from wildshape.geometry.rotation import rotation_from_quaternion
+from wildshape.geometry.box import EDGES
 from wildshape.records import Box, Points, SensorKind
 from wildshape.report.content import Cloud, ReportObject
 
 MAX_POINTS = 4096
 _MARGIN = 0.06
 _GAP, _ARROW = 0.06, 0.2  # of the object's extent: before the arrow, and its length
-_EDGES = ((0, 1), (1, 3), (3, 2), (2, 0), (4, 5), (5, 7), (7, 6), (6, 4))
-_EDGES += ((0, 4), (1, 5), (2, 6), (3, 7))
 AXES = {
     "lidar": ("x, m", "y, m", "z, m"),
     "camera": ("x right, m", "z forward, m", "\N{MINUS SIGN}y up, m"),
@@ -88,14 +85,11 @@ def box_segments(box: Box | None, sensor: SensorKind = "lidar") -> Segments:
     """The twelve edges of a box and a mark from its front face forward, drawing frame."""
     if box is None:
         return np.zeros((0, 2, 3), np.float32)
-    signs = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    corners = signs * np.asarray(box.size) / 2
-    front = np.array([[box.size[0] * share, 0.0, 0.0] for share in (0.5, 0.62)])
-    ends = np.concatenate((corners[np.array(_EDGES)], front[None]))
-    wxyz = torch.tensor(box.quaternion_wxyz, dtype=torch.float64)
-    rotation = rotation_from_quaternion(wxyz).numpy()
-    moved = ends @ rotation.T + np.asarray(box.centre)
-    return upright(moved, sensor).astype(np.float32)
+    corners, centre = box.corners, np.asarray(box.centre)
+    ahead = corners[4] - corners[0]
+    front = centre + np.outer((0.5, 0.62), ahead)
+    ends = np.concatenate((corners[np.array(EDGES)], front[None]))
+    return upright(ends, sensor).astype(np.float32)
 
 
 def _prepared(cloud: Cloud, sensor: SensorKind) -> Cloud:

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wildshape.datasets.accumulate import fuse_by_truth
-from wildshape.datasets.statistics import Quantity, Statistics
+from wildshape.datasets.tracks.accumulation import fuse_by_truth
 from wildshape.io.atomic import atomic_write
 from wildshape.records import Track
 from wildshape.report.content import Cell, Cloud, Figure, Report, ReportObject, Table
 from wildshape.report.histograms import INK, SOFT, draw_panel, is_rose, literal, number, panels_of
 from wildshape.report.page import write_report
+from wildshape.report.statistics.statistics import Quantity, Statistics
 from wildshape.report.thumbnails import PANELS, draw_track
 
 if TYPE_CHECKING:

@@ -1,3 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Simulated tracks: sensors, objects, drive-bys, ray casting."""
+"""Simulated tracks: sensors, objects, drive-bys, ray casting.
+
+Start with `generate`; what can be set is in `config`.
+"""

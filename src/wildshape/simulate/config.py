@@ -85,7 +85,7 @@ class SimulationConfig:
     @property
     def usual_scans(self) -> int:
         """Scans a track where nothing else is asked for."""
-        return self.scans or (24 if self.is_lidar else 5)
+        return (24 if self.is_lidar else 5) if self.scans is None else self.scans
 
     @property
     def loss(self) -> float:

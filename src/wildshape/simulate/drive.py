@@ -11,7 +11,7 @@ from wildshape.simulate.occluder import occluders
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.scan import Returns, scan
 from wildshape.simulate.sensor import DepthCamera, SpinningLidar
-from wildshape.simulate.solid import Solid
+from wildshape.simulate.shapes.solid import Solid
 from wildshape.simulate.trajectory import drive_by
 from wildshape.simulate.truth import visible_surface
 from wildshape.simulate.view import view

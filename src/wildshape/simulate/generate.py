@@ -8,14 +8,14 @@ from collections.abc import Iterator
 import numpy as np
 import torch
 
-from wildshape.geometry.se3 import SE3
-from wildshape.io.crew import in_order
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.parallel.processes import in_order
 from wildshape.records import Intrinsics, Sensor, Track
 from wildshape.simulate.config import SimulationConfig
 from wildshape.simulate.drive import RawTrack
 from wildshape.simulate.job import Job
-from wildshape.simulate.meshes import mesh_files
 from wildshape.simulate.sensor import DepthCamera, SpinningLidar
+from wildshape.simulate.shapes.meshes import mesh_files
 
 __all__ = ["SimulationConfig", "simulate_tracks"]
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from wildshape.simulate.config import SimulationConfig
 from wildshape.simulate.drive import Passing, RawTrack, camera_track, lidar_track
-from wildshape.simulate.meshes import read_mesh
 from wildshape.simulate.scan import Returns
 from wildshape.simulate.sensor import DepthCamera
-from wildshape.simulate.solid import Solid
-from wildshape.simulate.unit_shapes import airplane, chair
-from wildshape.simulate.vehicle import random_vehicle
+from wildshape.simulate.shapes.meshes import read_mesh
+from wildshape.simulate.shapes.solid import Solid
+from wildshape.simulate.shapes.unit_shapes import airplane, chair
+from wildshape.simulate.shapes.vehicle import random_vehicle
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@
 
 import numpy as np
 
-from wildshape.simulate.solid import Solid, box, cylinder
-from wildshape.simulate.vehicle import random_vehicle
+from wildshape.simulate.shapes.solid import Solid, box, cylinder
+from wildshape.simulate.shapes.vehicle import random_vehicle
 
 _TRIES = 8
 _ROW = 0.35

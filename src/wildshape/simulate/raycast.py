@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wildshape.errors import MissingExtraError
-from wildshape.simulate.solid import Solid
+from wildshape.simulate.shapes.solid import Solid
 
 
 @dataclass(frozen=True)

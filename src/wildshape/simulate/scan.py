@@ -8,7 +8,7 @@ import numpy as np
 
 from wildshape.simulate.raycast import Hits, Scene
 from wildshape.simulate.sensor import SpinningLidar
-from wildshape.simulate.solid import Solid
+from wildshape.simulate.shapes.solid import Solid
 
 _RIM_M = 0.3
 

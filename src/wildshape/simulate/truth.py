@@ -6,7 +6,7 @@ import numpy as np
 
 from wildshape.errors import BadInputError
 from wildshape.simulate.raycast import Scene
-from wildshape.simulate.solid import Solid
+from wildshape.simulate.shapes.solid import Solid
 
 _ROUNDS = 12
 

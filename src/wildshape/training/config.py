@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """An experiment is a value: frozen dataclasses, saved with every result."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-from wildshape.datasets.views import ViewConfig
-from wildshape.losses.multiview import LossConfig
-from wildshape.models.shapepose import NetworkConfig
+from wildshape.method.multiview import LossConfig
+from wildshape.method.network import NetworkConfig
+from wildshape.training.batches.views import ViewConfig
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class OptimConfig:
         precision: of the encoder's matrix products when training on a GPU, `bf16` or `fp32`; all
             else is float32.
         search: the type in which the encoder's winning points are searched for when training on a
-            CPU; bf16 only where the processor multiplies in it (`models/pcn_winners.py`).
+            CPU; bf16 only where the processor multiplies in it (`method/encoders/pcn_winners.py`).
     """
 
     steps: int = 400_000
@@ -58,3 +59,23 @@ class Recipe:
     views: ViewConfig = field(default_factory=ViewConfig)
     optim: OptimConfig = field(default_factory=OptimConfig)
     validate_every: int = 1000
+
+
+_LAST = 0.01
+
+
+def learning_rate(step: int, config: OptimConfig) -> float:
+    """Learning rate of a step, counted from 0."""
+    rise = min(1.0, (step + 1) / config.warmup) if config.warmup else 1.0
+    if config.decay_every:
+        return rise * config.lr * config.decay ** (step // config.decay_every)
+    fall = (1 + math.cos(math.pi * min(1.0, step / config.steps))) / 2
+    return rise * config.lr * (_LAST + (1 - _LAST) * fall)
+
+
+def template_weight(step: int, steps: int, config: LossConfig) -> float:
+    """Weight of the template pull: geometric from `template` to `template_end`."""
+    if config.template <= 0 or config.template_end <= 0:
+        return config.template
+    share = min(1.0, step / max(1, steps - 1))
+    return config.template * (config.template_end / config.template) ** share

@@ -9,11 +9,11 @@ from typing import Any
 
 from torch.profiler import record_function
 
-from wildshape.models.checkpoint import ModelSettings, save_checkpoint
-from wildshape.training.headings import agreed_poses
-from wildshape.training.log import RunLog
-from wildshape.training.meter import Meter, refuse_not_finite
-from wildshape.training.profile import steps_profiled
+from wildshape.method.checkpoint import ModelSettings, save_checkpoint
+from wildshape.training.runtime.log import RunLog
+from wildshape.training.runtime.profiler import steps_profiled
+from wildshape.training.runtime.running_mean import Meter, refuse_not_finite
+from wildshape.training.self_training.headings import agreed_poses
 from wildshape.training.setup import Run, setup, split_tracks, step_of
 from wildshape.training.state import save_state
 from wildshape.training.step import Step

@@ -10,11 +10,11 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.profiler import record_function
 
-from wildshape.datasets.views import Batch
-from wildshape.losses.multiview import LossConfig, multiview_loss
-from wildshape.losses.steady import turning_handicap
-from wildshape.losses.template import template_deviation
-from wildshape.models.shapepose import Encoding, Poses, ShapePoseNet
+from wildshape.method.multiview import LossConfig, multiview_loss
+from wildshape.method.network import Encoding, Poses, ShapePoseNet
+from wildshape.training.batches.views import Batch
+from wildshape.training.heading_continuity import turning_handicap
+from wildshape.training.template import template_deviation
 
 
 class Objective(NamedTuple):
@@ -36,7 +36,7 @@ class WeaklySupervised(nn.Module):
         super().__init__()
         self.network, self.config = network, config
         self.encoding: Encoding | None = encoding
-        self._held = config.steady or bool(config.agree_at)
+        self._held = config.time_ordered or bool(config.agree_at)
 
     def forward(self, batch: Batch, template: float | Tensor) -> Objective:
         """Loss of one batch; `template` is this step's weight of the template pull."""
@@ -69,7 +69,7 @@ class WeaklySupervised(nn.Module):
     ) -> Float[Tensor, "B K"]:
         """What keeps a track from turning around between its scans, or from what was agreed on."""
         agreed = batch.anchor.any(-1).any(-1)
-        if not self.config.steady:
+        if not self.config.time_ordered:
             held = turning_handicap(poses.rotation, batch.turn, batch.anchor)
             return torch.where(agreed[:, None], held, torch.zeros_like(held))
         believed = cost - self.config.belief * poses.log_belief

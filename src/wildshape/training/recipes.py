@@ -4,10 +4,10 @@
 
 from dataclasses import replace
 
-from wildshape.datasets.views import ViewConfig
-from wildshape.geometry.visibility import FacingBins, PixelBins, PolarBins
-from wildshape.losses.multiview import LossConfig
-from wildshape.models.shapepose import Backbone, NetworkConfig
+from wildshape.geometry.projection.visibility import FacingBins, PixelBins, PolarBins
+from wildshape.method.multiview import LossConfig
+from wildshape.method.network import Backbone, NetworkConfig
+from wildshape.training.batches.views import ViewConfig
 from wildshape.training.config import OptimConfig, Recipe
 
 
@@ -58,7 +58,7 @@ def small() -> Recipe:
             template=1.0,
             template_end=0.02,
             belief=0.05,
-            steady=True,
+            time_ordered=True,
             agree_at=(0.15, 0.4),
         ),
         views=ViewConfig(points=512, window=40, turn="facing"),
@@ -84,7 +84,7 @@ def views() -> Recipe:
             base.loss,
             projection=FacingBins(0.06),
             belief=0.01,
-            steady=False,
+            time_ordered=False,
             agree_at=(0.2, 0.5),
         ),
         views=replace(base.views, sensor="camera"),
@@ -130,7 +130,7 @@ def tiny() -> Recipe:
             template=1.0,
             template_end=0.02,
             belief=0.05,
-            steady=True,
+            time_ordered=True,
             agree_at=(0.15, 0.4),
         ),
         views=ViewConfig(points=256, window=40, turn="facing"),

@@ -13,24 +13,25 @@ from typing import Any, Literal
 import numpy as np
 import torch
 
-from wildshape.datasets.fused import FusedSampler, FusedTargets
-from wildshape.datasets.host import HostViews
-from wildshape.datasets.resident import ResidentViews
-from wildshape.datasets.views import ViewSampler
 from wildshape.errors import BadInputError
 from wildshape.inference.prepare import unit_of
-from wildshape.io.store import Store
-from wildshape.models.checkpoint import load_checkpoint
-from wildshape.models.shapepose import Encoding, ShapePoseNet
-from wildshape.ops.allocator import keep_memory
-from wildshape.ops.processor import multiplies_bf16
-from wildshape.training.capture import Captured
+from wildshape.io.atomic import write_text
+from wildshape.io.store.store import Store
+from wildshape.method.checkpoint import load_checkpoint
+from wildshape.method.network import Encoding, ShapePoseNet
+from wildshape.ops.device import keep_memory, multiplies_bf16
+from wildshape.training.batches.fused import FusedSampler, FusedTargets
+from wildshape.training.batches.host import HostViews
+from wildshape.training.batches.resident import ResidentViews, TooLargeError
+from wildshape.training.batches.views import ViewSampler
 from wildshape.training.config import Recipe
-from wildshape.training.fusing import fused_targets, load_targets, save_targets, true_targets
-from wildshape.training.meter import Meter
 from wildshape.training.objectives import WeaklySupervised
-from wildshape.training.processes import Processes, join
-from wildshape.training.selftaught import SelfTaught
+from wildshape.training.runtime.cuda_graph import Captured
+from wildshape.training.runtime.processes import Processes, join
+from wildshape.training.runtime.running_mean import Meter
+from wildshape.training.self_training.objective import SelfTaught
+from wildshape.training.self_training.pseudo_labels import fused_targets, true_targets
+from wildshape.training.self_training.saved_targets import load_targets, save_targets
 from wildshape.training.state import STATE, TrainState, load_state
 from wildshape.training.step import Step, Views
 
@@ -97,10 +98,10 @@ def setup(
         device: cpu or cuda.
         resume: go on from the folder's state, if it has one.
         start: checkpoint whose weights are fine-tuned, instead of random ones.
-        teacher: checkpoint that poses and fuses the tracks to train on (`training/fusing.py`);
+        teacher: checkpoint that poses and fuses the tracks to train on (`pseudo_labels.py`);
             `truth` takes true poses and shapes (the oracle); by default nothing teaches.
         headings: checkpoint of LiDAR scans that is asked which way the scans look, where the
-            teacher cannot know (`training/hints.py`).
+            teacher cannot know (`training/self_training/heading_transfer.py`).
         provenance: written into the run and its checkpoint.
         taught: called with the tracks that the teacher has fused, and their number.
         say: is told what a user should know, a sentence each.
@@ -120,17 +121,17 @@ def setup(
         identity["headings"] = _short_hash(headings.read_bytes())
     folder.mkdir(parents=True, exist_ok=True)
     if resume and (folder / STATE).exists():
-        load_state(folder, state, identity)
+        load_state(folder, state, identity, store.scan_count)
     sampler = ViewSampler(store, fit_tracks, recipe.views)
     held_out = ViewSampler(store, held_tracks, recipe.views)
-    steady = recipe.loss.steady or recipe.views.sensor == "lidar"
-    targets = _targets(teacher, headings, sampler, folder, identity, taught, steady)
+    time_ordered = recipe.loss.time_ordered or recipe.views.sensor == "lidar"
+    targets = _targets(teacher, headings, sampler, folder, identity, taught, time_ordered)
     views = _views(sampler, targets, seed, processes, recipe, say)
     if state.anchors is not None:
         views.hold(state.anchors)
     described = {"recipe": asdict(recipe), "identity": identity, **(provenance or {})}
     if processes.leads:
-        (folder / "run.json").write_text(json.dumps(described, indent=1, default=str))
+        write_text(folder / "run.json", json.dumps(described, indent=1, default=str))
     parts = (state, sampler, held_out, held_tracks, views, targets, identity, described, say)
     return Run(recipe, seed, folder, processes, *parts)
 
@@ -180,7 +181,7 @@ def _targets(
     folder: Path,
     identity: dict[str, str],
     taught: Taught,
-    steady: bool,
+    time_ordered: bool,
 ) -> FusedTargets | None:
     """Made once a run, and kept beside it."""
     if teacher is None:
@@ -188,9 +189,11 @@ def _targets(
     if teacher == "truth":
         return true_targets(sampler)
     kept = {key: identity[key] for key in ("data", "teacher", "headings") if key in identity}
-    found = load_targets(folder, kept)
+    found = load_targets(folder, kept, sampler.store.scan_count, len(sampler.scans_of))
     if found is None:
-        found = fused_targets(teacher, sampler, taught, steady=steady, headings=headings)
+        found = fused_targets(
+            teacher, sampler, taught, time_ordered=time_ordered, headings=headings
+        )
         save_targets(folder, found, kept)
     return found
 
@@ -213,7 +216,7 @@ def _views(
     most = int(_RESIDENT_SHARE * torch.cuda.mem_get_info(device)[1])
     try:
         return ResidentViews(sampler, seed, processes.rank, device, most)
-    except BadInputError as error:
+    except TooLargeError as error:
         say(f"{error} Batches are drawn on the CPU instead, which is slower.")
         return HostViews(sampler, seed, processes.rank, device)
 

@@ -11,13 +11,15 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 import torch
-from safetensors import SafetensorError
-from safetensors.torch import load_file, save
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
 from torch import nn
 
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import atomic_write
+from wildshape.method.saved_network import check_numbers, check_shapes
 
+_MOST_STEPS = 1 << 53
 STATE = "state.safetensors"
 Net = TypeVar("Net", bound=nn.Module)
 
@@ -47,25 +49,36 @@ def save_state(folder: Path, state: TrainState, identity: dict[str, str]) -> Non
         file.write(save(tensors, metadata))
 
 
-def load_state(folder: Path, state: TrainState, identity: dict[str, str]) -> None:
+def load_state(folder: Path, state: TrainState, identity: dict[str, str], scans: int) -> None:
     """Fill `state` from the folder.
+
+    Args:
+        folder: of the run.
+        state: of the sizes to be filled.
+        identity: says which run it is.
+        scans: of the data, of which headings may have been agreed on.
 
     Raises:
         BadInputError: damaged, or written by a run with other settings, data or seed.
     """
-    from safetensors import safe_open
-
     path = folder / STATE
     try:
-        tensors = load_file(path)
         with safe_open(path, framework="pt") as file:
             metadata = file.metadata() or {}
-        step, found = int(metadata["step"]), dict(json.loads(metadata["identity"]))
-    except (SafetensorError, OSError, KeyError, TypeError, ValueError) as error:
+            step, found = int(metadata["step"]), dict(json.loads(metadata["identity"]))
+            if not 0 <= step < _MOST_STEPS:
+                raise ValueError(f"step {step}")
+            _check_identity(path, found, identity)
+            expected = _expected(set(file.keys()), state, scans)
+            check_shapes(path, file, expected)
+            tensors = {name: file.get_tensor(name) for name in expected}
+    except BadInputError:
+        raise
+    except (SafetensorError, OSError, KeyError, TypeError, ValueError, RecursionError) as error:
         raise BadInputError(
             f"{path}: cannot be resumed from ({error!r}); choose a new --out."
         ) from error
-    _check_identity(path, found, identity)
+    check_numbers(path, tensors)
     for name, network in (("network.", state.network), ("mean.", state.mean)):
         network.load_state_dict(_under(tensors, name))
     described = state.optimiser.state_dict()
@@ -75,6 +88,21 @@ def load_state(folder: Path, state: TrainState, identity: dict[str, str]) -> Non
             described["state"][index] = moments
     state.optimiser.load_state_dict(described)
     state.step, state.anchors = step, tensors.get("anchors")
+
+
+def _expected(found: set[str], state: TrainState, scans: int) -> dict[str, torch.Tensor]:
+    """Tensors of the shapes that a file with these names should hold."""
+    expected = {f"network.{k}": v for k, v in state.network.state_dict().items()}
+    expected |= {f"mean.{k}": v for k, v in state.mean.state_dict().items()}
+    parameters = [p for group in state.optimiser.param_groups for p in group["params"]]
+    for index, parameter in enumerate(parameters):
+        moments = {"exp_avg": parameter, "exp_avg_sq": parameter, "step": torch.zeros(())}
+        named = {f"adam.{index}.{name}": moment for name, moment in moments.items()}
+        if found & named.keys():  # what was never stepped has none
+            expected |= named
+    if "anchors" in found:
+        expected["anchors"] = torch.empty(scans, 3, 3, device="meta")
+    return expected
 
 
 def _under(tensors: dict[str, torch.Tensor], prefix: str) -> dict[str, torch.Tensor]:

@@ -14,12 +14,11 @@ import torch
 from torch import Tensor, nn
 from torch.profiler import record_function
 
-from wildshape.datasets.host import HostViews
-from wildshape.datasets.resident import ResidentViews
-from wildshape.training.config import Recipe
-from wildshape.training.meter import Meter
+from wildshape.training.batches.host import HostViews
+from wildshape.training.batches.resident import ResidentViews
+from wildshape.training.config import Recipe, learning_rate, template_weight
 from wildshape.training.objectives import Objective
-from wildshape.training.schedule import learning_rate, template_weight
+from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.state import TrainState
 
 Views = HostViews | ResidentViews

@@ -11,19 +11,18 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from wildshape.datasets.views import Batch, ViewSampler
 from wildshape.evaluation import protocol
 from wildshape.evaluation.results import figures_of
-from wildshape.geometry.centring import scan_centre
-from wildshape.geometry.level import mean_up
-from wildshape.geometry.se3 import SE3
-from wildshape.inference.method import Learned
+from wildshape.geometry.gravity import mean_up
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.choose_hypothesis import choose_hypothesis
+from wildshape.inference.evaluated import Learned
 from wildshape.inference.predictor import Predictor
-from wildshape.io.store import Store
-from wildshape.losses.hindsight import score_hypotheses
-from wildshape.losses.multiview import LossConfig, multiview_loss
-from wildshape.models.checkpoint import ModelSettings
-from wildshape.models.shapepose import Poses, ShapePoseNet
+from wildshape.io.store.store import Store
+from wildshape.method.checkpoint import ModelSettings
+from wildshape.method.multiview import LossConfig, multiview_loss
+from wildshape.method.network import Poses, ShapePoseNet
+from wildshape.training.batches.views import Batch, ViewSampler
 
 _SEED = 20_200_823
 _TRUTH_TRACKS, _TRUTH_SCANS, _LEVEL_TRACKS = 8, 6, 128
@@ -128,18 +127,13 @@ def validate(
 def _figures(
     network: ShapePoseNet, sampler: ViewSampler, config: LossConfig, batch: Batch
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    code = network.encode(batch.scans)
-    poses, shapes = network.poses(code), network.canonical(code)
-    reference = shapes[batch.reference]
+    own = choose_hypothesis(network, batch.scans, batch.centres, config)
+    reference = own.shapes[batch.reference]
     terms = multiview_loss(
-        batch.scans, batch.centres, reference, poses.rotation, poses.translation, config
+        batch.scans, batch.centres, reference, own.poses.rotation, own.poses.translation, config
     )
-    own = score_hypotheses(batch.scans, batch.centres, poses.apply(shapes), config.projection)
-    cost = own.cost(config.beta)
-    branch = (cost - config.belief * poses.log_belief).argmin(-1)
-    cost = cost.gather(1, branch[:, None])[:, 0]
-    cycle = _cycle_angle(network, sampler, config, batch, poses.choose(branch))
-    return terms.observation[None], terms.projection[None], cost, cycle
+    cycle = _cycle_angle(network, sampler, config, batch, own.pose)
+    return terms.observation[None], terms.projection[None], own.cost(config.beta), cycle
 
 
 def _cycle_angle(
@@ -153,11 +147,8 @@ def _cycle_angle(
     target = target // views * views + (target + 1) % views
     T_b_a = T_sensor_can[target] @ T_sensor_can.inverse()
     moved = T_b_a.apply(batch.scans + batch.centres[:, None])
-    centres = torch.stack([scan_centre(scan, sampler.config.sensor) for scan in moved])
-    centred = moved - centres[:, None]
-    code = network.encode(centred)
-    again, shapes = network.poses(code), network.canonical(code)
-    scores = score_hypotheses(centred, centres, again.apply(shapes), config.projection)
-    believed = scores.cost(config.beta) - config.belief * again.log_belief
-    chosen = again.choose(believed.argmin(-1))
-    return SE3(poses.rotation[target, 0].mT @ chosen.rotation[:, 0], centres).angle()
+    # Turned and centred as a scan to be posed is, not as it lies in the batch.
+    centred, centres, turn = sampler.as_posed(moved)
+    chosen = choose_hypothesis(network, centred, centres, config).pose
+    again = turn.mT @ chosen.rotation[:, 0]
+    return SE3(poses.rotation[target, 0].mT @ again, centres).angle()

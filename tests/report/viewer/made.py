@@ -5,9 +5,9 @@
 import numpy as np
 from tests.cars import car_surface, drive_by
 
-from wildshape.geometry.rotation import quaternion_from_rotation
+from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.records import Box, Track
-from wildshape.report.viewer.content import Made, Source
+from wildshape.report.viewer.content import CompletedScan, Source
 
 SIZE = (4.2, 1.7, 1.35)
 
@@ -16,14 +16,14 @@ def track(scans: int = 5, name: str = "car <b>") -> Track:
     return drive_by(name, scans=scans, points=300)
 
 
-def perfect(shown: Track, scan: int) -> Made:
+def perfect(shown: Track, scan: int) -> CompletedScan:
     """The true pose as the learned one, and the true surface."""
     assert shown.T_sensor_object is not None
     pose = shown.T_sensor_object[scan]
     w, x, y, z = quaternion_from_rotation(pose.rotation).tolist()
     cx, cy, cz = pose.translation.tolist()
     points = pose.apply_numpy(car_surface(600)[0].astype(np.float32))
-    return Made(points, Box((cx, cy, cz), SIZE, (w, x, y, z)), pose, 0.8, seconds=0.01)
+    return CompletedScan(points, Box((cx, cy, cz), SIZE, (w, x, y, z)), pose, 0.8, seconds=0.01)
 
 
 def source(scans: int = 5) -> Source:

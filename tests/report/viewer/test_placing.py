@@ -5,7 +5,7 @@ import pytest
 import torch
 from tests.report.viewer.made import perfect, track
 
-from wildshape.inference.registering import to_middle
+from wildshape.inference.registration import to_middle
 from wildshape.report.scene import upright as upright_points
 from wildshape.report.viewer.fusing import AFTER, BEFORE, TRUTH, WAYS, moves
 from wildshape.report.viewer.placing import draw_from_middle, draw_from_sensor, upright

@@ -10,9 +10,9 @@ import pytest
 from tests.report.viewer.made import perfect, track
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.se3 import stack
-from wildshape.io.points import write_ply
+from wildshape.geometry.transforms.se3 import stack
 from wildshape.io.poses import write_poses
+from wildshape.io.scans.points import write_ply
 from wildshape.io.tracks import write_track
 from wildshape.records import Completion, Sensor, Track
 from wildshape.report.viewer.sources import from_model, from_results, worst_first

@@ -3,6 +3,9 @@
  *
  * A cloud's points along a Z-curve, in blocks of points that lie close together, and each block's
  * box. Copies of the last point fill the last block; boxes past the last are out of reach.
+ *
+ * Points that are not finite are held as NaN and are in no box: they find nothing, nothing finds
+ * them, and no difference of two bounds of boxes is ever inf - inf, which would be in reach of all.
  */
 #pragma once
 #include <math.h>
@@ -42,16 +45,24 @@ static inline uint32_t spread_bits(uint32_t v)
     return (v | v << 2) & 0x249249;
 }
 
+/* 0 for a finite point, else NaN: added to its coordinates it makes all of them NaN. */
+static inline float broken(const float *point)
+{
+    return (point[0] - point[0]) + (point[1] - point[1]) + (point[2] - point[2]);
+}
+
 /* Place of each point's cell on the Z-curve of a grid of 256 cells along the longest side. */
 static inline void cloud_cells(const float *points, int64_t count, uint32_t *cell)
 {
     float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (int64_t i = 0; i < count; i++)
+    for (int64_t i = 0; i < count; i++) {
+        const float gone = broken(points + 3 * i);
         for (int c = 0; c < 3; c++) {
-            float v = points[3 * i + c];
+            float v = points[3 * i + c] + gone;
             low[c] = v < low[c] ? v : low[c];
             high[c] = v > high[c] ? v : high[c];
         }
+    }
     float side = 0;
     for (int c = 0; c < 3; c++)
         side = high[c] - low[c] > side ? high[c] - low[c] : side;
@@ -119,8 +130,10 @@ static inline void cloud_fill(cloud *made, const float *points, int64_t count)
     cloud_sort(made, points);
     for (int64_t i = 0; i < made->blocks * BLOCK; i++) {
         made->order[i] = made->order[i < count ? i : count - 1];
+        const float *point = points + 3 * (int64_t)made->order[i];
+        const float gone = broken(point);
         for (int c = 0; c < 3; c++)
-            made->axes[c][i] = points[3 * (int64_t)made->order[i] + c];
+            made->axes[c][i] = point[c] + gone;
     }
     cloud_boxes(made);
 }

@@ -71,6 +71,8 @@ int wildshape_visible(const int64_t *bins, const float *depth, int64_t clouds, i
     };
     if (points > (int64_t)1 << 30)
         return 1;
+    if (points == 0)
+        return 0;
     while (((int64_t)1 << job.bits) < 2 * points)
         job.bits++;
     int worth = clouds * points > 100000;

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, UInt8
 
-from wildshape.geometry.shades import shades
+from wildshape.geometry.mesh_confidence import share_colours
 from wildshape.ops.nearest import nearest
 from wildshape.records import Points
 
@@ -39,7 +39,7 @@ def completed_colours(
 ) -> Rgb | None:
     """Colours of a completed shape; None where they stay plain. All clouds in one frame."""
     if colouring == CONFIDENCE and confidence is not None:
-        return np.repeat(shades(np.array([1.0 - confidence])), len(points), axis=0)
+        return np.repeat(share_colours(np.array([1.0 - confidence])), len(points), axis=0)
     others = {GUESSED: scan, WRONG: truth}.get(colouring)
     if others is None or not len(others):
         return None
@@ -51,7 +51,7 @@ def by_distance(points: Points, others: Points, far: float) -> Rgb:
     middle = points.mean(0)
     a, b = (torch.from_numpy(np.ascontiguousarray(p - middle))[None] for p in (points, others))
     distance = nearest(a.float(), b.float()).distance_squared[0].clamp(min=0).sqrt().numpy()
-    return shades(np.minimum(distance / far, 1.0))
+    return share_colours(np.minimum(distance / far, 1.0))
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
@@ -62,5 +62,5 @@ def rgb(colour: str) -> tuple[int, int, int]:
 
 def css(confidence: float) -> str:
     """A confidence as a CSS colour."""
-    r, g, b = shades(np.array([1.0 - confidence]))[0]
+    r, g, b = share_colours(np.array([1.0 - confidence]))[0]
     return f"rgb({r},{g},{b})"

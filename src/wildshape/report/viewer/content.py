@@ -5,12 +5,13 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from wildshape.geometry.se3 import SE3
+from wildshape.datasets.tracks.accumulation import shape_partial
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Box, Points, Track
 
 
 @dataclass(frozen=True)
-class Made:
+class CompletedScan:
     """What was made of one scan; everything in that scan's sensor frame, metres.
 
     Attributes:
@@ -18,7 +19,7 @@ class Made:
         box: around it.
         pose: `T_sensor_canonical`.
         confidence: 0 to 1.
-        warning: empty, or one sentence.
+        warning: why it is not to be trusted, or nothing.
         seconds: time spent on the scan.
     """
 
@@ -45,5 +46,12 @@ class Source:
     title: str
     labels: tuple[str, ...]
     track: Callable[[int], Track]
-    make: Callable[[int, Track, int], Iterator[tuple[int, Made]]]
+    make: Callable[[int, Track, int], Iterator[tuple[int, CompletedScan]]]
     note: str = ""
+
+
+def true_shape(track: Track) -> Points | None:
+    """`(g, 3)` in the object's frame: the track's shape, or what its true poses accumulate to."""
+    if track.shape is not None or track.T_sensor_object is None:
+        return track.shape
+    return shape_partial(track)

@@ -9,7 +9,7 @@ import numpy as np
 from wildshape.evaluation.metrics import completion_error
 from wildshape.report.scene import thin
 from wildshape.report.viewer.colours import LEGENDS, css
-from wildshape.report.viewer.content import Made
+from wildshape.report.viewer.content import CompletedScan
 from wildshape.report.viewer.stage import POINTS_A_CLOUD, Stage, Wish
 
 _ROW = "<div style='display:flex;gap:.8em;justify-content:space-between'><span style='opacity:.65'>"
@@ -38,10 +38,10 @@ def _rows(stage: Stage, wish: Wish) -> list[tuple[str, str]]:
         ("measured points", f"{len(scan):,}"),
         ("distance to the sensor", f"{np.linalg.norm(stage.centre(wish.scan)):.1f} m"),
     ]
-    return rows + _made_rows(stage.made.get(wish.scan)) + _true_rows(stage, wish)
+    return rows + _completed_rows(stage.made.get(wish.scan)) + _true_rows(stage, wish)
 
 
-def _made_rows(made: Made | None) -> list[tuple[str, str]]:
+def _completed_rows(made: CompletedScan | None) -> list[tuple[str, str]]:
     if made is None:
         return [("completed shape", "not yet")]
     rows = []
@@ -79,5 +79,5 @@ def _small(text: str, style: str = "opacity:.65") -> str:
     return f"<div style='{style};margin-top:.4em'>{escape(text)}</div>" if text else ""
 
 
-def _warning(made: Made | None) -> str:
+def _warning(made: CompletedScan | None) -> str:
     return made.warning if made is not None else ""

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from wildshape.baselines.identity import Identity
 from wildshape.baselines.local_icp import LocalIcp
 from wildshape.evaluation.metrics import ACCURATE_DEG, RegistrationError, registration_error
-from wildshape.geometry.se3 import SE3, stack
-from wildshape.inference.registering import to_middle
+from wildshape.geometry.transforms.se3 import SE3, stack
+from wildshape.inference.registration import to_middle
 from wildshape.records import Track
-from wildshape.report.viewer.content import Made
+from wildshape.report.viewer.content import CompletedScan
 
 BEFORE, AFTER, ICP, TRUTH = "before: only centred", "after: Wildshape", "local ICP", "true poses"
 WAYS = (AFTER, BEFORE, ICP, TRUTH)
@@ -40,7 +40,7 @@ class Moves:
         return f"{median:.1f}°, {metres:.2f} m median; {100 * right:.0f} % within 30°"
 
 
-def moves(way: str, track: Track, made: Mapping[int, Made]) -> Moves | None:
+def moves(way: str, track: Track, made: Mapping[int, CompletedScan]) -> Moves | None:
     """A track's scans taken to its middle scan's frame; None where that cannot be done (yet)."""
     if not all(len(scan) for scan in track.scans):
         return None
@@ -53,7 +53,7 @@ def moves(way: str, track: Track, made: Mapping[int, Made]) -> Moves | None:
     return Moves(T_middle_scan, registration_error(T_middle_scan, truth, truth[track.middle]))
 
 
-def _moves(way: str, track: Track, made: Mapping[int, Made]) -> SE3 | None:
+def _moves(way: str, track: Track, made: Mapping[int, CompletedScan]) -> SE3 | None:
     if way == BEFORE:
         return Identity().register_track(track.scans, track.sensor)
     if way == ICP:

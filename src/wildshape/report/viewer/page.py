@@ -7,7 +7,7 @@ import io
 import logging
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from html import escape
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ from wildshape.report.viewer.content import Source
 from wildshape.report.viewer.facts import facts
 from wildshape.report.viewer.panel import Panel
 from wildshape.report.viewer.stage import Stage
+from wildshape.report.viewer.visitors import answering_only, checked_hosts, prove
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -134,18 +135,20 @@ class Page:
 
 
 @contextmanager
-def serving(source: Source, port: int = 0) -> Iterator[Page]:
+def serving(source: Source, port: int = 0, allowed: Sequence[str] = ()) -> Iterator[Page]:
     """The page for as long as the block runs.
 
     Args:
         source: what it shows.
         port: taken, or the next free one; 0 takes any.
+        allowed: names under which it may be asked for beside this machine's (`visitors.py`).
 
     Raises:
-        MissingExtraError: viser is not installed.
+        BadInputError: an allowed name is none.
+        MissingExtraError: viser is not installed, or cannot be told whom to answer.
     """
     others = set(threading.enumerate())
-    server = _server(port)
+    server = _server(port, checked_hosts(allowed))
     own = set(threading.enumerate()) - others
     page = None
     try:
@@ -175,7 +178,7 @@ def run_until_interrupted(page: Page) -> None:
         page.play()
 
 
-def _server(port: int) -> "ViserServer":
+def _server(port: int, allowed: Sequence[str]) -> "ViserServer":
     try:
         import viser
     except ImportError as error:
@@ -183,8 +186,15 @@ def _server(port: int) -> "ViserServer":
             "the viewer needs viser: pip install 'wildshape[view]' (`wildshape report` draws"
             " results without it)."
         ) from error
-    with _quiet():
-        return viser.ViserServer(host=HOST, port=port, verbose=False)
+    with _quiet(), answering_only(allowed):
+        server = viser.ViserServer(host=HOST, port=port, verbose=False)
+    try:
+        prove(server.get_port())
+    except MissingExtraError:
+        with _quiet():
+            server.stop()
+        raise
+    return server
 
 
 def _quiet() -> contextlib.redirect_stdout:

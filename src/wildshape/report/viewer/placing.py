@@ -11,8 +11,8 @@ from typing import Literal
 import numpy as np
 import torch
 
-from wildshape.geometry.rotation import quaternion_from_rotation
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.rotation import quaternion_from_rotation
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import SensorKind
 
 Hold = Literal["sensor", "object"]

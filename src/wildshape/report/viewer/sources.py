@@ -11,9 +11,17 @@ import numpy as np
 
 from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
-from wildshape.records import Completion, Points, Sensor, Track
-from wildshape.report.results import OBJECTS, Inputs, TrackResult, box_of, find, read_result
-from wildshape.report.viewer.content import Made, Source
+from wildshape.records import Completion, Points, Sensor, Track, as_text
+from wildshape.report.results import (
+    OBJECTS,
+    Inputs,
+    TrackResult,
+    box_of,
+    doubt_of,
+    find,
+    read_result,
+)
+from wildshape.report.viewer.content import CompletedScan, Source
 
 
 @runtime_checkable
@@ -39,7 +47,7 @@ def from_results(folder: Path, inputs: Path | None = None) -> Source:
     if not folders:
         raise BadInputError(f"{folder}: holds no objects.json; name the --out of complete.")
     names = [place.relative_to(folder).as_posix() for place in folders]
-    labels = [folder.resolve().name if name == "." else name for name in names]
+    labels = [as_text(folder.resolve().name if name == "." else name) for name in names]
     where, kept = Inputs(inputs), {}
 
     def result(number: int) -> TrackResult:
@@ -49,7 +57,7 @@ def from_results(folder: Path, inputs: Path | None = None) -> Source:
         return kept[number]
 
     return Source(
-        title=folder.resolve().name,
+        title=as_text(folder.resolve().name),
         labels=tuple(labels),
         track=lambda number: _track(result(number)),
         make=lambda number, track, first: _read(result(number), track, first),
@@ -74,7 +82,7 @@ def from_model(
     """
     loaded: list[Completes] = []
 
-    def make(_: int, shown: Track, first: int) -> Iterator[tuple[int, Made]]:
+    def make(_: int, shown: Track, first: int) -> Iterator[tuple[int, CompletedScan]]:
         if not loaded:
             loaded.append(model())
         yield from _complete(loaded[0], shown, first)
@@ -103,20 +111,21 @@ def _completions(scores: dict[str, Any], method: str) -> Iterator[dict[str, Any]
                 yield from row["completions"]
 
 
-def _complete(model: Completes, track: Track, first: int) -> Iterator[tuple[int, Made]]:
+def _complete(model: Completes, track: Track, first: int) -> Iterator[tuple[int, CompletedScan]]:
     """The scan that is looked at, then all others."""
     order = [first, *(i for i in range(len(track.scans)) if i != first)]
     for part in (order[:1], order[1:]):
         done = model.complete_many([track.scans[i] for i in part], track.sensor)
         for number, completion in zip(part, done):
-            yield number, _made(completion)
+            yield number, _completed(completion)
 
 
-def _made(done: Completion) -> Made:
-    return Made(done.points, done.box, done.pose, done.confidence, done.warning, done.seconds)
+def _completed(done: Completion) -> CompletedScan:
+    doubt = doubt_of({"warning": done.warning, "reasons": done.reasons})
+    return CompletedScan(done.points, done.box, done.pose, done.confidence, doubt, done.seconds)
 
 
-def _read(result: TrackResult, track: Track, first: int) -> Iterator[tuple[int, Made]]:
+def _read(result: TrackResult, track: Track, first: int) -> Iterator[tuple[int, CompletedScan]]:
     poses = result.poses()
     lines = {scan: line for line, scan in enumerate(result.scans)}
     order = [first, *(i for i in range(len(track.scans)) if i != first)]
@@ -126,12 +135,12 @@ def _read(result: TrackResult, track: Track, first: int) -> Iterator[tuple[int, 
         known = poses is not None and line is not None and line < len(poses)
         yield (
             number,
-            Made(
+            CompletedScan(
                 points=result.completed(name),
                 box=box_of(entry),
                 pose=poses[line] if poses is not None and line is not None and known else None,
                 confidence=entry.get("confidence"),
-                warning=str(entry.get("warning") or ""),
+                warning=doubt_of(entry),
                 seconds=entry.get("seconds"),
             ),
         )

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 
-from wildshape.geometry.rotation import rotation_from_quaternion
-from wildshape.geometry.se3 import SE3
+from wildshape.geometry.transforms.rotation import rotation_from_quaternion
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Box, Points, Track
 from wildshape.report.content import BLUE, GREEN, GREY, ORANGE
 from wildshape.report.parts import fuse
 from wildshape.report.scene import box_segments, thin
 from wildshape.report.viewer.colours import PLAIN, WRONG, Rgb, by_height, completed_colours, rgb
-from wildshape.report.viewer.content import Made
+from wildshape.report.viewer.content import CompletedScan, true_shape
 from wildshape.report.viewer.fusing import AFTER, BEFORE, Moves, moves
 from wildshape.report.viewer.placing import (
     Hold,
@@ -26,7 +26,6 @@ from wildshape.report.viewer.placing import (
     moved_by,
     upright,
 )
-from wildshape.report.viewer.truth import true_shape
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -81,7 +80,7 @@ class Stage:
 
     server: "ViserServer"
     track: Track
-    made: dict[int, Made] = field(default_factory=dict)
+    made: dict[int, CompletedScan] = field(default_factory=dict)
     nodes: dict[tuple[str, int | str], Node] = field(default_factory=dict)
     ways: dict[str, Moves] = field(default_factory=dict)
     seen: int | None = None
@@ -99,7 +98,7 @@ class Stage:
         for handle in self.lines.values():
             handle.remove()
 
-    def add(self, scan: int, made: Made) -> None:
+    def add(self, scan: int, made: CompletedScan) -> None:
         """Take in what was made of a scan, hidden until it is asked for."""
         self.made[scan] = made
         self._scan(scan)
@@ -176,7 +175,7 @@ class Stage:
         return self._shaded(points, BLUE) if colours is None else colours
 
     def _show_lines(self, wish: Wish, T_draw_sensor: SE3) -> None:
-        made = self.made.get(wish.scan, Made())
+        made = self.made.get(wish.scan, CompletedScan())
         for kind, T_sensor_own in (("box", _box_pose(made.box)), ("axes", made.pose)):
             visible = kind in wish.shown and T_sensor_own is not None
             if T_sensor_own is None or (not visible and kind not in self.lines):

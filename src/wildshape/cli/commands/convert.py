@@ -1,0 +1,216 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`wildshape convert`: data sets as they lie on disk become tracks."""
+
+import math
+import time
+from dataclasses import asdict, dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+
+from tyro.conf import Positional, arg
+
+from wildshape.cli.conversion.sources import SOURCES, open_source
+from wildshape.cli.options import AsJson, Layout, Origin, Overwrite, Unit, listed, option
+from wildshape.errors import BadInputError
+
+if TYPE_CHECKING:
+    from wildshape.datasets.tracks.conversion import PartResult
+    from wildshape.datasets.tracks.source import Source
+    from wildshape.datasets.tracks.truth import TruthBuilder
+
+EXAMPLES = (
+    "wildshape convert semantic-kitti dataset cars.store --workers 4",
+    "wildshape convert kitti-raw 2011_09_26 cars.store --min-scans 5 --truth mirrored",
+    "wildshape convert nuscenes data/nuscenes cars.store --categories car,truck --range-m 2,40",
+    "wildshape convert folder myscans mytracks --layout folders --unit mm",
+)
+
+Name = Annotated[str, Positional, arg(metavar="SOURCE", help=", ".join(SOURCES))]
+Root = Annotated[Path, Positional, arg(metavar="ROOT", help="where it lies")]
+Out = Annotated[Path, Positional, arg(metavar="OUT", help="packed store, or folder, to write")]
+Count = Annotated[int | None, option(metavar="N")]
+Metres = Annotated[float | None, option(metavar="M")]
+Range = Annotated[tuple[float, float] | None, listed("LOW,HIGH", float, count=2), option()]
+Words = Annotated[tuple[str, ...] | None, listed("A,B", words=1), option()]
+Word = Annotated[str | None, option(metavar="WORD")]
+
+_OURS = ("source", "root", "out", "layout", "workers", "ray", "overwrite", "json")
+_TRUTH = ("truth", "outliers", "outlier_radius", "outlier_neighbours", "ground_strip")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Convert a data set into tracks: the crops of each object over time, with truth if known.
+
+    What is left out is counted by reason. Stopped at any instant, the same command goes on from
+    the parts (drives, sequences, logs) that are finished. Options that are not given are the
+    reader's own; those that a reader does not have are refused.
+
+    Attributes:
+        every: take every k-th frame of an object.
+        min_points: a scan with fewer points on the object is left out.
+        min_mean_points: an object whose scans have fewer on average is left out.
+        min_scans: an object with fewer scans is left out.
+        range_m: least and largest distance of a scan from the sensor, metres.
+        largest_m: a scan with a longer diagonal is left out, metres; 20.5 of folders.
+        categories: the data set's own words: Car,Van.
+        motion: objects that moved over the track, that stood, or any.
+        margin: labelled boxes are enlarged by this, metres.
+        ground: points lower than this above a box's floor are left out, metres.
+        keep_ground: leave them in, and those just under the floor.
+        truth: accumulate each object's scans, by their true poses, into its shape.
+        outliers: which rule removes stray points from that shape.
+        outlier_radius: of the rule `radius`, metres.
+        outlier_neighbours: how many points the rule `radius` wants within it.
+        ground_strip: height above the shape's lowest points that is left out, metres.
+        unit: of the coordinates in the files (folder).
+        origin: the sensor's position in the files, of scans that were moved into a map (folder).
+        split: of the data set (semantic-kitti, shapenet-views).
+        labels: folder of the labels (semantic-kitti).
+        gap: frames an object may be out of sight (semantic-kitti, rgbd).
+        sweeps: the scans between the labelled ones, too (nuscenes).
+        lidar: up, down or both (argoverse2); a channel such as LIDAR_RIGHT (nuscenes).
+        views: of each object (shapenet-views).
+        pixels: edge of its images (shapenet-views).
+        max_depth: farther pixels are left out, metres (rgbd, bop).
+        edge: so many pixels at a mask's border are left out (rgbd, bop).
+        workers: processes; by default one a core.
+        ray: spread the work over the Ray cluster at this address; `auto` finds the one that this
+            machine belongs to, `local` starts one. OUT must lie where all its machines see it.
+    """
+
+    source: Name
+    root: Root
+    out: Out
+    layout: Layout = "packed"
+    every: Count = None
+    min_points: Count = None
+    min_mean_points: Count = None
+    min_scans: Count = None
+    range_m: Range = None
+    largest_m: Metres = None
+    categories: Words = None
+    motion: Annotated[
+        Literal["any", "moving", "parked"] | None, option(metavar="{any,moving,parked}")
+    ] = None
+    margin: Metres = None
+    ground: Metres = None
+    keep_ground: bool = False
+    truth: Literal["none", "partial", "mirrored"] = "none"
+    outliers: Literal["statistical", "radius", "none"] = "statistical"
+    outlier_radius: Annotated[float, arg(metavar="M")] = 0.15
+    outlier_neighbours: Annotated[int, arg(metavar="N")] = 8
+    ground_strip: Annotated[float, arg(metavar="M")] = 0.0
+    unit: Annotated[Unit | None, option(metavar="{m,cm,mm}")] = None
+    origin: Annotated[Origin | None, option(metavar="X,Y,Z")] = None
+    split: Word = None
+    labels: Word = None
+    gap: Count = None
+    sweeps: bool = False
+    lidar: Word = None
+    views: Count = None
+    pixels: Count = None
+    max_depth: Metres = None
+    edge: Count = None
+    workers: Count = None
+    ray: Annotated[str | None, option(metavar="ADDRESS")] = None
+    overwrite: Overwrite = False
+    json: AsJson = False
+
+
+def run(settings: Settings) -> None:
+    """Read the source and write its tracks.
+
+    Raises:
+        BadInputError: an unknown source, files that are missing or damaged, an existing output.
+        MissingExtraError: a library that the source or Ray needs is not installed.
+    """
+    from wildshape.cli.conversion.work import Order, convert
+    from wildshape.cli.output import keep_apart
+
+    began = time.monotonic()
+    _check(settings)
+    keep_apart(settings.root, settings.out)
+    # Machines of a cluster have working folders of their own.
+    root = settings.root if settings.ray is None else settings.root.absolute()
+    source = open_source(settings.source, root, _options(settings))
+    order = Order(
+        name=settings.source,
+        source=source,
+        out=settings.out,
+        layout=settings.layout,
+        truth=_truth(settings),
+        settings=_identity(settings, source),
+        workers=settings.workers,
+        ray=settings.ray,
+        overwrite=settings.overwrite,
+    )
+    _tell(convert(order), settings, time.monotonic() - began)
+
+
+def _options(settings: Settings) -> dict[str, Any]:
+    """What the user asked of the reader, by the names of its fields."""
+    names = [f.name for f in fields(settings) if f.name not in (*_OURS, *_TRUTH)]
+    given = {name: getattr(settings, name) for name in names}
+    if settings.categories == ():
+        raise BadInputError("--categories names no category; leave it out for the usual ones.")
+    # By identity: 0 == False, and an explicit zero is a wish.
+    return {name: v for name, v in given.items() if v is not None and v is not False}
+
+
+def _truth(settings: Settings) -> "TruthBuilder | None":
+    from wildshape.datasets.tracks.truth import TruthBuilder
+
+    if settings.truth == "none":
+        return None
+    return TruthBuilder(
+        kind=settings.truth,
+        outliers=settings.outliers,
+        radius=settings.outlier_radius,
+        neighbours=settings.outlier_neighbours,
+        strip=settings.ground_strip,
+    )
+
+
+def _identity(settings: Settings, source: "Source") -> dict[str, Any]:
+    """The reader with all its options, those included that the user did not give."""
+    names = [f.name for f in fields(cast("Any", source)) if f.init and f.name != "root"]
+    options = {name: getattr(source, name) for name in names}
+    values = {n: asdict(cast("Any", v)) if is_dataclass(v) else v for n, v in options.items()}
+    return {"source": settings.source, "root": str(settings.root.resolve()), **values}
+
+
+def _check(settings: Settings) -> None:
+    least = dict.fromkeys(("every", "workers", "outlier_neighbours", "views"), 1)
+    least |= dict.fromkeys(("min_points", "min_mean_points", "min_scans", "ground_strip"), 0)
+    least |= dict.fromkeys(("gap", "pixels", "edge", "max_depth", "largest_m"), 0)
+    for name, bound in least.items():
+        value = getattr(settings, name)
+        if value is not None and not value >= bound:
+            raise BadInputError(f"--{name.replace('_', '-')} {value}: expected {bound} or more.")
+    for name in ("margin", "ground"):
+        if not math.isfinite(getattr(settings, name) or 0.0):
+            raise BadInputError(f"--{name} {getattr(settings, name)}: expected a number of metres.")
+    if settings.range_m is not None and not 0 <= settings.range_m[0] < settings.range_m[1]:
+        low, high = settings.range_m
+        raise BadInputError(f"--range-m {low:g} {high:g}: expected two distances, nearer first.")
+
+
+def _tell(results: "list[PartResult]", settings: Settings, seconds: float) -> None:
+    """The figures on stdout, and what was left out as a table on stderr."""
+    from wildshape.cli.conversion.output import left_out
+    from wildshape.cli.terminal import answer, counted, duration, say
+
+    counts = {key: sum(getattr(r, key) for r in results) for key in ("tracks", "scans", "points")}
+    reasons = left_out(results)
+    if reasons:
+        say("\n".join(("left out:", *(f"{n:9,}  {r}" for r, n in reasons.items()))))
+    damaged = [result.damage for result in results if result.damage]
+    if damaged:
+        say(f"{len(damaged)} of {len(results)} parts are damaged, for example {damaged[0]}")
+    made = ", ".join(counted(n, key.removesuffix("s")) for key, n in counts.items())
+    text = f"converted {made} in {duration(seconds)}; see {settings.out}"
+    parts = [{key: value for key, value in asdict(r).items() if key != "names"} for r in results]
+    data = {"out": str(settings.out), **counts, "left_out": reasons, "parts": parts}
+    answer(text, {**data, "seconds": round(seconds, 3)}, as_json=settings.json)

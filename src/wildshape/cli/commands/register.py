@@ -1,0 +1,147 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`wildshape register`: two scans of one object, or all scans of a track."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, arg
+
+from wildshape.cli.importing import uncollected
+from wildshape.cli.input.pipe import Format, as_file, is_pipe
+from wildshape.cli.options import (
+    AT_ORIGIN,
+    AsJson,
+    Device,
+    Model,
+    Origin,
+    Overwrite,
+    Together,
+    Unit,
+    option,
+)
+from wildshape.errors import BadInputError
+
+if TYPE_CHECKING:
+    from wildshape.records import Track
+
+EXAMPLES = (
+    "wildshape register before.ply after.ply",
+    "wildshape register mytracks/car-17 --out car-17 --track",
+    "wildshape register mytracks --out registered --track",
+)
+
+Source = Annotated[
+    Path,
+    Positional,
+    arg(metavar="SOURCE", help="a scan, or - for stdin; without TARGET a TRACK or DATASET"),
+]
+Target = Annotated[
+    Path | None,
+    Positional,
+    option(metavar="TARGET", help="the scan to whose frame SOURCE is taken, or -"),
+]
+Out = Annotated[Path | None, option(metavar="DIR", help="folder to write, with a TRACK")]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Register SOURCE to TARGET, or every scan of a TRACK to its middle scan.
+
+    Two scans: prints T_target_source, which takes the source's points to the target's sensor
+    frame, and the share of them that then lie near the target. A TRACK: writes
+    DIR/TRACK/poses.txt (T_sensor_canonical, KITTI's format), trajectory.tum (the same in TUM's),
+    trajectory.json (the same with smoothness figures), T_middle_scan.txt and objects.json.
+    """
+
+    source: Source
+    target: Target = None
+    out: Out = None
+    model: Model = None
+    unit: Unit = "m"
+    origin: Origin = AT_ORIGIN
+    device: Device = "auto"
+    together: Together = False
+    format: Format = "auto"
+    overwrite: Overwrite = False
+    json: AsJson = False
+
+
+def run(settings: Settings) -> None:
+    """Register a pair or tracks.
+
+    Raises:
+        BadInputError: input, model or output cannot be used.
+    """
+    if settings.target is not None and settings.out is not None:
+        raise BadInputError(
+            "register SOURCE TARGET prints its result; leave --out away, or name one TRACK alone."
+        )
+    if settings.target is not None and settings.together:
+        raise BadInputError("--track poses the scans of a TRACK together; a pair has no track.")
+    if settings.format != "auto" and not (is_pipe(settings.source) or is_pipe(settings.target)):
+        raise BadInputError(f"--format {settings.format}: is for a scan on stdin; leave it away.")
+    if settings.target is not None:
+        _pair(settings, settings.target)
+    elif settings.out is not None:
+        _tracks(settings, settings.out)
+    else:
+        raise BadInputError("register needs SOURCE and TARGET scans, or a TRACK and --out DIR.")
+
+
+def _tracks(settings: Settings, out: Path) -> None:
+    with uncollected():
+        from wildshape.cli.results.write import Work, perform
+        from wildshape.io.scans.points import Coordinates
+
+    work = Work(
+        command="register",
+        input=settings.source,
+        out=out,
+        model=settings.model,
+        coordinates=Coordinates(settings.unit, settings.origin),
+        device=settings.device,
+        track=settings.together,
+    )
+    perform(work, overwrite=settings.overwrite, as_json=settings.json)
+
+
+def _pair(settings: Settings, target: Path) -> None:
+    from wildshape.cli.models import load_model
+    from wildshape.cli.results.tally import doubt
+    from wildshape.cli.terminal import answer, say
+
+    if is_pipe(settings.source) and is_pipe(target):
+        raise BadInputError("register - -: stdin holds one scan; name a file for the other.")
+    source, target_track = (_scan(path, settings) for path in (settings.source, target))
+    predictor = load_model(settings.model, settings.device)
+    found = predictor.register(source.scans[0], target_track.scans[0], source.sensor)
+    matrix = found.T_target_source.matrix.tolist()
+    lines = [" ".join(f"{value:12.6f}" for value in row) for row in matrix]
+    shares = f"inlier ratio {found.inlier_ratio:.3f}, confidence {found.confidence:.3f}"
+    data = {
+        "T_target_source": matrix,
+        "inlier_ratio": found.inlier_ratio,
+        "confidence": found.confidence,
+        "warning": found.warning,
+        "reasons": found.reasons,
+    }
+    if found.reasons:
+        say(doubt(found))
+    answer("\n".join(("T_target_source", *lines, shares)), data, as_json=settings.json)
+
+
+def _scan(path: Path, settings: Settings) -> "Track":
+    from wildshape.cli.input.tracks import Reading
+    from wildshape.io.scans.points import Coordinates
+
+    kind = settings.format if is_pipe(path) else "auto"
+    with as_file(path, kind) as file:
+        track = Reading(file, Coordinates(settings.unit, settings.origin)).single("a pair")
+    if len(track.scans) != 1:
+        raise BadInputError(
+            f"{path}: holds {len(track.scans)} scans, but a pair takes two files of one scan each;"
+            " for a whole track name it alone with --out DIR."
+        )
+    return track

@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`wildshape report`: one HTML page of what other commands wrote."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from wildshape.cli.options import AsJson, Overwrite, option
+
+EXAMPLES = (
+    "wildshape report completed --out completed/report.html",
+    "wildshape report runs/cars",
+)
+
+Folder = Annotated[
+    Path, Positional, arg(metavar="DIR", help="the --out of complete, register, evaluate or train")
+]
+OutFile = Annotated[
+    Path | None, option(metavar="FILE", help="page to write; by default DIR/report.html")
+]
+Inputs = Annotated[
+    Path | None, option(metavar="INPUT", help="the scans, if they are no longer where they were")
+]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Draw results as one self-contained HTML page: objects in 3D, tables, curves, cost."""
+
+    folder: Folder
+    out: OutFile = None
+    inputs: Inputs = None
+    overwrite: Overwrite = False
+    json: AsJson = False
+
+
+def run(settings: Settings) -> None:
+    """Write the page.
+
+    Raises:
+        BadInputError: nothing there to report, or the page exists.
+    """
+    from wildshape.cli.output import refuse_file
+    from wildshape.cli.terminal import answer
+    from wildshape.report.folder import report_from_folder
+    from wildshape.report.page import write_report
+
+    out = settings.out or settings.folder / "report.html"
+    refuse_file(out, overwrite=settings.overwrite)
+    found = report_from_folder(settings.folder, settings.inputs)
+    write_report(found, out)
+    data = {"out": str(out), "objects": len(found.objects), "tables": len(found.tables)}
+    answer(f"the report is {out}", data, as_json=settings.json)

@@ -1,0 +1,166 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`wildshape view`: tracks, shapes, boxes and poses on an interactive page of this machine."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import FlagCreatePairsOff, Positional, arg
+
+from wildshape.cli.options import AT_ORIGIN, AsJson, Device, Model, Origin, Unit, listed, option
+
+if TYPE_CHECKING:
+    from wildshape.inference.predictor import Predictor
+    from wildshape.report.viewer.content import Source
+
+EXAMPLES = (
+    "wildshape view completed",
+    "wildshape view mytracks --no-open",
+)
+
+Shown = Annotated[
+    Path,
+    Positional,
+    arg(
+        metavar="INPUT",
+        help="the --out of complete, register or evaluate; or a scan, a TRACK, a DATASET, a store",
+    ),
+]
+Inputs = Annotated[
+    Path | None, option(metavar="INPUT", help="the scans, if they are no longer where they were")
+]
+Port = Annotated[int, arg(metavar="N", help="taken, or the next free one; 0 takes any")]
+AllowHost = Annotated[
+    tuple[str, ...],
+    listed("NAME,NAME"),
+    option(help="answer pages of these names, too: a tunnel's, each with :PORT or for any"),
+]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Show results, or scans completed as they are looked at, on an interactive page.
+
+    The page is served to this machine alone (127.0.0.1), needs no network, and lives until Ctrl-C.
+    Pages of other hosts get no answer; for a tunnel under another name or port add --allow-host.
+
+    Attributes:
+        open: open it in the browser even where no display is found.
+        no_open: do not open it, only print its address.
+    """
+
+    input: Shown
+    model: Model = None
+    inputs: Inputs = None
+    port: Port = 8080
+    allow_host: AllowHost = ()
+    open: FlagCreatePairsOff[bool] = False
+    no_open: FlagCreatePairsOff[bool] = False
+    unit: Unit = "m"
+    origin: Origin = AT_ORIGIN
+    device: Device = "auto"
+    json: AsJson = False
+
+
+def run(settings: Settings) -> None:
+    """Serve the page until Ctrl-C.
+
+    Raises:
+        BadInputError: the input is nothing that can be shown.
+        MissingExtraError: viser is not installed.
+    """
+    import webbrowser
+
+    from wildshape.cli.terminal import answer, say
+    from wildshape.report.viewer.page import run_until_interrupted, serving
+
+    with serving(source_of(settings), settings.port, settings.allow_host) as page:
+        text = f"showing {settings.input} at {page.url} (this machine only); Ctrl-C ends it"
+        answer(text, {"url": page.url, "tracks": len(page.source.labels)}, as_json=settings.json)
+        if settings.open or (_display() and not settings.no_open):
+            webbrowser.open(page.url)
+        try:
+            run_until_interrupted(page)
+        except KeyboardInterrupt:
+            say("closed")
+
+
+def source_of(settings: Settings) -> "Source":
+    """What the input holds: results as they lie there, or scans and the model.
+
+    Raises:
+        BadInputError: it holds neither.
+    """
+    from wildshape.report.results import METRICS, OBJECTS, find
+    from wildshape.report.viewer.sources import from_results
+
+    folder = settings.input
+    if folder.is_dir() and find(folder, OBJECTS):
+        return from_results(folder, settings.inputs)
+    if folder.is_dir() and (folder / METRICS).is_file():
+        return _evaluated(settings)
+    return _scans(settings, folder)
+
+
+def _scans(settings: Settings, path: Path) -> "Source":
+    from wildshape.cli.input.tracks import Reading
+    from wildshape.io.scans.points import Coordinates
+    from wildshape.records import as_text
+    from wildshape.report.viewer.sources import from_model
+
+    reading = Reading(path, Coordinates(settings.unit, settings.origin))
+    names = reading.source.names
+    return from_model(as_text(path.resolve().name), names, reading.track, lambda: _model(settings))
+
+
+def _evaluated(settings: Settings) -> "Source":
+    """The data of an evaluation, the worst object first, completed once more."""
+    from wildshape.cli.input.tracks import Reading
+    from wildshape.cli.models import OURS
+    from wildshape.errors import BadInputError
+    from wildshape.io.scans.points import SENSOR_METRES, Coordinates
+    from wildshape.records import as_text
+    from wildshape.report.results import METRICS, SCORES, coordinates_of, read_object
+    from wildshape.report.viewer.sources import from_model, worst_first
+
+    said = read_object(settings.input / METRICS)
+    made = (said.get("provenance") or {}).get("settings") or {}
+    data = settings.inputs or (Path(made["data"]) if made.get("data") else None)
+    if data is None:
+        raise BadInputError(f"{settings.input}: does not say which data it is of; add --inputs.")
+    here = Coordinates(settings.unit, settings.origin)
+    reading = Reading(data, coordinates_of(made) if here == SENSOR_METRES else here)
+    methods = list(said.get("methods") or ())
+    ours = OURS if OURS in methods else methods[-1]
+    numbers = {name: i for i, name in enumerate(reading.source.names)}
+    ranked = [
+        (numbers[name], f"{name}  (CD {cd:.3f} m)")
+        for name, cd in worst_first(settings.input / SCORES, ours)
+        if name in numbers
+    ]
+    if not ranked:
+        return _scans(settings, data)
+    return from_model(
+        as_text(settings.input.resolve().name),
+        [label for _, label in ranked],
+        lambda i: reading.track(ranked[i][0]),
+        lambda: _model(settings),
+        f"Worst object first, by {ours} in this evaluation; scans are shown as recorded, completed"
+        f" by {'--model' if settings.model else 'the shipped weights'}.",
+    )
+
+
+def _model(settings: Settings) -> "Predictor":
+    from wildshape.cli.models import load_model
+
+    return load_model(settings.model, settings.device)
+
+
+def _display() -> bool:
+    """Whether a browser could show anything here."""
+    import os
+    import sys
+
+    named = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return sys.platform != "linux" or bool(named)

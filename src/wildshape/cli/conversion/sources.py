@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Names of the data sets that `convert` reads, and what reads them.
+
+To add a reader (see `datasets.source.Source`): one line in `SOURCES`, in the order in
+which the help is to list them. Its own options are fields of `convert.Settings` with the names of
+the reader's fields; whoever passes one to a reader that lacks it is told so.
+"""
+
+from dataclasses import fields, replace
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
+
+from wildshape.errors import BadInputError
+
+if TYPE_CHECKING:
+    from wildshape.datasets.tracks.source import Source
+
+SOURCES = {
+    "kitti-raw": "wildshape.datasets.kitti.raw:KittiRaw",
+    "kitti-tracking": "wildshape.datasets.kitti.tracking:KittiTracking",
+    "semantic-kitti": "wildshape.datasets.semantic_kitti.reader:SemanticKitti",
+    "nuscenes": "wildshape.datasets.nuscenes.reader:NuScenes",
+    "argoverse2": "wildshape.datasets.argoverse2.reader:Argoverse2",
+    "waymo": "wildshape.datasets.waymo.reader:Waymo",
+    "pandaset": "wildshape.datasets.pandaset.reader:PandaSet",
+    "shapenet-views": "wildshape.datasets.shapenet.reader:ShapeNetViews",
+    "rgbd": "wildshape.datasets.rgbd.reader:Rgbd",
+    "bop": "wildshape.datasets.rgbd.bop:Bop",
+    "folder": "wildshape.datasets.tracks.folder:Folder",
+    "packed": "wildshape.datasets.tracks.packed:Packed",
+}
+"""Name on the command line -> module and class; imported when it is asked for."""
+
+_NESTED = ("selection", "crop", "cut")
+
+
+def open_source(name: str, root: Path, options: dict[str, Any]) -> "Source":
+    """The reader of a data set, with its own defaults where nothing else is wanted.
+
+    Args:
+        name: of `SOURCES`.
+        root: where the data set lies.
+        options: values for the fields of `Selection`, of `Crop` or of the reader itself, as far as
+            the user gave them.
+
+    Raises:
+        BadInputError: no such source, or an option that it does not have.
+    """
+    if name not in SOURCES:
+        raise BadInputError(
+            f"'{name}' is no source that can be converted; there are {', '.join(SOURCES)}."
+        )
+    module, _, kind = SOURCES[name].partition(":")
+    source = getattr(import_module(module), kind)(root)
+    for option, value in options.items():
+        source = _with(source, name, option, value)
+    return source
+
+
+def _with(source: Any, name: str, option: str, value: object) -> Any:
+    """The reader with one option set, wherever among its records the option belongs."""
+    own = _settable(source)
+    if option == "keep_ground" and "crop" in own:
+        return replace(source, crop=replace(source.crop, ground=-source.crop.margin))
+    if option in own:
+        return replace(source, **{option: _checked(source, option, value)})
+    for group in own & set(_NESTED):
+        record = getattr(source, group)
+        if option in _settable(record):
+            changed = replace(record, **{option: _checked(record, option, value)})
+            return replace(source, **{group: changed})
+    raise BadInputError(f"--{option.replace('_', '-')}: {name} has no such option; leave it out.")
+
+
+def _settable(record: Any) -> set[str]:
+    return {field.name for field in fields(record) if field.init}
+
+
+def _checked(record: Any, option: str, value: object) -> object:
+    """The value, if the field's type lists the words it may be."""
+    hint = get_type_hints(type(record))[option]
+    if get_origin(hint) is Literal and value not in get_args(hint):
+        expected = ", ".join(map(str, get_args(hint)))
+        raise BadInputError(f"--{option.replace('_', '-')} {value}: expected one of {expected}.")
+    return value

@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The files of one log of Argoverse 2 (sensor): boxes, sweeps, poses, calibration.
+
+Boxes and sweeps are in the egovehicle frame: x forward, y left, z up, origin on the rear axle.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float, Int64, UInt8
+
+from wildshape.datasets.argoverse2.feather import POSE, poses, read_feather
+from wildshape.datasets.tracks.measurements import check_boxes, measured
+from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.records import Points
+
+Lidar = Literal["both", "up", "down"]
+LABELS = "annotations.feather"
+_BRINGS = "the archive of Argoverse 2's sensor split brings it, copy the log again"
+_CITY = "city_SE3_egovehicle.feather"
+_CALIBRATION = "calibration/egovehicle_SE3_sensor.feather"
+_SIZE = ("length_m", "width_m", "height_m")
+_LASERS = 32  # a LiDAR; up_lidar's come first
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """All labelled boxes `(b,)` of a log, in the file's order.
+
+    Attributes:
+        timestamps: of the sweep, nanoseconds.
+        tracks: name of the object (`track_uuid`).
+        categories: for example `REGULAR_VEHICLE`.
+        sizes: full lengths along the box's own x (forward), y (left), z (up), metres.
+        T_ego_object: origin at the box's centre, at the sweep's time.
+        interior: how many points of the sweep lie in the box, as the data set itself says.
+    """
+
+    timestamps: Int64[np.ndarray, " b"]
+    tracks: np.ndarray
+    categories: np.ndarray
+    sizes: Float[np.ndarray, "b 3"]
+    T_ego_object: SE3
+    interior: Int64[np.ndarray, " b"]
+
+
+def read_boxes(log: Path) -> Boxes:
+    """The labels of a log.
+
+    Raises:
+        BadInputError: the file is missing or corrupt.
+    """
+    path = log / LABELS
+    names = ("timestamp_ns", "track_uuid", "category", "num_interior_pts")
+    table = read_feather(path, (*names, *_SIZE, *POSE), _BRINGS)
+    sizes = np.stack([table[name] for name in _SIZE], axis=-1)
+    T_ego_object = poses(table, path)
+    check_boxes(sizes, T_ego_object, str(path), _BRINGS)
+    stamps, tracks, categories, interior = (table[name] for name in names)
+    return Boxes(stamps, tracks, categories, sizes, T_ego_object, interior)
+
+
+def read_sweep(path: Path) -> tuple[Points, UInt8[np.ndarray, " n"]]:
+    """Points `(n, 3)` in the egovehicle frame, metres, and the number of each one's laser.
+
+    The file's own type is float16: a step is 8 mm between 8 and 16 m along an axis, 16 mm up to
+    32 m, 31 mm up to 64 m. Ego motion during the sweep is undone in the file.
+
+    Raises:
+        BadInputError: the file is corrupt.
+    """
+    table = read_feather(path, ("x", "y", "z", "laser_number"), _BRINGS)
+    points = np.stack([table[name] for name in "xyz"], axis=-1).astype(np.float32)
+    kept = measured(points)
+    return points[kept], table["laser_number"][kept]
+
+
+def read_city_poses(log: Path) -> dict[int, SE3]:
+    """`T_city_ego` by timestamp, nanoseconds.
+
+    Raises:
+        BadInputError: the file is missing or corrupt.
+    """
+    table = read_feather(log / _CITY, ("timestamp_ns", *POSE), _BRINGS)
+    T_city_ego = poses(table, log / _CITY)
+    return {int(stamp): T_city_ego[i] for i, stamp in enumerate(table["timestamp_ns"])}
+
+
+def read_sensor_pose(log: Path, lidar: Lidar) -> SE3:
+    """`T_ego_sensor` of the scans.
+
+    The two LiDARs stand on one pole, 12 cm apart, `down_lidar` upside down. Whichever is taken,
+    the axes are `up_lidar`'s (x forward, y left, z up); of both, the origin is halfway.
+
+    Raises:
+        BadInputError: the file is missing, corrupt or lacks a LiDAR.
+    """
+    path = log / _CALIBRATION
+    table = read_feather(path, ("sensor_name", *POSE), _BRINGS)
+    T_ego_any = poses(table, path)
+    rows = {name: i for i, name in enumerate(table["sensor_name"])}
+    absent = {"up_lidar", "down_lidar"} - set(rows)
+    if absent:
+        raise BadInputError(f"{path}: no sensor {min(absent)} in it; {_BRINGS}.")
+    up, down = (T_ego_any[rows[name]] for name in ("up_lidar", "down_lidar"))
+    share = {"up": 0.0, "both": 0.5, "down": 1.0}[lidar]
+    return SE3(up.rotation, (1 - share) * up.translation + share * down.translation)
+
+
+def taken_by(lidar: Lidar, lasers: UInt8[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+    """Which points a LiDAR took, by the numbers of their lasers."""
+    if lidar == "both":
+        return np.ones(len(lasers), bool)
+    return (lasers < _LASERS) == (lidar == "up")

@@ -1,0 +1,209 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""nuScenes as it lies on disk: tables and LIDAR_TOP's sweeps become tracks.
+
+Scans keep LIDAR_TOP's own frame (x right, y forward, z up): points are rows of the user's files.
+"""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from wildshape.datasets.nuscenes.index import CHANNELS, cache_folder, index_of, lidar_of
+from wildshape.datasets.nuscenes.json_rows import json_rows
+from wildshape.datasets.nuscenes.scene import Frame, Labelled, Scene, read_scene
+from wildshape.datasets.tracks.box_crop import Crop, points_in_box
+from wildshape.datasets.tracks.gathering import Gathering
+from wildshape.datasets.tracks.measurements import measured
+from wildshape.datasets.tracks.selection import Selection
+from wildshape.errors import BadInputError
+from wildshape.io.guard import reading
+from wildshape.io.scans.points import read_points
+from wildshape.records import Points, Sensor, Track
+
+HDL32E = Sensor(kind="lidar", resolution_deg=(0.33, 1.33))
+VEHICLES = ("car", "truck", "bus", "trailer", "construction", "emergency")
+VEHICLES += ("other_vehicle", "emergency_vehicle")  # Lyft's
+"""Parts of category names: vehicle.car, vehicle.bus.rigid, ...; no two-wheelers."""
+_LAYOUT = f"<root>/v1.0-trainval/scene.json, ... and <root>/samples/{CHANNELS[0]}/*.pcd.bin"
+_TABLES = ("v1.*", "data", "train_data", "annotation")  # nuScenes, TruckScenes, Lyft, T4
+_TOKEN_LETTERS = 12
+
+
+@dataclass
+class NuScenes:
+    """Labelled objects of nuScenes; a part is a scene.
+
+    Attributes:
+        root: the folder with `v1.0-*`, `samples` and `sweeps`, or one of its `v1.0-*` folders.
+        selection: which objects and scans; categories are words of the data set's dotted names
+            (`vehicle.bus.rigid`, `bus` or `bus.rigid`), default `VEHICLES`.
+        crop: how much around the labelled box belongs to the object.
+        sweeps: also take the 20 Hz sweeps between the 2 Hz key frames; boxes are interpolated.
+        lidar: channel of the LiDAR; default: the first of `CHANNELS` that there is.
+        cache: where the index of the tables is kept; default `nuscenes_index.cache_folder()`.
+        rejected: see `Source`.
+    """
+
+    root: Path
+    selection: Selection = Selection()
+    crop: Crop = Crop()
+    sweeps: bool = False
+    lidar: str = ""
+    cache: Path | None = None
+    rejected: dict[str, int] = field(default_factory=Counter, init=False)
+
+    def parts(self) -> list[str]:
+        """The scenes' names, sorted.
+
+        Raises:
+            BadInputError: `root` is no nuScenes, or several releases of it.
+        """
+        tables = find_tables(Path(self.root))
+        channel = lidar_of(tables, self.lidar)
+        beside = (f"samples/{channel}", "lidar", "train_lidar", f"data/{channel}")
+        if not any((tables.parent / folder).is_dir() for folder in beside):
+            raise BadInputError(
+                f"{tables.parent}: expected samples/{channel} beside {tables.name}, found "
+                f"{_found(tables.parent)}; unpack the data set's file blobs there."
+            )
+        labels = tables / "sample_annotation.json"
+        if next(json_rows(labels), None) is None:
+            raise BadInputError(f"{labels}: no labels (v1.0-test has none); give another release.")
+        return sorted(str(row.get("name")) for row in json_rows(tables / "scene.json"))
+
+    def tracks_of(self, part: str) -> Iterator[Track]:
+        """Tracks of a scene, at its end: an object may leave sight and come back.
+
+        Raises:
+            BadInputError: a table or a sweep is missing or corrupt.
+        """
+        tables = find_tables(Path(self.root))
+        channel = lidar_of(tables, self.lidar)
+        with index_of(tables, self.cache or cache_folder(), channel) as db:
+            scene = read_scene(db, part, sweeps=self.sweeps)
+        if not any(_file(tables, frame).is_file() for frame in scene.frames):
+            self._count(f"scene: none of its {channel} files is here")
+            return
+        gathering = Gathering(self.selection, HDL32E if channel == CHANNELS[0] else Sensor("lidar"))
+        wanted = self._wanted(scene)
+        for number, frame in enumerate(scene.frames):
+            boxes = scene.boxes_at(frame)
+            boxes = {token: box for token, box in boxes.items() if token in wanted}
+            self._crop_frame(_file(tables, frame), frame, number, boxes, wanted, gathering)
+        yield from gathering.finished()
+        for reason, count in gathering.rejected.items():
+            self._count(reason, count)
+
+    def _wanted(self, scene: Scene) -> dict[str, tuple[str, str]]:
+        """Name and category of the objects to be taken, by token."""
+        part = scene.name
+        wanted = {}
+        for token, category in scene.categories.items():
+            if _is_of(category, self.selection.categories or VEHICLES):
+                name = f"{part}_{token[:_TOKEN_LETTERS]}"
+                wanted[token] = (name, category.removeprefix("vehicle."))
+            else:
+                self._count(f"object: category {category}")
+        return wanted
+
+    def _crop_frame(
+        self,
+        path: Path,
+        frame: Frame,
+        number: int,
+        boxes: dict[str, Labelled],
+        wanted: dict[str, tuple[str, str]],
+        to: Gathering,
+    ) -> None:
+        active = []
+        for token, box in boxes.items():
+            name, category = wanted[token]
+            if to.wants(name, number, category=category, source=self._source(box)):
+                active.append((name, box))
+        if not active:
+            return
+        try:
+            cloud = read_sweep(path)
+        except BadInputError as damage:
+            to.miss(len(active), damage)
+            return
+        T_sensor_global = frame.T_global_sensor.inverse()
+        for name, box in active:
+            T = T_sensor_global @ box.T_global_object
+            points = points_in_box(cloud, T, box.size, self.crop)
+            place = box.T_global_object.translation.numpy()
+            to.add(name, frame.name, points, T, place)
+
+    def _source(self, box: Labelled) -> str:
+        length, width, height = box.size
+        text = f"nuScenes, labelled box {length:.2f} x {width:.2f} x {height:.2f} m"
+        return f"{text}, interpolated between key frames" if self.sweeps else text
+
+    def _count(self, reason: str, count: int = 1) -> None:
+        self.rejected[reason] = self.rejected.get(reason, 0) + count
+
+
+def _file(tables: Path, frame: Frame) -> Path:
+    """A frame's file: Lyft's lie in train_lidar, its tables say lidar."""
+    path = tables.parent / frame.file
+    renamed = tables.parent / f"train_{frame.file}"
+    return renamed if not path.is_file() and renamed.is_file() else path
+
+
+def find_tables(root: Path) -> Path:
+    """The folder of the tables, at or just below `root`.
+
+    Raises:
+        BadInputError: there is none, or there are several.
+    """
+    if (root / "scene.json").is_file():
+        return root
+    if not root.is_dir():
+        raise BadInputError(f"{root}: no such folder; expected {_LAYOUT}.")
+    found = [path.parent for name in _TABLES for path in sorted(root.glob(f"{name}/scene.json"))]
+    if not found:
+        raise BadInputError(f"{root}: expected {_LAYOUT}, found {_found(root)}.")
+    if len(found) > 1:
+        raise BadInputError(
+            f"{root}: holds {' and '.join(path.name for path in found)}, which may share scenes; "
+            f"give one of them, for example {found[-1]}."
+        )
+    return found[0]
+
+
+def read_sweep(path: Path) -> Points:
+    """One whole sweep `(n, 3)`, metres, in the frame of LIDAR_TOP.
+
+    Raises:
+        BadInputError: the file is missing or no sequence of x y z intensity ring in float32.
+    """
+    if not path.is_file():
+        raise BadInputError(
+            f"{path}: no such file; unpack the blob of nuScenes that brings it (sweeps/ comes with "
+            "the sweeps of the LiDAR, samples/ with the key frames)."
+        )
+    if path.suffix == ".pcd":  # TruckScenes
+        points = read_points(path)
+        return points[measured(points)]
+    with reading(path, "a sweep of nuScenes"):
+        size = path.stat().st_size
+        if size % 20 or size == 0:
+            raise BadInputError(
+                f"{path}: {size} bytes, expected a multiple of 20 (float32 x y z intensity ring); "
+                "the file is truncated, unpack it again."
+            )
+        points = np.fromfile(path, dtype="<f4").reshape(-1, 5)[:, :3]
+    return np.ascontiguousarray(points[measured(points)], dtype=np.float32)
+
+
+def _is_of(category: str, words: tuple[str, ...]) -> bool:
+    return any(f".{word}." in f".{category}." for word in words)
+
+
+def _found(folder: Path) -> str:
+    names = sorted(path.name for path in folder.iterdir())
+    return ", ".join(names[:5]) or "an empty folder"

@@ -1,0 +1,82 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Depth images and masks as they lie on disk, and the points behind their pixels."""
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float, Shaped
+
+from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.io.guard import reading
+from wildshape.records import Intrinsics, Points
+
+_BYTES = {"I;16": 2, "I;16B": 2, "I": 4, "L": 1, "P": 1, "1": 1}  # a pixel, of one channel
+_FREE_BYTES, _RATIO = 1 << 24, 8
+
+
+def read_png(path: Path, what: str) -> Shaped[np.ndarray, "h w"]:
+    """The numbers in a PNG of one channel, 8 or 16 bits; of a palette its indices.
+
+    Args:
+        path: the file.
+        what: it should be, for the error: `a 16-bit depth PNG`.
+
+    Raises:
+        BadInputError: no such file, truncated, in colour, or far larger than its file.
+        MissingExtraError: Pillow is not installed.
+    """
+    try:
+        from PIL import Image
+    except ImportError as missing:
+        raise MissingExtraError(
+            "depth images need the package Pillow: pip install pillow"
+        ) from missing
+    with reading(path, what), Image.open(path, formats=("PNG",)) as image:
+        if image.mode not in _BYTES:
+            raise BadInputError(f"{path}: expected {what}, found colours ({image.mode}).")
+        need = image.width * image.height * _BYTES[image.mode]
+        if need > _FREE_BYTES + _RATIO * path.stat().st_size:
+            raise BadInputError(
+                f"{path}: claims {image.width} x {image.height} pixels in "
+                f"{path.stat().st_size} bytes, too many for {what}; write it again."
+            )
+        return np.array(image)
+
+
+def back_project(depth: Float[np.ndarray, "h w"], camera: Intrinsics) -> Points:
+    """Points `(n, 3)` float32 of the pixels with a depth: x right, y down, z forward, metres.
+
+    Args:
+        depth: along the optical axis, metres; not finite or not positive where nothing was seen.
+        camera: pixel i covers [i, i + 1), so that its ray leaves through i + 0.5.
+    """
+    v, u = np.nonzero(np.isfinite(depth) & (depth > 0))
+    z = depth[v, u].astype(np.float64)
+    x = (u + 0.5 - camera.cx) / camera.fx * z
+    y = (v + 0.5 - camera.cy) / camera.fy * z
+    return np.stack((x, y, z), axis=1).astype(np.float32)
+
+
+def supported(
+    depth: Float[np.ndarray, "h w"], inside: Bool[np.ndarray, "h w"], jump: float
+) -> Bool[np.ndarray, "h w"]:
+    """The pixels inside a mask that lie on a surface, not between two.
+
+    A pixel is kept that has at least three of its eight neighbours inside the mask within
+    `jump` times its own depth: a corner has three. One that hangs between an object's edge and
+    what is behind it has fewer.
+
+    Args:
+        depth: metres.
+        inside: the mask, without pixels that have no depth.
+        jump: largest step between neighbours on one surface, as a share of the depth.
+    """
+    rows, columns = depth.shape
+    padded = np.pad(np.where(inside, depth, np.nan), 1, constant_values=np.nan)
+    count = np.zeros(depth.shape, np.int64)
+    for down in range(3):
+        for right in range(3):
+            beside = padded[down : down + rows, right : right + columns]
+            count += np.abs(beside - depth) <= jump * depth
+    return inside & (count >= 4)  # itself is one of them

@@ -1,0 +1,192 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""RGB-D frames with instance masks: depth images of anybody's camera become tracks.
+
+    ROOT/SEQUENCE/camera.json          fx fy cx cy, depth_scale: units of the PNG a metre (1000)
+    ROOT/SEQUENCE/depth/NAME.png       16 bits, 0: not measured; sorted by name = in time order
+    ROOT/SEQUENCE/masks/NAME.png       instance numbers, 0: background; or
+    ROOT/SEQUENCE/masks/ID/NAME.png    a folder an instance, not 0: the object
+    ROOT/SEQUENCE/poses.txt            optional: T_world_camera, 12 numbers a line, a line a depth
+    ROOT/SEQUENCE/objects.json         optional: {"ID": "category"}
+
+Nothing is known about the objects' poses, and nothing needs to be.
+"""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from wildshape.datasets.rgbd.depth_image import back_project, read_png, supported
+from wildshape.datasets.rgbd.sequence import Sequence, instances_of, open_sequence
+from wildshape.datasets.tracks.gathering import Gathering
+from wildshape.datasets.tracks.selection import Selection
+from wildshape.errors import BadInputError
+from wildshape.records import Intrinsics, Points, Sensor, Track
+
+
+@dataclass(frozen=True)
+class Cut:
+    """How an object's points are cut out of a depth image.
+
+    Attributes:
+        edge: so many pixels at the mask's border are left out: masks are never exact, and depth
+            between an object and what is behind it hangs in the air.
+        jump: inside, a pixel is left out unless three of its neighbours are within this share of
+            its depth.
+        max_depth: farther pixels are left out, metres.
+        most_points: of a scan; more are thinned, by chance with a fixed seed.
+    """
+
+    edge: int = 1
+    jump: float = 0.02
+    max_depth: float = float("inf")
+    most_points: int = 4096
+
+
+@dataclass
+class Rgbd:
+    """Depth images with masks; a part is a sequence.
+
+    Attributes:
+        root: a folder of sequences, or one.
+        selection: which objects and scans; categories are the words of objects.json.
+        cut: how points are cut out.
+        gap: an object that is not seen for more than so many frames begins a new track, and so
+            does one at `longest` scans: memory stays flat however long a sequence is.
+        longest: most scans of a track.
+        rejected: see `Source`.
+    """
+
+    root: Path
+    selection: Selection = Selection()
+    cut: Cut = Cut()
+    gap: int = 100
+    longest: int = 300
+    rejected: dict[str, int] = field(default_factory=Counter, init=False)
+
+    def parts(self) -> list[str]:
+        """The sequences: folders with depth/ in them.
+
+        Raises:
+            BadInputError: there is none.
+        """
+        root = Path(self.root)
+        if (root / "depth").is_dir():
+            return ["."]
+        found = sorted(entry.name for entry in root.iterdir()) if root.is_dir() else []
+        sequences = [name for name in found if (root / name / "depth").is_dir()]
+        if not sequences:
+            raise BadInputError(
+                f"{root}: expected folders with camera.json, depth and masks in them, found"
+                f" {' '.join(found[:8]) or 'nothing'}."
+            )
+        return sequences
+
+    def tracks_of(self, part: str) -> Iterator[Track]:
+        """Tracks of a sequence, each once its object has not been seen for `gap` frames.
+
+        Raises:
+            BadInputError: camera.json, a depth image, a mask or poses.txt is missing or damaged.
+        """
+        sequence = open_sequence(Path(self.root) / part)
+        gathering = Gathering(self.selection, Sensor("camera", intrinsics=sequence.camera))
+        names = _Names(sequence.name, self.gap, self.longest * self.selection.every)
+        for frame, path in enumerate(sequence.depth):
+            self._add_frame(sequence, frame, path, gathering, names)
+            yield from gathering.finished(before=frame - self.gap)
+        yield from gathering.finished()
+        for reason, count in gathering.rejected.items():
+            self.rejected[reason] += count
+
+    def _add_frame(
+        self, sequence: Sequence, frame: int, path: Path, to: Gathering, names: "_Names"
+    ) -> None:
+        try:
+            masks = dict(self._wanted(sequence, path))
+        except BadInputError as damage:
+            to.miss(1, damage)
+            return
+        chosen = {
+            instance: mask
+            for instance, mask in masks.items()
+            if to.wants(
+                names.of(instance, frame),
+                frame,
+                category=sequence.categories.get(instance, ""),
+                source=f"RGB-D {sequence.name}",
+            )
+        }
+        if not chosen:
+            return
+        try:
+            depth = sequence.read_depth(path)
+        except BadInputError as damage:
+            to.miss(len(chosen), damage)
+            return
+        for instance, mask in chosen.items():
+            points = cut_out(depth, mask, sequence.camera, self.cut)
+            to.add(names.now(instance), path.stem, points, place=sequence.place(frame, points))
+
+    def _wanted(
+        self, sequence: Sequence, path: Path
+    ) -> Iterator[tuple[int, Bool[np.ndarray, "h w"]]]:
+        files = sequence.masks(path.stem)
+        if not files:
+            self.rejected["frame: no mask"] += 1
+        for instance, file in files:
+            mask = read_png(file, "a PNG mask of one channel")
+            sequence.check_size(mask, file)
+            for number, inside in instances_of(mask, instance):
+                category = sequence.categories.get(number, "")
+                if self.selection.categories and category not in self.selection.categories:
+                    self.rejected[f"scan: category {category or 'unknown'}"] += 1
+                else:
+                    yield number, inside
+
+
+def cut_out(
+    depth: Float[np.ndarray, "h w"], mask: Bool[np.ndarray, "h w"], camera: Intrinsics, cut: Cut
+) -> Points:
+    """The points of a mask that lie on its object, camera frame, metres."""
+    from scipy.ndimage import binary_erosion
+
+    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return np.zeros((0, 3), np.float32)
+    window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    near, inside = depth[window], mask[window]
+    if cut.edge > 0:
+        inside = np.asarray(binary_erosion(inside, iterations=cut.edge), bool)
+    inside = inside & (near > 0) & (near <= cut.max_depth)
+    kept = np.zeros(depth.shape)
+    kept[window] = np.where(supported(near, inside, cut.jump), near, 0.0)
+    points = back_project(kept, camera)
+    if len(points) <= cut.most_points:
+        return points
+    chosen = np.random.default_rng(0).choice(len(points), cut.most_points, replace=False)
+    return points[np.sort(chosen)]
+
+
+class _Names:
+    """Names of tracks: an object's number, and which of its tracks it is."""
+
+    def __init__(self, sequence: str, gap: int, longest: int) -> None:
+        self.sequence, self.gap, self.longest = sequence, gap, longest
+        self._seen: dict[int, tuple[int, int, int]] = {}  # track, offers, last frame
+
+    def of(self, instance: int, frame: int) -> str:
+        """The track that a frame of an object belongs to."""
+        track, offers, last = self._seen.get(instance, (0, 0, frame))
+        if frame - last > self.gap or offers >= self.longest:
+            track, offers = track + 1, 0
+        self._seen[instance] = (track, offers + 1, frame)
+        return self.now(instance)
+
+    def now(self, instance: int) -> str:
+        """The track of the object's last frame."""
+        track = self._seen[instance][0]
+        return f"{self.sequence}_{instance:05d}" + (f"_{track}" if track else "")

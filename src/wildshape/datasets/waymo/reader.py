@@ -1,0 +1,218 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Waymo Open Dataset, Perception v2 (parquet), as it lies on disk: labelled objects become tracks.
+
+Scans are what the TOP LiDAR saw, first return, in its own frame at the frame's time.
+"""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from wildshape.datasets.tracks.box_crop import Crop, points_in_box
+from wildshape.datasets.tracks.gathering import Gathering
+from wildshape.datasets.tracks.measurements import measured
+from wildshape.datasets.tracks.selection import Selection
+from wildshape.datasets.waymo.range_image import at_frame_time, points_of_pixels
+from wildshape.datasets.waymo.tables import (
+    COMPONENTS,
+    TYPES,
+    Calibration,
+    Labelled,
+    range_images,
+    read_boxes,
+    read_calibration,
+    read_vehicle_poses,
+)
+from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.records import Points, Sensor, Track
+
+TOP = Sensor(kind="lidar", resolution_deg=(0.136, 0.31))
+_LAYOUT = f"<root>/<split>/{{{','.join(COMPONENTS)}}}/<segment>.parquet"
+
+
+@dataclass
+class Waymo:
+    """Labelled objects of Waymo's Perception data set; a part is a segment.
+
+    Attributes:
+        root: a split's folder, which holds `lidar`, `lidar_box`, ..., or the folder above.
+        selection: which objects and scans; categories are `vehicle` (the default), `pedestrian`,
+            `sign`, `cyclist`.
+        crop: how much around the labelled box belongs to the object.
+        rejected: see `Source`.
+    """
+
+    root: Path
+    selection: Selection = Selection()
+    crop: Crop = Crop()
+    rejected: dict[str, int] = field(default_factory=Counter, init=False)
+
+    def parts(self) -> list[str]:
+        """The segments' names, sorted.
+
+        Raises:
+            BadInputError: `root` has no split with the tables needed, or an unknown category.
+        """
+        _check_categories(self.selection.categories)
+        files = (f for split in find_splits(Path(self.root)) for f in split.glob("lidar/*.parquet"))
+        return sorted(file.stem for file in files)
+
+    def tracks_of(self, part: str) -> Iterator[Track]:
+        """Tracks of a segment, at its end: an object may leave sight and come back.
+
+        Raises:
+            BadInputError: a table of the segment is missing or corrupt.
+        """
+        tables = _tables(Path(self.root), part)
+        boxes = self._wanted(read_boxes(tables["lidar_box"]))
+        gathering = Gathering(self.selection, TOP)
+        unseen = set(boxes)
+        for number, frame in enumerate(frames(tables, boxes)):
+            unseen.remove(frame.microseconds)
+            self._crop_frame(frame, number, part, gathering)
+        for time in unseen:
+            self._count("scan: the frame has no range image of TOP", len(boxes[time]))
+        yield from gathering.finished()
+        for reason, count in gathering.rejected.items():
+            self._count(reason, count)
+
+    def _wanted(self, boxes: dict[int, list[Labelled]]) -> dict[int, list[Labelled]]:
+        categories = self.selection.categories or ("vehicle",)
+        known = {box.token: box.category for labelled in boxes.values() for box in labelled}
+        for category in known.values():
+            if category not in categories:
+                self._count(f"object: category {category}")
+        kept = {t: [b for b in found if b.category in categories] for t, found in boxes.items()}
+        return {time: labelled for time, labelled in kept.items() if labelled}
+
+    def _crop_frame(self, frame: "Frame", number: int, part: str, to: Gathering) -> None:
+        active = []
+        for box in frame.boxes:
+            name = f"{part}_{box.token}"
+            if to.wants(name, number, category=box.category, source=_source(box)):
+                active.append((name, box))
+        if not active:
+            return
+        cloud = frame.points()
+        T_sensor_vehicle = frame.calibration.T_vehicle_sensor.inverse()
+        for name, box in active:
+            T = T_sensor_vehicle @ box.T_vehicle_object
+            place = (frame.T_world_vehicle @ box.T_vehicle_object).translation.numpy()
+            points = points_in_box(cloud, T, box.size, self.crop)
+            to.add(name, str(frame.microseconds), points, T, place)
+
+    def _count(self, reason: str, count: int = 1) -> None:
+        self.rejected[reason] = self.rejected.get(reason, 0) + count
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One turn of the TOP LiDAR, with the boxes in it."""
+
+    microseconds: int
+    image: np.ndarray
+    pixel_poses: np.ndarray
+    calibration: Calibration
+    T_world_vehicle: SE3
+    boxes: list[Labelled]
+
+    def points(self) -> Points:
+        """All points `(n, 3)` in the sensor's frame at the frame's time, metres."""
+        T_vehicle_sensor = self.calibration.T_vehicle_sensor
+        inclinations = self.calibration.inclinations(len(self.image))
+        seen, points = points_of_pixels(self.image[..., 0], inclinations, T_vehicle_sensor)
+        poses = self.pixel_poses[seen]
+        moved = at_frame_time(points, poses, T_vehicle_sensor, self.T_world_vehicle)
+        return moved[measured(moved)].astype(np.float32)
+
+
+def frames(tables: dict[str, Path], boxes: dict[int, list[Labelled]]) -> Iterator[Frame]:
+    """The frames of a segment that have boxes, in time order, one held at a time.
+
+    Args:
+        tables: file of each component.
+        boxes: by time in microseconds.
+
+    Raises:
+        BadInputError: a table is missing or corrupt, or they are not of one segment.
+    """
+    calibration = read_calibration(tables["lidar_calibration"])
+    T_world_vehicle = read_vehicle_poses(tables["vehicle_pose"])
+    unknown = boxes.keys() - T_world_vehicle.keys()
+    if unknown:
+        raise _of_other_time(tables["lidar_box"], min(unknown), "vehicle_pose")
+    poses = range_images(tables["lidar_pose"], "LiDARPoseComponent")
+    posed, pixel_poses = next(poses, (-1, np.zeros((0, 0, 6))))
+    for time, image in range_images(tables["lidar"], "LiDARComponent"):
+        if time not in boxes:
+            continue
+        while posed < time:
+            posed, pixel_poses = next(poses, (1 << 62, pixel_poses))
+        if posed != time or pixel_poses.shape != (*image.shape[:2], 6):
+            raise _of_other_time(tables["lidar"], time, "lidar_pose")
+        yield Frame(time, image, pixel_poses, calibration, T_world_vehicle[time], boxes[time])
+
+
+def find_splits(root: Path) -> list[Path]:
+    """Split folders at, or just below `root`, that have all tables needed, sorted.
+
+    Raises:
+        BadInputError: there is none.
+    """
+    if not root.is_dir():
+        raise BadInputError(f"{root}: no such folder; expected {_LAYOUT}.")
+    splits = [path for path in (root, *sorted(root.iterdir())) if (path / "lidar").is_dir()]
+    whole = [path for path in splits if not _absent(path)]
+    if splits and not whole:
+        absent = ", ".join(_absent(splits[0]))
+        raise BadInputError(f"{splits[0]}: no {absent} beside lidar; download these components.")
+    if not splits:
+        raise _not_waymo(root)
+    return whole
+
+
+def _not_waymo(root: Path) -> BadInputError:
+    if any(root.glob("*.tfrecord")) or any(root.glob("*/*.tfrecord")):
+        return BadInputError(
+            f"{root}: holds .tfrecord files, Waymo's version 1; download version 2 (parquet), the "
+            f"components {', '.join(COMPONENTS)}."
+        )
+    found = ", ".join(sorted(path.name for path in root.iterdir())[:5])
+    return BadInputError(f"{root}: expected {_LAYOUT}, found {found or 'an empty folder'}.")
+
+
+def _absent(split: Path) -> list[str]:
+    return [name for name in COMPONENTS if not (split / name).is_dir()]
+
+
+def _tables(root: Path, segment: str) -> dict[str, Path]:
+    for split in find_splits(root):
+        tables = {name: split / name / f"{segment}.parquet" for name in COMPONENTS}
+        if tables["lidar"].is_file():
+            return tables
+    raise BadInputError(f"{root}: no segment {segment} in any split; check its name.")
+
+
+def _check_categories(categories: tuple[str, ...]) -> None:
+    unknown = [name for name in categories if name not in TYPES.values()]
+    if unknown:
+        raise BadInputError(
+            f"'{unknown[0]}' is no category of Waymo; there are {', '.join(TYPES.values())}."
+        )
+
+
+def _of_other_time(path: Path, time: int, other: str) -> BadInputError:
+    return BadInputError(
+        f"{path}: frame {time} has no counterpart of its size in {other}/{path.name}; download "
+        "both again, from one release."
+    )
+
+
+def _source(box: Labelled) -> str:
+    length, width, height = box.size
+    return f"Waymo Open Dataset, labelled box {length:.2f} x {width:.2f} x {height:.2f} m"

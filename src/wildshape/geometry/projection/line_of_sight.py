@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A scan seen along its own line of sight (beyond the paper).
+
+Every scan is taken from the origin, so the direction in which an object lies needs no label. Turned
+so that the object lies straight ahead, scans that differ by a turn of the sensor about its vertical
+become the same scan, and of a free rotation nothing is left but the roll about the line of sight.
+"""
+
+from typing import NamedTuple
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from wildshape.geometry.projection.visibility import facing_rotation
+
+_AHEAD, _SMALLEST_M = (1.0, 0.0, 0.0), 1e-6
+# Axes x forward, y left, z up of a depth camera's own x right, y down, z forward.
+_CAMERA = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
+
+
+class Facing(NamedTuple):
+    """How one scan is turned and centred.
+
+    Attributes:
+        turn: `R_facing_sensor`: x along the mean direction of the points, z as far up as can be,
+            where up is z of a LiDAR and -y of a depth camera.
+        centre: on that line of sight, at the middle of the ranges; turned frame, metres.
+    """
+
+    turn: Float[Tensor, "*batch 3 3"]
+    centre: Float[Tensor, "*batch 3"]
+
+
+def face(
+    points: Float[Tensor, "*batch n 3"],
+    counted: Bool[Tensor, "*batch n"] | None = None,
+    *,
+    sensor_kind: str = "lidar",
+) -> Facing:
+    """The facing frame of a scan, sensor frame, none of its points at the sensor itself.
+
+    Turns of the sensor change the roll of the frame about the line of sight, and nothing else.
+
+    Args:
+        points: of one scan or of many.
+        counted: which of them the scan has; others repeat one of those. All by default.
+        sensor_kind: `lidar` or `camera`: says which way is up.
+    """
+    exact = points.double()
+    distance = exact.norm(dim=-1)
+    unit = exact / distance[..., None].clamp_min(_SMALLEST_M)
+    if counted is not None:
+        unit = unit * counted[..., None]
+    middle = (distance.amin(-1) + distance.amax(-1)) / 2
+    turn = _towards(unit.mean(-2).reshape(-1, 3), sensor_kind).view(*middle.shape, 3, 3)
+    centre = middle[..., None] * exact.new_tensor(_AHEAD)
+    return Facing(turn.to(points.dtype), centre.to(points.dtype))
+
+
+def _towards(direction: Float[Tensor, "B 3"], sensor_kind: str) -> Float[Tensor, "B 3 3"]:
+    """Rotation that turns `direction` to +x, up as far up as can be."""
+    if sensor_kind == "lidar":
+        return facing_rotation(direction)
+    axes = direction.new_tensor(_CAMERA)
+    return facing_rotation(direction @ axes.mT) @ axes
+
+
+def roll(angle: Float[Tensor, "B"]) -> Float[Tensor, "B 3 3"]:
+    """Rotations about x, the line of sight; radians, right-handed."""
+    cosine, sine = torch.cos(angle), torch.sin(angle)
+    zero, one = torch.zeros_like(angle), torch.ones_like(angle)
+    rows = (one, zero, zero, zero, cosine, -sine, zero, sine, cosine)
+    return torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
+
+
+def roll_angle(R_facing_object: Float[Tensor, "B 3 3"]) -> Float[Tensor, "B"]:
+    """The angle to `roll` by so that the object's z axis points up beside the line of sight."""
+    up = R_facing_object[:, :, 2]
+    return torch.atan2(up[:, 1], up[:, 2])

@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which pose hypothesis of a network speaks, and a second look at tilted scans (beyond the paper).
+
+Turned towards its object (`line_of_sight.py`), nothing of a scan's rotation is unknown but the
+roll about the line of sight, and upright is what a network knows best. A scan that turns out to be
+tilted is rolled upright, as the first look says, and seen once more; the cheaper answer speaks.
+"""
+
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from wildshape.geometry.projection.line_of_sight import roll_angle
+from wildshape.geometry.projection.visibility import Projection
+from wildshape.inference.config import HypothesisRule
+from wildshape.inference.evidence import seen_facts
+from wildshape.inference.prepare import NetworkInput
+from wildshape.method.checkpoint import ModelSettings
+from wildshape.method.hindsight import Scores, score_hypotheses
+from wildshape.method.network import Poses, ShapePoseNet
+
+_RULE = HypothesisRule()
+
+
+@runtime_checkable
+class CostRule(Protocol):
+    """What a hypothesis costs: a checkpoint's settings, or the configuration of the loss."""
+
+    @property
+    def projection(self) -> Projection:
+        """How the sensor's image is binned."""
+        ...
+
+    @property
+    def beta(self) -> float:
+        """Weight of the projection term."""
+        ...
+
+    @property
+    def belief(self) -> float:
+        """Metres of cost that a nat of the selector's belief is worth."""
+        ...
+
+
+class Chosen(NamedTuple):
+    """The hypotheses of centred scans, and the one that speaks for each.
+
+    Attributes:
+        shapes: canonical, metres.
+        poses: all hypotheses, centred frames.
+        posed: the shapes under every hypothesis.
+        scores: of the hypotheses.
+        believed: what decides, metres: the label-free cost (METHOD 3, 6) less the belief.
+        branch: the hypothesis with the least of it.
+    """
+
+    shapes: Float[Tensor, "B P 3"]
+    poses: Poses
+    posed: Float[Tensor, "B K P 3"]
+    scores: Scores
+    believed: Float[Tensor, "B K"]
+    branch: Int[Tensor, "B"]
+
+    @property
+    def pose(self) -> Poses:
+        """The hypothesis that speaks, K = 1."""
+        return self.poses.choose(self.branch)
+
+    def cost(self, beta: float) -> Float[Tensor, "B"]:
+        """Its label-free cost, metres."""
+        return self.scores.cost(beta).gather(1, self.branch[:, None])[:, 0]
+
+
+def choose_hypothesis(
+    network: ShapePoseNet,
+    scans: Float[Tensor, "B N 3"],
+    centres: Float[Tensor, "B 3"],
+    rule: CostRule,
+) -> Chosen:
+    """Ask a network, score its hypotheses against the scans, and take the cheapest.
+
+    Args:
+        network: in evaluation.
+        scans: centred, as it was trained on.
+        centres: where each scan's centre lies in the frame it was turned into.
+        rule: what a hypothesis costs.
+    """
+    code = network.encode(scans)
+    shapes, poses = network.canonical(code), network.poses(code)
+    posed = poses.apply(shapes)
+    scores = score_hypotheses(scans, centres, posed, rule.projection)
+    believed = scores.cost(rule.beta) - rule.belief * poses.log_belief
+    return Chosen(shapes, poses, posed, scores, believed, believed.argmin(-1))
+
+
+class Found(NamedTuple):
+    """What looks at scans give: shapes, `T_sensor_canonical`, cost, branch, and facts."""
+
+    shapes: Float[Tensor, "B P 3"]
+    rotation: Float[Tensor, "B 3 3"]
+    translation: Float[Tensor, "B 3"]
+    cost: Float[Tensor, "B"]
+    branch: Int[Tensor, "B"]
+    facts: Float[Tensor, "B F"]
+
+    def part(self, rows: Int[Tensor, "b"]) -> "Found":
+        """Some of the scans."""
+        return Found(*(part[rows] for part in self))
+
+    def replaced(self, rows: Int[Tensor, "b"], new: "Found") -> "Found":
+        """With other answers for some of the scans."""
+        return Found(*(old.index_copy(0, rows, part) for old, part in zip(self, new)))
+
+
+def look(network: ShapePoseNet, settings: ModelSettings, given: NetworkInput) -> Found:
+    """Shapes, and the poses of the hypotheses that speak, from prepared scans."""
+    found = choose_hypothesis(network, given.scans, given.centres, settings)
+    facts = seen_facts(given.scans, found.posed, found.scores, found.poses, found.believed)
+    back, chosen = given.turn.mT, found.pose
+    translation = back @ (chosen.translation[:, 0] + given.centres)[..., None]
+    rotation, cost = back @ chosen.rotation[:, 0], found.cost(settings.beta)
+    return Found(found.shapes, rotation, translation[..., 0], cost, found.branch, facts)
+
+
+def look_twice(
+    network: ShapePoseNet,
+    settings: ModelSettings,
+    given: NetworkInput,
+    rule: HypothesisRule = _RULE,
+) -> Found:
+    """`look`, and a second one at the scans that turn out to be tilted, rolled upright."""
+    first = look(network, settings, given)
+    angle = roll_angle(given.turn @ first.rotation)
+    rows = torch.nonzero(angle.abs() > rule.upright_rad)[:, 0]
+    if len(rows) == 0:
+        return first
+    second = look(network, settings, given.part(rows).rolled(angle[rows]))
+    cheaper = torch.nonzero(second.cost < first.cost[rows])[:, 0]
+    return first.replaced(rows[cheaper], second.part(cheaper))

@@ -1,0 +1,198 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The numbers that decide what comes out of a trained network, in frozen records.
+
+They are written into every result (`objects.json`) and can be set from Python:
+`wildshape.load(config=InferenceConfig(refine=RefineConfig(iterations=0)))`. Lengths are for objects
+of five metres or more; for smaller ones they shrink with the object.
+"""
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class HypothesisRule:
+    """Which pose hypothesis speaks, and when a scan is looked at again.
+
+    Attributes:
+        upright_rad: a scan whose object comes out rolled by more than this is looked at again.
+            Networks see upright scans best.
+    """
+
+    upright_rad: float = 0.1
+
+
+@dataclass(frozen=True)
+class RefineConfig:
+    """How one completion is fitted to its scan (`refine.py`).
+
+    Attributes:
+        iterations: Gauss-Newton steps; 0 leaves pose and size as the network says.
+        matched_at: the steps before which correspondences are found anew.
+        plane_points: points of the shape that make the plane around a scan point.
+        scan_points: points of the scan that are used.
+        effective_points: scan points err together, because the shape errs: as much is believed as
+            if there were so many.
+        error_m: how far a scan point lies off the shape.
+        kernel_m: width of the robust kernel (Geman-McClure).
+        prior_deg: how far off the network's rotation is taken to be.
+        prior_m: the same of its translation.
+        prior_stretch: the same of its size, a share.
+        level_deg: how level a LiDAR on a vehicle is held.
+        tilted_deg: beyond this a sensor is taken for tilted on purpose; width of a robust kernel.
+        level_may_cost: by which factor the fit may be worse where a sensor was brought level.
+        reach_m: how far around a point of the shape the scan is looked for.
+        stiffness: weight of the point itself against what was seen around it.
+        drawn_by: most points of the scan that draw one of the shape.
+        voxel_m: the scan is thinned to this.
+    """
+
+    iterations: int = 6
+    matched_at: tuple[int, ...] = (0, 2, 4)
+    plane_points: int = 8
+    scan_points: int = 512
+    effective_points: float = 300.0
+    error_m: float = 0.07
+    kernel_m: float = 0.3
+    prior_deg: float = 3.0
+    prior_m: float = 0.05
+    prior_stretch: float = 0.08
+    level_deg: float = 1.0
+    tilted_deg: float = 5.0
+    level_may_cost: float = 1.1
+    reach_m: float = 0.12
+    stiffness: float = 0.2
+    drawn_by: int = 8
+    voxel_m: float = 0.08
+
+
+@dataclass(frozen=True)
+class JointIcpConfig:
+    """How the poses of a track are fitted to each other (`tracks/joint_icp.py`).
+
+    Attributes:
+        rounds: each moves every scan once.
+        points: of each scan that are used.
+        most: points of all scans together that are used.
+        widest_m: width of the robust kernel at first.
+        narrower: it narrows by this factor a round.
+        narrowest_m: at last.
+        normal_m: radius of the neighbourhood that a normal is taken from.
+        holding: how much a point is held in every direction, against sliding; of its normal's 1.
+        step: share of a Gauss-Newton step that is taken.
+    """
+
+    rounds: int = 10
+    points: int = 128
+    most: int = 16_384
+    widest_m: float = 0.5
+    narrower: float = 0.75
+    narrowest_m: float = 0.06
+    normal_m: float = 0.35
+    holding: float = 0.1
+    step: float = 0.8
+
+
+@dataclass(frozen=True)
+class HeadingVoteConfig:
+    """How the scans of a track agree on which way is front (`tracks/heading_vote.py`).
+
+    Attributes:
+        neighbours: scans on either side that are compared.
+        slow_deg: tracks of which three quarters of the neighbours turn by less follow each other.
+        far_m: misfits count no further than this.
+        same_side_m: two scans that lie worse on each other than this see different sides.
+        shape_votes: weight of the track's mean shape in the vote.
+        own_m: weight of what a scan found for itself, metres of cost at confidence 1.
+        unsure: confidence that is added to every scan's own.
+        near_m: largest weight of where the next sensor stood, metres of cost.
+        leap: a sensor that moved by this share of its distance says 1/e as much.
+    """
+
+    neighbours: int = 5
+    slow_deg: float = 15.0
+    far_m: float = 0.4
+    same_side_m: float = 0.1
+    shape_votes: float = 2.0
+    own_m: float = 0.05
+    unsure: float = 0.1
+    near_m: float = 1.0
+    leap: float = 0.7
+
+
+@dataclass(frozen=True)
+class PoseOutlierConfig:
+    """Which scans' poses no neighbour shares (`tracks/pose_outliers.py`).
+
+    Attributes:
+        alike_deg: neighbours that differ by less agree.
+        apart_deg: a scan that differs from both by more is an outlier.
+    """
+
+    alike_deg: float = 25.0
+    apart_deg: float = 45.0
+
+
+@dataclass(frozen=True)
+class TrackConfig:
+    """How all scans of a track make one object (`tracks/complete_track.py`).
+
+    Attributes:
+        vote: of the headings.
+        outliers: poses that no neighbour shares.
+        coarse: first fit of the poses to each other.
+        fine: the fit that goes on from it.
+        within_m: fits that move a pose farther are not believed.
+        within_rad: fits that turn a pose farther are not believed.
+        most_points: of all scans, fused.
+        voting_points: of each scan, where views are laid on each other.
+        voxel_m: the fused scans are thinned to this.
+        reach_m: how far around a point of the shape the fused scans are looked for.
+        stiffness: weight of the point itself against what was seen around it.
+    """
+
+    vote: HeadingVoteConfig = field(default_factory=HeadingVoteConfig)
+    outliers: PoseOutlierConfig = field(default_factory=PoseOutlierConfig)
+    coarse: JointIcpConfig = field(default_factory=JointIcpConfig)
+    fine: JointIcpConfig = field(
+        default_factory=lambda: JointIcpConfig(
+            rounds=15, points=512, most=4096, normal_m=0.3, holding=0.02
+        )
+    )
+    within_m: float = 1.5
+    within_rad: float = 0.6
+    most_points: int = 4096
+    voting_points: int = 192
+    voxel_m: float = 0.08
+    reach_m: float = 0.12
+    stiffness: float = 0.2
+
+
+@dataclass(frozen=True)
+class BoxConfig:
+    """How a box is laid around a shape (`boxes.py`).
+
+    Attributes:
+        strays: outermost points of the shape that do not count.
+        reach: share of the box's diagonal by which a scan may reach beyond the shape and is
+            believed.
+        scans_a_witness: of so many scans the one that reaches furthest is not believed.
+        level_deg: largest turn about y that levels a shape in its frame.
+        step_deg: of that turn.
+    """
+
+    strays: int = 2
+    reach: float = 0.08
+    scans_a_witness: int = 8
+    level_deg: float = 4.0
+    step_deg: float = 0.25
+
+
+@dataclass(frozen=True)
+class InferenceConfig:
+    """Everything that decides a result besides the checkpoint."""
+
+    hypothesis: HypothesisRule = field(default_factory=HypothesisRule)
+    refine: RefineConfig = field(default_factory=RefineConfig)
+    track: TrackConfig = field(default_factory=TrackConfig)
+    box: BoxConfig = field(default_factory=BoxConfig)

@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""An exported file held against the predictor that it was made from."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import torch
+
+from wildshape.inference.export.onnx import INPUTS
+from wildshape.inference.predictor import Predictor
+from wildshape.inference.prepare import drawn, in_order
+from wildshape.method.checkpoint import ModelSettings
+from wildshape.records import Points
+
+Runner = Callable[[np.ndarray, np.ndarray], list[np.ndarray]]
+
+
+class Difference(NamedTuple):
+    """How far an exported file is from torch.
+
+    Attributes:
+        largest_m: of any coordinate of any completed point, where both chose the same branch.
+        other_branch: scans whose branches cost the same to the last digits, so that another won.
+        scans: compared.
+    """
+
+    largest_m: float
+    other_branch: int
+    scans: int
+
+
+def open_exported(path: Path, threads: int = 0) -> Runner:
+    """What runs a file: onnxruntime for `.onnx`, torch for `.pt2`; `threads` 0 takes all cores."""
+    if path.suffix == ".pt2":
+        module = torch.export.load(path).module()
+        return lambda *given: [part.numpy() for part in module(*map(torch.from_numpy, given))]
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    return lambda *given: [
+        np.asarray(part) for part in session.run(None, dict(zip(INPUTS, given, strict=True)))
+    ]
+
+
+def compare(runner: Runner, predictor: Predictor, scans: Sequence[Points]) -> Difference:
+    """Both complete the same scans."""
+    largest, other = 0.0, 0
+    for scan, done in zip(scans, predictor.complete_many(scans)):
+        points, *_, branch = runner(*prepared(scan, predictor.settings.input_points))
+        if int(branch[0]) == done.branch:
+            largest = max(largest, float(np.abs(points[0] - done.points).max()))
+        else:
+            other += 1
+    return Difference(largest, other, len(scans))
+
+
+def prepared(scan: Points, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """What an exported file takes of one scan."""
+    return in_order(scan)[None], drawn(len(scan), count)[None]
+
+
+def rehearsal_scans(settings: ModelSettings, count: int, seed: int = 0) -> list[Points]:
+    """Half-seen ellipsoids of the size trained on, all around the sensor: enough to compare.
+
+    They need no data set, and are as hard on the arithmetic as real scans.
+    """
+    rng = np.random.default_rng(seed)
+    low, high = settings.extent_m
+    length = min(high, 10.0) / 2 if low == 0 else (low + min(high, 2 * low)) / 2
+    return [_half_ellipsoid(rng, length, settings.sensor == "camera") for _ in range(count)]
+
+
+def _half_ellipsoid(rng: np.random.Generator, length: float, ahead: bool) -> Points:
+    ball = rng.normal(size=(int(rng.integers(60, 1500)), 3))
+    ball *= np.array((0.5, 0.2, 0.16)) * length / np.linalg.norm(ball, axis=1, keepdims=True)
+    heading = rng.uniform(0, 2 * np.pi)
+    cos, sin = np.cos(heading), np.sin(heading)
+    turned = ball @ np.array(((cos, -sin, 0), (sin, cos, 0), (0, 0, 1.0))).T
+    bearing, distance = rng.uniform(0, 2 * np.pi), length * rng.uniform(1.5, 5)
+    at = distance * np.array((np.cos(bearing), np.sin(bearing), rng.uniform(-0.1, 0.1)))
+    at = np.array((0.0, 0.0, distance)) if ahead else at
+    facing = turned[turned @ at < 0]
+    return (facing + at).astype(np.float32)

@@ -1,0 +1,35 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Scans registered through the poses of one object (METHOD 7)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.prepare import extent
+from wildshape.ops.nearest import nearest
+from wildshape.records import Points
+
+_INLIER_M, _INLIER_SHARE = 0.2, 0.05
+
+
+def to_middle(T_sensor_canonical: SE3) -> SE3:
+    """`T_middle_scan = T_middle_can inv(T_scan_can)` of every scan of a track."""
+    middle = T_sensor_canonical[len(T_sensor_canonical) // 2]
+    return middle @ T_sensor_canonical.inverse()
+
+
+def fuse_scans(scans: Sequence[Points], T_middle_scan: SE3) -> Points:
+    """The scans' points, moved and joined."""
+    moved = [T_middle_scan[i].apply_numpy(scan) for i, scan in enumerate(scans)]
+    return np.concatenate(moved).astype(np.float32)
+
+
+def inlier_ratio(T_target_source: SE3, source: Points, target: Points) -> float:
+    """Share of moved source points near a target point (`Registration.inlier_ratio`)."""
+    reach = min(_INLIER_M, _INLIER_SHARE * extent(target))
+    moved = torch.from_numpy(T_target_source.apply_numpy(source))
+    found = nearest(moved[None], torch.from_numpy(np.ascontiguousarray(target))[None])
+    return float((found.distance_squared <= reach * reach).float().mean())

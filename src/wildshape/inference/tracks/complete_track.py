@@ -1,0 +1,255 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""One object from all scans of its track: headings voted, poses refined, one shape (METHOD 11).
+
+Beyond the paper. Each scan was completed on its own first; here they are held against each other.
+Nothing but the scans and what the network said of each is used.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from wildshape.geometry.box import FittedBox
+from wildshape.geometry.outliers import voxel_thin
+from wildshape.geometry.transforms.se3 import SE3, stack
+from wildshape.inference.boxes import carried, fit_to_scans
+from wildshape.inference.config import BoxConfig, InferenceConfig, TrackConfig
+from wildshape.inference.prepare import network_input, unit_of
+from wildshape.inference.reasons import judged_again
+from wildshape.inference.refine import denser
+from wildshape.inference.tracks.heading_vote import (
+    half_turn,
+    likeness_of_next,
+    nearness_of_next,
+    turned_where,
+    voted_signs,
+)
+from wildshape.inference.tracks.joint_icp import refine_jointly, stayed_near
+from wildshape.inference.tracks.pose_outliers import without_outliers
+from wildshape.method.checkpoint import ModelSettings
+from wildshape.method.hindsight import score_hypotheses
+from wildshape.ops.nearest import nearest
+from wildshape.records import Completion, Points
+
+_BATCH = 32
+_DEFAULT = InferenceConfig()
+
+
+class TrackFit(NamedTuple):
+    """Poses of one object in a track's scans.
+
+    Attributes:
+        T_sensor_object: of every scan.
+        refined: whether they were made to fit each other.
+    """
+
+    T_sensor_object: SE3
+    refined: bool
+
+
+@torch.inference_mode()
+def complete_together(
+    done: list[Completion],
+    scans: list[Points],
+    settings: ModelSettings,
+    config: InferenceConfig = _DEFAULT,
+) -> list[Completion]:
+    """Completions of a track's single scans made those of one object.
+
+    Args:
+        done: each scan on its own.
+        scans: of one rigid object, in time order, sensor frames.
+        settings: of the network that completed them.
+        config: how they are made so.
+    """
+    if len(done) < 2:
+        return done
+    weights = torch.tensor([max(item.confidence, 1e-3) for item in done], dtype=torch.float64)
+    shape = _mean_shape(done, weights, settings.network.points)
+    poses = stack([item.pose for item in done])
+    voted = _voted(poses, shape, weights, scans, settings, config.track)
+    mirror, unit = settings.network.mirror, unit_of(settings.extent_m[1])
+    given, start = _in_units(scans, voted, unit)
+    fit = refine_checked(given, start, mirror=mirror, config=config.track)
+    shape = unit * drawn_to(
+        shape / unit, _seen(given, fit.T_sensor_object, mirror, config.track), config.track
+    )
+    fit = fit._replace(T_sensor_object=_scaled(fit.T_sensor_object, unit))
+    fitted = _box(shape, scans, fit.T_sensor_object, config.box, mirror=mirror)
+    whole = torch.from_numpy(denser(shape.numpy())) if settings.facing else shape
+    cost = track_cost(shape, fit.T_sensor_object, scans, settings)
+    mean = float(np.mean([item.confidence for item in done]))
+    trust = [0.0 if item.warning else mean for item in done]
+    return [
+        replace(
+            item,
+            points=fit.T_sensor_object[i].apply(whole).float().numpy(),
+            pose=fit.T_sensor_object[i],
+            box=carried(fitted, fit.T_sensor_object[i]),
+            confidence=trust[i],
+            reasons=judged_again(item, float(cost[i]), trust[i], settings),
+            cost=float(cost[i]),
+            refined=fit.refined,
+        )
+        for i, item in enumerate(done)
+    ]
+
+
+def _in_units(scans: list[Points], T_sensor_object: SE3, unit: float) -> tuple[list[Points], SE3]:
+    """Both as if the object were as large as a vehicle (`unit_of`)."""
+    if unit == 1.0:
+        return scans, T_sensor_object
+    return [scan / np.float32(unit) for scan in scans], _scaled(T_sensor_object, 1 / unit)
+
+
+def _scaled(T_a_b: SE3, factor: float) -> SE3:
+    return SE3(T_a_b.rotation, T_a_b.translation * factor)
+
+
+def _box(
+    shape: Float[Tensor, "P 3"],
+    scans: list[Points],
+    T_sensor_object: SE3,
+    config: BoxConfig,
+    *,
+    mirror: bool,
+) -> FittedBox:
+    """One box for all scans of the track, object frame."""
+    T_object_sensor = T_sensor_object.inverse()
+    seen = [T_object_sensor[i].apply(torch.from_numpy(s).double()) for i, s in enumerate(scans)]
+    return fit_to_scans(shape, seen, mirror=mirror, config=config)
+
+
+def _mean_shape(
+    done: list[Completion], weights: Float[Tensor, "V"], count: int
+) -> Float[Tensor, "P 3"]:
+    """The mean of the canonical shapes: points of one index are the same place of the object.
+
+    That holds for the network's own `count` points, which come first.
+    """
+    points = [torch.from_numpy(item.points[:count]).double() for item in done]
+    shapes = [item.pose.inverse().apply(of) for item, of in zip(done, points)]
+    return (torch.stack(shapes) * weights[:, None, None]).sum(0) / weights.sum()
+
+
+def _voted(
+    T_sensor_can: SE3,
+    shape: Float[Tensor, "P 3"],
+    weights: Float[Tensor, "V"],
+    scans: list[Points],
+    settings: ModelSettings,
+    config: TrackConfig,
+) -> SE3:
+    """The same poses, all looking one way and no outlier among them."""
+    middle = float(shape[:, 0].amin() + shape[:, 0].amax()) / 2
+    turned = T_sensor_can @ half_turn(middle)
+    stands = track_cost(shape, T_sensor_can, scans, settings)
+    gain = track_cost(shape, turned, scans, settings) - stands
+    unit = unit_of(settings.extent_m[1])
+    if settings.sensor == "lidar":
+        links = nearness_of_next(T_sensor_can.inverse().translation, middle, config.vote)
+    else:
+        clouds = _some_of_each(scans, T_sensor_can, config.voting_points) / unit
+        mirror = settings.network.mirror
+        links = likeness_of_next(clouds, middle / unit, mirror=mirror, config=config.vote)
+    signs = voted_signs(T_sensor_can.rotation, gain / unit, links, weights, config.vote)
+    return without_outliers(turned_where(T_sensor_can, signs, middle), config)
+
+
+def _some_of_each(scans: list[Points], T_sensor_object: SE3, count: int) -> Float[Tensor, "V n 3"]:
+    """As many points of each scan, object frame."""
+    rng = np.random.default_rng(0)
+    rows = [rng.permutation(len(s))[np.arange(count) % len(s)] for s in scans]
+    picked = torch.stack([torch.from_numpy(s[row]) for s, row in zip(scans, rows)])
+    return T_sensor_object.inverse().apply(picked.double()).float()
+
+
+def track_cost(
+    shape: Float[Tensor, "P 3"], T_sensor_object: SE3, scans: list[Points], settings: ModelSettings
+) -> Float[Tensor, "V"]:
+    """The label-free cost of one shape in every scan, metres (METHOD 6)."""
+    found = []
+    for start in range(0, len(scans), _BATCH):
+        part = slice(start, start + _BATCH)
+        given = network_input(scans[part], settings.input_points, settings.sensor, settings.facing)
+        posed = T_sensor_object[part].apply(shape.expand(len(given.scans), -1, -1)).float()
+        posed = posed @ given.turn.mT - given.centres[:, None]
+        scores = score_hypotheses(given.scans, given.centres, posed[:, None], settings.projection)
+        found.append(scores.cost(settings.beta)[:, 0])
+    return torch.cat(found).double()
+
+
+def refine_checked(
+    scans: list[Points], voted: SE3, *, mirror: bool, config: TrackConfig = _DEFAULT.track
+) -> TrackFit:
+    """Refined poses, kept only if the scans then lie nearer to each other, and near the vote."""
+    refined = refine_jointly(scans, voted, mirror=mirror, config=config.coarse)
+    refined = refine_jointly(scans, refined, mirror=False, config=config.fine)
+    before, after = (_disagreement(scans, T, mirror, config) for T in (voted, refined))
+    if stayed_near(voted, refined, config) and after < before:
+        return TrackFit(refined, refined=True)
+    return TrackFit(voted, refined=False)
+
+
+def _disagreement(
+    scans: list[Points], T_sensor_object: SE3, mirror: bool, config: TrackConfig
+) -> float:
+    """Mean distance of every other scan to those between them, metres, each at most `far_m`."""
+    halves = [
+        _fused(scans, T_sensor_object, part, config.most_points)
+        for part in (slice(0, None, 2), slice(1, None, 2))
+    ]
+    bank = _with_mirror(halves[1]) if mirror else halves[1]
+    found = nearest(halves[0][None], bank[None])
+    return float(found.distance_squared.sqrt().clamp_max(config.vote.far_m).mean())
+
+
+def _fused(
+    scans: list[Points], T_sensor_object: SE3, part: slice, count: int
+) -> Float[Tensor, "n 3"]:
+    """Points of some of the scans in the object frame, about `count` at most."""
+    rng = np.random.default_rng(0)
+    chosen = range(len(scans))[part]
+    most = max(1, count // len(chosen))
+    clouds = []
+    for i in chosen:
+        points = torch.from_numpy(scans[i][rng.permutation(len(scans[i]))[:most]]).double()
+        clouds.append(T_sensor_object[i].inverse().apply(points))
+    return torch.cat(clouds).float()
+
+
+def _with_mirror(points: Float[Tensor, "n 3"]) -> Float[Tensor, "m 3"]:
+    return torch.cat((points, points * points.new_tensor((1.0, -1.0, 1.0))))
+
+
+def _seen(
+    scans: list[Points], T_sensor_object: SE3, mirror: bool, config: TrackConfig
+) -> Float[Tensor, "n 3"]:
+    """The surface that the scans saw, reflected and thinned to an even density, object frame."""
+    fused = _fused(scans, T_sensor_object, slice(None), config.most_points)
+    fused = _with_mirror(fused) if mirror else fused
+    return torch.from_numpy(voxel_thin(fused.numpy(), config.voxel_m))
+
+
+def drawn_to(
+    shape: Float[Tensor, "P 3"], seen: Float[Tensor, "n 3"], config: TrackConfig = _DEFAULT.track
+) -> Float[Tensor, "P 3"]:
+    """The shape's points drawn to the mean of what was seen around them; the others stay.
+
+    Args:
+        shape: object frame.
+        seen: points of even density, the same frame.
+        config: how far, and how stiffly.
+    """
+    moved = []
+    for part in shape.float().split(1024):
+        apart = torch.cdist(part, seen) / config.reach_m
+        weight = torch.exp(-apart.square())
+        total = weight.sum(1, keepdim=True) + config.stiffness
+        moved.append((weight @ seen + config.stiffness * part) / total)
+    return torch.cat(moved).to(shape.dtype)

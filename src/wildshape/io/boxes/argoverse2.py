@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Boxes as a table of Argoverse 2: `annotations.feather`, a row a box."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from wildshape.errors import MissingExtraError
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.atomic import atomic_write
+from wildshape.io.boxes.detections import Detection, moved
+
+_CATEGORIES = {"": "REGULAR_VEHICLE", "car": "REGULAR_VEHICLE"}
+
+
+def write_argoverse2_boxes(
+    path: Path, detections: Sequence[Detection], T_ego_sensor: SE3 | None = None
+) -> None:
+    """Write a feather table with the columns of Argoverse 2's labels, and `score`.
+
+    Args:
+        path: of the file, `annotations.feather` by custom.
+        detections: a row each.
+        T_ego_sensor: the data set's boxes are in the egovehicle frame; None leaves them in the
+            sensor's.
+
+    Raises:
+        MissingExtraError: pyarrow is not installed.
+    """
+    pyarrow = load_pyarrow()
+    from pyarrow import feather
+
+    boxes = [
+        one.box if T_ego_sensor is None else moved(one.box, T_ego_sensor) for one in detections
+    ]
+    numbers = {
+        name: [getattr(box, part)[i] for box in boxes]
+        for part, names in (
+            ("size", ("length_m", "width_m", "height_m")),
+            ("quaternion_wxyz", ("qw", "qx", "qy", "qz")),
+            ("centre", ("tx_m", "ty_m", "tz_m")),
+        )
+        for i, name in enumerate(names)
+    }
+    count = len(detections)
+    table = pyarrow.table(
+        {
+            "timestamp_ns": pyarrow.array([one.scan_number for one in detections], pyarrow.int64()),
+            "track_uuid": pyarrow.array([one.track for one in detections], pyarrow.string()),
+            "category": [
+                _CATEGORIES.get(c, c.upper()) for c in (one.category for one in detections)
+            ],
+            **numbers,
+            "num_interior_pts": pyarrow.array([-1] * count, pyarrow.int64()),
+            "score": [one.score for one in detections],
+        }
+    )
+    with atomic_write(path) as file:
+        feather.write_feather(table, file)
+
+
+def load_pyarrow() -> Any:
+    """The library.
+
+    Raises:
+        MissingExtraError: it is not installed.
+    """
+    try:
+        import pyarrow
+    except ImportError as error:
+        raise MissingExtraError(
+            "Argoverse 2's boxes are written by pyarrow, which is not installed: "
+            "pip install 'wildshape[arrow]'."
+        ) from error
+    return pyarrow

@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Boxes of many scans as one list, and as the JSON that needs no other project's conventions."""
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+import torch
+
+from wildshape.geometry.transforms.rotation import (
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+)
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.atomic import write_json
+from wildshape.io.guard import reading
+from wildshape.records import Box, SensorKind
+
+FRAME = (
+    "centre and quaternion (w, x, y, z; box to frame) in each scan's own sensor frame, metres; "
+    "size along the box's own x (forward), y (left), z (up)"
+)
+
+
+@dataclass(frozen=True)
+class Detection:
+    """One object in one scan.
+
+    Attributes:
+        track: name of the object.
+        track_number: of the object among all that are written, from 0.
+        scan: name.
+        scan_number: the scan's name where that is a whole number, else its place in the track.
+        category: for example `car`; empty if unknown.
+        sensor: tells the axes of the frame.
+        score: confidence, 0 to 1.
+        box: in the scan's sensor frame.
+    """
+
+    track: str
+    track_number: int
+    scan: str
+    scan_number: int
+    category: str
+    sensor: SensorKind
+    score: float
+    box: Box
+
+
+def pose_of(box: Box) -> SE3:
+    """`T_sensor_box`, float64; origin at the box's centre."""
+    wxyz = torch.tensor(box.quaternion_wxyz, dtype=torch.float64)
+    return SE3(rotation_from_quaternion(wxyz), torch.tensor(box.centre, dtype=torch.float64))
+
+
+def moved(box: Box, T_target_sensor: SE3) -> Box:
+    """The same box in another frame."""
+    T = T_target_sensor.to(pose_of(box).rotation.dtype) @ pose_of(box)
+    x, y, z = T.translation.tolist()
+    qw, qx, qy, qz = quaternion_from_rotation(T.rotation).tolist()
+    return Box((x, y, z), box.size, (qw, qx, qy, qz))
+
+
+def number_of(scan: str, place: int) -> int:
+    """What a scan's name counts, or else its place in the track."""
+    return int(scan) if scan.isascii() and scan.isdigit() else place
+
+
+def read_detections(out: Path) -> list[Detection]:
+    """The boxes of the `objects.json` of every track below `out`, by track and scan.
+
+    Raises:
+        BadInputError: one of these files is damaged.
+    """
+    found: list[Detection] = []
+    for number, path in enumerate(sorted(out.glob("*/objects.json"))):
+        with reading(path, "what complete or register writes"):
+            said = json.loads(path.read_text("utf-8"))
+            if said["track"] != path.parent.name:  # it becomes a file's name
+                raise ValueError(f"track {said['track']!r} in the folder {path.parent.name!r}")
+            found += _detections_of(said, number)
+    return found
+
+
+def _detections_of(said: dict[str, Any], number: int) -> Iterator[Detection]:
+    kind = said.get("sensor", "lidar")
+    if kind not in get_args(SensorKind):
+        raise ValueError(f"sensor {kind!r}")
+    for place, scan in enumerate(said["scans"]):
+        name = _text(scan["scan"])
+        yield Detection(
+            track=_text(said["track"]),
+            track_number=number,
+            scan=name,
+            scan_number=number_of(name, place),
+            category=_text(said.get("category") or ""),
+            sensor=kind,
+            score=_finite([scan["confidence"]])[0],
+            box=_box(scan["box"]),
+        )
+
+
+def _text(raw: object) -> str:
+    """A text that a file can hold: half of a pair of surrogates raises `UnicodeEncodeError`."""
+    text = str(raw)
+    text.encode()
+    return text
+
+
+def _box(raw: dict[str, Any]) -> Box:
+    x, y, z = _finite(raw["centre"])
+    length, width, height = _finite(raw["size"])
+    qw, qx, qy, qz = _finite(raw["quaternion_wxyz"])
+    return Box((x, y, z), (length, width, height), (qw, qx, qy, qz))
+
+
+def _finite(raw: Sequence[Any]) -> list[float]:
+    numbers = [float(number) for number in raw]
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError(f"{numbers}, which are not all finite")
+    return numbers
+
+
+def write_box_list(path: Path, detections: Sequence[Detection]) -> None:
+    """Write all boxes as one JSON object, atomically."""
+    rows = [{**asdict(one), **asdict(one.box)} for one in detections]
+    for row in rows:
+        del row["box"]
+    write_json(path, {"format": 1, "frame": FRAME, "boxes": rows})

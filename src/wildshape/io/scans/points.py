@@ -1,0 +1,239 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The door to scan files: points by suffix, in metres, and the checks that every scan passes."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32
+
+from wildshape.errors import BadInputError
+from wildshape.io.guard import reading
+from wildshape.io.scans.arrays import read_kitti_bin, read_npy, read_npz
+from wildshape.io.scans.coordinates import METRES, SENSOR_METRES, Coordinates, Unit
+from wildshape.io.scans.las import read_las
+from wildshape.io.scans.pcd import read_pcd
+from wildshape.io.scans.ply import read_ply
+from wildshape.io.scans.ply_writer import write_ply
+from wildshape.io.scans.text import header_unit, read_text
+
+__all__ = [
+    "METRES",
+    "SENSOR_METRES",
+    "SUFFIXES",
+    "Coordinates",
+    "ScanFile",
+    "Unit",
+    "check_near",
+    "check_scan",
+    "drop_nonfinite",
+    "is_scan_file",
+    "read_points",
+    "read_scan",
+    "write_ply",
+]
+
+_READERS: dict[str, tuple[str, Callable[[Path], Float[np.ndarray, "n 3"]]]] = {
+    ".ply": ("a PLY file", read_ply),
+    ".pcd": ("a PCD file", read_pcd),
+    ".bin": ("a KITTI scan (float32 x y z intensity)", read_kitti_bin),
+    ".npy": ("a numpy array (n, 3)", read_npy),
+    ".npz": ("a numpy archive with an array (n, 3)", read_npz),
+    ".xyz": ("text with x y z a line", read_text),
+    ".txt": ("text with x y z a line", read_text),
+    ".csv": ("text with x y z a line", read_text),
+    ".las": ("a LAS file", read_las),
+    ".laz": ("a LAZ file", read_las),
+}
+SUFFIXES = tuple(_READERS)
+"""The suffixes of scan files, in lower case."""
+
+_LEAST_POINTS = 16
+_LARGEST_EXTENT = 100.0
+_SMALLEST_EXTENT = 0.01
+_FARTHEST = 1000.0
+
+
+@dataclass(frozen=True)
+class ScanFile:
+    """A scan as read.
+
+    Attributes:
+        points: `(n, 3)` float32, metres, sensor frame, all finite.
+        dropped_nonfinite: how many points of the file were NaN or infinite.
+    """
+
+    points: Float32[np.ndarray, "n 3"]
+    dropped_nonfinite: int
+
+
+def is_scan_file(path: Path) -> bool:
+    """Whether the suffix is one that `read_points` knows and the file is not hidden."""
+    return path.suffix.lower() in _READERS and not path.name.startswith(".") and path.is_file()
+
+
+def read_points(
+    path: Path | str, coordinates: Coordinates = SENSOR_METRES
+) -> Float32[np.ndarray, "n 3"]:
+    """The finite points of a file, chosen by suffix, in metres; no check but `check_near`.
+
+    Args:
+        path: .ply .pcd .bin .npy .npz .xyz .txt .csv .las .laz
+        coordinates: the file's unit, and the sensor's position if that is not the file's origin.
+
+    Raises:
+        BadInputError: the file is missing, damaged, of an unknown kind, or far from its origin.
+    """
+    points = _read(Path(path), coordinates)
+    check_near(points, str(path))
+    return drop_nonfinite(points).points
+
+
+def read_scan(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> ScanFile:
+    """A scan, its NaN and infinite points dropped and counted, that has passed `check_scan`.
+
+    Raises:
+        BadInputError: the file cannot be read, or is no scan of an object in metres.
+    """
+    points = _read(Path(path), coordinates)
+    check_scan(points, str(path))
+    return drop_nonfinite(points)
+
+
+def drop_nonfinite(points: Float[np.ndarray, "n 3"]) -> ScanFile:
+    """The points as float32, without those that are NaN, infinite or beyond float32."""
+    kept = _only_finite(points)
+    return ScanFile(np.ascontiguousarray(kept, np.float32), len(points) - len(kept))
+
+
+def check_scan(points: Float[np.ndarray, "n 3"], name: str) -> None:
+    """Refuse what cannot be a scan of one object in metres, taken by a sensor at the origin.
+
+    Args:
+        points: `(n, 3)`, metres, in the precision of the file.
+        name: the file, for the error.
+
+    Raises:
+        BadInputError: fewer than 16 finite points, all points equal, an extent (the longest
+            side of the bounding box) over 100 m or under 1 cm, or farther than 1 km away.
+    """
+    if not len(points):
+        raise BadInputError(
+            f"{name}: is empty but for its header (0 finite points); write the scan again."
+        )
+    points = _only_finite(points)
+    if len(points) < _LEAST_POINTS:
+        raise BadInputError(
+            f"{name}: {len(points)} finite points; a scan needs at least {_LEAST_POINTS}: "
+            "use a denser one."
+        )
+    low, high = points.min(0).astype(np.float64), points.max(0).astype(np.float64)
+    extent = float((high - low).max())
+    if extent == 0.0:
+        raise BadInputError(
+            f"{name}: all {len(points)} points are equal; the file was written wrongly or "
+            "is no scan."
+        )
+    if extent > _LARGEST_EXTENT:
+        raise BadInputError(
+            f"{name}: {extent:.4g} m across, but a scan of one object is at most "
+            f"{_LARGEST_EXTENT:g} m: "
+            "coordinates in millimetres (then pass --unit mm or cm) or degrees, or a whole scene "
+            "(then cut the object out first)."
+        )
+    if extent < _SMALLEST_EXTENT:
+        raise BadInputError(
+            f"{name}: {extent:.4g} m across, but a scan of one object is at least "
+            f"{_SMALLEST_EXTENT:g} m: "
+            "normalised coordinates (write them in metres), or a unit that does not fit "
+            "(drop --unit mm if the file is in metres)."
+        )
+    check_near(points, name)
+
+
+def check_near(points: Float[np.ndarray, "n 3"], name: str) -> None:
+    """Refuse what no sensor at the origin saw, and what float32 could not hold to a millimetre.
+
+    Args:
+        points: `(n, 3)`, metres, in the precision of the file.
+        name: the file, for the error.
+
+    Raises:
+        BadInputError: the points lie farther than 1 km from the origin.
+    """
+    points = _only_finite(points)
+    if not len(points):
+        return
+    with np.errstate(over="ignore"):  # infinitely far is farther
+        away = math.hypot(*(float(np.median(axis)) for axis in points.T))
+    if away > _FARTHEST:
+        raise BadInputError(
+            f"{name}: lies {away:.5g} m from the origin, but a scan is in its sensor's frame,"
+            f" within {_FARTHEST:g} m of it: coordinates of a map (then pass the sensor's position"
+            " there, --origin X,Y,Z, or subtract it in float64) or in millimetres (then pass --unit"
+            " mm or cm)."
+        )
+
+
+def _finite(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
+    """Which points are neither NaN nor infinite nor beyond float32."""
+    largest, finite = np.finfo(np.float32).max, np.ones(len(points), bool)
+    for axis in points.T:  # one at a time: less memory
+        finite &= np.abs(axis) <= largest
+    return finite
+
+
+def _only_finite(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "k 3"]:
+    """Those points; the same array where all are."""
+    finite = _finite(points)
+    return points if finite.all() else points[finite]
+
+
+def _read(path: Path, coordinates: Coordinates) -> Float[np.ndarray, "n 3"]:
+    """All points, NaN included, in the sensor's frame, metres, in the precision of the file."""
+    suffix = path.suffix.lower()
+    if suffix not in _READERS:
+        raise BadInputError(
+            f"{path}: the suffix '{suffix}' is none of a scan file; use one of "
+            f"{' '.join(SUFFIXES)}."
+        )
+    expected, reader = _READERS[suffix]
+    with reading(path, expected):
+        if not path.stat().st_size:
+            raise BadInputError(f"{path}: is empty (0 bytes); write or copy it again.")
+        if reader is read_text:
+            coordinates = coordinates.agreeing(header_unit(path), path)
+        return coordinates.to_sensor(reader(path), path)
+
+
+_TEXT_BYTES = 512
+_LAS_COMPRESSED_AT = 104  # the point format's byte; LAZ sets its highest bit
+
+
+def suffix_of(data: bytes) -> str:
+    """The suffix that a scan file with this content would have; empty if nothing is recognised.
+
+    A KITTI .bin is bare numbers and cannot be told from damage: it is never guessed.
+    """
+    if data[:3] == b"ply" and data[3:4].isspace():
+        return ".ply"
+    if data[:6] == b"\x93NUMPY":
+        return ".npy"
+    if data[:4] == b"PK\x03\x04":
+        return ".npz"
+    if data[:4] == b"LASF":
+        return ".laz" if data[_LAS_COMPRESSED_AT : _LAS_COMPRESSED_AT + 1] >= b"\x80" else ".las"
+    if data.lstrip()[:6].upper().startswith((b"# .PCD", b"VERSIO")):
+        return ".pcd"
+    return ".xyz" if _is_text(data[:_TEXT_BYTES]) else ""
+
+
+def _is_text(start: bytes) -> bool:
+    """Whether it reads as text with a number in it."""
+    text = start.decode("utf-8-sig", errors="ignore")
+    lost = len(start) - len(text.encode())
+    readable = all(c.isprintable() or c.isspace() for c in text)
+    return readable and lost < 4 and any(c.isdigit() for c in text)

@@ -1,0 +1,246 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Writing a packed store: points stream into shards and the index into its columns."""
+
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float32
+
+from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.atomic import write_json
+from wildshape.io.store.checks import cloud_crc
+from wildshape.io.store.index import IndexWriter, file_record
+from wildshape.io.store.layout import (
+    FORMAT,
+    INDEX_JSON,
+    INDEX_TENSORS,
+    JOINING_JSON,
+    PARTS,
+    POINT_BYTES,
+    SHARD_NAME,
+    VERSION,
+    WRITING_JSON,
+    FileRecord,
+)
+from wildshape.io.store.manifest import manifest_of
+from wildshape.io.tracks import sensor_to_json
+from wildshape.records import Track
+
+_SHARD_BYTES = 256 << 20
+_HEADER_BYTES = 256
+
+
+class StoreWriter:
+    """Appends tracks to a new packed store, which exists only once `close` has returned.
+
+    As a context manager it closes at the end of the block, or leaves a half-written store, which
+    nothing will open, after an error.
+    """
+
+    def __init__(
+        self,
+        path: Path | str,
+        provenance: dict[str, Any],
+        *,
+        overwrite: bool = False,
+        shard_bytes: int = _SHARD_BYTES,
+    ) -> None:
+        """Start a store.
+
+        Args:
+            path: the folder to make.
+            provenance: JSON values kept with the store (`io.provenance.provenance`).
+            overwrite: replace a store, finished or half-written, at this path.
+            shard_bytes: a shard is closed once it holds this much.
+
+        Raises:
+            BadInputError: something is at `path` already.
+        """
+        self.path = Path(path)
+        self._provenance = provenance
+        self._shard_bytes = shard_bytes
+        _make_room(self.path, overwrite=overwrite)
+        self.path.mkdir(parents=True, exist_ok=True)
+        write_json(
+            self.path / WRITING_JSON,
+            {"format": FORMAT, "version": VERSION, "provenance": provenance},
+        )
+        self._index = IndexWriter(self.path)
+        self._names: set[str] = set()
+        self._points = 0
+        self._shards: list[FileRecord] = []
+        self._shard: _Shard | None = None
+
+    def __enter__(self) -> "StoreWriter":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self._abandon()
+
+    def __len__(self) -> int:
+        return self._index.count("track_names")
+
+    def add(self, track: Track) -> None:
+        """Append a track.
+
+        Raises:
+            BadInputError: a name that was added before, no scans, or poses and names of another
+                length than the scans.
+            OSError: the disk is full.
+        """
+        self._check(track)
+        index = self._index
+        if self._shard is None:
+            self._shard = _Shard(self.path / SHARD_NAME.format(len(self._shards)))
+        for points, name in zip(track.scans, track.scan_names):
+            index.append("scan_names", index.text(name))
+            index.append("scan_sizes", len(points))
+            start, crc = self._write(points)
+            index.append("scan_starts", start)
+            index.append("scan_crcs", crc)
+        index.append("track_starts", index.count("scan_sizes"))
+        index.append("track_names", index.text(track.name))
+        index.append("categories", index.text(track.category))
+        index.append("sources", index.text(track.source))
+        index.append("sensors", index.text(json.dumps(sensor_to_json(track.sensor))))
+        self._add_truth(track.T_sensor_object, track.shape)
+        if self._shard.points * POINT_BYTES >= self._shard_bytes:
+            self._end_shard()
+
+    def close(self) -> None:
+        """Finish the store: last shard, index, and at last `index.json`.
+
+        Raises:
+            BadInputError: not a single track was added.
+            OSError: the disk is full; the store stays half-written and is not opened.
+        """
+        if not len(self):
+            raise BadInputError(f"{self.path}: no track to store; check the source.")
+        if self._shard is not None:
+            self._end_shard()
+        counts = {
+            "tracks": len(self),
+            "scans": self._index.count("scan_sizes"),
+            "points": self._points,
+        }
+        manifest = manifest_of(self._index.finish(), self._shards, counts, self._provenance)
+        write_json(self.path / INDEX_JSON, manifest)
+        (self.path / WRITING_JSON).unlink(missing_ok=True)
+
+    def _check(self, track: Track) -> None:
+        poses = track.T_sensor_object
+        lengths = {len(track.scans), len(track.scan_names), len(poses or track.scans)}
+        if len(lengths) > 1 or not track.scans:
+            raise BadInputError(
+                f"track {track.name}: {len(track.scans)} scans, {len(track.scan_names)} names and "
+                f"{'no' if poses is None else len(poses)} poses do not fit together."
+            )
+        if track.name in self._names:
+            raise BadInputError(f"two tracks are named '{track.name}'; rename one of them.")
+        self._names.add(track.name)
+
+    def _add_truth(self, poses: SE3 | None, shape: Float32[np.ndarray, "n 3"] | None) -> None:
+        index = self._index
+        index.append("pose_starts", -1 if poses is None else index.count("poses") // 12)
+        if poses is not None:
+            index.extend("poses", poses.matrix[:, :3].detach().cpu().numpy())
+        index.append("shape_sizes", 0 if shape is None else len(shape))
+        start, crc = (-1, 0) if shape is None else self._write(shape)
+        index.append("shape_starts", start)
+        index.append("shape_crcs", crc)
+
+    def _write(self, points: Float32[np.ndarray, "n 3"]) -> tuple[int, int]:
+        """Append a cloud to the shard; returns its first row and its CRC."""
+        assert self._shard is not None
+        points = np.ascontiguousarray(points, "<f4")
+        self._shard.write(points)
+        start = self._points
+        self._points += len(points)
+        return start, cloud_crc(points)
+
+    def _end_shard(self) -> None:
+        assert self._shard is not None
+        self._shards.append(self._shard.finish())
+        self._index.append("shard_starts", self._points)
+        self._shard = None
+
+    def _abandon(self) -> None:
+        self._index.abandon()
+        if self._shard is not None:
+            self._shard.abandon()
+
+
+class _Shard:
+    """One `points` tensor of a length that is known at the end only: the header keeps its room."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.points = 0
+        self._temporary = path.with_name(path.name + ".part")
+        self._file = self._temporary.open("wb")
+        self._file.write(bytes(_HEADER_BYTES))
+
+    def write(self, points: Float32[np.ndarray, "n 3"]) -> None:
+        self._file.write(points.data)
+        self.points += len(points)
+
+    def finish(self) -> FileRecord:
+        offsets = [0, self.points * POINT_BYTES]
+        tensor = {"dtype": "F32", "shape": [self.points, 3], "data_offsets": offsets}
+        header = json.dumps({"points": tensor}).encode().ljust(_HEADER_BYTES - 8)
+        self._file.seek(0)
+        self._file.write(len(header).to_bytes(8, "little") + header)
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._file.close()
+        self._temporary.replace(self.path)
+        return file_record(self.path)
+
+    def abandon(self) -> None:
+        self._file.close()
+
+
+def _make_room(path: Path, *, overwrite: bool) -> None:
+    check_room(path, overwrite=overwrite)
+    if path.exists():
+        remove_store(path)
+
+
+def check_room(path: Path, *, overwrite: bool) -> None:
+    """Refuse an output where something else is, or a store that must not be replaced.
+
+    Raises:
+        BadInputError: either.
+    """
+    if not path.exists() or (path.is_dir() and set(path.iterdir()) <= set(path.glob(".*.part"))):
+        return  # nothing, or what a writer left that was killed before it had begun
+    ours = path.is_dir() and any((path / name).exists() for name in (INDEX_JSON, WRITING_JSON))
+    if not ours:
+        raise BadInputError(f"{path}: exists and is no packed store; choose another output.")
+    if not overwrite:
+        state = "a packed store" if (path / INDEX_JSON).exists() else "a half-written packed store"
+        raise BadInputError(f"{path}: {state} is there already; pass --overwrite to replace it.")
+
+
+def remove_store(path: Path, *, parts: bool = True) -> None:
+    """Remove a store, finished or half-written: its own files, no others.
+
+    Args:
+        path: its folder.
+        parts: remove the finished parts of a conversion as well.
+    """
+    # The store ends to exist with its manifest, which therefore goes first.
+    own = (INDEX_JSON, JOINING_JSON, INDEX_TENSORS, "points-*.safetensors*", ".*.part")
+    for file in [file for pattern in own for file in path.glob(pattern)]:
+        file.unlink()
+    if parts:
+        shutil.rmtree(path / PARTS, ignore_errors=True)

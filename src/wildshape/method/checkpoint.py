@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The only file that knows the checkpoint format: one safetensors file (DESIGN, Checkpoint)."""
+
+import json
+import math
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors.torch import save
+
+from wildshape.geometry.projection.visibility import Projection
+from wildshape.io.atomic import atomic_write
+from wildshape.io.typed_records import record_of
+from wildshape.method.confidence import Calibration, Facts
+from wildshape.method.network import NetworkConfig, ShapePoseNet
+from wildshape.method.saved_network import Format, load_network
+from wildshape.records import SensorKind
+
+FORMAT, VERSION = "wildshape-checkpoint", 1
+_UNIT_WITHIN = 0.01
+_WIDTH = (1.0, 2.0**16)
+_BOUNDS = {
+    "network.encoder": _WIDTH,
+    "network.decoder": _WIDTH,
+    "network.pose": _WIDTH,
+    "network.points": (1.0, 2.0**20),
+    "network.branches": (1.0, 2.0**10),
+    "network.start": (0.0, 1e3),
+    "network.scale": (1e-3, 1e4),
+    "input_points": (1.0, 2.0**16),
+    "projection.d_azimuth": (1e-3, math.pi),
+    "projection.d_pitch": (1e-3, math.pi),
+    "projection.cell_m": (1e-3, 1e3),
+    "projection.cell": (1e-4, 1e2),
+    "beta": (0.0, 1e3),
+    "belief": (0.0, 1e3),
+    "extent_m": (0.0, math.inf),
+    "cost_m": (0.0, 1e6),
+    "calibration.weights": (-1e3, 1e3),
+    "calibration.bias": (-1e3, 1e3),
+    "calibration.sigma": (1e-6, 1e3),
+    "calibration.within_m": (1e-6, 1e3),
+}
+"""Of numbers in the settings: wide of all that was ever trained, and safe to compute with."""
+
+
+@dataclass(frozen=True)
+class ModelSettings:
+    """Everything besides the weights that inference needs, and where the weights come from.
+
+    Attributes:
+        network: sizes.
+        sensor: how scans are centred.
+        input_points: n, points a scan is resampled to.
+        projection: binning of the projection term.
+        beta: its weight in the label-free cost.
+        facing: scans are turned towards their object first (`line_of_sight.py`).
+        belief: metres of cost that a nat of the selector's belief is worth.
+        extent_m: smallest and largest extent of the scans trained on, metres.
+        cost_m: median and 90th percentile of the label-free cost on held-out scans, metres.
+        up: canonical direction that the z axes of the LiDARs trained on have in common; None if
+            they have none (`geometry/gravity.py`), or for cameras.
+        calibration: of the confidence; None if truth never told (`confidence.py`).
+        provenance: command, commit, data, hardware, seed, steps.
+        metrics: held-out figures.
+    """
+
+    network: NetworkConfig
+    sensor: SensorKind
+    input_points: int
+    projection: Projection
+    beta: float
+    facing: bool = False
+    belief: float = 0.0
+    extent_m: tuple[float, float] = (0.0, float("inf"))
+    cost_m: tuple[float, float] = (0.1, 0.2)
+    up: tuple[float, float, float] | None = None
+    calibration: Calibration | None = None
+    provenance: dict[str, Any] = field(default_factory=dict)
+    metrics: dict[str, Any] = field(default_factory=dict)
+
+
+def save_checkpoint(
+    path: Path, network: ShapePoseNet, settings: ModelSettings, half: bool = False
+) -> None:
+    """Write weights and settings atomically; `half` stores float16."""
+    dtype = torch.float16 if half else torch.float32
+    weights = {k: v.detach().cpu().to(dtype) for k, v in network.state_dict().items()}
+    described = asdict(settings)
+    described["projection"]["kind"] = type(settings.projection).__name__
+    metadata = {"format": FORMAT, "version": str(VERSION), "settings": json.dumps(described)}
+    with atomic_write(path) as file:
+        file.write(save(weights, metadata))
+
+
+def load_checkpoint(path: Path) -> tuple[ShapePoseNet, ModelSettings]:
+    """Network in evaluation mode, and its settings.
+
+    Raises:
+        BadInputError: no such file, no safetensors, another format or version, damaged settings,
+            weights missing, of another shape or no numbers.
+    """
+    return load_network(Path(path), _FORMAT)
+
+
+def settings_from_dict(values: object) -> ModelSettings:
+    """The inverse of what `save_checkpoint` writes into the metadata.
+
+    Raises:
+        ValueError: a value is missing, unknown, of another type or out of its bounds.
+    """
+    settings = record_of(ModelSettings, values, _BOUNDS)
+    for name, (low, high) in (("extent_m", settings.extent_m), ("cost_m", settings.cost_m)):
+        if not (low <= high and high > 0):
+            raise ValueError(f"{name} is {low:g}, {high:g}, expected a smaller and a larger number")
+    if settings.up is not None and abs(math.hypot(*settings.up) - 1) > _UNIT_WITHIN:
+        raise ValueError(f"up is {settings.up}, expected a direction of length 1")
+    known = settings.calibration
+    if known is not None and len(known.weights) != len(Facts._fields):
+        raise ValueError(f"{len(known.weights)} weights for {len(Facts._fields)} facts")
+    return settings
+
+
+def _build(settings: ModelSettings) -> ShapePoseNet:
+    return ShapePoseNet(settings.network)
+
+
+_FORMAT = Format(
+    FORMAT, VERSION, "give --model a file written by wildshape train", settings_from_dict, _build
+)

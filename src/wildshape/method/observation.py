@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The two terms that tie a posed shape to a scan (paper eq. 2 and 3, METHOD 4 and 5)."""
+
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from wildshape.ops.nearest import nearest_distance
+
+
+def one_way_chamfer(
+    source: Float[Tensor, "B N 3"],
+    target: Float[Tensor, "B M 3"],
+    counted: Bool[Tensor, "B N"] | None = None,
+) -> Float[Tensor, "B"]:
+    """`CD(source -> target)`: mean over source points of the distance to the nearest target point.
+
+    Args:
+        source: points whose mean is taken.
+        target: points that are searched.
+        counted: which source points the mean runs over; all by default.
+    """
+    return masked_mean(nearest_distance(source, target), counted)
+
+
+def chamfer(a: Float[Tensor, "B N 3"], b: Float[Tensor, "B M 3"]) -> Float[Tensor, "B"]:
+    """`CD(a -> b) + CD(b -> a)`: precision plus coverage (METHOD 8)."""
+    return one_way_chamfer(a, b) + one_way_chamfer(b, a)
+
+
+def masked_mean(
+    values: Float[Tensor, "B N"], counted: Bool[Tensor, "B N"] | None
+) -> Float[Tensor, "B"]:
+    """Mean over the counted entries of each row; 0 where none is counted."""
+    if counted is None:
+        return values.mean(-1)
+    weight = counted.to(values.dtype)
+    return (values * weight).sum(-1) / weight.sum(-1).clamp_min(1.0)
+
+
+_SMALLEST = 1e-12
+
+
+def _distance_to(source: Tensor, target: Tensor, index: Tensor) -> Tensor:
+    found = target.gather(1, index[..., None].expand(-1, -1, 3))
+    return (source - found).square().sum(-1).clamp_min(_SMALLEST).sqrt()
+
+
+def observation_term(
+    scans: Float[Tensor, "B N 3"], posed: Float[Tensor, "B P 3"], to_shape: Int[Tensor, "B N"]
+) -> Float[Tensor, "B"]:
+    """`CD(X -> Y)`: every scan point lies on the shape. `to_shape` are known neighbours."""
+    return _distance_to(scans, posed, to_shape).mean(-1)
+
+
+def projection_term(
+    posed: Float[Tensor, "B P 3"],
+    scans: Float[Tensor, "B N 3"],
+    to_scan: Int[Tensor, "B P"],
+    visible: Bool[Tensor, "B P"],
+) -> Float[Tensor, "B"]:
+    """`CD(visible(Y) -> X)`: what the sensor would see of the shape, it did see.
+
+    The gradient flows through the coordinates of the visible points, not through the choice.
+    """
+    return masked_mean(_distance_to(posed, scans, to_scan), visible)

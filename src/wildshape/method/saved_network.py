@@ -1,0 +1,125 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A network in a safetensors file: nothing is built of what does not fit, nor of no numbers."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import torch
+from safetensors import SafetensorError, safe_open
+from torch import Tensor, nn
+
+from wildshape.errors import BadInputError
+from wildshape.io.guard import first_line
+
+Net = TypeVar("Net", bound=nn.Module)
+Settings = TypeVar("Settings")
+_FLOATS = ("F16", "BF16", "F32", "F64")
+_MOST = 1e9
+_CURE = "take another copy of the file, or train it again"
+
+
+@dataclass(frozen=True)
+class Format(Generic[Net, Settings]):
+    """What a file of some kind holds.
+
+    Attributes:
+        name: in its metadata.
+        version: likewise.
+        source: of such files, in words.
+        settings: from the JSON values of its metadata; raises ValueError.
+        build: the network that the settings describe.
+    """
+
+    name: str
+    version: int
+    source: str
+    settings: Callable[[object], Settings]
+    build: Callable[[Settings], Net]
+
+
+def load_network(path: Path, form: Format[Net, Settings]) -> tuple[Net, Settings]:
+    """The network in evaluation mode, its weights float32, and its settings.
+
+    Raises:
+        BadInputError: no such file, no safetensors, another format or version, damaged settings,
+            weights missing, of another shape or no numbers.
+    """
+    if not path.is_file():
+        raise BadInputError(f"{path}: no such checkpoint; give --model a .safetensors file.")
+    try:
+        with safe_open(path, framework="pt") as file:
+            settings = _settings(path, file.metadata() or {}, form)
+            with torch.device("meta"):
+                expected = form.build(settings).state_dict()
+            check_shapes(path, file, expected)
+            weights = {name: file.get_tensor(name).to(expected[name].dtype) for name in expected}
+    except BadInputError:
+        raise
+    except (SafetensorError, OSError, ValueError) as error:
+        said = first_line(error)
+        raise BadInputError(f"{path}: not a readable safetensors file ({said}).") from error
+    check_numbers(path, weights)
+    network = form.build(settings)
+    network.load_state_dict(weights)
+    return network.eval(), settings
+
+
+def _settings(path: Path, metadata: dict[str, str], form: Format[Any, Settings]) -> Settings:
+    found = f"{metadata.get('format', 'no format')} version {metadata.get('version', 'none')}"
+    if found != f"{form.name} version {form.version}":
+        raise BadInputError(
+            f"{path}: expected a {form.name} of version {form.version}, found"
+            f" {found[:80]}; {form.source}."
+        )
+    try:
+        return form.settings(json.loads(metadata["settings"]))
+    except (KeyError, ValueError, RecursionError) as error:
+        said = first_line(error).rstrip(".")
+        raise BadInputError(f"{path}: its settings are damaged: {said}; {_CURE}.") from error
+
+
+def check_shapes(path: Path, file: Any, expected: dict[str, Tensor]) -> None:
+    """Compare what an open safetensors file promises with what is expected; nothing is read.
+
+    Args:
+        path: of the file.
+        file: `safe_open`'s.
+        expected: tensors of the shapes and kinds expected, on any device.
+
+    Raises:
+        BadInputError: tensors are missing, unexpected, or of another shape or kind.
+    """
+    found = set(file.keys())
+    missing, extra = sorted(set(expected) - found), sorted(found - set(expected))
+    wrong = [n for n in expected if n in found and not _fits(file.get_slice(n), expected[n])]
+    if missing or extra or wrong:
+        raise BadInputError(
+            f"{path}: weights do not fit the network; missing {_few(missing)}, unexpected"
+            f" {_few(extra)}, of another shape {_few(wrong)}."
+        )
+
+
+def _fits(promised: Any, expected: Tensor) -> bool:
+    is_float = promised.get_dtype() in _FLOATS
+    shape = tuple(promised.get_shape())
+    return shape == tuple(expected.shape) and is_float == expected.is_floating_point()
+
+
+def _few(names: list[str]) -> str:
+    shown = [name[:60] for name in names[:4]]
+    return f"{shown}{' ...' if len(names) > 4 else ''}" if names else "none"
+
+
+def check_numbers(path: Path, tensors: dict[str, Tensor]) -> None:
+    """Refuse NaN, infinity, and numbers so large that they soon become infinite.
+
+    Raises:
+        BadInputError: a tensor has some.
+    """
+    for name, values in tensors.items():
+        if not bool((values.abs() <= _MOST).all()):
+            raise BadInputError(f"{path}: {name} holds values that are no numbers; {_CURE}.")

@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The user's own meshes as objects: PLY, OBJ, STL, OFF, GLB; x forward, y left, z up."""
+
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from wildshape.errors import BadInputError
+from wildshape.io.guard import reading
+from wildshape.simulate.shapes.solid import Solid
+
+_SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
+_PLY_HEADER, _FACE_BYTES = 65536, 7  # a face is `3 0 1 2` at least
+_SMALLEST_M, _LARGEST_M = 0.5, 30.0
+
+
+def mesh_files(folder: Path) -> tuple[Path, ...]:
+    """All meshes below a folder, sorted by path.
+
+    Raises:
+        BadInputError: no such folder, or no mesh in it.
+    """
+    if not folder.is_dir():
+        raise BadInputError(f"{folder} is no folder, expected one with meshes.")
+    found = sorted(p for p in folder.rglob("*") if p.suffix.lower() in _SUFFIXES)
+    if not found:
+        raise BadInputError(f"{folder} holds no mesh, expected files {' '.join(_SUFFIXES)}.")
+    return tuple(found)
+
+
+def read_mesh(path: Path, metres: bool) -> Solid:
+    """One mesh, box centre at the origin.
+
+    Args:
+        path: the file; a scene of several meshes is taken as one.
+        metres: keep the size, which must be that of something a LiDAR passes (0.5 to 30 m);
+            otherwise scale to a box diagonal of 1.
+
+    Raises:
+        BadInputError: unreadable, no triangles, not finite, or of a size that is not in metres.
+    """
+    _check_faces(path)
+    try:
+        vertices, faces = _loaded(path)
+    except Exception as cause:  # trimesh's readers raise nearly anything
+        raise BadInputError(
+            f"{path} cannot be read as a mesh ({cause}); export it anew."
+        ) from cause
+    if len(faces) == 0:
+        raise BadInputError(f"{path} holds no triangles, expected a surface, not points or lines.")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise BadInputError(
+            f"{path} has triangles with corners that are none of its {len(vertices)} vertices; "
+            "export it anew."
+        )
+    vertices, faces = _used(vertices, faces)
+    extent = float(np.ptp(vertices, axis=0).max())
+    if not np.isfinite(vertices).all() or extent <= 0:
+        raise BadInputError(f"{path} has vertices that are not finite or all equal; repair it.")
+    if metres and not _SMALLEST_M <= extent <= _LARGEST_M:
+        raise BadInputError(
+            f"{path} is {extent:.4g} long, expected {_SMALLEST_M:g} to {_LARGEST_M:g} metres for a "
+            f"LiDAR: {_advice(extent)}."
+        )
+    no_glass, one_part = np.zeros(len(faces), bool), np.zeros(len(faces), np.int64)
+    solid = Solid(vertices, faces, no_glass, one_part, path.stem, closed=False)
+    return solid.centred(None if metres else 1.0)
+
+
+def _loaded(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    import trimesh
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a damaged file's numbers
+        mesh = trimesh.load(path, force="mesh", process=False)
+        vertices = np.asarray(getattr(mesh, "vertices", np.empty((0, 3))), np.float64)
+        faces = np.asarray(getattr(mesh, "faces", np.empty((0, 3))), np.int64)
+    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
+        raise ValueError(f"vertices {vertices.shape}, triangles {faces.shape}")
+    return vertices, faces
+
+
+def _check_faces(path: Path) -> None:
+    """Refuse a PLY with more faces than it can hold the corners of; trimesh would make each."""
+    if path.suffix.lower() != ".ply":
+        return
+    with reading(path, "a mesh"), path.open("rb") as file:
+        head, size = file.read(_PLY_HEADER), path.stat().st_size
+    said = re.search(rb"element +face +(\d{1,18})\b", head)
+    if said and int(said[1]) * _FACE_BYTES > size:
+        raise BadInputError(
+            f"{path} promises {int(said[1])} triangles, more than its {size} bytes hold; export it "
+            "anew."
+        )
+
+
+def _used(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Without vertices that no triangle uses: they would enlarge the box."""
+    used, compact = np.unique(faces, return_inverse=True)
+    return vertices[used], compact.reshape(-1, 3)
+
+
+def _advice(extent: float) -> str:
+    if extent > _LARGEST_M:
+        return "it looks like millimetres or inches, scale it to metres"
+    return "it looks like unit scale, scale it to metres or use --sensor depth-camera"

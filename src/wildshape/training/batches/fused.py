@@ -1,0 +1,168 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Single scans, each with the pose and the shape that its whole track gave it.
+
+The trainer's reader for self-training (`pseudo_labels.py` makes the targets) and for the oracle.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from wildshape.training.batches.occlusion_augmentation import partly_hidden
+from wildshape.training.batches.views import ViewSampler
+
+_PLACES = 2
+_LARGER, _AXIS, _HALF = 0.2, 0.08, 0.5
+_END_ON, _OFTENER = math.cos(math.radians(60)), 3.0
+_CLOSE_M, _CLOSER = 8.0, 4.0
+
+
+class FusedTargets(NamedTuple):
+    """What every scan of a training set is to give.
+
+    Attributes:
+        rotation: `R_sensor_canonical` of every scan of the store, as recorded; zero if unused.
+        translation: of the same, metres.
+        shapes: points of each used track's object, canonical frame, metres.
+        sensors: places from which each used track was seen, canonical frame, metres.
+        view_top: slope above which those sensors saw nothing (`field_of_view.py`), or
+            infinite.
+        complete: whether the shapes are whole; else only what the sensors saw is known.
+    """
+
+    rotation: Float[Tensor, "S 3 3"]
+    translation: Float[Tensor, "S 3"]
+    shapes: Float[Tensor, "T G 3"]
+    sensors: Float[Tensor, "T O 3"]
+    view_top: Float[Tensor, "T"]
+    complete: bool = False
+
+
+class FusedBatch(NamedTuple):
+    """Centred scans, each of another track, and their targets.
+
+    Attributes:
+        scans: B clouds of n points, metres, about their own centres.
+        rotation: `R_scan_canonical`, in the scan's turned and centred frame.
+        translation: of the same, metres.
+        shapes: target shapes, canonical frame.
+        sensors: some places from which the track was seen, canonical frame.
+        view_top: slope above which they saw nothing.
+    """
+
+    scans: Float[Tensor, "B N 3"]
+    rotation: Float[Tensor, "B 3 3"]
+    translation: Float[Tensor, "B 3"]
+    shapes: Float[Tensor, "B G 3"]
+    sensors: Float[Tensor, "B O 3"]
+    view_top: Float[Tensor, "B"]
+
+    def to(self, device: torch.device | str) -> "FusedBatch":
+        """The same batch on a device."""
+        return FusedBatch(*(part.to(device, non_blocking=True) for part in self))
+
+
+class FusedSampler:
+    """Draws batches of single scans; a batch depends on its seeds alone.
+
+    Of some LiDAR scans a part is hidden (`hiding.py`). Every scan is stretched with its object (see
+    `stretching`), turned as scans to be posed are, and rolled as configured. Where objects are
+    mirror-symmetric, half of the scans are reflected: what is seen of an object's left side could
+    as well be seen of its right. Tracks that saw both ends of their object are drawn more often,
+    and of a LiDAR's scans those from close by, which are few and show an object like no others.
+    """
+
+    def __init__(self, views: ViewSampler, targets: FusedTargets, *, mirror: bool = False) -> None:
+        """Sample from the sampler's tracks; `mirror`: objects are symmetric in y = 0."""
+        self.views, self.targets, self.mirror = views, targets, mirror
+        share = torch.where(both_ends(targets.sensors), _OFTENER, 1.0).double().numpy()
+        self._share = share / share.sum()
+        self._shares = [self._shares_in(scans) for scans in views.scans_of]
+
+    def draw(self, *seed: int) -> FusedBatch:
+        """The batch of these seeds: as many scans as a batch of views has."""
+        rng = np.random.default_rng(seed)
+        config, targets = self.views.config, self.targets
+        scans_of = self.views.scans_of
+        tracks = rng.choice(len(scans_of), config.tracks * config.views, p=self._share)
+        rows = np.asarray([rng.choice(scans_of[track], p=self._shares[track]) for track in tracks])
+        points = torch.stack([self._seen(int(scan), rng) for scan in rows])
+        at, chosen = torch.from_numpy(rows), torch.from_numpy(tracks)
+        rotation, factors = targets.rotation[at], _factors(len(rows), rng)
+        stretch = stretching(rotation, factors)
+        scans, centres, turn = self.views.turned_points(points @ stretch.mT, rng)
+        translation = (turn @ stretch @ targets.translation[at][..., None])[..., 0] - centres
+        some = torch.from_numpy(rng.integers(targets.sensors.shape[1], size=(len(rows), _PLACES)))
+        sensors = targets.sensors[chosen[:, None], some] * factors[:, None]
+        shapes = targets.shapes[chosen] * factors[:, None]
+        steeper = factors[:, 2] / (factors[:, 0] * factors[:, 1]).sqrt()
+        view_top = targets.view_top[chosen] * steeper
+        batch = FusedBatch(scans, turn @ rotation, translation, shapes, sensors, view_top)
+        return reflected(batch, rng.random(len(rows)) < _HALF) if self.mirror else batch
+
+    def _shares_in(self, scans: np.ndarray) -> np.ndarray | None:
+        """How likely each scan of a track is drawn; None: alike."""
+        if self.views.config.sensor != "lidar":
+            return None
+        away = self.targets.translation[torch.from_numpy(scans)].norm(dim=-1).double()
+        share = ((_CLOSE_M / away.clamp_min(1e-9)) ** 2).clamp(1.0, _CLOSER).numpy()
+        return share / share.sum()
+
+    def _seen(self, scan: int, rng: np.random.Generator) -> Float[Tensor, "n 3"]:
+        """A scan of the store, or a part of it."""
+        points = self.views.picked(scan, rng)
+        config = self.views.config
+        if config.sensor != "lidar":
+            return points
+        return partly_hidden(points, rng, config.min_points)
+
+
+def both_ends(sensors: Float[Tensor, "T O 3"]) -> Bool[Tensor, "T"]:
+    """Which tracks saw their object's front and its rear.
+
+    From one end the length is a guess, and so is the middle, which is the origin: what such tracks
+    teach is what their teacher believed.
+
+    Args:
+        sensors: places, canonical frame (x along the object, z up).
+    """
+    along = torch.nn.functional.normalize(sensors[..., :2], dim=-1)[..., 0]
+    return (along > _END_ON).any(-1) & (along < -_END_ON).any(-1)
+
+
+def reflected(batch: FusedBatch, chosen: Bool[np.ndarray, "B"]) -> FusedBatch:
+    """Some of the scans as if seen in a mirror, y reversed, and so their objects.
+
+    With the reflection S of the scan and M of the object in y = 0, `S (R x + t) = (S R M) (M x) +
+    S t`: a rotation again.
+    """
+    signs = torch.ones(len(batch.scans), 3)
+    signs[torch.from_numpy(chosen), 1] = -1.0
+    rotation = signs[:, :, None] * batch.rotation * signs[:, None]
+    across = signs[:, None]
+    scans, shapes, sensors = batch.scans * across, batch.shapes * across, batch.sensors * across
+    translation = batch.translation * signs
+    return FusedBatch(scans, rotation, translation, shapes, sensors, batch.view_top)
+
+
+def stretching(
+    R_sensor_canonical: Float[Tensor, "B 3 3"], factors: Float[Tensor, "B 3"]
+) -> Float[Tensor, "B 3 3"]:
+    """The linear maps of the sensor frame that stretch objects along their own axes.
+
+    Stretched together with the place of the sensor, an object shows the sensor the same points as
+    before: what hides what does not change under an affine map. So the stretched scan is what a
+    sensor would see of an object of that size.
+    """
+    return (R_sensor_canonical * factors[:, None]) @ R_sensor_canonical.mT
+
+
+def _factors(count: int, rng: np.random.Generator) -> Float[Tensor, "B 3"]:
+    """Lengths of the stretched axes: larger or smaller as a whole, and a little out of shape."""
+    whole = np.exp(rng.uniform(-_LARGER, _LARGER, (count, 1)))
+    return torch.from_numpy((whole * rng.uniform(1 - _AXIS, 1 + _AXIS, (count, 3))).astype("f4"))

@@ -1,0 +1,33 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+import json
+import shutil
+
+from wildshape.cli.commands.demo import FILES
+from wildshape.io.store.store import open_store
+
+QUICK = ("--preset", "tiny", "--seconds", "0.5", "--tracks", "4", "--test-tracks", "2")
+
+
+def test_demo_on_simulated_and_on_own_scans(wildshape, refused, dataset, tmp_path):
+    out = tmp_path / "demo"
+    found = wildshape("demo", "--out", out, *QUICK)
+    assert found.code == 0, found.err
+    lines = found.out.splitlines()
+    assert "identity" in lines[0]
+    assert "of one scan" in lines[1]
+    assert lines[-1] == f"the report is {out / 'report.html'}"
+    assert "left in all" in found.err
+    assert len(list(out.glob("fused/*.ply"))) > 0
+    assert set(open_store(out / "data/train.store").names)
+    assert "--overwrite" in refused("demo", "--out", out, *QUICK)
+    own = shutil.copytree(dataset, tmp_path / "own")
+    for file in own.glob("*/*.*"):
+        file.unlink()  # no truth
+    found = wildshape("demo", "--out", out, "--data", own, *QUICK, "--overwrite", "--json")
+    assert found.code == 0, found.err
+    said = json.loads(found.out)
+    assert "could not be measured" in said["verdict"][0]
+    written = {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()}
+    ours = {str(path.relative_to(out)) for pattern in FILES for path in out.glob(pattern)}
+    assert written - ours == {"wildshape.json"}

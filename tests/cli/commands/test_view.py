@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`wildshape view` without a browser; tests/report/viewer opens the page in one."""
+
+import json
+import sys
+import time
+from pathlib import Path
+from urllib.request import urlopen
+
+import pytest
+
+from wildshape.cli.commands.view import Settings, source_of
+from wildshape.cli.main import main
+
+
+@pytest.fixture(scope="module")
+def completed(store, tmp_path_factory):
+    out = tmp_path_factory.mktemp("view") / "completed"
+    main(["complete", str(store), "--out", str(out)])
+    return out
+
+
+@pytest.fixture(scope="module")
+def evaluated(store, tmp_path_factory):
+    out = tmp_path_factory.mktemp("view") / "evaluation"
+    main(["evaluate", str(store), "--out", str(out), "--baselines", "none", "--max-scans", "2"])
+    return out
+
+
+def test_every_kind_of_input_can_be_shown(store, completed, evaluated):
+    for path, tracks in ((completed, 6), (completed / "000001", 1), (store, 6), (evaluated, 6)):
+        source = source_of(Settings(Path(path)))
+        assert len(source.labels) == tracks, path
+        track = source.track(0)
+        made = dict(source.make(0, track, 1))
+        assert sorted(made) == list(range(len(track.scans)))
+        assert all(one.points is not None and one.box is not None for one in made.values())
+    distances = [float(label.split("CD ")[1].split()[0]) for label in source.labels]
+    assert distances == sorted(distances, reverse=True)
+    assert "Worst object first" in source.note
+
+
+def test_what_cannot_be_shown_is_refused(refused, tmp_path):
+    assert "no such file" in refused("view", tmp_path / "absent")
+    assert "no scans" in refused("view", tmp_path)
+
+
+def test_without_viser_the_extra_is_named(refused, completed, monkeypatch):
+    monkeypatch.setitem(sys.modules, "viser", None)
+    assert "wildshape[view]" in refused("view", completed)
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_page_is_served_here_until_it_is_interrupted(wildshape, completed, monkeypatch):
+    pytest.importorskip("viser", reason="did not run: viser is not installed (extra view)")
+    from wildshape.report.viewer import page
+
+    seen = []
+
+    def once(served):
+        while served.status or served.stage is None:
+            time.sleep(0.01)
+        with urlopen(served.url, timeout=60) as answer:
+            seen.append((served.url, len(served.stage.made), len(answer.read())))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(page, "run_until_interrupted", once)
+    found = wildshape("view", completed, "--port", "0", "--no-open", "--json")
+    assert found.code == 0, found
+    assert found.err == "closed\n"
+    url, made, size = seen[0]
+    assert json.loads(found.out) == {"url": url, "tracks": 6}
+    assert url.startswith("http://127.0.0.1:")
+    assert made == 6
+    assert size > 100_000

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is no vehicle is completed, too: the commands say that it is not to be trusted, and why."""
+
+import json
+
+import numpy as np
+import pytest
+from tests.cars import car_surface
+
+from wildshape.io.scans.points import write_ply
+
+
+def _wall(rng):
+    plane = rng.uniform((-2.5, -1.7), (2.5, 0.3), (1500, 2))
+    return np.column_stack((rng.normal(10, 0.01, 1500), plane))
+
+
+def _noise(rng):
+    return rng.normal((10, 0, -1), 1, (500, 3))
+
+
+def _pole(rng):
+    angle = rng.uniform(np.pi / 2, 3 * np.pi / 2, 300)
+    turned = (10 + 0.15 * np.cos(angle), 0.15 * np.sin(angle))
+    return np.column_stack((*turned, rng.uniform(-1.7, 1.3, 300)))
+
+
+def _blob(rng):
+    """Half a ball whose bounding box has a diagonal of 20 m: more than trained on, not refused."""
+    out = rng.normal(size=(3000, 3))
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    half = out[out[:, 0] < 0]
+    return 20 * half / np.linalg.norm(np.ptp(half, axis=0)) + (25, 0, 0)
+
+
+@pytest.fixture(params=(_wall, _noise, _pole, _blob), ids=lambda made: made.__name__[1:])
+def no_vehicle(request, tmp_path):
+    path = tmp_path / f"{request.param.__name__[1:]}.ply"
+    write_ply(path, request.param(np.random.default_rng(0)).astype(np.float32))
+    return path
+
+
+def _reasons(folder):
+    records = json.loads(next(folder.rglob("objects.json")).read_text("utf-8"))["scans"]
+    return [record["reasons"] for record in records]
+
+
+@pytest.mark.parametrize("command", ["complete", "register"])
+def test_what_is_no_vehicle_is_flagged(wildshape, no_vehicle, tmp_path, command):
+    done = wildshape(command, no_vehicle, "--out", tmp_path / "out", "--json")
+    assert done.code == 0, done.err
+    found = json.loads(done.out)
+    assert found["flagged"] == 1
+    assert found["reasons"]["low_confidence"] == 1
+    assert ("too_large_for_model" in found["reasons"]) == (no_vehicle.stem == "blob")
+    assert [sorted(found["reasons"])] == [sorted(one) for one in _reasons(tmp_path / "out")]
+    assert "1 of 1 result is not to be trusted: " in done.err
+    assert "low confidence 1" in done.err
+
+
+def test_one_result_alone_says_so_too(wildshape, no_vehicle):
+    done = wildshape("complete", no_vehicle, "--out", "-", "--json")
+    assert "low_confidence" in json.loads(done.out)["reasons"]
+    pair = wildshape("register", no_vehicle, no_vehicle, "--json")
+    assert "low_confidence" in json.loads(pair.out)["reasons"]
+    assert "not to be trusted" in done.err
+    assert "not to be trusted" in pair.err
+
+
+def test_fused_scans_in_doubt_are_counted(wildshape, no_vehicle, tmp_path):
+    track = tmp_path / "track"
+    for name in ("0.ply", "1.ply"):
+        (track / "scans").mkdir(parents=True, exist_ok=True)
+        (track / "scans" / name).write_bytes(no_vehicle.read_bytes())
+    done = wildshape("fuse", track, "--out", tmp_path / "fused.ply", "--json")
+    found = json.loads(done.out)
+    assert found["flagged"] == 2
+    assert found["reasons"]["low_confidence"] == 2
+    assert "2 of 2 results are not to be trusted" in done.err
+
+
+def test_a_simulated_car_is_not_flagged(wildshape, cars, tmp_path):
+    write_ply(tmp_path / "car.ply", cars[0].scans[0])
+    done = wildshape("complete", tmp_path / "car.ply", "--out", tmp_path / "out")
+    assert "completed 1 scan of 1 track in" in done.out
+    assert "not to be trusted" not in done.err
+    assert _reasons(tmp_path / "out") == [[]]
+    said = wildshape("complete", tmp_path / "car.ply", "--out", tmp_path / "again", "--json")
+    found = json.loads(said.out)
+    assert (found["flagged"], found["reasons"]) == (0, {})
+
+
+def test_few_points_are_a_reason(wildshape, tmp_path):
+    write_ply(tmp_path / "few.ply", (car_surface(20)[0] + (10, 0, -1)).astype(np.float32))
+    wildshape("complete", tmp_path / "few.ply", "--out", tmp_path / "out")
+    assert "few_points" in _reasons(tmp_path / "out")[0]

@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A scene written here in the BOP format, of chairs whose every face is known."""
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+from tests.cars import poses_of
+from tests.datasets.damaged import passed_over
+from tests.datasets.unit_scene import off_boxes
+from tests.datasets.write_rgbd import THINGS, write_bop, write_model
+
+from wildshape.datasets.rgbd.bop import Bop
+from wildshape.datasets.tracks.selection import Selection
+from wildshape.datasets.tracks.source import Source, all_tracks
+from wildshape.errors import BadInputError
+
+NAMES = ("test_000001_obj000007", "test_000001_obj000007-1")
+
+
+def tracks(root, **options):
+    return {track.name: track for track in all_tracks(Bop(root, **options))}
+
+
+@pytest.mark.parametrize("scale", [0.1, 1.0])
+def test_points_land_back_on_the_chairs(tmp_path, scale):
+    T_camera_world = write_bop(tmp_path, scale=scale)
+    found = tracks(tmp_path)
+    assert tuple(found) == NAMES
+    for name, T_world_object in zip(NAMES, THINGS.values(), strict=True):
+        track, poses = found[name], poses_of(found[name])
+        assert track.category == "obj_000007"
+        assert track.shape is None
+        for i, scan in enumerate(track.scans):
+            assert len(scan) > 200
+            assert np.asarray(poses[i]) == pytest.approx(T_camera_world[i] @ T_world_object)
+            assert off_boxes(poses[i].inverse().apply_numpy(scan)).max() < 1e-3
+
+
+def test_shapes_come_from_the_models(tmp_path):
+    write_bop(tmp_path, count=1)
+    write_model(tmp_path)
+    for track in tracks(tmp_path).values():
+        assert track.shape is not None
+        assert track.shape.shape == (8192, 3)
+        assert off_boxes(track.shape.astype(np.float64)).max() < 1e-5
+    assert all(track.shape is None for track in tracks(tmp_path, shapes=False).values())
+
+
+@pytest.mark.parametrize("below", ["", "test", "test/000001"])
+def test_root_may_be_the_data_set_a_split_or_a_scene(tmp_path, below):
+    write_bop(tmp_path, count=1)
+    assert len(tracks(tmp_path / below)) == 2
+
+
+def test_motion_is_known_where_the_cameras_stand_in_a_world(tmp_path):
+    write_bop(tmp_path / "a", world=True)
+    write_bop(tmp_path / "b")
+    assert len(tracks(tmp_path / "a", selection=Selection(motion="parked"))) == 2
+    assert tracks(tmp_path / "b", selection=Selection(motion="parked")) == {}
+
+
+def test_selection_and_counts(tmp_path):
+    write_bop(tmp_path)
+    source = Bop(tmp_path, Selection(categories=("obj_000008",)))
+    assert list(all_tracks(source)) == []
+    assert source.rejected == {"scan: category obj_000007": 8}
+    assert [len(t.scans) for t in tracks(tmp_path, selection=Selection(every=2)).values()] == [2, 2]
+
+
+def test_it_is_a_source_and_travels_to_workers(tmp_path):
+    write_bop(tmp_path, count=1)
+    source = pickle.loads(pickle.dumps(Bop(tmp_path)))
+    assert isinstance(source, Source)
+    assert source.parts() == ["test/000001"]
+
+
+def refused(root, match):
+    with pytest.raises(BadInputError, match=match):
+        list(all_tracks(Bop(root)))
+
+
+def test_missing_and_damaged_files_are_named(tmp_path):
+    refused(tmp_path, r"expected a BOP data set, split or scene .* found nothing")
+    write_bop(tmp_path, count=2)
+    scene = tmp_path / "test" / "000001"
+    camera, truth = scene / "scene_camera.json", scene / "scene_gt.json"
+    good = camera.read_text(), truth.read_text()
+    camera.write_text(json.dumps({"0": json.loads(good[0])["0"]}))
+    refused(tmp_path, r"scene_camera\.json: lacks image 1")
+    camera.write_text(json.dumps({"0": {}, "1": {}}))
+    refused(tmp_path, "expected BOP's fields of image 0")
+    camera.write_text("[]")
+    refused(tmp_path, r"scene_camera\.json: expected cam_K")
+    camera.unlink()
+    refused(tmp_path, r"scene_camera\.json: no such file")
+    camera.write_text(good[0])
+    entries = json.loads(good[1])
+    entries["1"][0]["cam_R_m2c"] = [2.0] * 9
+    truth.write_text(json.dumps(entries))
+    refused(tmp_path, r"000001.*a pose is")
+    truth.write_text("{}")
+    refused(tmp_path, r"scene_gt\.json: holds no image")
+    truth.write_text(good[1])
+    (scene / "mask_visib" / "000001_000001.png").unlink()
+    passed_over(Bop(tmp_path), r"000001_000001\.png: no such file")
+    (scene / "depth" / "000000.png").write_bytes(b"\x89PNG")
+    refused(tmp_path, r"depth/000000\.png: ")

@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Frames written here in the documented layout, of chairs whose every face is known."""
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+from PIL import Image
+from tests.datasets.damaged import passed_over
+from tests.datasets.street import moved
+from tests.datasets.unit_scene import off_boxes
+from tests.datasets.write_rgbd import CAMERA, THINGS, write_png, write_sequence
+
+from wildshape.datasets.rgbd.depth_image import supported
+from wildshape.datasets.rgbd.reader import Cut, Rgbd, cut_out
+from wildshape.datasets.tracks.selection import Selection
+from wildshape.datasets.tracks.source import Source, all_tracks
+from wildshape.errors import BadInputError
+from wildshape.records import Intrinsics
+
+
+def tracks(root, **options):
+    return {track.name: track for track in all_tracks(Rgbd(root, **options))}
+
+
+@pytest.mark.parametrize("apart", [False, True])
+@pytest.mark.parametrize("inside", [False, True])
+def test_points_land_back_on_the_chairs(tmp_path, apart, inside):
+    """Masks together or apart; the root is the folder of sequences or the sequence itself."""
+    T_camera_world = write_sequence(tmp_path / "kitchen", apart=apart)
+    found = tracks(tmp_path / "kitchen" if inside else tmp_path)
+    assert set(found) == {"kitchen_00001", "kitchen_00002"}
+    for number, T_world_object in THINGS.items():
+        track = found[f"kitchen_{number:05d}"]
+        assert track.T_sensor_object is None
+        assert track.scan_names == tuple(f"{i:06d}" for i in range(5))
+        for i, scan in enumerate(track.scans):
+            assert len(scan) > 200
+            T_object_camera = np.linalg.inv(T_camera_world[i] @ T_world_object)
+            assert off_boxes(moved(T_object_camera, scan.astype(np.float64))).max() < 1e-3
+
+
+def test_what_a_track_says(tmp_path):
+    write_sequence(tmp_path / "kitchen")
+    first, second = tracks(tmp_path).values()
+    assert (first.category, second.category) == ("chair", "stool")
+    camera = first.sensor.intrinsics
+    assert camera == Intrinsics(140.0, 143.0, 79.2, 61.7, 160, 120)
+    assert first.source == "RGB-D kitchen"
+
+
+@pytest.mark.parametrize(
+    ("motion", "kept"), [("moving", "kitchen_00002"), ("parked", "kitchen_00001")]
+)
+def test_motion_is_known_by_the_cameras_poses(tmp_path, motion, kept):
+    """The camera moves 2.5 m meanwhile, one chair 1.5 m."""
+    write_sequence(tmp_path / "kitchen", moves=True)
+    assert list(tracks(tmp_path, selection=Selection(motion=motion))) == [kept]
+    (tmp_path / "kitchen" / "poses.txt").unlink()
+    assert tracks(tmp_path, selection=Selection(motion=motion)) == {}
+
+
+def test_pixels_between_two_surfaces_are_left_out():
+    """A square before a wall, its border mixed with the wall as sensors mix it."""
+    rng = np.random.default_rng(0)
+    depth = np.full((60, 60), 3.0)
+    depth[15:45, 15:45] = 1.0
+    border = np.zeros((60, 60), bool)
+    border[14:46, 14:46] = True
+    border[16:44, 16:44] = False
+    depth[border] = rng.uniform(1.05, 2.95, border.sum())
+    mask = np.zeros((60, 60), bool)
+    mask[14:46, 14:46] = True
+    camera = Intrinsics(60.0, 60.0, 30.0, 30.0, 60, 60)
+    rough = cut_out(depth, mask, camera, Cut(edge=0, jump=1e9))
+    clean = cut_out(depth, mask, camera, Cut())
+    assert (rough[:, 2] > 1.02).sum() > 200
+    assert (clean[:, 2] > 1.02).sum() == 0
+    assert len(clean) > 0.95 * 28 * 28
+
+
+def test_corners_and_slopes_are_kept():
+    slope = 1.0 + 0.01 * np.arange(20)[:, None] + np.zeros((1, 20))
+    square = np.zeros((20, 20), bool)
+    square[5:15, 5:15] = True
+    assert (supported(slope, square, 0.02) == square).all()
+
+
+def test_far_pixels_and_too_many_are_left_out(tmp_path):
+    write_sequence(tmp_path / "kitchen", count=2)
+    near = tracks(tmp_path, cut=Cut(max_depth=1.3))["kitchen_00001"]
+    every = tracks(tmp_path)["kitchen_00001"]
+    assert near.scans[0][:, 2].max() <= 1.3 < every.scans[0][:, 2].max()
+    few = tracks(tmp_path, cut=Cut(most_points=150))["kitchen_00001"]
+    assert [len(scan) for scan in few.scans] == [150, 150]
+    assert set(map(tuple, few.scans[0])) <= set(map(tuple, every.scans[0]))
+
+
+def test_long_sequences_and_gaps_make_several_tracks(tmp_path):
+    write_sequence(tmp_path / "kitchen", count=7)
+    cut = {name: track.scan_names for name, track in tracks(tmp_path, longest=3).items()}
+    assert cut["kitchen_00001"] == ("000000", "000001", "000002")
+    assert cut["kitchen_00001_1"] == ("000003", "000004", "000005")
+    assert cut["kitchen_00001_2"] == ("000006",)
+    for i in (2, 3, 4):
+        (tmp_path / "kitchen" / "masks" / f"{i:06d}.png").unlink()
+    source = Rgbd(tmp_path, gap=2)
+    again = {track.name: track.scan_names for track in all_tracks(source)}
+    assert again["kitchen_00002"] == ("000000", "000001")
+    assert again["kitchen_00002_1"] == ("000005", "000006")
+    assert source.rejected == {"frame: no mask": 3}
+    assert len(tracks(tmp_path, gap=5)) == 2
+
+
+def test_selection(tmp_path):
+    write_sequence(tmp_path / "kitchen", count=4)
+    source = Rgbd(tmp_path, Selection(categories=("stool",), every=2))
+    (track,) = all_tracks(source)
+    assert (track.name, track.scan_names) == ("kitchen_00002", ("000000", "000002"))
+    assert source.rejected == {"scan: category chair": 4}
+
+
+def test_it_is_a_source_and_travels_to_workers(tmp_path):
+    write_sequence(tmp_path / "kitchen", count=1)
+    source = pickle.loads(pickle.dumps(Rgbd(tmp_path)))
+    assert isinstance(source, Source)
+    assert source.parts() == ["kitchen"]
+
+
+def refused(root, match):
+    with pytest.raises(BadInputError, match=match):
+        list(all_tracks(Rgbd(root)))
+
+
+def test_missing_and_damaged_files_are_named(tmp_path):
+    folder = tmp_path / "kitchen"
+    refused(tmp_path, "expected folders with camera.json, depth and masks in them, found nothing")
+    write_sequence(folder, count=2)
+    camera, mask = folder / "camera.json", folder / "masks" / "000001.png"
+    good = camera.read_text(), mask.read_bytes()
+    camera.unlink()
+    refused(tmp_path, r"camera\.json: no such file")
+    camera.write_text("{")
+    refused(tmp_path, r"camera\.json: expected JSON with fx")
+    camera.write_text(json.dumps({"fx": 1, "fy": 1}))
+    refused(tmp_path, r"camera\.json: lacks cx, cy")
+    camera.write_text(json.dumps(CAMERA | {"depth_scale": 0}))
+    refused(tmp_path, r"camera\.json: depth_scale is 0, expected a number above 0")
+    camera.write_text(json.dumps(CAMERA | {"width": 320}))
+    refused(tmp_path, r"160 x 120 pixels, expected 320 x 120")
+    camera.write_text(good[0])
+    write_png(mask, np.zeros((24, 32), np.uint8))
+    passed_over(Rgbd(tmp_path), r"000001\.png: 32 x 24 pixels, expected 160 x 120")
+    Image.new("RGB", (160, 120)).save(mask)
+    passed_over(Rgbd(tmp_path), r"000001\.png: expected a PNG mask of one channel, found colours")
+    mask.write_bytes(good[1][:60])
+    passed_over(Rgbd(tmp_path), r"000001\.png: ")
+    mask.write_bytes(good[1])
+    poses = folder / "poses.txt"
+    poses.write_text(poses.read_text().splitlines()[0] + "\n")
+    refused(tmp_path, r"poses\.txt")
+    poses.unlink()
+    (folder / "objects.json").write_text('{"cup": "cup"}')
+    refused(tmp_path, "'cup' is no instance number")
+    (folder / "objects.json").unlink()
+    (folder / "depth" / "000000.png").rename(folder / "depth" / "000009.png")
+    assert len(tracks(tmp_path)) == 2  # a frame without its mask is counted
+    (folder / "masks").rename(folder / "labels")
+    refused(tmp_path, "masks: no such folder")

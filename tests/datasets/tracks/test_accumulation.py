@@ -1,0 +1,49 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+from tests.cars import car_surface, drive_by, poses_of
+
+from wildshape.datasets.tracks.accumulation import fuse_by_truth, shape_mirrored, shape_partial
+from wildshape.errors import BadInputError
+
+
+def test_scans_of_a_drive_meet_on_the_objects_surface():
+    track = drive_by(scans=9)
+    fused = fuse_by_truth(track)
+    assert len(fused) == sum(map(len, track.scans))
+    distance, _ = KDTree(track.shape).query(fused)
+    assert np.quantile(distance, 0.99) < 0.2
+    assert np.median(distance) < 0.06
+
+
+def test_mirrored_shape_is_its_own_reflection_and_fills_the_far_side():
+    track = drive_by(scans=9)
+    partial, mirrored = shape_partial(track), shape_mirrored(track)
+    reflected = mirrored * np.array((1, -1, 1), np.float32)
+    assert KDTree(mirrored).query(reflected)[0].max() < 0.08
+    # The sensor passes on the object's right, so it never sees the wall on its left:
+    # 0.7 m high, the nearest it sees is its upper edge, half of the height away in the median.
+    surface = car_surface()[0]
+    wall = surface[surface[:, 1] > 0.84]
+    assert np.median(KDTree(partial).query(wall)[0]) == pytest.approx(0.35, abs=0.05)
+    assert np.median(KDTree(mirrored).query(wall)[0]) < 0.06
+
+
+def test_outliers_and_ground_are_removed_and_the_cloud_is_thin():
+    track = drive_by(scans=5)
+    stray = poses_of(track)[0].apply_numpy(np.array([[0, 0, 5], [9, 0, 0]], np.float32))
+    track = replace(track, scans=(np.concatenate((track.scans[0], stray)), *track.scans[1:]))
+    shape = shape_partial(track, floor=-0.4, voxel=0.1)
+    assert np.abs(shape).max() < 2.5
+    assert shape[:, 2].min() >= -0.4
+    cells = np.floor(fuse_by_truth(track) / 0.1)
+    assert len(shape) <= len(np.unique(cells, axis=0))
+
+
+def test_no_poses_no_truth():
+    with pytest.raises(BadInputError, match=r"drive: no poses"):
+        shape_partial(replace(drive_by(scans=2), T_sensor_object=None))

@@ -1,0 +1,7 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""All readers that are attacked."""
+
+from tests.fuzz import drives, results, scans, weights
+
+TARGETS = (*scans.TARGETS, *drives.TARGETS, *results.TARGETS, *weights.TARGETS)

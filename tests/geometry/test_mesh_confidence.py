@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A mesh is blue where it was measured and turns orange where it was guessed."""
+
+import io
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from wildshape.geometry.mesh_confidence import colour_by_confidence, place_confidence
+from wildshape.io.scans.mesh_writer import MESH_FORMATS, write_mesh
+
+CENTRE = np.array([40.0, -25.0, -1.0])
+
+
+def ball() -> Any:
+    made = trimesh.creation.icosphere(subdivisions=3)
+    made.apply_translation(CENTRE)
+    return made
+
+
+def front(mesh):
+    """The half that a sensor at the origin sees."""
+    return mesh.vertices[(mesh.vertices - CENTRE) @ CENTRE < 0].astype(np.float32)
+
+
+def test_confidence_falls_with_the_distance_to_what_was_measured():
+    scan = np.array([[30.0, 5, -1]] * 3, np.float32)
+    places = scan[:1] + np.array([[0, 0, 0], [0, 0.25, 0], [0.5, 0, 0], [0, 0, 3]])
+    found = place_confidence(places, scan, confidence=0.8)
+    np.testing.assert_allclose(found, [1, 1 - 0.48 / 2, 0.52, 0.52], atol=1e-5)
+
+
+def test_the_half_not_seen_is_less_sure():
+    mesh = ball()
+    colour_by_confidence(mesh, front(mesh), 0.9)
+    held = mesh.vertex_attributes["confidence"]
+    seen = (mesh.vertices - CENTRE) @ CENTRE < 0
+    assert held[seen].min() > 0.999
+    assert held[~seen].mean() < 0.75
+    red, _, blue, _ = np.asarray(mesh.visual.vertex_colors).T.astype(int)
+    assert (blue - red)[seen].min() > 150
+    assert (blue - red)[~seen].min() < 60
+
+
+@pytest.mark.parametrize("kind", MESH_FORMATS)
+def test_colours_are_in_the_file(kind, tmp_path):
+    mesh = ball()
+    colour_by_confidence(mesh, front(mesh), 0.9)
+    write_mesh(tmp_path / f"a.{kind}", mesh)
+    found: Any = trimesh.load_mesh(tmp_path / f"a.{kind}")
+    colours = np.asarray(found.visual.vertex_colors).astype(int)
+    assert np.ptp(colours[:, 2] - colours[:, 0]) > 100
+
+
+def test_the_attribute_is_in_ply():
+    mesh = ball()
+    colour_by_confidence(mesh, front(mesh), 0.9)
+    made = mesh.export(file_type="ply")
+    assert isinstance(made, bytes)
+    header = io.BytesIO(made).read(600)
+    assert b"property float confidence" in header

@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Every checkpoint that the package carries exports, and does without torch what it does here."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from wildshape.geometry.transforms.rotation import random_rotation
+from wildshape.inference.export.verify import prepared
+from wildshape.inference.predictor import load
+from wildshape.inference.shipped_weights import SHIPPED
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+
+EXAMPLE = Path(__file__).parents[3] / "examples" / "06_onnx_inference.py"
+NAMES = sorted(path.stem for path in SHIPPED.parent.glob("*.safetensors"))
+SCANS, WITH_TORCH = 200, 6
+TURNED = 4  # each so many scans one is turned freely: such are looked at again
+# One trace for both files, in a process whose shapes are not checked: the tracer sees no checks.
+EXPORT = """
+import sys
+from pathlib import Path
+from wildshape.inference.export.onnx import describe, trace, write_onnx, write_torch
+from wildshape.inference.predictor import load
+made = load(sys.argv[1], raw=True)
+program, said = trace(made), describe(made)
+write_onnx(Path("model.onnx"), program, said)
+write_torch(Path("model.pt2"), program, said)
+"""
+ALONE = """
+import runpy
+import sys
+sys.modules["torch"] = sys.modules["wildshape"] = None  # importing them is an ImportError
+del sys.argv[0]
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+RUN = """
+import sys
+import numpy as np
+given = np.load("given.npz")
+if sys.argv[1] == "model.onnx":
+    sys.modules["torch"] = None  # importing it is an ImportError
+    import onnxruntime
+    alone = onnxruntime.SessionOptions()
+    alone.intra_op_num_threads = 1
+    session = onnxruntime.InferenceSession("model.onnx", alone, ["CPUExecutionProvider"])
+    run = lambda scans, drawn: session.run(None, {"scans": scans, "drawn": drawn})
+else:
+    import torch
+    module = torch.export.load(sys.argv[1]).module()
+    run = lambda *given: [part.numpy() for part in module(*map(torch.from_numpy, given))]
+found = [run(given[f"scans{i}"], given[f"drawn{i}"]) for i in range(int(sys.argv[2]))]
+points, _, _, confidence, _, branch = (np.concatenate(parts) for parts in zip(*found))
+np.savez(sys.argv[1] + ".npz", points=points, confidence=confidence, branch=branch)
+"""
+
+
+def simulated(name):
+    """Scans of the kind that the weights were trained on, some of them turned freely."""
+    drives = SimulationConfig(tracks=20, scans=10)
+    if name != SHIPPED.stem:
+        drives = SimulationConfig(tracks=40, scans=5, sensor="depth-camera", category=name)
+    tracks = simulate_tracks(drives, seed=21, workers=1)
+    scans = [scan for track in tracks for scan in track.scans][:SCANS]
+    turns = random_rotation(SCANS, torch.Generator().manual_seed(0)).numpy()
+    return [s if i % TURNED else s @ turns[i].T.astype(s.dtype) for i, s in enumerate(scans)]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_shipped_weights_do_the_same_exported(name, tmp_path):
+    made = load(name, raw=True)
+    scans = simulated(name)
+    given = {}
+    for i, scan in enumerate(scans):
+        given[f"scans{i}"], given[f"drawn{i}"] = prepared(scan, made.settings.input_points)
+    np.savez(tmp_path / "given.npz", **given)
+
+    def python(program, *arguments):
+        words = [sys.executable, "-c", program, *map(str, arguments)]
+        done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr[-2000:]
+
+    python(EXPORT, name)
+    done = list(made.complete_many(scans))
+    for file, count in (("model.onnx", SCANS), ("model.pt2", WITH_TORCH)):
+        python(RUN, file, count)
+        found = np.load(tmp_path / f"{file}.npz")
+        assert found["branch"].tolist() == [one.branch for one in done[:count]]
+        points = np.stack([one.points for one in done[:count]])
+        np.testing.assert_allclose(found["points"], points, atol=1e-4, rtol=0)
+        confidence = [one.confidence for one in done[:count]]
+        np.testing.assert_allclose(found["confidence"], confidence, atol=1e-3)
+    np.save(tmp_path / "scan.npy", scans[1])
+    python(ALONE, EXAMPLE, "model.onnx", "scan.npy", "completed.npy")
+    np.testing.assert_allclose(np.load(tmp_path / "completed.npy"), done[1].points, atol=1e-4)

@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Each reason speaks above its threshold and not below, alone and on a track."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from wildshape.geometry.projection.visibility import FacingBins
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.reasons import judged_again, reasons_of_result, reasons_of_scan
+from wildshape.method.checkpoint import ModelSettings
+from wildshape.method.network import NetworkConfig
+from wildshape.records import Box, Completion, Sensor
+
+SETTINGS = ModelSettings(
+    network=NetworkConfig(),
+    sensor="lidar",
+    input_points=128,
+    projection=FacingBins(0.3),
+    beta=0.25,
+    extent_m=(2.0, 6.0),
+    cost_m=(0.1, 0.2),
+)
+
+
+def line(length, count=64):
+    """Points on a line: the diagonal of their bounding box is its length, metres."""
+    x = np.linspace(8, 8 + length, count)
+    return np.column_stack((x, np.zeros((count, 2)))).astype(np.float32)
+
+
+@pytest.mark.parametrize(
+    ("scan", "sensor", "expected"),
+    [
+        (line(5.9), None, ()),
+        (line(6.1), None, ("too_large_for_model",)),
+        (line(1.1), Sensor("lidar"), ()),
+        (line(0.9), None, ("too_small_for_model",)),
+        (line(4.0, 32), None, ()),
+        (line(4.0, 31), None, ("few_points",)),
+        (line(4.0), Sensor("camera"), ("other_sensor",)),
+        (line(7.0, 20), Sensor("camera"), ("other_sensor", "too_large_for_model", "few_points")),
+    ],
+)
+def test_reasons_of_a_scan(scan, sensor, expected):
+    assert reasons_of_scan(scan, sensor, SETTINGS) == expected
+
+
+@pytest.mark.parametrize(
+    ("cost", "confidence", "expected"),
+    [
+        (0.29, 0.11, ()),
+        (0.31, 0.11, ("poor_fit",)),
+        (0.29, 0.09, ("low_confidence",)),
+        (0.31, 0.0, ("poor_fit", "low_confidence")),
+    ],
+)
+def test_reasons_of_a_result(cost, confidence, expected):
+    assert reasons_of_result(cost, confidence, SETTINGS) == expected
+
+
+def test_a_track_keeps_what_speaks_against_the_scan():
+    box = Box((8.0, 0.0, 0.0), (4.0, 2.0, 1.0), (1.0, 0.0, 0.0, 0.0))
+    alone = Completion(line(4.0), SE3.identity(), box, confidence=0.05, branch=0, cost=0.4)
+    reasons = ("few_points", *reasons_of_result(alone.cost, alone.confidence, SETTINGS))
+    alone = dataclasses.replace(alone, reasons=reasons)
+    assert judged_again(alone, 0.1, 0.7, SETTINGS) == ("few_points",)
+    assert judged_again(alone, 0.4, 0.7, SETTINGS) == ("few_points", "poor_fit")

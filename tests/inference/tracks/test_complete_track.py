@@ -1,0 +1,205 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A track used as a whole: half turns are voted out, bad refinements refused, one shape posed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from tests.cars import car_surface, drive_by, poses_of
+from tests.inference.test_predictor import CONFIG, SETTINGS
+from tests.inference.tracks.test_joint_icp import relative, spoilt
+
+from wildshape.geometry.transforms.rotation import rotation_z
+from wildshape.geometry.transforms.se3 import SE3, stack
+from wildshape.inference.boxes import carried, fit_to_scans
+from wildshape.inference.predictor import Predictor
+from wildshape.inference.tracks import complete_track as whole
+from wildshape.inference.tracks.heading_vote import (
+    continuous_signs,
+    half_turn,
+    likeness_of_next,
+    nearness_of_next,
+    slow,
+    voted_signs,
+)
+from wildshape.method.network import ShapePoseNet
+from wildshape.records import Completion
+
+TRACK = drive_by(scans=7, step=2.0, heading=0.3, side=5.0)
+SHAPE = torch.from_numpy(car_surface(2000)[0])
+BOX = fit_to_scans(SHAPE, [], mirror=True)
+
+
+def completed(poses):
+    """As a network would that knows the car's shape, but not quite its pose."""
+    return [
+        Completion(
+            poses[i].apply(SHAPE).float().numpy(), poses[i], carried(BOX, poses[i]), 0.5, 0, 0.1
+        )
+        for i in range(len(poses))
+    ]
+
+
+def turned_around(poses, rows):
+    back = poses @ half_turn(0.0)
+    return stack([back[i] if i in rows else poses[i] for i in range(len(poses))])
+
+
+def each_turned(track, generator):
+    """Every scan turned by its own yaw."""
+    yaw = 6.28 * torch.rand(len(track.scans), generator=generator, dtype=torch.float64)
+    turn = SE3(rotation_z(yaw), torch.zeros(len(yaw), 3, dtype=torch.float64))
+    scans = tuple(turn[i].apply_numpy(scan) for i, scan in enumerate(track.scans))
+    return replace(track, scans=scans, T_sensor_object=turn @ poses_of(track))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_half_turns_are_voted_out_and_poses_come_nearer(turned):
+    track = each_turned(TRACK, torch.Generator().manual_seed(0)) if turned else TRACK
+    true = poses_of(track)
+    start = turned_around(spoilt(true, seed=1, degrees=3.0, metres=0.1), {1, 5})
+    done = whole.complete_together(completed(start), list(track.scans), SETTINGS)
+    error = [true[i].inverse() @ item.pose for i, item in enumerate(done)]
+    assert max(float(torch.rad2deg(e.angle())) for e in error) < 5.0
+    # One shape, posed in every scan.
+    canonical = [item.pose.inverse().apply_numpy(item.points) for item in done]
+    for shape in canonical[1:]:
+        np.testing.assert_allclose(shape, canonical[0], atol=1e-4)
+    assert all(0 <= item.confidence <= 1 for item in done)
+
+
+def test_a_refinement_that_fits_worse_is_not_kept(monkeypatch):
+    """True poses, and a refinement that spoils them: the vote stands, and says so."""
+    scans, true = list(TRACK.scans), poses_of(TRACK)
+    worse = lambda _, poses, **__: spoilt(poses, seed=5, degrees=10.0, metres=0.4)  # noqa: E731
+    monkeypatch.setattr(whole, "refine_jointly", worse)
+    fit = whole.refine_checked(scans, true, mirror=True)
+    assert not fit.refined
+    assert fit.T_sensor_object is true
+
+
+def test_a_refinement_that_leaves_the_vote_far_behind_is_not_kept(monkeypatch):
+    scans, true = list(TRACK.scans), poses_of(TRACK)
+    start = turned_around(true, {2})
+    monkeypatch.setattr(whole, "refine_jointly", lambda *_, **__: true)
+    assert not whole.refine_checked(scans, start, mirror=True).refined
+
+
+def test_a_better_refinement_is_kept():
+    start = spoilt(poses_of(TRACK), seed=1)
+    fit = whole.refine_checked(list(TRACK.scans), start, mirror=True)
+    assert fit.refined
+    off = [
+        float((relative(poses_of(TRACK)).inverse() @ relative(poses)).angle().mean())
+        for poses in (fit.T_sensor_object, start)
+    ]
+    assert off[0] < 0.7 * off[1]
+
+
+def test_one_scan_is_completed_as_ever():
+    done = completed(poses_of(TRACK)[:1])
+    assert whole.complete_together(done, list(TRACK.scans[:1]), SETTINGS) is done
+
+
+def test_slow_turns_are_told_from_scans_turned_each_on_their_own():
+    steady = rotation_z(torch.linspace(0, 0.5, 8))
+    flipped = torch.where(torch.arange(8) % 3 == 1, 3.1416, 0.0)
+    assert slow(steady)
+    assert slow(rotation_z(torch.linspace(0, 0.5, 8) + flipped))
+    generator = torch.Generator().manual_seed(1)
+    wild = [rotation_z(6.28 * torch.rand(8, generator=generator)) for _ in range(20)]
+    assert not any(slow(rotation) for rotation in wild)
+    assert not slow(steady[:3])
+
+
+def test_the_heavier_part_says_which_way():
+    yaw = torch.linspace(0.0, 0.5, 6)
+    back = torch.tensor([False, True, False, True, False, False])
+    rotation = rotation_z(torch.where(back, yaw + torch.pi, yaw))
+    nothing = (torch.zeros(6), torch.zeros(5))
+    assert torch.equal(voted_signs(rotation, *nothing, torch.ones(6)) < 0, back)
+    heavy = torch.where(back, 5.0, 1.0)
+    assert torch.equal(voted_signs(rotation, *nothing, heavy) > 0, back)
+    assert set(continuous_signs(rotation).tolist()) == {-1.0, 1.0}
+
+
+def test_turned_each_on_their_own_the_shape_and_the_neighbours_vote():
+    """One scan that the shape is unsure of follows its neighbours; a sure shape is followed, and
+    where neither says anything, the scan itself, if it is sure."""
+    generator = torch.Generator().manual_seed(1)
+    rotation = rotation_z(6.28 * torch.rand(5, generator=generator))
+    alike = torch.full((4,), 0.1)
+    unsure = torch.tensor((0.05, 0.05, -0.01, 0.05, 0.05))
+    assert voted_signs(rotation, unsure, alike, torch.ones(5)).tolist() == [1.0] * 5
+    opposed = torch.tensor((0.1, -0.1, -0.1, 0.1))
+    assert voted_signs(rotation, unsure, opposed, torch.ones(5)).tolist() == [1, 1, -1, 1, 1]
+    alone = torch.zeros(4)
+    assert voted_signs(rotation, unsure, alone, torch.zeros(5)).tolist() == [1, 1, -1, 1, 1]
+    assert voted_signs(rotation, unsure, alone, torch.ones(5)).tolist() == [1.0] * 5
+    sure = torch.tensor((0.05, 0.05, -0.1, 0.05, 0.05))
+    assert voted_signs(rotation, sure, alone, torch.ones(5)).tolist() == [1, 1, -1, 1, 1]
+
+
+def test_scans_posed_alike_lie_on_each_other():
+    true = poses_of(TRACK)
+    for poses, sign in ((true, 1), (turned_around(true, {1, 3, 5}), -1)):
+        clouds = torch.stack(
+            [
+                poses[i].inverse().apply(torch.from_numpy(scan[:300]).double())
+                for i, scan in enumerate(TRACK.scans)
+            ]
+        )
+        likeness = likeness_of_next(clouds.float(), 0.0, mirror=True)
+        assert bool((sign * likeness > 0.01).all())
+
+
+def test_scans_of_opposite_ends_say_little_of_each_other():
+    """Between them the sensor passed by: in neither heading does one lie on the other."""
+    clouds = torch.zeros(2, 100, 3)
+    clouds[0, :, 0], clouds[1, :, 0] = 2.0, -1.5
+    clouds[:, :, 1] = torch.linspace(-0.9, 0.9, 100)
+    one_end = likeness_of_next(clouds, 0.0, mirror=True)
+    assert float(one_end.abs()) < 1e-3
+    clouds[1, :, 0] = 2.0
+    assert float(likeness_of_next(clouds, 0.0, mirror=True)) > 0.5
+
+
+def test_drawn_to_what_was_seen_and_nowhere_else():
+    """A plane a hand's breadth off is drawn to the seen half; the other half stays."""
+    axis = torch.linspace(-1, 1, 26, dtype=torch.float64)
+    x, y = torch.meshgrid(axis, axis, indexing="ij")
+    flat = torch.stack((x.flatten(), y.flatten(), torch.zeros(676).double()), dim=1)
+    seen = flat[flat[:, 0] > 0].float()
+    lifted = flat + torch.tensor((0.0, 0.0, 0.08)).double()
+    drawn = whole.drawn_to(lifted, seen)
+    near, far = flat[:, 0] > 0.2, flat[:, 0] < -0.5
+    assert float(drawn[near, 2].abs().max()) < 0.03
+    torch.testing.assert_close(drawn[far], lifted[far], atol=1e-3, rtol=0)
+
+
+def test_the_predictor_uses_tracks():
+    torch.manual_seed(0)
+    predictor = Predictor(ShapePoseNet(CONFIG).eval(), SETTINGS)
+    scans = [scan.astype(np.float32) for scan in TRACK.scans]
+    done = predictor.complete_track(scans)
+    assert len(done) == len(scans)
+    middle = done[len(done) // 2].pose
+    T_middle_scan = predictor.register_track(scans, track=True)
+    torch.testing.assert_close(T_middle_scan[0].matrix, (middle @ done[0].pose.inverse()).matrix)
+    assert len(predictor.fuse(scans, track=True)) == sum(map(len, scans))
+
+
+def test_a_sensor_is_near_where_it_was_before():
+    """Said of each pair of neighbours, whatever the sensor's own turns; a leap says little."""
+    sensors = poses_of(TRACK).inverse().translation
+    links = nearness_of_next(sensors, 0.0)
+    assert bool((links > 0).all())
+    turned = sensors.clone()
+    turned[3] = half_turn(0.4).apply(sensors[3:4])[0]
+    opposed = nearness_of_next(turned, 0.4)
+    assert (opposed < 0).tolist() == [False, False, True, True, False, False]
+    sparse = torch.tensor([(x, 3.0, 0.0) for x in (24.0, 8.0, -8.0, -24.0)], dtype=torch.float64)
+    leap = nearness_of_next(sparse, 0.0)[1]
+    assert abs(float(leap)) < 0.1 * float(links.min())

@@ -1,0 +1,159 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A track of a known car, its poses spoilt a little: they come back, and nothing else moves."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from tests.cars import drive_by, poses_of
+from tests.strategies import rotation_about
+
+from wildshape.geometry.transforms.se3 import SE3, stack
+from wildshape.inference.config import TrackConfig
+from wildshape.inference.tracks import joint_icp as joint
+from wildshape.inference.tracks.joint_icp import refine_jointly, surface_normals
+
+BOXY = drive_by(scans=9, step=2.0, heading=0.3, side=5.0)
+BODY, CABIN, SHIFT = np.array((2.1, 0.9, 0.7)), np.array((1.0, 0.75, 0.6)), (-0.4, 0.0, 0.6)
+FINE = TrackConfig().fine
+LONG = replace(FINE, rounds=30)
+
+
+def round_car(count, rng):
+    """An ellipsoid with another one on top, nowhere flat: points and outward normals."""
+    unit = rng.normal(size=(count, 3))
+    unit /= np.linalg.norm(unit, axis=1, keepdims=True)
+    cabin = (rng.random(count) < 0.35)[:, None]
+    points = np.where(cabin, unit * CABIN + SHIFT, unit * BODY)
+    inside_body = ((points / BODY) ** 2).sum(1) < 1
+    inside_cabin = (((points - SHIFT) / CABIN) ** 2).sum(1) < 1
+    outside = ~np.where(cabin[:, 0], inside_body, inside_cabin)
+    return points[outside], np.where(cabin, unit / CABIN, unit / BODY)[outside]
+
+
+def seen(pose, seed, count=700):
+    """What a sensor sees of it, with 3 mm of noise."""
+    rng = np.random.default_rng(seed)
+    points, normals = round_car(12 * count, rng)
+    R, t = pose.rotation.numpy(), pose.translation.numpy()
+    at = points @ R.T + t
+    facing = at[((normals @ R.T) * at).sum(1) < 0][:count]
+    return (facing + rng.normal(scale=0.003, size=facing.shape)).astype(np.float32)
+
+
+TRUE = poses_of(BOXY)
+SCANS = [seen(TRUE[i], i) for i in range(len(TRUE))]
+
+
+def spoilt(T_sensor_object, seed, degrees=4.0, metres=0.15):
+    """Each pose turned and moved a little, about the object's own centre."""
+    generator = torch.Generator().manual_seed(seed)
+    made = []
+    for i in range(len(T_sensor_object)):
+        axis = torch.randn(3, generator=generator).double()
+        angle = math.radians(degrees) * float(torch.rand(1, generator=generator))
+        shift = metres * (2 * torch.rand(3, generator=generator).double() - 1)
+        made.append(T_sensor_object[i] @ SE3(rotation_about(axis.tolist(), angle), shift))
+    return stack(made)
+
+
+def relative(poses):
+    """Every scan to the first one's frame: what the frame of the object has no part in."""
+    return poses[0] @ poses.inverse()
+
+
+def off(found, true):
+    """Largest rotation in degrees, and largest way of the object's centre in metres."""
+    error = true.inverse() @ found
+    return float(torch.rad2deg(error.angle()).max()), float(error.translation.norm(dim=-1).max())
+
+
+def of_first(poses):
+    """The object's pose in the first scan, as every scan tells it."""
+    return relative(poses) @ TRUE
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_poses_spoilt_a_little_come_back(seed):
+    """Every scan to half a degree, the median scan to 2.5 cm, as the middle scan sees it."""
+    start = spoilt(TRUE, seed=seed)
+    refined = refine_jointly(SCANS, start, mirror=False, config=LONG)
+    middle = len(TRUE) // 2
+    error = [TRUE.inverse() @ TRUE[middle] @ T[middle].inverse() @ T for T in (start, refined)]
+    degrees = [float(torch.rad2deg(e.angle()).max()) for e in error]
+    metres = [float(e.translation.norm(dim=-1).median()) for e in error]
+    assert degrees[0] > 4.0
+    assert metres[0] > 0.2
+    assert degrees[1] < 0.5
+    assert metres[1] < 0.025
+
+
+def test_true_poses_stay():
+    degrees, metres = off(refine_jointly(SCANS, TRUE, mirror=True, config=FINE), TRUE)
+    assert degrees < 0.5
+    assert metres < 0.02
+
+
+def test_the_mirror_plane_is_kept():
+    """Poses spoilt each in its own way: the plane y = 0 stays the car's own, on average."""
+    start = spoilt(TRUE, seed=1)
+    error = TRUE.inverse() @ refine_jointly(SCANS, start, mirror=True, config=LONG)
+    asked = TRUE.inverse() @ start
+    aside = float(error.translation[:, 1].mean().abs())
+    assert aside < float(asked.translation[:, 1].mean().abs()) + 0.02
+    yaw = torch.rad2deg(error.rotation[:, 1, 0].asin())
+    assert abs(float(yaw.mean())) < 2.0
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+def test_the_object_stays_where_it_was_on_average(mirror):
+    """Its points' mean does not move, nor does the mean rotation, in what no scan can tell."""
+    start = spoilt(TRUE, seed=2)
+    refined = refine_jointly(SCANS, start, mirror=mirror)
+    means = [
+        torch.stack(
+            [
+                T[i].inverse().apply(torch.from_numpy(c).double()).mean(0)
+                for i, c in enumerate(SCANS)
+            ]
+        ).mean(0)
+        for T in (start, refined)
+    ]
+    way = (means[1] - means[0]).abs()
+    free = way[[0, 2]] if mirror else way
+    assert float(free.max()) < 0.015  # of the points drawn it is exactly the mean
+    mean = (start.rotation.mT @ refined.rotation).mean(0)
+    turned = torch.rad2deg(torch.atan2(mean[0, 2] - mean[2, 0], mean[0, 0] + mean[2, 2]))
+    assert abs(float(turned)) < 0.3
+
+
+def test_one_scan_is_left_alone():
+    pose = TRUE[:1]
+    assert refine_jointly(SCANS[:1], pose, mirror=True) is pose
+
+
+def test_the_same_result_every_time():
+    start = spoilt(TRUE, seed=3)
+    first, second = (refine_jointly(SCANS, start, mirror=True) for _ in range(2))
+    assert torch.equal(first.matrix, second.matrix)
+    assert first.rotation.dtype == torch.float64
+
+
+def test_the_normals_of_a_plane_and_a_sphere():
+    generator = torch.Generator().manual_seed(4)
+    plane = torch.rand(400, 3, generator=generator) * torch.tensor((1.0, 1.0, 0.0))
+    assert float(surface_normals(plane)[:, 2].abs().min()) > 0.999
+    sphere = 2 * torch.nn.functional.normalize(torch.randn(4000, 3, generator=generator), dim=1)
+    cosine = (surface_normals(sphere) * sphere / 2).sum(1).abs()
+    assert float(cosine.mean()) > 0.99
+
+
+def test_normals_do_not_depend_on_the_blocks_that_keep_memory_small(monkeypatch):
+    points = torch.from_numpy(round_car(300, np.random.default_rng(2))[0]).float()
+    whole = surface_normals(points)
+    monkeypatch.setattr(joint, "_BLOCK", 64)
+    alike = (surface_normals(points) * whole).sum(-1).abs()
+    torch.testing.assert_close(alike, torch.ones_like(alike), atol=1e-4, rtol=0)

@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Points come back from every format, wherever they lie."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import torch
+
+from wildshape.errors import BadInputError
+from wildshape.io.scans.cloud_writer import CLOUD_SUFFIXES, save
+from wildshape.io.scans.points import read_points
+
+OFFSET = np.array((83.1, -61.9, -2.2))
+POINTS = (np.random.default_rng(0).normal(size=(50, 3)) + OFFSET).astype(np.float32)
+
+
+@pytest.mark.parametrize("suffix", CLOUD_SUFFIXES)
+def test_saved_points_read_back(suffix, tmp_path):
+    path = tmp_path / "new" / f"shape{suffix}"
+    save(POINTS, path)
+    np.testing.assert_allclose(read_points(path), POINTS, atol=1e-4)
+    assert [entry.name for entry in path.parent.iterdir()] == [path.name]
+
+
+def test_pcd_is_binary_and_other_programs_read_it(tmp_path):
+    from pypcd4.pypcd4 import PointCloud
+
+    save(POINTS, tmp_path / "a.pcd")
+    save(POINTS[:0], tmp_path / "none.pcd")
+    head = (tmp_path / "a.pcd").read_bytes()
+    assert b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\n" in head
+    assert b"DATA binary\n" in head
+    np.testing.assert_array_equal(PointCloud.from_path(tmp_path / "a.pcd").numpy(), POINTS)
+    np.testing.assert_array_equal(read_points(tmp_path / "a.pcd"), POINTS)
+    assert read_points(tmp_path / "none.pcd").shape == (0, 3)
+
+
+def test_whatever_is_an_array_is_saved(tmp_path):
+    held = SimpleNamespace(__array__=None)
+    for name, shape in {"list": POINTS.tolist(), "tensor": torch.from_numpy(POINTS)}.items():
+        save(shape, str(tmp_path / f"{name}.npy"))
+        np.testing.assert_array_equal(np.load(tmp_path / f"{name}.npy"), POINTS)
+    for wrong in (POINTS[:, :2], POINTS[0], "words", held, torch.zeros(3, 3, requires_grad=True)):
+        with pytest.raises(BadInputError, match=r"x\.ply: cannot save"):
+            save(wrong, tmp_path / "x.ply")
+
+
+def test_another_suffix_is_refused_and_leaves_nothing(tmp_path):
+    for name in ("shape.stl", "shape"):
+        with pytest.raises(BadInputError, match=r"\.ply \.pcd \.npy"):
+            save(POINTS, tmp_path / name)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,235 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+import json
+import pickle
+import time
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.store.store import Store, StoreWriter, is_store, open_store
+from wildshape.records import Sensor, Track
+
+
+def _tracks(track: Track) -> list[Track]:
+    """Tracks with and without truth, of 1 to 3 scans, one of them empty."""
+    bare = Track("bare", (track.scans[1],), ("x",), Sensor("lidar", (0.2, 0.4)))
+    empty = Track("empty scan", (track.scans[0], track.scans[0][:0]), ("a", "b"))
+    return [track, bare, empty, replace(track, name="again", shape=None)]
+
+
+@pytest.fixture
+def store(track: Track, tmp_path: Path) -> Store:
+    with StoreWriter(tmp_path / "store", {"seed": 1}, shard_bytes=1000) as writer:
+        for each in _tracks(track):
+            writer.add(each)
+    return open_store(tmp_path / "store")
+
+
+def test_round_trip(store: Store, track: Track) -> None:
+    assert len(store) == 4
+    assert store.names == ("car-1", "bare", "empty scan", "again")
+    for found, truth in zip(store, _tracks(track), strict=True):
+        assert found.name == truth.name
+        assert found.scan_names == truth.scan_names
+        assert found.sensor == truth.sensor
+        assert (found.category, found.source) == (truth.category, truth.source)
+        for scan, points in zip(found.scans, truth.scans, strict=True):
+            np.testing.assert_array_equal(scan, points)
+        _assert_same_truth(found, truth)
+
+
+def _assert_same_truth(found: Track, truth: Track) -> None:
+    assert (found.shape is None) == (truth.shape is None)
+    if found.shape is not None and truth.shape is not None:
+        np.testing.assert_array_equal(found.shape, truth.shape)
+    assert (found.T_sensor_object is None) == (truth.T_sensor_object is None)
+    if found.T_sensor_object is not None and truth.T_sensor_object is not None:
+        assert torch.equal(found.T_sensor_object.matrix, truth.T_sensor_object.matrix)
+
+
+def test_global_scan_index(store: Store, track: Track) -> None:
+    assert store.track_starts.tolist() == [0, 3, 4, 6, 9]
+    assert store.scan_sizes.tolist() == [60, 20, 33, 20, 60, 0, 60, 20, 33]
+    np.testing.assert_array_equal(store.scan_points(7), track.scans[1])
+    np.testing.assert_array_equal(store.scan_points(-1), track.scans[2])
+    for wrong in (9, -10):
+        with pytest.raises(IndexError):
+            store.scan_points(wrong)
+    with pytest.raises(IndexError):
+        store.track(4)
+    assert store.provenance == {"seed": 1}
+    assert store.sensor_of(1) == Sensor("lidar", (0.2, 0.4))
+
+
+def test_points_are_views_that_torch_takes_and_that_never_reach_the_disk(store: Store) -> None:
+    view = store.scan_points(0)
+    assert view.base is not None
+    tensor = torch.from_numpy(view)  # would warn, so fail here, were the view read-only
+    tensor += 1
+    assert torch.equal(torch.from_numpy(store.scan_points(0)), tensor)
+    store.verify()
+    assert not np.array_equal(open_store(store.path).scan_points(0), view)
+
+
+def test_shards_are_ordinary_safetensors(store: Store) -> None:
+    from safetensors.numpy import load_file
+
+    shards = sorted(store.path.glob("points-*.safetensors"))
+    assert len(shards) > 1
+    assert sum(len(load_file(shard)["points"]) for shard in shards) == 306 + 60
+    assert load_file(store.path / "index.safetensors")["poses"].shape == (6, 3, 4)
+
+
+def test_several_processes_and_pickling(store: Store) -> None:
+    assert pickle.loads(pickle.dumps(store)).fingerprint == store.fingerprint
+    with ProcessPoolExecutor(2, mp_context=get_context("fork")) as pool:
+        sums = list(pool.map(_sum, [store] * 4, range(4)))
+    assert sums == [float(store.scan_points(i).sum()) for i in range(4)]
+
+
+def _sum(store: Store, scan: int) -> float:
+    return float(store.scan_points(scan).sum())
+
+
+def test_fingerprint_is_of_the_contents_alone(track: Track, tmp_path: Path) -> None:
+    prints = []
+    for name, changed in (("a", track), ("b", track), ("c", replace(track, category="van"))):
+        with StoreWriter(tmp_path / name, {"made": name}) as writer:
+            writer.add(changed)
+        prints.append(open_store(tmp_path / name).fingerprint)
+    assert prints[0] == prints[1] != prints[2]
+
+
+def test_verify_names_the_damaged_file(store: Store) -> None:
+    shard = store.path / "points-00001.safetensors"
+    data = bytearray(shard.read_bytes())
+    data[-1] ^= 1
+    shard.write_bytes(data)
+    with pytest.raises(BadInputError, match=r"points-00001\.safetensors: the checksum is wrong"):
+        open_store(store.path).verify()
+
+
+def test_half_written_stores_are_refused(track: Track, tmp_path: Path) -> None:
+    path = tmp_path / "store"
+
+    def stop() -> None:
+        with StoreWriter(path, {}) as writer:
+            writer.add(track)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stop()
+    assert is_store(path)
+    with pytest.raises(BadInputError, match="half-written"):
+        open_store(path)
+    with pytest.raises(BadInputError, match=r"half-written.*--overwrite"):
+        StoreWriter(path, {})
+    with StoreWriter(path, {}, overwrite=True) as writer:
+        writer.add(track)
+    assert len(open_store(path)) == 1
+    names = sorted(file.name for file in path.iterdir())
+    assert names == ["index.json", "index.safetensors", "points-00000.safetensors"]
+
+
+def test_output_that_exists_is_refused(store: Store, tmp_path: Path, track: Track) -> None:
+    with pytest.raises(BadInputError, match="--overwrite"):
+        StoreWriter(store.path, {})
+    assert len(open_store(store.path)) == 4
+    (tmp_path / "notes").mkdir()
+    (tmp_path / "notes" / "thesis.txt").write_text("")
+    with pytest.raises(BadInputError, match="no packed store"):
+        StoreWriter(tmp_path / "notes", {}, overwrite=True)
+    assert (tmp_path / "notes" / "thesis.txt").exists()
+
+
+def test_bad_tracks_and_empty_stores_are_refused(track: Track, tmp_path: Path) -> None:
+    writer = StoreWriter(tmp_path / "store", {})
+    with pytest.raises(BadInputError, match="no track"):
+        writer.close()
+    with pytest.raises(BadInputError, match="3 scans, 2 names"):
+        writer.add(replace(track, scan_names=("a", "b")))
+    with pytest.raises(BadInputError, match="2 poses"):
+        writer.add(replace(track, T_sensor_object=SE3.identity(2)))
+    with pytest.raises(BadInputError, match="0 scans"):
+        writer.add(replace(track, scans=(), scan_names=(), T_sensor_object=None))
+    writer.add(track)
+    with pytest.raises(BadInputError, match="two tracks are named 'car-1'"):
+        writer.add(track)
+    writer.close()
+    assert len(open_store(tmp_path / "store")) == 1
+
+
+def _rewrite(path: Path, **changes) -> None:
+    data = json.loads((path / "index.json").read_text())
+    (path / "index.json").write_text(json.dumps(data | changes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"version": 2}, "expected wildshape-store version 1, found wildshape-store version 2"),
+        ({"format": "zip"}, "found zip version 1"),
+        ({"index": {}}, "damaged"),
+        ({"provenance": {"seed": 2}}, "checksum is wrong"),
+        ({"shards": []}, "checksum is wrong"),
+    ],
+)
+def test_other_versions_and_damaged_manifests(changes: dict, said: str, store: Store) -> None:
+    _rewrite(store.path, **changes)
+    with pytest.raises(BadInputError, match=said):
+        open_store(store.path)
+
+
+def test_truncation_is_seen_on_opening(store: Store) -> None:
+    shard = store.path / "points-00000.safetensors"
+    shard.write_bytes(shard.read_bytes()[:-100])
+    with pytest.raises(BadInputError, match=r"points-00000\.safetensors: expected \d+ bytes"):
+        open_store(store.path)
+    shard.unlink()
+    with pytest.raises(BadInputError, match="found 0"):
+        open_store(store.path)
+
+
+def test_no_store(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match="no packed store"):
+        open_store(tmp_path)
+
+
+def test_damaged_index_files_never_surprise(store: Store) -> None:
+    rng = np.random.default_rng(0)
+    for name in ("index.json", "index.safetensors"):
+        path = store.path / name
+        good = path.read_bytes()
+        for _ in range(60):
+            data = bytearray(good)
+            data[rng.integers(min(len(data), 1200))] = rng.integers(256)
+            path.write_bytes(data)
+            try:
+                open_store(store.path)
+            except BadInputError as error:
+                assert str(store.path) in str(error)  # noqa: PT017
+        path.write_bytes(good)
+    open_store(store.path).verify()
+
+
+def test_opening_does_not_depend_on_the_size(tmp_path: Path) -> None:
+    """A million scans may take 1 s; here 20,000 take a twentieth of it at most."""
+    points = np.zeros((4, 3), np.float32)
+    with StoreWriter(tmp_path / "store", {}) as writer:
+        for i in range(200):
+            names = tuple(f"{k:06d}" for k in range(100))
+            writer.add(Track(f"{i}", (points,) * 100, names, T_sensor_object=SE3.identity(100)))
+    seconds = []
+    for _ in range(5):
+        start = time.perf_counter()
+        assert open_store(tmp_path / "store").scan_count == 20_000
+        seconds.append(time.perf_counter() - start)
+    assert min(seconds) < 0.05

@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""One process a folder: a second is refused, a dead one is not waited for."""
+
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import pytest
+
+from wildshape.errors import BadInputError
+from wildshape.io.single_writer import lock_folder, release_folders
+
+pytest.importorskip("fcntl", reason="this system has no locks of folders")
+HOLDER = (
+    "import sys, time; from pathlib import Path;"
+    " from wildshape.io.single_writer import lock_folder;"
+    " lock_folder(Path(sys.argv[1])); print('locked', flush=True); time.sleep(600)"
+)
+
+
+@pytest.fixture(autouse=True)
+def _released():
+    yield
+    release_folders()
+
+
+@contextmanager
+def held(folder):
+    """Another process that claims the folder."""
+    command = [sys.executable, "-c", HOLDER, str(folder)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "locked\n"
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_a_second_process_is_refused_until_the_first_has_died(tmp_path):
+    folder = tmp_path / "a" / "out"
+    with held(folder) as process:
+        with pytest.raises(BadInputError, match="out: another process is writing there; wait"):
+            lock_folder(folder)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        lock_folder(folder)
+    assert not any(folder.iterdir())
+
+
+def test_one_process_may_claim_again_and_others_after_it_gave_up(tmp_path):
+    lock_folder(tmp_path)
+    lock_folder(tmp_path)
+    release_folders()
+    with held(tmp_path), pytest.raises(BadInputError):
+        lock_folder(tmp_path)
