@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ways in which Wildshape refuses: one sentence that names the cause and the cure."""
 
+import errno
+
 _LONGEST = 1600
 
 
@@ -28,3 +30,21 @@ class MissingExtraError(ImportError):
 
 def _visible(character: str) -> str:
     return character if character.isprintable() else ascii(character)[1:-1]
+
+
+_MEMORY_WORDS = (
+    "out of memory",
+    "allocate memory",
+    "bad_alloc",
+    "start new thread",
+    "failed to map segment",
+    "without exception set",  # CPython's own words where an import runs out of it
+)
+
+
+def lacks_memory(error: BaseException) -> bool:
+    """Whether memory or threads ran out, in the words of Python, numpy, torch or the system."""
+    if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
+        return True
+    said = str(error).lower()
+    return any(words in said for words in _MEMORY_WORDS)

@@ -15,7 +15,7 @@ from random import Random
 
 from tests.faults.content import content, differences, read, under_final_names
 from tests.faults.jobs import Job, done_already, steps_saved
-from tests.faults.process import Blow, Ended, cold, warm
+from tests.faults.process import Blow, Ended, cold, warm, workers_gone
 
 Fault = Callable[[Job, Path, Random, float], str]
 """Disturbs a job that writes to a path, at a share of its length; says how it went."""
@@ -51,7 +51,9 @@ def kill_cold(job: Job, out: Path, random: Random, share: float) -> str:
         word if word != "1" or "--workers" not in job.line(out) else "2" for word in job.line(out)
     ]
     after = 2.5 + share * (job.seconds + 2.0)
-    ended = cold(line, _usual()).end(Blow(signal.SIGKILL, after))
+    process = cold(line, _usual())
+    ended = process.end(Blow(signal.SIGKILL, after))
+    promise(workers_gone(process.pid), "workers outlive the command")
     resumed(job, out)
     return "killed 1 times" if ended.code == -signal.SIGKILL else "ended before"
 

@@ -100,9 +100,33 @@ def cold(arguments: Sequence[str], environment: dict[str, str]) -> Process:
             stdout=subprocess.DEVNULL,
             stderr=said,
             cwd=ROOT,
+            start_new_session=True,
         )
     process.returncode = 0  # we wait ourselves
     return Process(process.pid, folder)
+
+
+def workers_gone(session: int) -> bool:
+    """Whether what a killed process had started ends, too; seen in a moment, not at once."""
+    ends = time.monotonic() + PATIENCE_S
+    while members := _in_session(session):
+        if time.monotonic() > ends:
+            for pid in members:
+                os.kill(pid, signal.SIGKILL)
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def _in_session(session: int) -> list[int]:
+    """The processes of a session that are not zombies."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            state, _, _, its_session = stat.read_text().rpartition(")")[2].split()[:4]
+            if int(its_session) == session and state not in "ZX":
+                found.append(int(stat.parent.name))
+    return found
 
 
 def _import_too(names: Sequence[str]) -> None:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Damaged files of every format: a valid result or one sentence, and no memory for a lie."""
 
+import errno
 import resource
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from wildshape.errors import BadInputError
+from wildshape.io import guard
 from wildshape.io.guard import reading
 from wildshape.io.scans.points import read_points
 
@@ -146,3 +148,29 @@ def _refused(path: Path, data: bytes, said: str = "header|points|file") -> None:
     path.write_bytes(data)
     with pytest.raises(BadInputError, match=said):
         read_points(path)
+
+
+@pytest.mark.parametrize("error", [MemoryError(), OSError(errno.ENOMEM, "Cannot allocate memory")])
+def test_a_lack_of_memory_is_no_damaged_file(
+    error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file that is skipped because memory was short would be missing without a word."""
+    path = tmp_path / "whole.ply"
+    path.touch()
+
+    def none_left(*_: object) -> None:
+        raise OSError(errno.ENOMEM, "Cannot allocate memory")
+
+    monkeypatch.setattr(guard, "mmap", none_left)
+    with pytest.raises(MemoryError), reading(path, "a scan"):
+        raise error
+
+
+def test_a_file_that_asks_for_more_than_any_scan_is_damaged(tmp_path: Path) -> None:
+    path = tmp_path / "greedy.ply"
+    path.touch()
+    with (
+        pytest.raises(BadInputError, match=r"greedy\.ply: expected a scan"),
+        reading(path, "a scan"),
+    ):
+        raise MemoryError

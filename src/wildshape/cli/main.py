@@ -10,7 +10,7 @@ from importlib import import_module
 from types import ModuleType
 
 from wildshape.cli.interrupt import Terminated, terminable
-from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.errors import BadInputError, MissingExtraError, lacks_memory
 from wildshape.io.single_writer import release_folders
 
 COMMANDS = {
@@ -34,13 +34,7 @@ _NO_MEMORY = (
     "not enough memory; end other programs, raise the limit (ulimit -v) or hand in less at once;"
     " what is finished stays valid, and the same command goes on from it."
 )
-_MEMORY_WORDS = (
-    "out of memory",
-    "allocate memory",
-    "bad_alloc",
-    "start new thread",
-    "failed to map segment",
-)
+_RESERVED_BYTES = 1 << 20  # enough to say so, also after a small allocation has failed
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -105,7 +99,11 @@ def _print_completion(shell: str = "") -> None:
 
 def _guarded(command: str, arguments: list[str]) -> None:
     """Run a command; what a user can cure becomes one sentence and an exit code."""
+    from wildshape.cli import terminal  # noqa: F401  # without memory nothing can be imported
+
+    reserved: list[bytearray] = []
     try:
+        reserved.append(bytearray(_RESERVED_BYTES))
         module = import_module(f"wildshape.cli.commands.{command}")
         module.run(_parse(module, command, arguments))
     except (BadInputError, MissingExtraError) as error:
@@ -117,20 +115,14 @@ def _guarded(command: str, arguments: list[str]) -> None:
     except BrokenPipeError:
         sys.stderr.close()  # the reader of our output has gone; nothing is left to say
         raise SystemExit(_FAILED) from None
-    except (MemoryError, RuntimeError, ImportError, OSError) as error:
+    except (MemoryError, RuntimeError, ImportError, OSError, SystemError) as error:
+        reserved.clear()
         if lacks_memory(error):
+            error.__traceback__ = error.__context__ = None  # they hold what filled the memory
             _leave(_NO_MEMORY, _FAILED)
         if not isinstance(error, OSError):
             raise
         _leave(_system_sentence(error), _FAILED if error.errno in _NO_ROOM else _BAD_INPUT)
-
-
-def lacks_memory(error: BaseException) -> bool:
-    """Whether memory or threads ran out, in the words of Python, numpy, torch or the system."""
-    if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
-        return True
-    said = str(error).lower()
-    return any(words in said for words in _MEMORY_WORDS)
 
 
 def _parse(module: ModuleType, command: str, arguments: list[str]) -> object:

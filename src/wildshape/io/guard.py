@@ -5,13 +5,15 @@
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from mmap import mmap
 from pathlib import Path
 
-from wildshape.errors import BadInputError
+from wildshape.errors import BadInputError, lacks_memory
 
 MAX_POINTS = 100_000_000
 """More points in one scan of one object are taken for a damaged header."""
 
+_MOST_TIMES, _MOST_BYTES = 10, 64 << 20
 _FREE_UNPACKED, _MOST_UNPACKED = 32_000_000, 100
 
 
@@ -30,6 +32,7 @@ def reading(path: Path, expected: str) -> Iterator[None]:
     except FileNotFoundError as error:
         raise BadInputError(f"{path}: no such file; check the path.") from error
     except OSError as error:
+        _let_through(error, path)
         reason = error.strerror or first_line(error)
         raise BadInputError(f"{path}: cannot be read as {expected} ({reason}).") from error
     except BaseException as error:
@@ -37,10 +40,25 @@ def reading(path: Path, expected: str) -> Iterator[None]:
         # not end the program.
         if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
             raise
+        _let_through(error, path)
         raise BadInputError(
             f"{path}: expected {expected}, found a damaged or foreign file "
             f"({type(error).__name__}: {first_line(error)}); write or copy it again."
         ) from error
+
+
+def _let_through(error: BaseException, path: Path) -> None:
+    """Raise MemoryError where memory is short; a damaged file asks for more than a reader needs.
+
+    No reader needs more than ten times the file and 64 MB: where that much is to be had, it was
+    the file that asked for too much.
+    """
+    if not lacks_memory(error):
+        return
+    try:
+        mmap(-1, _MOST_TIMES * path.stat().st_size + _MOST_BYTES).close()
+    except (OSError, ValueError, OverflowError):
+        raise MemoryError(first_line(error)) from error
 
 
 def first_line(error: BaseException, limit: int = 160) -> str:

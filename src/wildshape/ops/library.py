@@ -8,7 +8,7 @@ from pathlib import Path
 
 import torch
 
-from wildshape.errors import BadInputError
+from wildshape.errors import BadInputError, lacks_memory
 
 _ABI = 2
 _PATH = Path(__file__).parent / "native" / "libwildshape_ops.so"
@@ -32,13 +32,19 @@ _SIGNATURES = {
 
 @cache
 def library() -> ctypes.CDLL | None:
-    """The kernels, or None where they are absent, do not load or are of another version."""
+    """The kernels, or None where they are absent, do not load or are of another version.
+
+    Raises:
+        MemoryError: there is no room to load them; other kernels would round otherwise.
+    """
     try:
         loaded = ctypes.CDLL(str(_PATH))
         for name, (arguments, result) in _SIGNATURES.items():
             function = getattr(loaded, name)
             function.argtypes, function.restype = arguments, result
-    except (OSError, AttributeError):
+    except (OSError, AttributeError) as error:
+        if lacks_memory(error):
+            raise MemoryError(str(error)) from error
         return None
     return loaded if loaded.wildshape_abi() == _ABI else None
 
