@@ -3,21 +3,19 @@
 """What holds for every baseline, and what each is known to do and not to do."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 import torch
+from tests.baselines.named import errors, named
 from tests.cars import drive_by, half_turned, poses_of
 
 from wildshape.baselines.gicp import Gicp
 from wildshape.baselines.identity import Identity, OneScan
 from wildshape.baselines.local_icp import LocalIcp
 from wildshape.baselines.multi_start_icp import MultiStartIcp, headings
-from wildshape.baselines.named import NAMES, baseline
+from wildshape.baselines.named import NAMES
 from wildshape.baselines.pairs import chain
-from wildshape.errors import MissingExtraError
-from wildshape.evaluation.metrics import registration_error
 from wildshape.evaluation.turning import turn_track
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
@@ -25,20 +23,6 @@ from wildshape.records import Sensor
 
 LIDAR = Sensor()
 REGISTRARS = [name for name in NAMES if name != "one-scan"]
-
-
-def named(name) -> Any:
-    """The baseline, where its library is installed."""
-    try:
-        return baseline(name)
-    except MissingExtraError as error:
-        pytest.skip(str(error))
-
-
-def errors(method, track):
-    T_middle_scan = method.register_track(list(track.scans), track.sensor)
-    poses = poses_of(track)
-    return registration_error(T_middle_scan, poses, poses[track.middle])
 
 
 def small_motions():

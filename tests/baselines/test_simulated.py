@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 import torch
-from tests.baselines.test_baselines import errors, named
+from tests.baselines.named import errors, named
 from tests.cars import half_turned, poses_of
 
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks

@@ -3,48 +3,18 @@
 """Processes that are killed: finished work stays, and the same command goes on."""
 
 import json
-import os
 import shutil
 import signal
-import subprocess
-import sys
-import time
-from contextlib import contextmanager
 
 import pytest
 import torch
 from safetensors.torch import load_file
+from tests.cli.processes import running, wait_for
 
 from wildshape.io.scans.points import read_points
 from wildshape.io.tracks import read_poses
 
 _COPIES = 60
-
-# A shell that starts the tests in the background has them ignore Ctrl-C, and all that they start.
-PROGRAM = (
-    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
-    " import torch; torch.set_num_threads(1); from wildshape.cli.main import main; main()"
-)
-
-
-@contextmanager
-def running(*arguments):
-    command = [sys.executable, "-c", PROGRAM, *(str(argument) for argument in arguments)]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.communicate()
-
-
-def wait_for(condition, process):
-    until = time.monotonic() + 300
-    while not condition():
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < until
-        time.sleep(0.002)
 
 
 def test_a_killed_complete_goes_on(wildshape, dataset, trained, tmp_path):

@@ -7,7 +7,7 @@ import shutil
 import sys
 
 import pytest
-from tests.io.store.test_checks import content
+from tests.io.store.stores import content
 
 from wildshape.io.inputs import open_tracks
 from wildshape.io.store.store import open_store

@@ -12,6 +12,7 @@ from tests.datasets.write_argoverse2 import write_log, write_table
 from tests.datasets.write_kitti_raw import tracklet_xml, write_drive
 from tests.datasets.write_kitti_tracking import write_sequence
 from tests.io.limits import allowed, costs
+from tests.refusal import refused
 
 from wildshape.datasets.argoverse2.log import read_boxes
 from wildshape.datasets.kitti.raw import KittiRaw
@@ -31,12 +32,6 @@ POSES = [(10.0, 2.0, -1.7, 0.1)]
 def labels(tmp_path):
     drive = write_drive(tmp_path / "2011_09_26_drive_0001_sync", [("Car", 0, POSES)], {})
     return drive / "tracklet_labels.xml"
-
-
-def refused(read, *arguments, match):
-    with pytest.raises(BadInputError, match=match) as caught:
-        read(*arguments)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -9,44 +9,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tests.models import CONFIG, SETTINGS, scan
 from tests.strategies import rotation_about
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.projection.visibility import FacingBins
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.registration import inlier_ratio
 from wildshape.inference.shipped_weights import weights_file
-from wildshape.method.checkpoint import ModelSettings, save_checkpoint
+from wildshape.method.checkpoint import save_checkpoint
 from wildshape.method.confidence import Facts
-from wildshape.method.network import NetworkConfig, ShapePoseNet
+from wildshape.method.network import ShapePoseNet
 from wildshape.records import Sensor
-
-CONFIG = NetworkConfig(
-    encoder=(16, 16, 32, 32), decoder=(32, 32), pose=(16, 16), points=600, mirror=True, scale=2.0
-)
-SETTINGS = ModelSettings(
-    network=CONFIG,
-    sensor="lidar",
-    input_points=128,
-    projection=FacingBins(0.3),
-    beta=0.25,
-    extent_m=(2.0, 6.0),
-    cost_m=(0.1, 0.3),
-)
 
 
 @pytest.fixture(scope="module")
 def predictor():
     torch.manual_seed(0)
     return Predictor(ShapePoseNet(CONFIG).eval(), SETTINGS)
-
-
-def scan(seed=0, count=200):
-    rng = np.random.default_rng(seed)
-    at = np.array([9.0 + rng.uniform(-2, 2), rng.uniform(-3, 3), -1.0])
-    return (rng.normal(size=(count, 3)) * [1.0, 0.5, 0.3] + at).astype(np.float32)
 
 
 def assert_same(a, b, atol=2e-4):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.refusal import refused
 
 from wildshape.errors import BadInputError
 from wildshape.io import guard
@@ -146,8 +147,7 @@ def test_panics_are_caught_and_interrupts_are_not() -> None:
 
 def _refused(path: Path, data: bytes, said: str = "header|points|file") -> None:
     path.write_bytes(data)
-    with pytest.raises(BadInputError, match=said):
-        read_points(path)
+    refused(read_points, path, match=said)
 
 
 @pytest.mark.parametrize("error", [MemoryError(), OSError(errno.ENOMEM, "Cannot allocate memory")])

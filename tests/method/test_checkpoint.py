@@ -7,28 +7,13 @@ import pytest
 import torch
 from safetensors import safe_open
 from safetensors.torch import save_file
+from tests.method.small import SMALL, settings
 from tests.strategies import clouds
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.projection.visibility import FacingBins, PixelBins, PolarBins
-from wildshape.method.checkpoint import ModelSettings, load_checkpoint, save_checkpoint
-from wildshape.method.network import NetworkConfig, ShapePoseNet
-
-SMALL = NetworkConfig(encoder=(8, 8, 16, 16), decoder=(16, 16), pose=(8, 8), points=32, scale=2.0)
-
-
-def settings(projection=FacingBins(0.3)):  # noqa: B008
-    return ModelSettings(
-        network=SMALL,
-        sensor="lidar",
-        input_points=128,
-        projection=projection,
-        beta=0.05,
-        extent_m=(0.5, 7.25),
-        cost_m=(0.08, 0.21),
-        provenance={"command": "wildshape train", "seed": 3},
-        metrics={"cycle_deg": 4.5},
-    )
+from wildshape.method.checkpoint import load_checkpoint, save_checkpoint
+from wildshape.method.network import ShapePoseNet
 
 
 @pytest.fixture

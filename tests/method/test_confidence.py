@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 import torch
-from tests.inference.test_predictor import CONFIG, SETTINGS, scan
+from tests.models import CONFIG, SETTINGS, scan
 
 from wildshape.inference.predictor import Predictor, load
 from wildshape.method.checkpoint import load_checkpoint, save_checkpoint

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 import torch
-from tests.method.test_checkpoint import SMALL, settings
+from tests.method.small import SMALL, settings
 from tests.strategies import clouds
 from torch.nn.functional import leaky_relu, relu
 

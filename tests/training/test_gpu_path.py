@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import torch
-from tests.training.test_step import RECIPES, step_of, take
+from tests.training.steps import RECIPES, step_of, take
 
 from wildshape.geometry.projection.line_of_sight import Facing
 from wildshape.method import hindsight
@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[2]
 PROGRAM = """
 import sys
 import torch
-from tests.training.test_step import RECIPES, step_of, take
+from tests.training.steps import RECIPES, step_of, take
 from wildshape.io.store.store import open_store
 from wildshape.method import hindsight
 from wildshape.ops import nearest

@@ -12,7 +12,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from tests.cli.test_interrupted import running
+from tests.cli.processes import running
 from tests.datasets.street import street
 from tests.datasets.write_argoverse2 import write_log
 from tests.datasets.write_kitti_raw import in_velo, write_drive

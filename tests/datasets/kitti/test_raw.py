@@ -10,6 +10,7 @@ import pytest
 from tests.cars import poses_of
 from tests.datasets.damaged import passed_over
 from tests.datasets.write_kitti_raw import SIZE, in_velo, write_drive
+from tests.refusal import refusal_of
 
 from wildshape.datasets.kitti.raw import KittiRaw
 from wildshape.datasets.tracks.box_crop import Crop
@@ -105,9 +106,7 @@ def test_a_drive_without_labels_among_others_is_counted(drive):
     assert source.rejected["drive without tracklet_labels.xml"] == 1
 
 
-def refused(root, match):
-    with pytest.raises(BadInputError, match=match):
-        list(all_tracks(KittiRaw(root)))
+refused = refusal_of(lambda root: list(all_tracks(KittiRaw(root))))
 
 
 def test_missing_and_corrupt_files_are_named(drive):

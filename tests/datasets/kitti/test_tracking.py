@@ -9,11 +9,11 @@ import pytest
 from tests.cars import off_surface, poses_of
 from tests.datasets.street import street
 from tests.datasets.write_kitti_tracking import EYE, T_EGO_VELO, write_sequence
+from tests.refusal import refusal_of
 
 from wildshape.datasets.kitti.tracking import KittiTracking
 from wildshape.datasets.kitti.tracking_labels import read_boxes
 from wildshape.datasets.tracks.selection import Selection
-from wildshape.errors import BadInputError
 
 FRAMES = 5
 NAMES = {"parked": "0001_0003", "moving": "0001_0012"}
@@ -135,10 +135,7 @@ def test_dontcare_is_no_object(training):
     assert {box.track for box in boxes} == {3, 12}
 
 
-def refused(root, match, **options):
-    with pytest.raises(BadInputError, match=match) as caught:
-        tracks(root, **options)
-    assert "\n" not in str(caught.value)
+refused = refusal_of(tracks)
 
 
 def test_a_wrong_root_says_what_was_expected_and_found(tmp_path):

@@ -23,6 +23,7 @@ from tests.datasets.write_nuscenes import (
     write_nuscenes,
     write_relative,
 )
+from tests.refusal import refusal_of
 
 from wildshape.datasets.nuscenes import index as nuscenes_index
 from wildshape.datasets.nuscenes.reader import NuScenes
@@ -159,7 +160,7 @@ def test_a_build_that_failed_leaves_no_index(own, tmp_path):
     whole, stamp = table.read_text(), table.stat()
     table.write_text(whole[:-2] + " " * 2)
     os.utime(table, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
-    refused(own, tmp_path, r"sample_annotation\.json: expected a list")
+    refused(own, cache=tmp_path, match=r"sample_annotation\.json: expected a list")
     table.write_text(whole)
     # Same size and time as the broken one had: only a complete index may be believed.
     os.utime(table, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
@@ -174,10 +175,7 @@ def test_blobs_that_are_not_here_are_counted(own, tmp_path):
     assert source.rejected == {"scene: none of its LIDAR_TOP files is here": 1}
 
 
-def refused(root, cache, match, **options):
-    source = NuScenes(root, cache=cache, **options)
-    with pytest.raises(BadInputError, match=match):
-        list(all_tracks(source))
+refused = refusal_of(lambda root, **options: list(all_tracks(NuScenes(root, **options))))
 
 
 def edit(root, table, key, value, row=0):
@@ -188,15 +186,27 @@ def edit(root, table, key, value, row=0):
 
 
 def test_a_wrong_root_says_what_was_expected_and_found(own, tmp_path):
-    refused(tmp_path / "nowhere", tmp_path, r"nowhere: no such folder; expected <root>/v1\.0-")
-    refused(own / "samples", tmp_path, r"expected <root>/v1\.0-trainval.*found LIDAR_TOP")
+    refused(
+        tmp_path / "nowhere",
+        cache=tmp_path,
+        match=r"nowhere: no such folder; expected <root>/v1\.0-",
+    )
+    refused(
+        own / "samples", cache=tmp_path, match=r"expected <root>/v1\.0-trainval.*found LIDAR_TOP"
+    )
     write_nuscenes(own, (SECOND,), version="v1.0-trainval")
-    refused(own, tmp_path, r"holds v1\.0-mini and v1\.0-trainval.*give one of them")
+    refused(own, cache=tmp_path, match=r"holds v1\.0-mini and v1\.0-trainval.*give one of them")
     shutil.rmtree(own / "v1.0-trainval")
     (own / "v1.0-mini" / "sample_annotation.json").write_text("[]")
-    refused(own, tmp_path, r"sample_annotation\.json: no labels \(v1\.0-test has none\)")
+    refused(
+        own, cache=tmp_path, match=r"sample_annotation\.json: no labels \(v1\.0-test has none\)"
+    )
     (own / "samples").rename(own / "elsewhere")
-    refused(own / "v1.0-mini", tmp_path, r"expected samples/LIDAR_TOP beside v1\.0-mini, found")
+    refused(
+        own / "v1.0-mini",
+        cache=tmp_path,
+        match=r"expected samples/LIDAR_TOP beside v1\.0-mini, found",
+    )
 
 
 @pytest.mark.parametrize(
@@ -227,7 +237,7 @@ def test_tables_that_do_not_fit_are_named(own, tmp_path, table, key, value, matc
     rows = json.loads((own / "v1.0-mini" / f"{table}.json").read_text())
     lidar = [i for i, row in enumerate(rows) if "LIDAR_TOP" in row.get("filename", "LIDAR_TOP")]
     edit(own, table, key, value, lidar[0])
-    refused(own, tmp_path, rf"{table}\.json: {match}")
+    refused(own, cache=tmp_path, match=rf"{table}\.json: {match}")
 
 
 def test_missing_calibration_tables_and_sweeps_are_named(own, tmp_path):
@@ -239,12 +249,16 @@ def test_missing_calibration_tables_and_sweeps_are_named(own, tmp_path):
     scan.unlink()
     passed_over(NuScenes(own, cache=tmp_path), r"pcd\.bin: no such file; unpack the blob")
     (own / "v1.0-mini" / "calibrated_sensor.json").unlink()
-    refused(own, tmp_path, r"calibrated_sensor\.json: no such file; unpack nuScenes' metadata")
+    refused(
+        own,
+        cache=tmp_path,
+        match=r"calibrated_sensor\.json: no such file; unpack nuScenes' metadata",
+    )
 
 
 def test_an_index_that_cannot_be_written_is_one_sentence(own, tmp_path):
     (tmp_path / "file").write_text("")
-    refused(own, tmp_path / "file", r"this index of .* cannot be used")
+    refused(own, cache=tmp_path / "file", match=r"this index of .* cannot be used")
 
 
 @pytest.mark.parametrize("kind", RELATIVES)
@@ -290,4 +304,4 @@ def test_numbers_and_words_that_no_table_has(own, tmp_path, table, key, value):
     lidar = [i for i, row in enumerate(rows) if "LIDAR_TOP" in row.get("filename", "LIDAR_TOP")]
     for row in lidar:
         edit(own, table, key, value, row)
-    refused(own, tmp_path, rf"{table}\.json: ")
+    refused(own, cache=tmp_path, match=rf"{table}\.json: ")

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from tests.datasets.write_pandas import FRAME, MANAGER, Made, Name, _array, _index, frame, pickled
 from tests.io.limits import allowed, costs
+from tests.refusal import refusal_of
 
 from wildshape.datasets.pandaset import pandas_pickle
 from wildshape.datasets.pandaset.pandas_pickle import read_pickled_table
-from wildshape.errors import BadInputError
 
 
 def column(*values):
@@ -63,10 +63,7 @@ def test_a_table_of_a_newer_pandas(tmp_path):
     assert found["y"].tolist() == [2, 4]
 
 
-def refused(path, match):
-    with pytest.raises(BadInputError, match=match) as caught:
-        read_pickled_table(path)
-    assert "\n" not in str(caught.value)
+refused = refusal_of(read_pickled_table)
 
 
 @pytest.mark.parametrize(

@@ -21,10 +21,10 @@ from tests.datasets.write_pandaset import (
     write_scene,
     write_sweep,
 )
+from tests.refusal import refusal_of
 
 from wildshape.datasets.pandaset.reader import PandaSet
 from wildshape.datasets.tracks.selection import Selection
-from wildshape.errors import BadInputError
 
 FRAMES = 3
 MOUNTED_AT = (0.0002, 0.8078, 1.8460)  # on the base: right, forward, up
@@ -106,10 +106,7 @@ def test_what_is_left_out_is_counted(made, tmp_path):
     }
 
 
-def refused(root, match):
-    with pytest.raises(BadInputError, match=match) as caught:
-        tracks(root)
-    assert "\n" not in str(caught.value)
+refused = refusal_of(tracks)
 
 
 def test_a_wrong_root_says_what_was_expected_and_found(tmp_path):

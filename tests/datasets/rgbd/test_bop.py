@@ -11,11 +11,11 @@ from tests.cars import poses_of
 from tests.datasets.damaged import passed_over
 from tests.datasets.unit_scene import off_boxes
 from tests.datasets.write_rgbd import THINGS, write_bop, write_model
+from tests.refusal import refusal_of
 
 from wildshape.datasets.rgbd.bop import Bop
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.datasets.tracks.source import Source, all_tracks
-from wildshape.errors import BadInputError
 
 NAMES = ("test_000001_obj000007", "test_000001_obj000007-1")
 
@@ -77,9 +77,7 @@ def test_it_is_a_source_and_travels_to_workers(tmp_path):
     assert source.parts() == ["test/000001"]
 
 
-def refused(root, match):
-    with pytest.raises(BadInputError, match=match):
-        list(all_tracks(Bop(root)))
+refused = refusal_of(lambda root: list(all_tracks(Bop(root))))
 
 
 def test_missing_and_damaged_files_are_named(tmp_path):

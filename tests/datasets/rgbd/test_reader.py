@@ -12,12 +12,12 @@ from tests.datasets.damaged import passed_over
 from tests.datasets.street import moved
 from tests.datasets.unit_scene import off_boxes
 from tests.datasets.write_rgbd import CAMERA, THINGS, write_png, write_sequence
+from tests.refusal import refusal_of
 
 from wildshape.datasets.rgbd.depth_image import supported
 from wildshape.datasets.rgbd.reader import Cut, Rgbd, cut_out
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.datasets.tracks.source import Source, all_tracks
-from wildshape.errors import BadInputError
 from wildshape.records import Intrinsics
 
 
@@ -129,9 +129,7 @@ def test_it_is_a_source_and_travels_to_workers(tmp_path):
     assert source.parts() == ["kitchen"]
 
 
-def refused(root, match):
-    with pytest.raises(BadInputError, match=match):
-        list(all_tracks(Rgbd(root)))
+refused = refusal_of(lambda root: list(all_tracks(Rgbd(root))))
 
 
 def test_missing_and_damaged_files_are_named(tmp_path):

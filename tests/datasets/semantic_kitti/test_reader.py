@@ -20,6 +20,7 @@ from tests.datasets.write_semantic_kitti import (
     write_frame,
     write_sequence,
 )
+from tests.refusal import refusal_of
 
 from wildshape.datasets.semantic_kitti.reader import PAPER, SPLITS, SemanticKitti
 from wildshape.datasets.tracks.accumulation import fuse_by_truth, shape_mirrored, shape_partial
@@ -212,10 +213,7 @@ def test_readers_can_be_sent_to_workers(sequence):
     assert [track.name for track in copy.tracks_of("00")] == [PARKED]
 
 
-def refused(root, match, **options):
-    with pytest.raises(BadInputError, match=match) as caught:
-        tracks(root, **options)
-    assert "\n" not in str(caught.value)
+refused = refusal_of(tracks)
 
 
 def test_a_wrong_root_says_what_was_expected_and_found(tmp_path):

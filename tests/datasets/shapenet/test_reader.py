@@ -11,6 +11,7 @@ from scipy.io import savemat
 from tests.cars import poses_of
 from tests.datasets.unit_scene import off_boxes
 from tests.datasets.write_shapenet_views import SYNSET, write_data, write_list, write_model
+from tests.refusal import refusal_of
 
 from wildshape.datasets.shapenet.reader import ShapeNetViews
 from wildshape.datasets.tracks.selection import Selection
@@ -116,9 +117,7 @@ def test_it_is_a_source_and_travels_to_workers(written):
     assert len(source.parts()) == 3
 
 
-def refused(root, match, **options):
-    with pytest.raises(BadInputError, match=match):
-        list(all_tracks(ShapeNetViews(root, **options)))
+refused = refusal_of(lambda root, **options: list(all_tracks(ShapeNetViews(root, **options))))
 
 
 def test_wrong_folders_and_categories_are_named(written, tmp_path):

@@ -22,6 +22,7 @@ from tests.datasets.write_waymo import (
     vehicle_pose,
     write_waymo,
 )
+from tests.refusal import refusal_of
 
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.datasets.tracks.source import Source, all_tracks
@@ -130,9 +131,7 @@ def test_a_split_without_labels_is_passed_over(own):
     assert find_splits(own.parent) == [own]
 
 
-def refused(root, match):
-    with pytest.raises(BadInputError, match=match):
-        list(all_tracks(Waymo(root)))
+refused = refusal_of(lambda root: list(all_tracks(Waymo(root))))
 
 
 def test_a_wrong_root_says_what_was_expected_and_found(own, tmp_path):

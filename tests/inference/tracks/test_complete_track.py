@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 from tests.cars import car_surface, drive_by, poses_of
-from tests.inference.test_predictor import CONFIG, SETTINGS
-from tests.inference.tracks.test_joint_icp import relative, spoilt
+from tests.inference.tracks.spoilt import relative, spoilt
+from tests.models import CONFIG, SETTINGS
 
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3, stack

@@ -2,16 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """A track of a known car, its poses spoilt a little: they come back, and nothing else moves."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 from tests.cars import drive_by, poses_of
-from tests.strategies import rotation_about
+from tests.inference.tracks.spoilt import relative, spoilt
 
-from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.config import TrackConfig
 from wildshape.inference.tracks import joint_icp as joint
 from wildshape.inference.tracks.joint_icp import refine_jointly, surface_normals
@@ -46,23 +44,6 @@ def seen(pose, seed, count=700):
 
 TRUE = poses_of(BOXY)
 SCANS = [seen(TRUE[i], i) for i in range(len(TRUE))]
-
-
-def spoilt(T_sensor_object, seed, degrees=4.0, metres=0.15):
-    """Each pose turned and moved a little, about the object's own centre."""
-    generator = torch.Generator().manual_seed(seed)
-    made = []
-    for i in range(len(T_sensor_object)):
-        axis = torch.randn(3, generator=generator).double()
-        angle = math.radians(degrees) * float(torch.rand(1, generator=generator))
-        shift = metres * (2 * torch.rand(3, generator=generator).double() - 1)
-        made.append(T_sensor_object[i] @ SE3(rotation_about(axis.tolist(), angle), shift))
-    return stack(made)
-
-
-def relative(poses):
-    """Every scan to the first one's frame: what the frame of the object has no part in."""
-    return poses[0] @ poses.inverse()
 
 
 def off(found, true):

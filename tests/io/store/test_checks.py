@@ -4,14 +4,13 @@
 
 import json
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from safetensors.numpy import load_file, save_file
 from tests.io.older_store import make_older, shards_of
-from tests.io.store.test_join import assert_holds, make_parts, with_gaps
+from tests.io.store.stores import assert_holds, content, make_parts, with_gaps
 
 from wildshape.errors import BadInputError
 from wildshape.io.store import checks as store_checks
@@ -19,7 +18,7 @@ from wildshape.io.store.index import file_record
 from wildshape.io.store.join import join_stores
 from wildshape.io.store.layout import INDEX_JSON, INDEX_TENSORS
 from wildshape.io.store.manifest import manifest_of
-from wildshape.io.store.store import Store, StoreWriter, open_store
+from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.records import Track
 
 FLIPS = 100
@@ -34,20 +33,6 @@ def path(request, track: Track, tmp_path: Path) -> Path:
     if request.param == "older":
         make_older(path)
     return path
-
-
-def content(store: Store) -> Iterator[bytes]:
-    """All that a store says."""
-    sealed = "checksum" in json.loads((store.path / INDEX_JSON).read_text())
-    told = store.provenance if sealed else None
-    yield repr((store.names, store.fingerprint, told)).encode()
-    for track in store:
-        said = (track.name, track.scan_names, track.sensor, track.category, track.source)
-        yield repr(said).encode()
-        yield from (scan.tobytes() for scan in track.scans)
-        yield b"" if track.shape is None else track.shape.tobytes()
-        poses = track.T_sensor_object
-        yield b"" if poses is None else poses.matrix.numpy().tobytes()
 
 
 def places(file: Path, rng: np.random.Generator) -> list[int]:

@@ -3,60 +3,19 @@
 """Stores joined are the store that one writer would have written, whatever stops the joining."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
-import torch
 from safetensors.numpy import load_file, save
+from tests.io.store.stores import assert_holds, make_parts, with_gaps
 
 from wildshape.errors import BadInputError
 from wildshape.io.store import index as store_index
 from wildshape.io.store.join import finish_join, is_joining, join_stores
-from wildshape.io.store.layout import JOINING_JSON, PARTS, WRITING_JSON
+from wildshape.io.store.layout import JOINING_JSON
 from wildshape.io.store.manifest import sealed
 from wildshape.io.store.store import StoreWriter, open_store
-from wildshape.records import Sensor, Track
-
-
-def make_parts(track: Track, out: Path, names=(("a", "b"), ("c",))) -> list[Path]:
-    """Stores with and without truth, of one shard and of several."""
-    (out / PARTS).mkdir(parents=True)
-    (out / WRITING_JSON).write_text("{}")
-    paths = []
-    for number, group in enumerate(names):
-        paths.append(out / PARTS / f"{number}")
-        with StoreWriter(paths[-1], {}, shard_bytes=500 * (1 + 9 * number)) as writer:
-            for name in group:
-                writer.add(with_gaps(track, name))
-    return paths
-
-
-def with_gaps(track: Track, name: str) -> Track:
-    bare = Track(name, (track.scans[1],), (f"x{name}",), Sensor("lidar", (0.2, 0.4)))
-    return bare if name == "b" else replace(track, name=name, category=name)
-
-
-def assert_holds(path: Path, track: Track, names: str) -> None:
-    store = open_store(path)
-    store.verify()
-    assert "".join(store.names) == names
-    for found, name in zip(store, names):
-        truth = with_gaps(track, name)
-        assert (found.scan_names, found.category) == (truth.scan_names, truth.category)
-        assert found.sensor == truth.sensor
-        assert all(map(np.array_equal, found.scans, truth.scans))
-        assert_same_truth(found, truth)
-
-
-def assert_same_truth(found: Track, truth: Track) -> None:
-    assert (found.shape is None) == (truth.shape is None)
-    if found.shape is not None and truth.shape is not None:
-        assert np.array_equal(found.shape, truth.shape)
-    assert (found.T_sensor_object is None) == (truth.T_sensor_object is None)
-    if found.T_sensor_object is not None and truth.T_sensor_object is not None:
-        assert torch.equal(found.T_sensor_object.matrix, truth.T_sensor_object.matrix)
+from wildshape.records import Track
 
 
 def test_joined_parts_hold_what_went_in(track: Track, tmp_path: Path) -> None:

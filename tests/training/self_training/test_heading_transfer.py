@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 from tests.cars import poses_of
-from tests.training.self_training.test_pseudo_labels import sampler_of, teacher  # noqa: F401
+from tests.training.self_training.taught import sampler_of
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
@@ -62,7 +62,7 @@ def test_weights_of_a_camera_are_refused():
         check_transfer(load("airplane"))
 
 
-def test_targets_look_as_the_hint_says(car_store, teacher, tmp_path, monkeypatch):  # noqa: F811
+def test_targets_look_as_the_hint_says(car_store, teacher, tmp_path, monkeypatch):
     """Each scan by itself: every other one is said to be turned, and is."""
     asked = []
 

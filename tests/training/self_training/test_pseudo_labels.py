@@ -3,7 +3,6 @@
 """A teacher's targets: made from scans alone, kept for one run, and what a run makes of them."""
 
 import itertools
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,12 +10,11 @@ import pytest
 import torch
 from safetensors.torch import load_file
 from tests.cars import drive_by
-from tests.training.worker import FEW_STEPS, SMALLEST
+from tests.training.self_training.taught import TAUGHT, sampler_of
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.store.store import StoreWriter, open_store
-from wildshape.training.batches.views import ViewSampler
 from wildshape.training.loop import StopRequested, fit, setup
 from wildshape.training.self_training.pseudo_labels import (
     fused_targets,
@@ -26,27 +24,11 @@ from wildshape.training.self_training.saved_targets import TARGETS, load_targets
 from wildshape.training.state import STATE, save_state
 
 IDENTITY = {"data": "abc", "teacher": "def"}
-TAUGHT = replace(
-    SMALLEST,
-    optim=replace(SMALLEST.optim, steps=20),
-    views=replace(SMALLEST.views, turn="facing", roll=0.5),
-    validate_every=10,
-)
-
-
-def sampler_of(store):
-    return ViewSampler(store, np.arange(len(store)), TAUGHT.views)
 
 
 def counts(store):
     """Of scans, and of tracks to train on."""
     return store.scan_count, len(sampler_of(store).scans_of)
-
-
-@pytest.fixture(scope="module")
-def teacher(car_store, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("teacher")
-    return fit(setup(FEW_STEPS, car_store, folder, seed=1))
 
 
 @pytest.fixture(scope="module")
@@ -80,10 +62,11 @@ def test_the_fused_shape_is_its_scans_reflected(car_store, targets):
 def test_targets_do_not_pitch_against_level_sensors(car_store, targets):
     """The sensors of the fixture are level; whatever the teacher's frame does."""
     starts = np.asarray(car_store.track_starts)
-    for first, last in itertools.pairwise(starts):
-        up = targets.rotation[first:last, 2].mean(0)
-        if float(up.norm()) > 0.9 and abs(math.atan2(float(up[0]), float(up[2]))) < 0.5:
-            assert abs(float(up[0])) < 1e-4
+    ups = [targets.rotation[a:b, 2].mean(0) for a, b in itertools.pairwise(starts)]
+    level = [up for up in ups if float(up.norm()) > 0.9]
+    assert len(level) > len(ups) / 2
+    for up in level:
+        assert abs(float(up[0])) < 1e-4
 
 
 def test_the_sensors_are_where_the_scans_were_taken(car_store, targets):
