@@ -23,7 +23,7 @@ from torch import Tensor
 from turns import begin, options, set_clock, take_turns, timed
 
 from wildshape.inference.predictor import Predictor
-from wildshape.io.scans.ply_writer import write_ply
+from wildshape.io.scans.writers import write_ply
 from wildshape.method.checkpoint import ModelSettings, save_checkpoint
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.network import ShapePoseNet

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 import wildshape
-from wildshape.io.scans.ply_writer import write_ply
 from wildshape.io.scans.points import read_points
+from wildshape.io.scans.writers import write_ply
 
 SCAN = Path(__file__).parent / "scan.npy"
 

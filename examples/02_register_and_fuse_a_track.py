@@ -9,7 +9,7 @@ import sys
 
 import wildshape
 from wildshape.inference.registration import fuse_scans
-from wildshape.io.scans.ply_writer import write_ply
+from wildshape.io.scans.writers import write_ply
 from wildshape.io.tracks import read_track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 

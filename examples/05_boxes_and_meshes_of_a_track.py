@@ -11,7 +11,7 @@ from pathlib import Path
 
 import wildshape
 from wildshape.io.atomic import write_json
-from wildshape.io.scans.mesh_writer import write_mesh
+from wildshape.io.scans.writers import write_mesh
 from wildshape.io.tracks import read_track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from wildshape.errors import BadInputError, MissingExtraError
     from wildshape.inference.predictor import Predictor, load
-    from wildshape.io.scans.cloud_writer import save
+    from wildshape.io.scans.writers import save
     from wildshape.records import Box, Completion, Registration, Sensor, Track
 
 __version__ = "0.1.0"
@@ -29,7 +29,7 @@ _HOME = {
     "MissingExtraError": "wildshape.errors",
     "Predictor": "wildshape.inference.predictor",
     "load": "wildshape.inference.predictor",
-    "save": "wildshape.io.scans.cloud_writer",
+    "save": "wildshape.io.scans.writers",
 }
 
 

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
+from wildshape.io.poses import read_tum
 from wildshape.io.scans.points import read_points
-from wildshape.io.trajectories import read_tum
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,7 @@ from wildshape.datasets.tracks.selection import Selection
 from wildshape.datasets.tracks.source import all_tracks
 from wildshape.datasets.waymo.tables import read_vehicle_poses
 from wildshape.errors import BadInputError
-from wildshape.io.json_text import read_json
+from wildshape.io.guard import read_json
 
 POSES = [(10.0, 2.0, -1.7, 0.1)]
 

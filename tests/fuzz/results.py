@@ -16,7 +16,7 @@ from tests.fuzz.target import Arrays, Target, numbers_of
 from wildshape.cli.results.boxes import BoxOrder
 from wildshape.datasets.tracks.packed import Packed
 from wildshape.io.poses import write_poses
-from wildshape.io.scans.ply_writer import write_ply
+from wildshape.io.scans.writers import write_ply
 from wildshape.io.store.index import file_record
 from wildshape.io.store.join import finish_join
 from wildshape.io.store.layout import INDEX_JSON, JOINING_JSON, WRITING_JSON

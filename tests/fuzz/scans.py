@@ -16,10 +16,9 @@ from tests.fuzz.target import Arrays, Target, numbers_of, only_file
 from wildshape.cli.input.pipe import as_file
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.inputs import open_tracks
-from wildshape.io.poses import read_poses, write_poses
+from wildshape.io.poses import read_poses, read_tum, write_poses, write_tum
 from wildshape.io.scans.points import check_scan, read_points
 from wildshape.io.tracks import read_info, read_track_file, write_track
-from wildshape.io.trajectories import read_tum, write_tum
 from wildshape.records import Intrinsics, Sensor, Track
 
 CLOUD = np.random.default_rng(7).normal((6, 1, 0), size=(24, 3)).astype(np.float32)

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from wildshape.geometry.mesh_confidence import colour_by_confidence, place_confidence
-from wildshape.io.scans.mesh_writer import MESH_FORMATS, write_mesh
+from wildshape.io.scans.writers import MESH_FORMATS, write_mesh
 
 CENTRE = np.array([40.0, -25.0, -1.0])
 

@@ -13,7 +13,7 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.smoothness import smoothness
-from wildshape.io.trajectories import read_tum, times_of, write_trajectory, write_tum
+from wildshape.io.poses import read_tum, times_of, write_trajectory, write_tum
 
 
 def drive(count=9, turn_deg=3.0, speed=2.0):

@@ -11,7 +11,7 @@ from types import ModuleType
 
 from wildshape.cli.interrupt import Terminated, terminable
 from wildshape.errors import BadInputError, MissingExtraError, lacks_memory
-from wildshape.io.single_writer import release_folders
+from wildshape.io.atomic import release_folders
 
 COMMANDS = {
     "demo": "the whole way on simulated scans, or on yours, in five minutes on a CPU",

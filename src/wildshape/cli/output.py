@@ -16,9 +16,8 @@ from typing import Any
 
 from wildshape.cli.terminal import say
 from wildshape.errors import BadInputError
-from wildshape.io.atomic import write_json
+from wildshape.io.atomic import lock_folder, write_json
 from wildshape.io.provenance import provenance
-from wildshape.io.single_writer import lock_folder
 
 MARKER = "wildshape.json"
 _LEFTOVER = ".*.part"  # as `io/atomic.py` names what it has not finished

@@ -15,8 +15,8 @@ from wildshape.cli.output import begin, command_line
 from wildshape.cli.results.write import file_name
 from wildshape.cli.terminal import say
 from wildshape.errors import BadInputError
+from wildshape.io.atomic import lock_folder
 from wildshape.io.provenance import provenance
-from wildshape.io.single_writer import lock_folder
 from wildshape.io.store.layout import INDEX_JSON, WRITING_JSON
 from wildshape.io.store.store import StoreWriter
 from wildshape.io.tracks import write_track

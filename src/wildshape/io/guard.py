@@ -1,12 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Every failure of a file or of a library that reads it becomes one sentence."""
+"""Every failure of a file or of a library that reads it becomes one sentence.
 
+What is read takes no more memory than ten times the file: promises of headers, JSON and lines of
+text are checked before anything is allocated.
+"""
+
+import json
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from mmap import mmap
 from pathlib import Path
+from typing import IO, Any, AnyStr
 
 from wildshape.errors import BadInputError, lacks_memory
 
@@ -15,6 +21,8 @@ MAX_POINTS = 100_000_000
 
 _MOST_TIMES, _MOST_BYTES = 10, 64 << 20
 _FREE_UNPACKED, _MOST_UNPACKED = 32_000_000, 100
+_FREE_BYTES, _RATIO, _CONTAINER_BYTES = 1 << 25, 6, 240
+_LONGEST = 1 << 20  # characters: a PCD row may hold many numbers besides its point
 
 
 @contextmanager
@@ -111,3 +119,40 @@ def check_promise(path: Path, what: str, promised: int, least: int, present: int
             f"{path}: {promised} {what} is more than one scan of one object can hold "
             f"({MAX_POINTS}); cut the objects out of the scan first."
         )
+
+
+def read_json(path: Path, expected: str) -> Any:
+    """What a JSON file holds.
+
+    Args:
+        path: of the file, in UTF-8.
+        expected: what it should hold, for the error.
+
+    Raises:
+        BadInputError: missing, damaged, or hardly anything but brackets, which take far more
+            memory than they take room in a file.
+    """
+    with reading(path, expected):
+        text = path.read_text("utf-8")
+        containers = text.count("[") + text.count("{")
+        if _CONTAINER_BYTES * containers > _FREE_BYTES + _RATIO * len(text):
+            raise BadInputError(
+                f"{path}: expected {expected}, found {containers} brackets in {len(text)} letters; "
+                "write or copy it again."
+            )
+        return json.loads(text)
+
+
+def lines_of(file: IO[AnyStr], path: Path, longest: int = _LONGEST) -> Iterator[AnyStr]:
+    """The lines that hold something, with their ends.
+
+    Raises:
+        BadInputError: a line is longer than `longest`.
+    """
+    while line := file.readline(longest + 1):
+        if len(line) > longest:
+            raise BadInputError(
+                f"{path}: a line of more than {longest} characters is no point; write x y z a line."
+            )
+        if not line.isspace():
+            yield line

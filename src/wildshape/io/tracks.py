@@ -18,7 +18,6 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import reading
 from wildshape.io.poses import read_poses, write_poses
-from wildshape.io.scans.ply_writer import ply_bytes, write_ply
 from wildshape.io.scans.points import (
     METRES,
     SENSOR_METRES,
@@ -27,6 +26,7 @@ from wildshape.io.scans.points import (
     read_points,
     read_scan,
 )
+from wildshape.io.scans.writers import ply_bytes, write_ply
 from wildshape.records import Intrinsics, Sensor, Track
 
 __all__ = [

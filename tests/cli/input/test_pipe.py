@@ -14,8 +14,8 @@ import pytest
 import trimesh
 
 from wildshape.cli.main import main
-from wildshape.io.scans.ply_writer import ply_bytes
 from wildshape.io.scans.points import read_points
+from wildshape.io.scans.writers import ply_bytes
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@
 import numpy as np
 import pytest
 
-from wildshape.io.scans.cloud_writer import CLOUD_SUFFIXES, save
 from wildshape.io.scans.points import suffix_of
+from wildshape.io.scans.writers import CLOUD_SUFFIXES, save
 
 POINTS = np.random.default_rng(0).normal(size=(50, 3)).astype(np.float32)
 PCD = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\n"

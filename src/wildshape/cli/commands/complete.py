@@ -25,7 +25,7 @@ from wildshape.cli.options import (
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
-    from wildshape.io.scans.mesh_writer import MeshOrder
+    from wildshape.io.scans.writers import MeshOrder
 
 EXAMPLES = (
     "wildshape complete scan.ply --out completed",
@@ -153,7 +153,7 @@ def _to_stdout(settings: Settings) -> None:
 
 
 def _mesh(settings: Settings) -> "MeshOrder | None":
-    from wildshape.io.scans.mesh_writer import MeshOrder
+    from wildshape.io.scans.writers import MeshOrder
 
     coloured = settings.mesh_colours == "confidence"
     if coloured and not settings.mesh:

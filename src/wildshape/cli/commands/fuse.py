@@ -58,8 +58,8 @@ def run(settings: Settings) -> None:
     from wildshape.cli.terminal import answer, counted, say, say_skipped
     from wildshape.geometry.transforms.se3 import stack
     from wildshape.inference.registration import fuse_scans, to_middle
-    from wildshape.io.scans.cloud_writer import check_suffix, write_cloud
     from wildshape.io.scans.points import Coordinates
+    from wildshape.io.scans.writers import check_suffix, write_cloud
 
     check_suffix(settings.out)
     refuse_file(settings.out, overwrite=settings.overwrite)

@@ -221,7 +221,7 @@ def open_data(settings: Settings) -> "Store":
 def _check_folder(settings: Settings) -> "Output | None":
     """The marker of a new run; processes that do not lead leave the folder alone."""
     from wildshape.cli.output import MARKER, begin, is_begun, keep_apart, remove_leftovers
-    from wildshape.io.single_writer import lock_folder
+    from wildshape.io.atomic import lock_folder
 
     if int(os.environ.get("RANK", "0")) > 0:
         return None

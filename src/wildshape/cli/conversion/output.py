@@ -15,9 +15,8 @@ from wildshape.cli.results.write import file_name
 from wildshape.cli.terminal import say
 from wildshape.datasets.tracks.conversion import STORE, TRACKS, PartResult
 from wildshape.errors import BadInputError
-from wildshape.io.atomic import write_json
+from wildshape.io.atomic import lock_folder, write_json
 from wildshape.io.provenance import provenance
-from wildshape.io.single_writer import lock_folder
 from wildshape.io.store.join import finish_join, is_joining, join_stores
 from wildshape.io.store.layout import FORMAT, JOINING_JSON, PARTS, VERSION, WRITING_JSON
 from wildshape.io.store.writer import check_room

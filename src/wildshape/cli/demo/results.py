@@ -19,7 +19,7 @@ from wildshape.evaluation.results import Results, as_json, figures_of
 from wildshape.inference.evaluated import Learned
 from wildshape.inference.predictor import Predictor
 from wildshape.inference.registration import fuse_scans
-from wildshape.io.scans.cloud_writer import write_cloud
+from wildshape.io.scans.writers import write_cloud
 from wildshape.records import Completion, Track
 from wildshape.report.content import Cloud, Report, ReportObject
 from wildshape.report.page import write_report

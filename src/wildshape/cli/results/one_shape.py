@@ -13,9 +13,8 @@ from wildshape.cli.results.tally import doubt
 from wildshape.cli.results.write import describe
 from wildshape.cli.terminal import answer, say
 from wildshape.errors import BadInputError
-from wildshape.io.scans.mesh_writer import MeshOrder, mesh_bytes
-from wildshape.io.scans.ply_writer import ply_bytes
 from wildshape.io.scans.points import Coordinates
+from wildshape.io.scans.writers import MeshOrder, mesh_bytes, ply_bytes
 from wildshape.records import Completion, Points, Track
 
 

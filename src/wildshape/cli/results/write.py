@@ -25,10 +25,10 @@ from wildshape.inference.predictor import Predictor
 from wildshape.inference.registration import to_middle
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import reading as reading_file
-from wildshape.io.scans.mesh_writer import MESH_FORMATS, MeshOrder, write_mesh
+from wildshape.io.poses import times_of, write_trajectory, write_tum
 from wildshape.io.scans.points import Coordinates, write_ply
+from wildshape.io.scans.writers import MESH_FORMATS, MeshOrder, write_mesh
 from wildshape.io.tracks import write_poses
-from wildshape.io.trajectories import times_of, write_trajectory, write_tum
 from wildshape.records import Completion, Track
 
 OBJECTS, POSES, COMPLETED, MIDDLE = "objects.json", "poses.txt", "completed", "T_middle_scan.txt"

@@ -23,8 +23,7 @@ from wildshape.datasets.tracks.measurements import check_boxes
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
 from wildshape.geometry.transforms.se3 import SE3, between
-from wildshape.io.guard import reading
-from wildshape.io.json_text import read_json
+from wildshape.io.guard import read_json, reading
 from wildshape.records import Points
 
 CUBOIDS, SWEEPS = "annotations/cuboids", "lidar"

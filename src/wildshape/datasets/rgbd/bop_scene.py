@@ -15,8 +15,7 @@ from jaxtyping import Float
 from wildshape.datasets.rgbd.depth_image import read_png
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.guard import reading
-from wildshape.io.json_text import read_json
+from wildshape.io.guard import read_json, reading
 from wildshape.records import Intrinsics, Points
 
 _MM = 1e-3

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Shaped
 from wildshape.datasets.rgbd.depth_image import read_png
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.json_text import read_json
+from wildshape.io.guard import read_json
 from wildshape.io.poses import read_poses
 from wildshape.io.tracks import folder_name
 from wildshape.records import Intrinsics, Points

@@ -2,15 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """LAS and LAZ through laspy and lazrs, behind checks: both allocate what a file promises."""
 
+import os
+import re
 import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryFile
+from threading import Lock
 
 import numpy as np
 from jaxtyping import Float
 
 from wildshape.errors import BadInputError
 from wildshape.io.guard import check_promise, check_unpacked
-from wildshape.io.scans.panics import without_traces
 
 _PIECE_BYTES = 16_000_000
 _MOST_RECORDS = 10_000
@@ -21,6 +26,11 @@ _LAZ_ITEM = struct.Struct("<HHH")
 _LAZ_LAYERED, _ANY_SIZE = 3, (1 << 32) - 1
 _LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}  # layers of the items POINT14, RGB14, RGBNIR14, WAVEPACKET14
 _BYTE14 = 14  # an item with a layer for each of its bytes
+_STDERR = 2
+_TRACE = re.compile(
+    rb"^\n?thread '[^\n]*panicked at .*?(?:RUST_BACKTRACE[^\n]*\n|\Z)", re.DOTALL | re.MULTILINE
+)
+_alone = Lock()
 
 
 def read_las(path: Path) -> Float[np.ndarray, "n 3"]:
@@ -135,3 +145,27 @@ def _count_layered(
         size = points if chunk_size == _ANY_SIZE else min(chunk_size, count - found)
         found += points if at <= len(body) and points == size else 0
     return found
+
+
+@contextmanager
+def without_traces() -> Iterator[None]:
+    """Leave out the traces of panics inside; all else that any thread writes to stderr follows.
+
+    Rust writes to the file descriptor, so that is what is turned aside, by one thread at a time.
+    """
+    with _alone, TemporaryFile() as aside:
+        try:
+            kept = os.dup(_STDERR)
+        except OSError:  # there is no stderr
+            yield
+            return
+        os.dup2(aside.fileno(), _STDERR)
+        try:
+            yield
+        finally:
+            os.dup2(kept, _STDERR)
+            os.close(kept)
+            aside.seek(0)
+            rest = _TRACE.sub(b"", aside.read())
+            if rest:
+                os.write(_STDERR, rest)

@@ -17,8 +17,7 @@ import numpy as np
 from jaxtyping import Float
 
 from wildshape.errors import BadInputError
-from wildshape.io.guard import check_promise
-from wildshape.io.scans.lines import lines_of
+from wildshape.io.guard import check_promise, lines_of
 
 _SIZES = {"F": (4, 8), "I": (1, 2, 4, 8), "U": (1, 2, 4, 8)}
 _ENCODINGS = ("ascii", "binary", "binary_compressed")

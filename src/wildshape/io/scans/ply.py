@@ -18,8 +18,7 @@ import numpy as np
 from jaxtyping import Float
 
 from wildshape.errors import BadInputError
-from wildshape.io.guard import check_promise
-from wildshape.io.scans.lines import lines_of
+from wildshape.io.guard import check_promise, lines_of
 
 _NAMES = {  # numpy's name: the PLY names
     "i1": ("char", "int8"),

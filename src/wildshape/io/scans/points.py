@@ -17,8 +17,8 @@ from wildshape.io.scans.coordinates import METRES, SENSOR_METRES, Coordinates, U
 from wildshape.io.scans.las import read_las
 from wildshape.io.scans.pcd import read_pcd
 from wildshape.io.scans.ply import read_ply
-from wildshape.io.scans.ply_writer import write_ply
 from wildshape.io.scans.text import header_unit, read_text
+from wildshape.io.scans.writers import write_ply
 
 __all__ = [
     "METRES",

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float
 
 from wildshape.errors import BadInputError
+from wildshape.io.guard import lines_of
 from wildshape.io.scans.coordinates import Unit
-from wildshape.io.scans.lines import lines_of
 from wildshape.io.scans.text_header import Columns, columns_of, split
 
 _LONGEST = 65_536  # characters of a line

@@ -9,8 +9,8 @@ import pytest
 import torch
 
 from wildshape.errors import BadInputError
-from wildshape.io.scans.cloud_writer import CLOUD_SUFFIXES, save
 from wildshape.io.scans.points import read_points
+from wildshape.io.scans.writers import CLOUD_SUFFIXES, save
 
 OFFSET = np.array((83.1, -61.9, -2.2))
 POINTS = (np.random.default_rng(0).normal(size=(50, 3)) + OFFSET).astype(np.float32)

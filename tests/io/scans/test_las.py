@@ -7,7 +7,7 @@ import pytest
 
 from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
-from wildshape.io.scans.panics import without_traces
+from wildshape.io.scans.las import without_traces
 
 _TRACE = (
     b"\nthread '<unnamed>' (77) panicked at src/decoders.rs:91:17:\nmid > len\n"

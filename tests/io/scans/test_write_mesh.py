@@ -5,7 +5,7 @@
 import pytest
 import trimesh
 
-from wildshape.io.scans.mesh_writer import MESH_FORMATS, write_mesh
+from wildshape.io.scans.writers import MESH_FORMATS, write_mesh
 
 
 @pytest.mark.parametrize("kind", MESH_FORMATS)

@@ -10,12 +10,12 @@ from contextlib import contextmanager
 import pytest
 
 from wildshape.errors import BadInputError
-from wildshape.io.single_writer import lock_folder, release_folders
+from wildshape.io.atomic import lock_folder, release_folders
 
 pytest.importorskip("fcntl", reason="this system has no locks of folders")
 HOLDER = (
     "import sys, time; from pathlib import Path;"
-    " from wildshape.io.single_writer import lock_folder;"
+    " from wildshape.io.atomic import lock_folder;"
     " lock_folder(Path(sys.argv[1])); print('locked', flush=True); time.sleep(600)"
 )
 

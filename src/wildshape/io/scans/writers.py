@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Writing points and triangle meshes, in the format that a file's suffix names."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO, Literal, cast, get_args
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from wildshape.errors import BadInputError
+from wildshape.geometry.other_libraries import las_cloud
+from wildshape.io.atomic import atomic_write
+
+if TYPE_CHECKING:
+    import trimesh
+
+MeshFormat = Literal["ply", "obj", "glb"]
+MESH_FORMATS: tuple[MeshFormat, ...] = get_args(MeshFormat)
+_COLOURS = ("red", "green", "blue")
+
+
+def ply_bytes(
+    points: Float[np.ndarray, "n 3"], colors: UInt8[np.ndarray, "n 3"] | None = None
+) -> bytes:
+    """A binary little-endian PLY file: float32 x y z (and uchar red green blue)."""
+    columns = dict(zip("xyz", np.asarray(points, "<f4").T))
+    if colors is not None:
+        columns |= dict(zip(_COLOURS, np.asarray(colors, "u1").T))
+    rows = np.empty(len(points), [(name, column.dtype) for name, column in columns.items()])
+    lines = []
+    for name, column in columns.items():
+        rows[name] = column
+        lines.append(f"property {'uchar' if name in _COLOURS else 'float'} {name}")
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}", *lines]
+    return ("\n".join([*header, "end_header"]) + "\n").encode() + rows.tobytes()
+
+
+def write_ply(
+    path: Path | str,
+    points: Float[np.ndarray, "n 3"],
+    colors: UInt8[np.ndarray, "n 3"] | None = None,
+) -> None:
+    """Write points as binary little-endian PLY, float32 x y z, atomically.
+
+    Args:
+        path: the file; its folder is made if needed.
+        points: `(n, 3)`, metres.
+        colors: `(n, 3)` 0 to 255, kept as uchar red green blue.
+    """
+    with atomic_write(path) as file:
+        file.write(ply_bytes(points, colors))
+
+
+def _ply(file: BinaryIO, points: Float[np.ndarray, "n 3"]) -> None:
+    file.write(ply_bytes(points))
+
+
+def _pcd(file: BinaryIO, points: Float[np.ndarray, "n 3"]) -> None:
+    """Binary, float32 x y z."""
+    from pypcd4.pypcd4 import Encoding, PointCloud
+
+    rows = np.ascontiguousarray(points, np.float32)
+    PointCloud.from_xyz_points(rows).save(file, Encoding.BINARY)
+
+
+def _text(file: BinaryIO, points: Float[np.ndarray, "n 3"]) -> None:
+    np.savetxt(file, points, fmt="%.6f")
+
+
+def _las(file: BinaryIO, points: Float[np.ndarray, "n 3"], *, packed: bool) -> None:
+    las_cloud(points).write(file, do_compress=packed)
+
+
+_WRITERS: dict[str, Callable[[BinaryIO, Float[np.ndarray, "n 3"]], None]] = {
+    ".ply": _ply,
+    ".pcd": _pcd,
+    ".npy": np.save,
+    ".xyz": _text,
+    ".txt": _text,
+    ".las": partial(_las, packed=False),
+    ".laz": partial(_las, packed=True),
+}
+CLOUD_SUFFIXES = tuple(_WRITERS)
+"""The suffixes of files that points are written to, in lower case."""
+
+
+def check_suffix(path: Path) -> None:
+    """Refuse a name that tells no format.
+
+    Raises:
+        BadInputError: its suffix is none of `CLOUD_SUFFIXES`.
+    """
+    if path.suffix.lower() not in CLOUD_SUFFIXES:
+        raise BadInputError(
+            f"{path}: a cloud is written as one of {' '.join(CLOUD_SUFFIXES)}; give it such a"
+            " suffix."
+        )
+
+
+def write_cloud(path: Path, points: Float[np.ndarray, "n 3"]) -> None:
+    """Write points atomically.
+
+    Args:
+        path: .ply .pcd .npy .xyz .txt .las .laz
+        points: metres.
+
+    Raises:
+        BadInputError: another suffix.
+    """
+    check_suffix(path)
+    with atomic_write(path) as file:
+        _WRITERS[path.suffix.lower()](cast("BinaryIO", file), points)
+
+
+def save(shape: object, path: str | Path) -> None:
+    """Write the points of a completion, or an array `(n, 3)`, to a file.
+
+    Args:
+        shape: whatever `np.asarray` makes `(n, 3)` of; a `Completion` is its points.
+        path: .ply .pcd .npy .xyz .txt .las .laz; a file of that name is replaced.
+
+    Raises:
+        BadInputError: another suffix, or no array `(n, 3)`.
+    """
+    try:
+        points = np.asarray(shape, np.float32)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise BadInputError(f"{path}: cannot save what is no array of numbers: {error}") from error
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise BadInputError(f"{path}: cannot save an array of shape {points.shape}; pass (n, 3).")
+    write_cloud(Path(path), points)
+
+
+@dataclass(frozen=True)
+class MeshOrder:
+    """How meshes are wanted.
+
+    Attributes:
+        kind: of the files.
+        coloured: by confidence (`geometry/meshing.py`).
+    """
+
+    kind: MeshFormat = "ply"
+    coloured: bool = False
+
+
+def mesh_bytes(mesh: "trimesh.Trimesh", kind: MeshFormat) -> bytes:
+    """A mesh as a file's content; colours go with it, PLY and GLB hold attributes, too."""
+    made = mesh.export(file_type=kind)
+    return made.encode() if isinstance(made, str) else bytes(made)
+
+
+def write_mesh(path: Path, mesh: "trimesh.Trimesh") -> None:
+    """Write a mesh atomically, in the format that the suffix names."""
+    with atomic_write(path) as file:
+        mesh.export(file, file_type=path.suffix[1:])
