@@ -41,7 +41,26 @@ def cloud() -> np.ndarray:
 @pytest.fixture(scope="session")
 def formats(tmp_path_factory: pytest.TempPathFactory, cloud: np.ndarray) -> dict[str, Path]:
     """The cloud in every format that can be read."""
-    folder = tmp_path_factory.mktemp("formats")
+    return _write_all(tmp_path_factory.mktemp("formats"), cloud)
+
+
+@pytest.fixture(scope="session")
+def full_scan() -> np.ndarray:
+    """`(120000, 3)` float32: a turn of 64 beams, 3 to 118 m away."""
+    rng = np.random.default_rng(8)
+    azimuth = rng.uniform(-np.pi, np.pi, 120_000)
+    reach, z = rng.uniform(3, 118, azimuth.shape), rng.uniform(-2, 6, azimuth.shape)
+    scan = np.stack((reach * np.cos(azimuth), reach * np.sin(azimuth), z), axis=1)
+    return scan.astype(np.float32)
+
+
+@pytest.fixture(scope="session")
+def full_formats(tmp_path_factory: pytest.TempPathFactory, full_scan) -> dict[str, Path]:
+    """The full scan in every format that can be read."""
+    return _write_all(tmp_path_factory.mktemp("full"), full_scan)
+
+
+def _write_all(folder: Path, cloud: np.ndarray) -> dict[str, Path]:
     write_ply(folder / "plain.ply", cloud, np.zeros(cloud.shape, np.uint8))
     for order, sign in (("binary_little_endian", "<"), ("binary_big_endian", ">")):
         (folder / f"{order}.ply").write_bytes(_ply_with_lists(order, sign, cloud))
@@ -58,11 +77,11 @@ def formats(tmp_path_factory: pytest.TempPathFactory, cloud: np.ndarray) -> dict
 
 
 def _ply_with_lists(order: str, sign: str, cloud: np.ndarray) -> bytes:
-    body = struct.pack(sign + "BiBii", 1, 5, 2, 6, 7)
+    body = [_LISTS.format(order, len(cloud)).encode(), struct.pack(sign + "BiBii", 1, 5, 2, 6, 7)]
     for i, point in enumerate(cloud):
         tags = [1] * (i % 3)
-        body += struct.pack(f"{sign}BB{len(tags)}h3df", 9, len(tags), *tags, *point, 0.5)
-    return _LISTS.format(order, len(cloud)).encode() + body + struct.pack(sign + "B3i", 3, 0, 1, 2)
+        body.append(struct.pack(f"{sign}BB{len(tags)}h3df", 9, len(tags), *tags, *point, 0.5))
+    return b"".join((*body, struct.pack(sign + "B3i", 3, 0, 1, 2)))
 
 
 def _ascii_ply_with_lists(cloud: np.ndarray) -> str:

@@ -48,6 +48,26 @@ def test_every_format_gives_the_same_points(
     np.testing.assert_allclose(scan.points, cloud, rtol=0, atol=tolerance)
 
 
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_full_turn_of_a_sensor_is_read_as_points_and_refused_as_an_object(
+    name: str, full_formats: dict[str, Path], full_scan: np.ndarray
+) -> None:
+    points = read_points(full_formats[name])
+    np.testing.assert_allclose(points, full_scan, rtol=0, atol=1e-4 if "format" in name else 1e-5)
+    with pytest.raises(BadInputError, match="a whole scene"):
+        read_scan(full_formats[name])
+
+
+def test_a_full_scan_of_a_map_is_brought_to_its_sensor(tmp_path: Path, full_scan) -> None:
+    np.save(tmp_path / "mm.npy", 1000 * (full_scan.astype(np.float64) + (4e5, 5e6, 30)))
+    place = Coordinates("mm", (4e8, 5e9, 3e4))
+    np.testing.assert_allclose(
+        read_points(tmp_path / "mm.npy", place), full_scan, rtol=0, atol=1e-5
+    )
+    with pytest.raises(BadInputError, match="--origin"):
+        read_points(tmp_path / "mm.npy", Coordinates("mm"))
+
+
 def test_every_suffix_is_covered() -> None:
     assert {Path(name).suffix for name in FORMATS} | {".txt"} == set(SUFFIXES)
 
