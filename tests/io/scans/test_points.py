@@ -59,7 +59,7 @@ def test_a_full_turn_of_a_sensor_is_read_as_points_and_refused_as_an_object(
 
 
 def test_a_full_scan_of_a_map_is_brought_to_its_sensor(tmp_path: Path, full_scan) -> None:
-    np.save(tmp_path / "mm.npy", 1000 * (full_scan.astype(np.float64) + (4e5, 5e6, 30)))
+    np.save(tmp_path / "mm.npy", 1000 * (full_scan + np.array((4e5, 5e6, 30.0))))
     place = Coordinates("mm", (4e8, 5e9, 3e4))
     np.testing.assert_allclose(
         read_points(tmp_path / "mm.npy", place), full_scan, rtol=0, atol=1e-5
