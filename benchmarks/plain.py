@@ -17,8 +17,7 @@ from wildshape.geometry.transforms.rotation import rotation_from_6d
 from wildshape.method.multiview import LossConfig
 from wildshape.method.network import NetworkConfig, ShapePoseNet
 from wildshape.training.batches.views import Batch
-from wildshape.training.heading_continuity import turning_handicap
-from wildshape.training.template import template_deviation
+from wildshape.training.objectives import template_deviation, turning_handicap
 
 _SMALLEST = 1e-12
 _MODES = {False: "use_mm_for_euclid_dist_if_necessary", True: "donot_use_mm_for_euclid_dist"}

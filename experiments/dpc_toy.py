@@ -123,7 +123,7 @@ def train(run: DpcRun, trained: Track, tested: Track) -> dict[str, Any]:
 
     def report(step: int, values: dict[str, Any]) -> None:
         if step % EVERY == 0:
-            shown = {key: values[key] for key in ("observation", "projection", "template")}
+            shown = {key: values[key] for key in ("silhouette", "depth", "student")}
             shown |= right_share(method, known, tested)
             rounded = {k: round(v, 3) for k, v in shown.items()}
             print(step, values["branch_shares"], rounded, flush=True)

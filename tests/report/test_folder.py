@@ -233,3 +233,10 @@ def test_a_damaged_record_of_a_command_is_named(tmp_path: Path, made: object) ->
     (tmp_path / "wildshape.json").write_text(json.dumps({"provenance": made}), encoding="utf-8")
     with pytest.raises(BadInputError, match=r"wildshape\.json: expected what a command says"):
         report_from_folder(tmp_path)
+
+
+def test_the_curve_of_the_loss_shows_the_terms_of_any_objective(tmp_path: Path) -> None:
+    line = {"step": 1, "loss": 3.0, "silhouette": 1.0, "student": 2.0, "steps_per_second": 9.0}
+    (tmp_path / "log.jsonl").write_text(json.dumps(line) + "\n", encoding="utf-8")
+    (curve,) = report_from_folder(tmp_path).curves
+    assert [name for name, _, _ in curve.series] == ["loss", "silhouette", "student"]

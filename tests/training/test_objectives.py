@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a track is held to before and after headings are agreed."""
+"""What a track is held to before and after headings are agreed; the pull to a template."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
+from tests.strategies import clouds, rotation_about
 from tests.training.worker import SMALLEST
 
 from wildshape.geometry.transforms.rotation import random_rotation
@@ -15,8 +17,13 @@ from wildshape.method.network import Poses, ShapePoseNet
 from wildshape.training import objectives
 from wildshape.training.batches.fused import FusedBatch
 from wildshape.training.batches.views import ViewSampler
-from wildshape.training.heading_continuity import turning_handicap
-from wildshape.training.objectives import WeaklySupervised, own_anchor
+from wildshape.training.objectives import (
+    WeaklySupervised,
+    own_anchor,
+    template_deviation,
+    turning_handicap,
+)
+from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.self_training.objective import SelfTaught
 
 VIEWS = replace(SMALLEST.views, tracks=4, views=3)
@@ -107,3 +114,72 @@ def test_what_is_taught_does_not_depend_on_the_size_of_the_objects():
         batch = FusedBatch(unit * scans, rotation, *places, view_top=ends)
         losses.append(SelfTaught(network, SMALLEST.loss, False, unit=unit)(batch, 0.0).loss)
     torch.testing.assert_close(losses[0], losses[1], atol=1e-3, rtol=1e-3)
+
+
+def branches(degrees):
+    """One scan's branches, each turned about z against the reference by these angles."""
+    return torch.stack([rotation_about((0.0, 0.0, 1.0), math.radians(d)) for d in degrees])
+
+
+def test_branches_that_turn_the_object_around_cannot_win():
+    rotation = branches([0, 80, 100, 180, -80, -100])[None]
+    eye = torch.eye(3, dtype=torch.float64)[None]
+    handicap = turning_handicap(rotation, eye, eye)[0].tolist()
+    assert [h > 50 for h in handicap] == [False, False, True, True, False, True]
+    assert [h for h in handicap if h <= 50] == [0, 0, 0]
+    assert handicap[3] == pytest.approx(max(handicap))
+
+
+def test_the_turn_of_training_is_taken_off():
+    """Scans turned at random hold the same handicaps: poses are compared as recorded."""
+    anchor = random_rotation(6, torch.Generator().manual_seed(0)).double()
+    turn = random_rotation(6, torch.Generator().manual_seed(1)).double()
+    relative = branches([0, 60, 120, 180])
+    recorded = anchor[:, None] @ relative
+    still = turning_handicap(recorded, torch.eye(3).double().repeat(6, 1, 1), anchor)
+    turned = turning_handicap(turn[:, None] @ recorded, turn, anchor)
+    torch.testing.assert_close(turned, still)
+    assert (still == 0).tolist() == [[True, True, False, False]] * 6
+
+
+def test_the_template_by_hand():
+    """Two shapes of two points: the first pair 6 m apart (3 m off its mean), the second equal."""
+    first = torch.tensor([[[1.0, 0.0, 0.0], [5.0, 5.0, 5.0]]])
+    second = torch.tensor([[[1.0, 0.0, 6.0], [5.0, 5.0, 5.0]]])
+    found = template_deviation(torch.cat((first, second)))
+    assert float(found) == pytest.approx((3 + 0 + 3 + 0) / 4, abs=1e-6)
+
+
+def test_equal_shapes_cost_nothing_and_have_a_finite_gradient():
+    shapes = clouds(0, 1, 20, 3).float().repeat(4, 1, 1).requires_grad_()
+    loss = template_deviation(shapes)
+    loss.backward()
+    assert float(loss.detach()) < 2e-6
+    assert shapes.grad is not None
+    assert shapes.grad.isfinite().all()
+
+
+def test_a_turned_shape_pays():
+    shape = clouds(1, 50, 3)
+    turned = shape @ rotation_about((0.0, 0.0, 1.0), 3.1).T
+    straight = torch.stack((shape, shape + 0.01))
+    assert float(template_deviation(torch.stack((shape, turned)))) > 20 * float(
+        template_deviation(straight)
+    )
+
+
+def test_gradcheck_of_the_template():
+    shapes = clouds(2, 3, 4, 3).requires_grad_()
+    assert torch.autograd.gradcheck(template_deviation, (shapes,))
+
+
+def test_what_is_logged_is_called_what_it_is(batch):
+    network = ShapePoseNet(SMALLEST.network)
+    weak = WeaklySupervised(network, SMALLEST.loss)(batch, 0.5)
+    assert list(weak.terms) == ["observation", "projection", "template"]
+    meter = Meter(SMALLEST.network.branches, 0, torch.device("cpu"))
+    meter.write(torch.tensor(0), weak)
+    read = meter.read(1)
+    assert {name: read[name] for name in weak.terms} == pytest.approx(
+        {name: float(value) for name, value in weak.terms.items()}
+    )

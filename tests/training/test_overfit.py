@@ -23,7 +23,7 @@ def mean_terms(run, network):
     objective = WeaklySupervised(network, RECIPE.loss)
     with torch.no_grad():
         rows = [objective(run.sampler.draw(99, step), 0.0) for step in range(8)]
-    return np.mean([(float(r.loss), float(r.observation)) for r in rows], axis=0)
+    return np.mean([(float(r.loss), float(r.terms["observation"])) for r in rows], axis=0)
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from tests.training.worker import SMALLEST
 
 from wildshape.training.batches.resident import ResidentViews
 from wildshape.training.config import learning_rate, template_weight
-from wildshape.training.objectives import WeaklySupervised
+from wildshape.training.objectives import Objective, WeaklySupervised
 from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.step import average_one_by_one, average_together
 
@@ -131,7 +131,10 @@ def test_what_the_meter_reads_are_the_means_of_the_steps(car_store):
 
 def test_the_meters_ring_goes_round():
     meter = Meter(2, 0, CPU)
-    meter.ring[:, 0] = torch.arange(Meter.ROWS).float()
+    winner = torch.zeros(1, dtype=torch.int64)
+    for step in range(Meter.ROWS):
+        loss = torch.tensor(float(step))
+        meter.write(torch.tensor(step), Objective(loss, {"term": -loss}, winner))
     assert meter.losses(Meter.ROWS - 1, Meter.ROWS + 2).tolist() == [255.0, 0.0, 1.0]
 
 

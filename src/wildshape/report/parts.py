@@ -37,6 +37,7 @@ _COLUMNS = (
 )
 _TRAINED_RIVALS = ("dpc", "oracle")  # and what their names begin, such as dpc-lidar
 _VALIDATION = "validation/"
+_NO_TERMS = ("step", "branch_shares", "steps_per_second")
 
 
 def track_object(
@@ -109,7 +110,7 @@ def is_ours(method: str) -> bool:
 def training_curves(log: Path) -> tuple[Curve, ...]:
     """The curves of a run's `log.jsonl`; a line cut off by a kill is left out."""
     entries = list(_entries(log))
-    loss = _series(entries, ("loss", "observation", "projection", "template"))
+    loss = _series(entries, _terms(entries))
     held_out = _series(entries, tuple(f"{_VALIDATION}{k}" for k in ("observation", "projection")))
     cycle = _series(entries, (f"{_VALIDATION}cycle_deg",))
     curves = (
@@ -170,6 +171,12 @@ def _entries(log: Path) -> Iterable[dict[str, Any]]:
             continue
         if isinstance(entry, dict) and _is_number(entry.get("step")):
             yield entry
+
+
+def _terms(entries: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    """The loss and its terms, whatever their objective calls them, in the order of the log."""
+    names = dict.fromkeys(name for entry in entries for name in entry)
+    return tuple(n for n in names if n not in _NO_TERMS and not n.startswith(_VALIDATION))
 
 
 def _series(

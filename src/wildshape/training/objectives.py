@@ -6,25 +6,29 @@ from functools import partial
 from typing import NamedTuple
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor, nn
 from torch.profiler import record_function
 
 from wildshape.method.multiview import LossConfig, multiview_loss
 from wildshape.method.network import Encoding, Poses, ShapePoseNet
 from wildshape.training.batches.views import Batch
-from wildshape.training.heading_continuity import turning_handicap
-from wildshape.training.template import template_deviation
+
+PROHIBITIVE_M = 100.0
 
 
 class Objective(NamedTuple):
-    """A loss with a graph and what is worth logging, all on the device."""
+    """What a step minimises and what it logs, all on the device.
 
-    loss: Tensor
-    observation: Tensor
-    projection: Tensor
-    template: Tensor
-    winner: Tensor
+    Attributes:
+        loss: with a graph.
+        terms: of the loss by the names under which they are logged, without a graph, unweighted.
+        winner: the branch that won, of each scan.
+    """
+
+    loss: Float[Tensor, ""]
+    terms: dict[str, Tensor]
+    winner: Int[Tensor, "B"]
 
 
 class WeaklySupervised(nn.Module):
@@ -60,9 +64,12 @@ class WeaklySupervised(nn.Module):
         if self.config.belief > 0:
             belief = poses.log_belief.gather(1, terms.winner[:, None]).mean()
             loss = loss - self.config.belief * belief
-        return Objective(
-            loss, terms.observation, terms.projection, deviation.detach(), terms.winner
-        )
+        logged = {
+            "observation": terms.observation,
+            "projection": terms.projection,
+            "template": deviation.detach(),
+        }
+        return Objective(loss, logged, terms.winner)
 
     def _handicap(
         self, batch: Batch, poses: Poses, cost: Float[Tensor, "B K"]
@@ -90,3 +97,39 @@ def own_anchor(
     branch = cost[at].argmin(-1)
     anchor = batch.turn[at].mT @ rotation[at, branch]
     return anchor.repeat_interleave(len(batch.scans) // len(at), dim=0)
+
+
+@torch.no_grad()
+def turning_handicap(
+    rotation: Float[Tensor, "B K 3 3"],
+    turn: Float[Tensor, "B 3 3"],
+    anchor: Float[Tensor, "B 3 3"],
+) -> Float[Tensor, "B K"]:
+    """Metres of handicap: none up to 90 degrees from the anchor, prohibitive beyond.
+
+    Beyond the paper. Hindsight lets every scan pick whichever of two headings, a half turn apart,
+    fits a near-symmetric shape a little better, so nothing ever makes the scans of a track agree:
+    the paper's lottery (METHOD 12). Neighbouring scans, as recorded, do agree: their relative
+    rotation is far below 90 degrees. Branches that would turn the object around cannot win.
+
+    Args:
+        rotation: `R_sensor_canonical` of every branch of the turned scans.
+        turn: rotation by which each scan was turned for training (`x_turned = turn x_recorded`).
+        anchor: `R_sensor_canonical` that each scan, as recorded, is held to.
+    """
+    recorded = turn.mT[:, None] @ rotation
+    relative = anchor[:, None].mT @ recorded
+    cosine = (relative.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2
+    return torch.where(cosine > 0, 0.0, PROHIBITIVE_M * (1 - cosine))
+
+
+def template_deviation(shapes: Float[Tensor, "I P 3"]) -> Float[Tensor, ""]:
+    """Mean distance, metres, of canonical points from the batch's mean of the same points.
+
+    Beyond the paper. Without a shared template each object may settle in either of two headings a
+    half turn apart (METHOD 12.2): a decoder free to draw every object alone has no reason to prefer
+    one. A shape that must stay near the mean of all shapes pays for being turned. The decoder's
+    j-th outputs correspond across shapes, so no search is needed.
+    """
+    deviation = shapes - shapes.mean(0, keepdim=True)
+    return deviation.square().sum(-1).clamp_min(1e-12).sqrt().mean()

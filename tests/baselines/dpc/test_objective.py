@@ -107,7 +107,7 @@ def test_a_half_turn_that_wins_teaches_a_candidate_too(plane_store, monkeypatch)
 def test_training_lowers_the_loss_and_can_be_resumed(plane_store, tmp_path):
     seen = []
     whole = setup_dpc(tiny("dpc-small", 27), plane_store, tmp_path / "whole")
-    assert fit_dpc(whole, lambda _, values: seen.append(values["observation"]))
+    assert fit_dpc(whole, lambda _, values: seen.append(values["silhouette"]))
     assert seen[-1] < seen[0]
     part = setup_dpc(tiny("dpc-small", 27), plane_store, tmp_path / "part")
     assert not fit_dpc(part, stopped=lambda: part.state.step == 9)

@@ -172,7 +172,12 @@ class DpcObjective(nn.Module):
         lesson = student_loss(poses.student, teacher)
         taught = lesson + student_loss(nearest(poses.candidates, teacher), teacher)
         loss = found.loss + self.config.student * taught
-        return Objective(loss, found.silhouette, found.depth, lesson.detach(), winner)
+        terms = {
+            "silhouette": found.silhouette,
+            "depth": found.depth,
+            "student": lesson.detach(),
+        }
+        return Objective(loss, terms, winner)
 
     def _and_half_turned(self, pose: Float[Tensor, "B 4"]) -> Float[Tensor, "B 2 4"]:
         """Each pose, and beside it the one that is opposed to it."""

@@ -119,8 +119,8 @@ def _train(run: "DpcRun") -> None:
 def _line(values: dict[str, Any]) -> str:
     shares = "/".join(f"{100 * share:.0f}" for share in values["branch_shares"])
     return (
-        f"silhouette {values['observation']:.1f}, depth {values['projection']:.1f}, student"
-        f" {values['template']:.3f}, candidates {shares} %,"
+        f"silhouette {values['silhouette']:.1f}, depth {values['depth']:.1f}, student"
+        f" {values['student']:.3f}, candidates {shares} %,"
         f" {values['steps_per_second']:.1f} steps/s"
     )
 

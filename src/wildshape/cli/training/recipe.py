@@ -81,8 +81,9 @@ def fit_with_progress(
 
 def _line(values: dict[str, Any]) -> str:
     shares = "/".join(f"{100 * share:.0f}" for share in values["branch_shares"])
+    others = ("loss", "branch_shares", "steps_per_second")
+    terms = ", ".join(f"{k} {value:.4f}" for k, value in values.items() if k not in others)
     return (
-        f"loss {values['loss']:.4f} (observation {values['observation']:.4f},"
-        f" projection {values['projection']:.4f}), branches {shares} %,"
+        f"loss {values['loss']:.4f} ({terms}), branches {shares} %,"
         f" {values['steps_per_second']:.1f} steps/s"
     )

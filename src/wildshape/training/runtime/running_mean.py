@@ -13,11 +13,11 @@ from torch import Tensor
 from wildshape.errors import BadInputError
 from wildshape.training.objectives import Objective
 
-_TERMS = ("loss", "observation", "projection", "template")
-
 
 class Meter:
-    """A ring of the last steps' figures, one row a step: the terms, then each branch's share.
+    """A ring of the last steps' figures, one row a step: loss, its terms, each branch's share.
+
+    The terms are those of the first step, whatever the objective calls them.
 
     Args:
         branches: K.
@@ -30,14 +30,18 @@ class Meter:
     def __init__(self, branches: int, step: int, device: torch.device) -> None:
         self.branches, self.since = branches, step
         self.started = time.perf_counter()
-        self.ring = torch.zeros(self.ROWS, len(_TERMS) + branches, device=device)
+        self.names: tuple[str, ...] = ()
+        self.ring = torch.zeros(self.ROWS, 0, device=device)
 
     def write(self, step: Int64[Tensor, ""], result: Objective) -> None:
         """Part of a step: put its figures into their row."""
-        terms = (result.loss.detach(), result.observation, result.projection, result.template)
+        terms = (result.loss.detach(), *result.terms.values())
         branch = torch.arange(self.branches, device=step.device)
         wins = (result.winner[:, None] == branch).float().mean(0)
         row = torch.cat((torch.stack(terms), wins))
+        if not self.names:
+            self.names = ("loss", *result.terms)
+            self.ring = row.new_zeros(self.ROWS, len(row))
         self.ring.index_copy_(0, (step % self.ROWS)[None], row[None])
 
     def losses(self, first: int, end: int) -> Float[Tensor, "steps"]:
@@ -58,8 +62,8 @@ class Meter:
         rate = count / (time.perf_counter() - self.started)
         self.started, self.since = time.perf_counter(), end
         return {
-            **dict(zip(_TERMS, means)),
-            "branch_shares": [round(share, 4) for share in means[len(_TERMS) :]],
+            **dict(zip(self.names, means)),
+            "branch_shares": [round(share, 4) for share in means[len(self.names) :]],
             "steps_per_second": rate,
         }
 

@@ -8,9 +8,8 @@ from torch.profiler import record_function
 from wildshape.method.multiview import LossConfig
 from wildshape.method.network import Encoding, ShapePoseNet
 from wildshape.training.batches.fused import FusedBatch
-from wildshape.training.objectives import Objective
+from wildshape.training.objectives import Objective, template_deviation
 from wildshape.training.self_training.loss import pose_terms, seen_from, shape_terms
-from wildshape.training.template import template_deviation
 
 _BELIEF = 0.1
 
@@ -56,10 +55,14 @@ class SelfTaught(nn.Module):
         )
         loss = distance + precision + coverage - _BELIEF * belief
         loss = loss + self.config.template_end * deviation
-        coverage, precision, deviation = (
-            self.unit * part.detach() for part in (coverage, precision, deviation)
-        )
-        return Objective(loss, coverage, precision, deviation, pose.winner)
+        lengths = {
+            "pose": distance,
+            "coverage": coverage,
+            "precision": precision,
+            "template": deviation,
+        }
+        metres = {name: self.unit * part.detach() for name, part in lengths.items()}
+        return Objective(loss, metres, pose.winner)
 
     def _in_units(self, batch: FusedBatch) -> FusedBatch:
         """Targets in units instead of metres; scans as they are."""
