@@ -16,6 +16,7 @@ from functools import cache
 from importlib import import_module
 from io import StringIO
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import pytest
@@ -28,6 +29,11 @@ from wildshape.cli.main import COMMANDS, main
 ROOT = Path(__file__).parent.parent
 PAGES = sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("docs/**/*.md"))
 WRITTEN = [*PAGES, "README.md", "CONTRIBUTING.md", "CHANGELOG.md"]
+SPOKEN = [
+    *WRITTEN,
+    *sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("benchmarks/**/*.md")),
+]
+PLACES = [ROOT, ROOT / "src" / "wildshape", ROOT / "benchmarks" / "results"]
 NOT_RUN = "# not run by our tests"
 # What a page takes for granted, and what of ours stands in for it.
 GIVEN = {
@@ -174,6 +180,53 @@ def test_links_lead_to_files_of_the_project(page):
     for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", (ROOT / page).read_text(encoding="utf-8")):
         place = (ROOT / page).parent / target
         assert ":" in target or place.exists() or target.endswith("commands.md"), target
+
+
+@pytest.mark.parametrize("page", SPOKEN)
+def test_paths_and_names_in_the_text_exist(page):
+    assert not unknown((ROOT / page).read_text(encoding="utf-8"))
+
+
+def test_a_path_or_name_that_has_moved_is_found():
+    moved = {"training/moved.py", "moved/moved.py", "io/moved", "wildshape.io.moved"}
+    here = {"io/scans/", "OUT/any.md", "car.py", "//X", "wildshape.io.scans"}
+    assert unknown(" ".join(f"`{name}`" for name in moved | here)) == moved
+
+
+def unknown(text: str) -> set[str]:
+    """Paths between back quotes, and names of modules and what is in them, that there are not."""
+    paths = {path for path in re.findall(r"`([\w./-]+)`", text) if is_ours(path)}
+    names = set(re.findall(r"\bwildshape(?:\.\w+)+", text)) - {"wildshape.json"}
+    return {path for path in paths if not any((place / path).exists() for place in PLACES)} | {
+        name for name in names if not is_found(name)
+    }
+
+
+def is_ours(path: str) -> bool:
+    """Whether a path is one of this project: of a Python file, or in a folder that there is."""
+    folder, slash, _ = path.partition("/")
+    inside = any((place / folder).is_dir() for place in PLACES)
+    return bool(folder and slash) and (path.endswith(".py") or inside)
+
+
+def is_found(name: str) -> bool:
+    """Whether a dotted name can be imported."""
+    try:
+        return resolve_name(name) is not None
+    except (ImportError, AttributeError):
+        return False
+
+
+def test_sources_cite_no_document_that_is_not_here():
+    sections = re.findall(
+        r"^## (\d+)\. ", (ROOT / "docs/method.md").read_text("utf-8"), re.MULTILINE
+    )
+    for path in (ROOT / "src").rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        cited = re.findall(r"METHOD (\d+)(?:\.\d)?(?:(?:, | and | to )(\d+))?", text)
+        assert {number for pair in cited for number in pair if number} <= set(sections), path
+        assert not re.search(r"\b(DESIGN|STYLE|PERFORMANCE)\b", text), path
+        assert all((ROOT / page).is_file() for page in re.findall(r"docs/[\w/-]+\.md", text)), path
 
 
 def test_the_software_and_the_paper_can_be_cited():

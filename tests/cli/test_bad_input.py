@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Each line of DESIGN's table of bad input, at the command line."""
+"""Each kind of bad input, at the command line."""
 
 import errno
 import json

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Track folders: scans/ and, if known, poses.txt, shape.ply, track.json (DESIGN, Track folder)."""
+"""Track folders: scans/ and, if known, poses.txt, shape.ply, track.json (docs/formats.md)."""
 
 import json
 import math

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The only file that knows the checkpoint format: one safetensors file (DESIGN, Checkpoint)."""
+"""The only file that knows the checkpoint format: one safetensors file (docs/formats.md)."""
 
 import json
 import math

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""What `complete` and `register` write of a track (DESIGN, Commands).
+"""What `complete` and `register` write of a track (docs/formats.md).
 
 `objects.json` is written last: a track folder that has it is finished.
 """

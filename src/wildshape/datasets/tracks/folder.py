@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Track folders (DESIGN, "Track folder") as a source: the way in for anybody's own scans."""
+"""Track folders (docs/formats.md) as a source: the way in for anybody's own scans."""
 
 from collections import Counter
 from collections.abc import Iterator

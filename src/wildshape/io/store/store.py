@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The packed store: tracks in few large files, memory-mapped (DESIGN, Packed store)."""
+"""The packed store: tracks in few large files, memory-mapped (docs/formats.md)."""
 
 import json
 from bisect import bisect_right

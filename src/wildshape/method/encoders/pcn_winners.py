@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The same encoder, trained through the winning points only (PERFORMANCE 3.2).
+"""The same encoder, trained through the winning points only.
 
 Max-pooling sends gradient through the arg-max points alone. A pass without a graph finds them, a
 second pass with a graph runs on them only: the same code and the same gradient, several times

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The scans of a run on the device itself, and batches drawn there (PERFORMANCE 2.6).
+"""The scans of a run on the device itself, and batches drawn there.
 
 The batches have the distribution of `ViewSampler`'s. Every shape is fixed and every number comes
 from counters, so that drawing is part of a step recorded once and replayed.
