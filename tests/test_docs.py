@@ -189,6 +189,7 @@ def test_paths_and_names_in_the_text_exist(page):
 
 def test_a_path_or_name_that_has_moved_is_found():
     moved = {"training/moved.py", "moved/moved.py", "io/moved", "wildshape.io.moved"}
+    assert unknown("python experiments/moved.py OUT") == {"experiments/moved.py"}
     here = {"io/scans/", "OUT/any.md", "car.py", "//X", "wildshape.io.scans"}
     assert unknown(" ".join(f"`{name}`" for name in moved | here)) == moved
 
@@ -196,6 +197,7 @@ def test_a_path_or_name_that_has_moved_is_found():
 def unknown(text: str) -> set[str]:
     """Paths between back quotes, and names of modules and what is in them, that there are not."""
     paths = {path for path in re.findall(r"`([\w./-]+)`", text) if is_ours(path)}
+    paths |= set(re.findall(r"(?<![\w/.-])((?:src|tests|experiments|examples)/[\w/-]+\.\w+)", text))
     names = set(re.findall(r"\bwildshape(?:\.\w+)+", text)) - {"wildshape.json"}
     return {path for path in paths if not any((place / path).exists() for place in PLACES)} | {
         name for name in names if not is_found(name)
@@ -215,6 +217,19 @@ def is_found(name: str) -> bool:
         return resolve_name(name) is not None
     except (ImportError, AttributeError):
         return False
+
+
+def test_contributors_find_every_room():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (`[^|]+`) \|", text, re.MULTILINE)
+    listed = {name.removesuffix(".py") for row in rows for name in re.findall(r"`([\w.]+)`", row)}
+    here = {path.stem for path in (ROOT / "src/wildshape").iterdir() if is_room(path)}
+    assert listed == here
+
+
+def is_room(path: Path) -> bool:
+    """A folder with Python files, or a file that is a floor of its own."""
+    return (path / "__init__.py").is_file() or (path.suffix == ".py" and path.stem != "__init__")
 
 
 def test_sources_cite_no_document_that_is_not_here():
