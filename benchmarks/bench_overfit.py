@@ -17,7 +17,7 @@ from machine import header, judge_speed, verdict
 from turns import begin, options
 
 from wildshape.evaluation import protocol
-from wildshape.evaluation.results import summarise
+from wildshape.evaluation.summary import summarise
 from wildshape.evaluation.tables import markdown
 from wildshape.inference.evaluated import Learned
 from wildshape.inference.predictor import load

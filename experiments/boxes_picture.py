@@ -15,7 +15,7 @@ import numpy as np
 import tyro
 from PIL import Image
 
-from wildshape.evaluation.boxes import box_score, true_box
+from wildshape.evaluation.metrics import box_score, true_box
 from wildshape.inference.boxes import carried
 from wildshape.inference.predictor import load
 from wildshape.io.boxes.detections import pose_of

@@ -23,9 +23,9 @@ import torch
 import tyro
 from safetensors import safe_open
 
+from wildshape.evaluation.cases import turn_track
 from wildshape.evaluation.confidence import RiskCoverage, rank_correlation, risk_coverage
 from wildshape.evaluation.metrics import completion_error
-from wildshape.evaluation.turning import turn_track
 from wildshape.geometry.transforms.se3 import stack
 from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.shipped_weights import SHIPPED, weights_file

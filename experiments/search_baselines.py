@@ -28,8 +28,8 @@ from wildshape.baselines.multi_start_icp import MultiStartIcp
 from wildshape.errors import MissingExtraError
 from wildshape.evaluation.metrics import ACCURATE_DEG
 from wildshape.evaluation.protocol import run
-from wildshape.evaluation.results import figures_of
-from wildshape.evaluation.turning import Rotate
+from wildshape.evaluation.results import Rotate
+from wildshape.evaluation.summary import figures_of
 from wildshape.io.atomic import write_json
 from wildshape.io.provenance import provenance
 from wildshape.records import Track

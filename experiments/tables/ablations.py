@@ -10,7 +10,7 @@ from experiments.tables.rows import default_form, paper_form, views_form
 from experiments.tables.table import Block, Table, Trained
 
 from wildshape.evaluation.paper import ABLATION_ROWS, VIEW_COUNT_ROWS
-from wildshape.evaluation.turning import Rotate
+from wildshape.evaluation.results import Rotate
 from wildshape.simulate.config import Category
 
 _TURNS: tuple[Rotate, ...] = ("none", "yaw")

@@ -16,7 +16,7 @@ from experiments.tables.rows import default_form
 from experiments.tables.train import Workshop, model_of
 from experiments.tables.tsne import tsne
 
-from wildshape.evaluation.figures import project
+from wildshape.evaluation.pictures import project
 from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.prepare import network_input
 from wildshape.io.atomic import atomic_write

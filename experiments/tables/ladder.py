@@ -18,9 +18,10 @@ from experiments.tables.train import Workshop, model_of
 from wildshape.cli.input.tracks import Reading
 from wildshape.evaluation.cases import Case, prepare
 from wildshape.evaluation.examples import pick
-from wildshape.evaluation.figures import draw_panel
 from wildshape.evaluation.method import Completer
+from wildshape.evaluation.pictures import draw_panel
 from wildshape.evaluation.protocol import complete_scans
+from wildshape.evaluation.results import Limits
 from wildshape.io.atomic import atomic_write
 from wildshape.records import Points
 from wildshape.training.recipes import small
@@ -91,7 +92,7 @@ def draw(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
     chosen = pick(best[0].results.methods[0])
     wanted = {track: label for label, (track, _) in chosen.items()}
     tracks = [t for _, t in Reading(store_of(shop.folder, test)).tracks() if t.name in wanted]
-    cases = {wanted[t.name]: prepare(t, "none", 0, most) for t in tracks}
+    cases = {wanted[t.name]: prepare(t, "none", 0, Limits(max_scans=most)) for t in tracks}
     cases = {label: cases[label] for label in chosen}
     columns = []
     for row, one in zip(rows, best):

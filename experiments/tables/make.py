@@ -14,7 +14,7 @@ from experiments.tables.table import Block, Row, Table, Trained
 from experiments.tables.train import Model, Workshop
 
 from wildshape.errors import BadInputError
-from wildshape.evaluation.turning import Rotate
+from wildshape.evaluation.results import Rotate
 from wildshape.io.atomic import write_json, write_text
 from wildshape.io.provenance import provenance
 from wildshape.method.checkpoint import load_checkpoint

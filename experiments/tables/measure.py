@@ -18,17 +18,17 @@ from wildshape.cli.input.tracks import Reading
 from wildshape.cli.models import choose_device, fingerprint, load_model
 from wildshape.cli.terminal import say
 from wildshape.errors import MissingExtraError
-from wildshape.evaluation.boxes import BoxScore
 from wildshape.evaluation.method import Method
-from wildshape.evaluation.metrics import CompletionError
+from wildshape.evaluation.metrics import BoxScore, CompletionError
 from wildshape.evaluation.results import (
     CompletionScore,
+    Limits,
     MethodScores,
     RegistrationScore,
     Results,
+    Rotate,
+    Skipped,
 )
-from wildshape.evaluation.skipped import Skipped
-from wildshape.evaluation.turning import Rotate
 from wildshape.inference.evaluated import Learned, LearnedTrack
 from wildshape.io.atomic import write_json
 from wildshape.io.provenance import provenance
@@ -66,7 +66,7 @@ def measure(
         made = {**provenance(shop.command), "model": mark}
         write_json(path, {"results": asdict(found), "made": made})
     kept = json.loads(path.read_text("utf-8"))
-    return Measured(as_results(kept["results"]), kept["made"], model)
+    return Measured(as_results(kept["results"], Limits(max_scans=max_scans)), kept["made"], model)
 
 
 def seeds_of(row: Row, rotate: Rotate, seeds: int) -> range:
@@ -99,10 +99,10 @@ def method_of(shop: Workshop, row: Row, model: Model | None) -> Method | None:
         return None
 
 
-def as_results(kept: dict[str, Any]) -> Results:
+def as_results(kept: dict[str, Any], limits: Limits) -> Results:
     """What `asdict` made of results, as they were."""
     methods = tuple(_scores(method) for method in kept["methods"])
-    return Results(kept["rotate"], kept["seed"], methods)
+    return Results(kept["rotate"], kept["seed"], methods, limits)
 
 
 def _scores(kept: dict[str, Any]) -> MethodScores:

@@ -21,7 +21,7 @@ from wildshape.baselines.local_icp import LocalIcp
 from wildshape.cli.input.tracks import Reading
 from wildshape.cli.models import load_model
 from wildshape.evaluation.examples import Example, gather
-from wildshape.evaluation.figures import draw_examples
+from wildshape.evaluation.pictures import draw_examples
 from wildshape.inference.evaluated import Learned
 from wildshape.io.atomic import atomic_write
 from wildshape.simulate.config import Category
@@ -65,7 +65,7 @@ def _draw(
     """Measure the row, choose the seed and the objects, and write the figure."""
     tried = [measure(shop, row, block, "none", seed, most) for seed in seeds]
     best = _selected(row.name, tuple(cast("list[Measured]", tried)))
-    examples = _examples(shop, block, best, most)
+    examples = _examples(shop, block, best)
     with atomic_write(path) as file:
         draw_examples(examples).savefig(file, dpi=130, format="webp")
     drawn = {example.label: {"track": example.track, "cd_m": example.cd} for example in examples}
@@ -78,13 +78,12 @@ def _selected(name: str, measured: tuple[Measured, ...]) -> Measured:
     return measured[0] if len(measured) == 1 else selected(name, measured)
 
 
-def _examples(shop: Workshop, block: Block, best: Measured, most: int | None) -> list[Example]:
+def _examples(shop: Workshop, block: Block, best: Measured) -> list[Example]:
     model = None if best.model is None else best.model.path
     return gather(
         (track for _, track in Reading(store_of(shop.folder, block.test)).tracks()),
         best.results,
         best.results.methods[0].name,
         Learned(load_model(model, shop.device, raw=model is not None)),
-        max_scans=most,
         rival=LocalIcp(),
     )

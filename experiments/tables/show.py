@@ -3,7 +3,7 @@
 """A made table as markdown for people and as JSON with all that it came from."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from experiments.tables.data import as_values
@@ -11,18 +11,20 @@ from experiments.tables.measure import Measured
 from experiments.tables.table import Block, Row, Table, Trained
 
 from wildshape.evaluation.paper import PaperRow
-from wildshape.evaluation.results import Summary, as_json, summarise
-from wildshape.evaluation.tables import COLUMNS, ROTATE, notes, number, pipe_table, spread
-from wildshape.evaluation.turning import Rotate
-
-_PARTIAL = (
-    ("CD partial", "cd_partial", 1, 3),
-    ("precision partial", "precision_partial", 1, 3),
-    ("coverage partial", "coverage_partial", 1, 3),
+from wildshape.evaluation.results import Rotate
+from wildshape.evaluation.summary import FIGURES, Figure, Summary, as_json, summarise
+from wildshape.evaluation.tables import (
+    COUNTED,
+    ROTATE,
+    cell,
+    cells_of,
+    columns_of,
+    notes,
+    pipe_table,
 )
+
+_PARTIAL = ("precision_partial", "coverage_partial")
 _LENGTHS = ("cd", "precision", "coverage", "cd_floor")
-Column = tuple[str, str, int, int]
-Columns = tuple[Column, ...]
 
 
 @dataclass(frozen=True)
@@ -70,45 +72,41 @@ def _part(part: Part) -> str:
     rows = [_ours(summary, columns) for summary in summaries]
     if part.rotate == "none":
         rows += [_paper(row, columns, part.block) for row in part.block.paper]
-    heading = ["method", "seeds", *(column[0] for column in columns), "scans: shape / pose"]
+    heading = ["method", "seeds", *(column.heading for column in columns), COUNTED]
     title = f"## {part.block.title}: {ROTATE[part.rotate]}"
     return "\n\n".join([title, pipe_table(heading, rows), notes(summaries)])
 
 
-def _columns(block: Block, summaries: Sequence[Summary]) -> Columns:
-    partial = any(summary.mean["cd_partial"] is not None for summary in summaries)
-    columns = (*COLUMNS[:3], *(_PARTIAL if partial else ()), *COLUMNS[3:])
-    if not block.percent:
-        return columns
-    return tuple(_of_unit_size(column) for column in columns)
+def _columns(block: Block, summaries: Sequence[Summary]) -> list[Figure]:
+    """Those of an evaluation's own table, and both parts of the CD against partial truth."""
+    columns = columns_of(summaries)
+    names = [figure.name for figure in columns]
+    if "cd_partial" in names:
+        after = names.index("cd_partial") + 1
+        parts = [figure for figure in FIGURES if figure.name in _PARTIAL]
+        columns[after:after] = [replace(f, heading=f.name.replace("_", " ")) for f in parts]
+    return [_of_unit_size(figure) for figure in columns] if block.percent else columns
 
 
-def _of_unit_size(column: Column) -> Column:
+def _of_unit_size(figure: Figure) -> Figure:
     """Lengths have no unit there, and those of shapes are times 100."""
-    heading, name, factor, digits = column
-    heading = heading.removesuffix(", m")
-    return (
-        (f"{heading} x 100", name, 100, 2) if name in _LENGTHS else (heading, name, factor, digits)
-    )
+    heading = figure.heading.removesuffix(", m")
+    if figure.name not in _LENGTHS:
+        return replace(figure, heading=heading)
+    return replace(figure, heading=f"{heading} x 100", factor=100, digits=2)
 
 
-def _ours(summary: Summary, columns: Columns) -> list[str]:
-    cells = [
-        number(summary.mean[name], factor, digits) + spread(summary.std[name], factor, digits)
-        for _, name, factor, digits in columns
-    ]
-    counted = f"{summary.completions} / {summary.registrations}"
-    return [summary.name, str(len(summary.per_seed)), *cells, counted]
+def _ours(summary: Summary, columns: Sequence[Figure]) -> list[str]:
+    return [summary.name, str(len(summary.per_seed)), *cells_of(summary, columns)]
 
 
-def _paper(row: PaperRow, columns: Columns, block: Block) -> list[str]:
+def _paper(row: PaperRow, columns: Sequence[Figure], block: Block) -> list[str]:
     """The paper prints CD of views times 100 already, as our columns do."""
     cells = []
-    for _, name, factor, digits in columns:
-        printed = _printed(name, block)
-        scale = 1 if name in _LENGTHS else factor
-        value = getattr(row, printed, None)
-        cells.append(number(value, scale, digits) + spread(row.std.get(printed), scale, digits))
+    for figure in columns:
+        printed = _printed(figure.name, block)
+        scale = replace(figure, factor=1) if figure.name in _LENGTHS else figure
+        cells.append(cell(getattr(row, printed, None), row.std.get(printed), scale))
     return [f"† {row.data}: {row.method}", "", *cells, ""]
 
 

@@ -9,7 +9,7 @@ from experiments.tables.data import Data, key
 
 from wildshape.baselines.dpc.objective import DpcRecipe
 from wildshape.evaluation.paper import PaperRow
-from wildshape.evaluation.turning import Rotate
+from wildshape.evaluation.results import Rotate
 from wildshape.training.config import Recipe
 
 Answer = Literal["raw", "refined", "track"]

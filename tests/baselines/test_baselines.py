@@ -16,7 +16,7 @@ from wildshape.baselines.local_icp import LocalIcp
 from wildshape.baselines.multi_start_icp import MultiStartIcp, headings
 from wildshape.baselines.named import NAMES
 from wildshape.baselines.pairs import chain
-from wildshape.evaluation.turning import turn_track
+from wildshape.evaluation.cases import turn_track
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Sensor

@@ -17,7 +17,7 @@ from wildshape.datasets.tracks.box_crop import Crop, points_in_box
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.datasets.tracks.source import all_tracks
 from wildshape.evaluation.protocol import run
-from wildshape.evaluation.results import figures_of
+from wildshape.evaluation.summary import figures_of
 
 ROOT = Path(__file__).parents[2].parent / "shared" / "data" / "real" / "kitti_raw"
 DRIVE = ROOT / "2011_09_26" / "2011_09_26_drive_0001_sync"

@@ -10,9 +10,10 @@ import pytest
 import torch
 from tests.cars import drive_by, poses_of
 
-from wildshape.evaluation.boxes import BoxScore, box_figures, box_score, true_box
+from wildshape.evaluation.metrics import BoxScore, CompletionError, box_score, true_box
 from wildshape.evaluation.protocol import run
-from wildshape.evaluation.results import figures_of, write_metrics
+from wildshape.evaluation.results import CompletionScore, MethodScores
+from wildshape.evaluation.summary import figures_of, write_metrics
 from wildshape.evaluation.tables import markdown
 from wildshape.geometry.box import FittedBox
 from wildshape.geometry.transforms.rotation import random_rotation, rotation_z
@@ -56,14 +57,20 @@ def test_scores_by_hand_wherever_the_object_is(seed, shift, degrees, iou, headin
     assert score.heading_deg == pytest.approx(heading, abs=1e-3)
 
 
+def scored(box):
+    error = CompletionError(0.1, 0.1)
+    return CompletionScore("a", "0", error, None, "shape", 1, 1, 0.05, box=box)
+
+
 def test_one_end_is_the_front_for_the_whole_row():
-    found = [BoxScore(0.8, off) for off in (178.0, 175.0, 10.0, 95.0)]
-    figures = box_figures(found)
+    found = [scored(BoxScore(0.8, off)) for off in (178.0, 175.0, 10.0, 95.0)]
+    figures = figures_of(MethodScores("m", tuple(found), (), ()))
     assert figures["box_iou"] == pytest.approx(0.8)
     assert figures["heading30"] == 0.5
     assert figures["heading30_sym"] == 0.75
     assert figures["heading_sym_median_deg"] == pytest.approx((5 + 10) / 2)
-    assert box_figures([]) == {}
+    bare = figures_of(MethodScores("m", (scored(None),), (), ()))
+    assert all(bare[name] is None for name in ("box_iou", "heading30", "heading30_sym"))
 
 
 class Boxing:

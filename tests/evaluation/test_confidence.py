@@ -11,9 +11,9 @@ from scipy.stats import spearmanr
 from tests.cars import drive_by
 
 from wildshape.evaluation.confidence import rank_correlation, risk_coverage
-from wildshape.evaluation.figures import draw_confidence, write_figures
+from wildshape.evaluation.pictures import draw_confidence, write_figures
 from wildshape.evaluation.protocol import run
-from wildshape.evaluation.results import figures_of, write_metrics
+from wildshape.evaluation.summary import figures_of, write_metrics
 
 TRACKS = [drive_by(name=f"drive {i}", scans=5, seed=i) for i in range(2)]
 

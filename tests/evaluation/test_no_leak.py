@@ -18,7 +18,7 @@ from wildshape.baselines.named import NAMES, baseline
 from wildshape.errors import MissingExtraError
 from wildshape.evaluation.examples import gather
 from wildshape.evaluation.protocol import run
-from wildshape.evaluation.results import figures_of
+from wildshape.evaluation.summary import figures_of
 from wildshape.geometry.projection.visibility import FacingBins
 from wildshape.geometry.transforms.rotation import random_rotation
 from wildshape.geometry.transforms.se3 import SE3

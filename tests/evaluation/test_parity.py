@@ -13,10 +13,10 @@ from tests.cars import drive_by, poses_of
 from tests.evaluation import naive
 from tests.strategies import poses, rotations
 
+from wildshape.evaluation.cases import turn_track
 from wildshape.evaluation.metrics import completion_error, registration_error
 from wildshape.evaluation.protocol import run
-from wildshape.evaluation.results import figures_of, summarise
-from wildshape.evaluation.turning import turn_track
+from wildshape.evaluation.summary import figures_of, summarise
 from wildshape.geometry.transforms.se3 import SE3, stack
 
 

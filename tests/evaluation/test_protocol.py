@@ -1,5 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +11,10 @@ from tests.cars import drive_by, known, poses_of
 from wildshape.baselines.identity import Identity, OneScan
 from wildshape.baselines.local_icp import LocalIcp
 from wildshape.errors import BadInputError
+from wildshape.evaluation.cases import turn_track
 from wildshape.evaluation.protocol import run
-from wildshape.evaluation.results import figures_of
-from wildshape.evaluation.skipped import Skipped, by_reason
-from wildshape.evaluation.turning import turn_track
+from wildshape.evaluation.results import Limits, Skipped
+from wildshape.evaluation.summary import figures_of
 from wildshape.geometry.transforms.rotation import random_rotation
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Sensor
@@ -184,7 +185,7 @@ def test_what_is_left_out_is_counted_with_its_reason():
     scans[3], scans[4] = scans[3][:30], scans[4][:40]
     track = replace(track, scans=tuple(scans))
     results = run({"picky": Picky()}, [track, replace(track, name="bare", T_sensor_object=None)])
-    assert by_reason(results["picky"].skipped) == {
+    assert Counter(one.reason for one in results["picky"].skipped) == {
         "fewer than 16 finite points": 4,
         "all points equal": 2,
         "completion: refused by the method": 1,
@@ -205,7 +206,7 @@ def test_what_is_left_out_is_counted_with_its_reason():
 
 def test_truth_is_accumulated_where_no_shape_is_given():
     track = replace(drive_by(scans=7), shape=None)
-    row = run({"scan": OneScan()}, [track], max_scans=3)["scan"]
+    row = run({"scan": OneScan()}, [track], limits=Limits(max_scans=3))["scan"]
     assert [score.scan for score in row.completions] == ["000000", "000003", "000006"]
     score = row.completions[0]
     assert score.truth == "mirrored"

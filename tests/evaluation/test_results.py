@@ -9,21 +9,18 @@ from tests.cars import drive_by
 from wildshape.baselines.identity import OneScan
 from wildshape.baselines.local_icp import LocalIcp
 from wildshape.evaluation.examples import gather, pick
-from wildshape.evaluation.figures import draw_errors, draw_examples, project, write_figures
 from wildshape.evaluation.metrics import CompletionError
 from wildshape.evaluation.paper import ABLATION_ROWS, LIDAR_ROWS, VIEW_ROWS
+from wildshape.evaluation.pictures import draw_errors, draw_examples, project, write_figures
 from wildshape.evaluation.protocol import run
 from wildshape.evaluation.results import (
     CompletionScore,
     MethodScores,
     RegistrationScore,
     Results,
-    figures_of,
-    summarise,
-    write_metrics,
-    write_scores,
+    Skipped,
 )
-from wildshape.evaluation.skipped import Skipped
+from wildshape.evaluation.summary import figures_of, summarise, write_metrics, write_scores
 from wildshape.evaluation.tables import markdown, paper_markdown, write_table
 
 FIXED = ["cd", "precision", "coverage", "acc30", "rot_median_deg"]

@@ -20,9 +20,10 @@ from tests.cars import drive_by
 
 from wildshape.baselines.identity import Identity, OneScan
 from wildshape.errors import BadInputError
-from wildshape.evaluation.boxes import BoxScore
+from wildshape.evaluation.metrics import BoxScore
 from wildshape.evaluation.protocol import run
-from wildshape.evaluation.results import Results, figures_of
+from wildshape.evaluation.results import Results
+from wildshape.evaluation.summary import figures_of
 from wildshape.training.recipes import PRESETS, paper_lidar
 
 ROWS = "paper's form,identity"
@@ -134,7 +135,7 @@ def test_scores_are_read_as_they_were_written():
     scan, identity = found.methods
     boxed = tuple(replace(row, box=BoxScore(0.5, 12.0)) for row in scan.completions)
     found = replace(found, methods=(replace(scan, completions=boxed), identity))
-    assert as_results(json.loads(json.dumps(asdict(found)))) == found
+    assert as_results(json.loads(json.dumps(asdict(found))), found.limits) == found
 
 
 def test_seed_is_selected_by_its_cost_and_not_by_the_truth(monkeypatch):

@@ -35,10 +35,13 @@ def evaluate_once(
     """The protocol under one seed, with progress."""
     from wildshape.cli.terminal import progress
     from wildshape.evaluation.protocol import run as run_protocol
+    from wildshape.evaluation.results import Limits
 
     with progress(f"evaluating, seed {seed}", len(reading.source)) as bar:
         tracks = (track for _, track in reading.tracks())
-        return run_protocol(methods, tracks, rotate, seed, bar.at, max_scans=max_scans)
+        return run_protocol(
+            methods, tracks, rotate, seed, bar.at, limits=Limits(max_scans=max_scans)
+        )
 
 
 def write(
@@ -47,7 +50,6 @@ def write(
     runs: "list[Results]",
     drawn: "tuple[str, Method]",
     made: dict[str, Any],
-    max_scans: int | None,
 ) -> str:
     """Write metrics, scores, table and figures; returns the table.
 
@@ -57,15 +59,14 @@ def write(
         runs: one a seed.
         drawn: row and method whose best, median and worst object are drawn.
         made: how the figures came about.
-        max_scans: as in the runs.
     """
     from wildshape.evaluation.examples import gather
-    from wildshape.evaluation.figures import write_figures
-    from wildshape.evaluation.results import write_metrics, write_scores
+    from wildshape.evaluation.pictures import write_figures
+    from wildshape.evaluation.summary import write_metrics, write_scores
     from wildshape.evaluation.tables import markdown, write_table
 
     tracks = (track for _, track in reading.tracks())
-    write_figures(out, runs[0], gather(tracks, runs[0], *drawn, max_scans=max_scans))
+    write_figures(out, runs[0], gather(tracks, runs[0], *drawn))
     write_scores(out, runs)
     write_table(out, runs, views=has_views(reading))
     write_metrics(out, runs, made)

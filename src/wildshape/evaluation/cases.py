@@ -2,21 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """A track made ready for evaluation: usable scans, turned, and the truth kept apart from them."""
 
+import zlib
 from dataclasses import dataclass, replace
 
 import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from wildshape.datasets.tracks.accumulation import shape_mirrored, shape_partial
-from wildshape.evaluation.boxes import true_box
-from wildshape.evaluation.metrics import hull_area
-from wildshape.evaluation.skipped import Skipped
-from wildshape.evaluation.turning import Rotate, turn_track
+from wildshape.evaluation.metrics import hull_area, true_box
+from wildshape.evaluation.results import Limits, Rotate, Skipped
 from wildshape.geometry.box import FittedBox
+from wildshape.geometry.transforms.rotation import random_rotation, random_yaw
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor, Track
-
-MIN_POINTS = 16
-MAX_TRUTH_POINTS = 8192
 
 
 @dataclass(frozen=True)
@@ -70,15 +70,11 @@ class Case:
         return [scan.copy() for scan in self.scans]
 
 
-def prepare(track: Track, rotate: Rotate, seed: int, max_scans: int | None = None) -> Case:
-    """The case of a track.
-
-    Truth is accumulated from all usable scans; only then the track is subsampled, evenly, to
-    `max_scans`.
-    """
-    usable, skipped = _usable(track)
-    truth = _truth(usable)
-    turned = turn_track(_subsample(usable, max_scans), rotate, seed)
+def prepare(track: Track, rotate: Rotate, seed: int, limits: Limits) -> Case:
+    """The case of a track under an input protocol; see `turn_track`."""
+    usable, skipped = _usable(track, limits.min_points)
+    truth = _truth(usable, limits.truth_points)
+    turned = turn_track(_subsample(usable, limits.max_scans), rotate, seed)
     return Case(
         name=track.name,
         scans=turned.scans,
@@ -90,9 +86,9 @@ def prepare(track: Track, rotate: Rotate, seed: int, max_scans: int | None = Non
     )
 
 
-def _usable(track: Track) -> tuple[Track, tuple[Skipped, ...]]:
+def _usable(track: Track, min_points: int) -> tuple[Track, tuple[Skipped, ...]]:
     finite = [scan[np.isfinite(scan).all(axis=1)] for scan in track.scans]
-    reasons = [_unusable(scan) for scan in finite]
+    reasons = [_unusable(scan, min_points) for scan in finite]
     kept = [i for i, reason in enumerate(reasons) if not reason]
     cleaned = replace(track, scans=tuple(finite))
     named = zip(track.scan_names, reasons, strict=True)
@@ -100,9 +96,9 @@ def _usable(track: Track) -> tuple[Track, tuple[Skipped, ...]]:
     return cleaned.part(kept), skipped
 
 
-def _unusable(scan: Points) -> str:
-    if len(scan) < MIN_POINTS:
-        return f"fewer than {MIN_POINTS} finite points"
+def _unusable(scan: Points, min_points: int) -> str:
+    if len(scan) < min_points:
+        return f"fewer than {min_points} finite points"
     return "all points equal" if bool((scan == scan[0]).all()) else ""
 
 
@@ -113,20 +109,55 @@ def _subsample(track: Track, max_scans: int | None) -> Track:
     return track.part(np.linspace(0, count - 1, max_scans).round().astype(int).tolist())
 
 
-def _truth(track: Track) -> Truth | None:
+def _truth(track: Track, count: int) -> Truth | None:
     if track.T_sensor_object is None or not track.scans:
         return None
     if track.shape is not None:
-        shape = _thin(track.shape)
+        shape = _thin(track.shape, count)
         return Truth("shape", shape, None, hull_area(shape), true_box(track.shape))
     whole = shape_mirrored(track)
-    mirrored, partial = _thin(whole), _thin(shape_partial(track))
+    mirrored, partial = _thin(whole, count), _thin(shape_partial(track), count)
     return Truth("mirrored", mirrored, partial, hull_area(mirrored), true_box(whole))
 
 
-def _thin(points: Points) -> Points:
-    """At most `MAX_TRUTH_POINTS`, drawn once and for all."""
-    if len(points) <= MAX_TRUTH_POINTS:
+def _thin(points: Points, count: int) -> Points:
+    """At most so many, drawn once and for all."""
+    if len(points) <= count:
         return points
-    draw = np.random.default_rng(0).permutation(len(points))[:MAX_TRUTH_POINTS]
+    draw = np.random.default_rng(0).permutation(len(points))[:count]
     return points[np.sort(draw)]
+
+
+def turn_track(track: Track, rotate: Rotate, seed: int) -> Track:
+    """Each scan turned about its sensor's origin, its true pose along with it.
+
+    The rotations depend on `seed` and the track's name alone, not on the order of the tracks.
+
+    Args:
+        track: as recorded.
+        rotate: `none`, `yaw` (about the sensor's vertical: z of a LiDAR, y of a camera) or `so3`
+            (uniform over all rotations).
+        seed: of the draw.
+    """
+    if rotate == "none":
+        return track
+    generator = torch.Generator().manual_seed(zlib.crc32(f"{seed}/{track.name}".encode()))
+    draw = _yaw(len(track.scans), track.sensor, generator)
+    if rotate == "so3":
+        draw = random_rotation(len(track.scans), generator)
+    turn = SE3(draw.double(), torch.zeros(len(track.scans), 3, dtype=torch.float64))
+    poses = track.T_sensor_object
+    return replace(
+        track,
+        scans=tuple(turn[i].apply_numpy(scan) for i, scan in enumerate(track.scans)),
+        T_sensor_object=None if poses is None else turn @ poses,
+    )
+
+
+def _yaw(count: int, sensor: Sensor, generator: torch.Generator) -> Float[Tensor, "count 3 3"]:
+    about_z = random_yaw(count, generator)
+    if sensor.kind == "lidar":
+        return about_z
+    # Relabelled axes (y, z, x): the same turn about y.
+    order = torch.tensor([1, 2, 0])
+    return about_z[:, order][:, :, order]

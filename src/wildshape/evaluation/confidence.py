@@ -2,14 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether a method knows when it errs: rank correlation and the risk-coverage curve."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-
-_SHARES = 20
-Stated = tuple[list[float], list[float]]
 
 
 @dataclass(frozen=True)
@@ -34,32 +31,34 @@ def rank_correlation(confidence: Sequence[float], error: Sequence[float]) -> flo
 
     None for fewer than three, or where one of the two never changes.
     """
-    doubt, errors = -_ranks(confidence), _ranks(error)
+    from scipy.stats import rankdata
+
+    doubt, errors = -rankdata(confidence), rankdata(error)
     if len(doubt) < 3 or doubt.std() == 0 or errors.std() == 0:
         return None
     return float(np.corrcoef(doubt, errors)[0, 1])
 
 
-def _ranks(values: Sequence[float]) -> Float[np.ndarray, "n"]:
-    """Ranks; equal values share the mean of theirs."""
-    given = np.asarray(values, dtype=np.float64)
-    _, place, counts = np.unique(given, return_inverse=True, return_counts=True)
-    last = np.cumsum(counts)
-    return (last - (counts - 1) / 2)[place.reshape(-1)]
+def risk_coverage(
+    confidence: Sequence[float], error: Sequence[float], shares: int = 20
+) -> RiskCoverage | None:
+    """The curve; equal confidences keep their mean risk. None without completions.
 
-
-def risk_coverage(confidence: Sequence[float], error: Sequence[float]) -> RiskCoverage | None:
-    """The curve; equal confidences keep their mean risk. None without completions."""
+    Args:
+        confidence: of each completion.
+        error: likewise.
+        shares: how many points of the curve are kept, evenly over the coverage.
+    """
     if not len(confidence):
         return None
     errors = np.asarray(error, dtype=np.float64)
     risks = _kept_risk(np.asarray(confidence, dtype=np.float64), errors)
     best = _kept_risk(-errors, errors)
     count = len(errors)
-    shares = np.unique(np.ceil(np.linspace(1 / _SHARES, 1, _SHARES) * count).astype(int))
+    kept = np.unique(np.ceil(np.linspace(1 / shares, 1, shares) * count).astype(int))
     return RiskCoverage(
-        coverage=tuple(float(n / count) for n in shares),
-        risk=tuple(float(risks[n - 1]) for n in shares),
+        coverage=tuple(float(n / count) for n in kept),
+        risk=tuple(float(risks[n - 1]) for n in kept),
         area=float(risks.mean()),
         best_area=float(best.mean()),
     )
@@ -73,24 +72,3 @@ def _kept_risk(
     place = place.reshape(-1)
     mean = np.bincount(place, error) / np.bincount(place)
     return np.cumsum(mean[np.sort(place)]) / np.arange(1, len(error) + 1)
-
-
-def confidence_figures(stated: Stated) -> dict[str, float | None]:
-    """The figures of `metrics.json` of completions that state a confidence."""
-    confidence, error = stated
-    curve = risk_coverage(confidence, error)
-    return {
-        "confidence_rank_correlation": rank_correlation(confidence, error),
-        "risk_coverage_area": curve.area if curve else None,
-    }
-
-
-def risk_coverage_curves(stated: Iterable[tuple[str, Stated]]) -> dict[str, dict[str, object]]:
-    """The curve of each row that states confidences, over all its runs together."""
-    rows: dict[str, Stated] = {}
-    for name, (confidence, error) in stated:
-        known = rows.setdefault(name, ([], []))
-        known[0].extend(confidence)
-        known[1].extend(error)
-    curves = {name: risk_coverage(*found) for name, found in rows.items()}
-    return {name: asdict(curve) for name, curve in curves.items() if curve is not None}

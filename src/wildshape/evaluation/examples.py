@@ -57,7 +57,6 @@ def gather(
     name: str,
     method: Method,
     *,
-    max_scans: int | None = None,
     rival: Registrar | None = None,
 ) -> list[Example]:
     """The three objects of a run, completed and fused once more for drawing.
@@ -67,7 +66,6 @@ def gather(
         results: of the run.
         name: the method's row; it must complete single scans.
         method: the same as in the run.
-        max_scans: the same as in the run.
         rival: fuses the same tracks, to be drawn beside the method.
     """
     chosen = pick(results[name])
@@ -75,7 +73,7 @@ def gather(
         return []
     wanted = {track for track, _ in chosen.values()}
     cases = {
-        track.name: prepare(track, results.rotate, results.seed, max_scans)
+        track.name: prepare(track, results.rotate, results.seed, results.limits)
         for track in tracks
         if track.name in wanted
     }

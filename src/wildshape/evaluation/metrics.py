@@ -10,10 +10,12 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from wildshape.geometry.transforms.rotation import rotation_z
+from wildshape.geometry.box import FittedBox
+from wildshape.geometry.box_overlap import box_iou
+from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.ops.nearest import nearest_both, nearest_distance
-from wildshape.records import Points
+from wildshape.records import Box, Points
 
 ACCURATE_DEG = 30.0
 
@@ -103,37 +105,39 @@ def distance_floor(area: float, count: int) -> float:
     return 0.5 * math.sqrt(area / count)
 
 
-# Names fixed in the design, then what stands beside them.
-NAMES = (
-    "cd",
-    "precision",
-    "coverage",
-    "acc30",
-    "rot_median_deg",
-    "trans_median_m",
-    "acc30_sym",
-    "rot_sym_median_deg",
-    "cd_partial",
-    "precision_partial",
-    "coverage_partial",
-    "cd_floor",
-    "points",
-    "truth_points",
-    "partial_points",
-    "confidence_rank_correlation",
-    "risk_coverage_area",
-    "box_iou",
-    "heading30",
-    "heading30_sym",
-    "heading_sym_median_deg",
-)
-UNITS = {
-    "cd, precision, coverage, *_partial, cd_floor, trans_median_m": "metres",
-    "acc30, acc30_sym": "share, 0 to 1",
-    "rot_median_deg, rot_sym_median_deg": "degrees",
-    "confidence_rank_correlation": "Spearman, doubt with cd: 1 orders perfectly, 0 by chance",
-    "risk_coverage_area, risk_coverage": "metres of cd, over the share of the surest scans",
-    "box_iou": "shared over joint volume of oriented boxes, 0 to 1, mean",
-    "heading30, heading30_sym": "share, 0 to 1; heading_sym_median_deg: degrees",
-    "std": "sample standard deviation over seeds; null for one seed",
-}
+@dataclass(frozen=True)
+class BoxScore:
+    """One predicted box.
+
+    Attributes:
+        iou: shared over joint volume, 0 to 1, both boxes as they stand in space.
+        heading_deg: turn about the object's vertical from the box's x to the object's, 0 to 180.
+    """
+
+    iou: float
+    heading_deg: float
+
+    @property
+    def heading_sym_deg(self) -> float:
+        """The same if half turns are forgiven, 0 to 90."""
+        return min(self.heading_deg, 180 - self.heading_deg)
+
+
+def true_box(shape: Points) -> FittedBox:
+    """The tight box of a true shape, object frame, its axes those of that frame."""
+    points = torch.from_numpy(shape).double()
+    low, high = points.amin(0), points.amax(0)
+    return FittedBox((low + high) / 2, high - low, torch.eye(3, dtype=torch.float64))
+
+
+def box_score(predicted: Box, truth: FittedBox, T_sensor_object: SE3) -> BoxScore:
+    """A box of the sensor frame against the true one of the object frame."""
+    T_object_sensor = T_sensor_object.to(torch.float64).inverse()
+    centre, size, wxyz = (
+        torch.tensor(part, dtype=torch.float64)
+        for part in (predicted.centre, predicted.size, predicted.quaternion_wxyz)
+    )
+    rotation = T_object_sensor.rotation @ rotation_from_quaternion(wxyz)
+    found = FittedBox(T_object_sensor.apply(centre[None])[0], size, rotation)
+    x, y = rotation[:2, 0].tolist()
+    return BoxScore(box_iou(found, truth), abs(math.degrees(math.atan2(y, x))))

@@ -11,7 +11,6 @@ import numpy as np
 import torch
 
 from wildshape.errors import BadInputError
-from wildshape.evaluation.boxes import box_score
 from wildshape.evaluation.cases import Case, Truth, prepare
 from wildshape.evaluation.method import (
     BatchCompleter,
@@ -23,18 +22,25 @@ from wildshape.evaluation.method import (
     Registrar,
     TrackCompleter,
 )
-from wildshape.evaluation.metrics import completion_error, distance_floor, registration_error
+from wildshape.evaluation.metrics import (
+    box_score,
+    completion_error,
+    distance_floor,
+    registration_error,
+)
 from wildshape.evaluation.results import (
     CompletionScore,
+    Limits,
     MethodScores,
     RegistrationScore,
     Results,
+    Rotate,
+    Skipped,
 )
-from wildshape.evaluation.skipped import Skipped
-from wildshape.evaluation.turning import Rotate
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Box, Points, Track
 
+ALL_SCANS = Limits()
 Progress = Callable[[int, str], None]
 REFUSED = "refused by the method"
 NOT_FINITE = "prediction empty or not finite"
@@ -68,7 +74,7 @@ def run(
     seed: int = 0,
     progress: Progress | None = None,
     *,
-    max_scans: int | None = None,
+    limits: Limits = ALL_SCANS,
 ) -> Results:
     """Every method on every track.
 
@@ -81,18 +87,18 @@ def run(
         rotate: input protocol, see `turn_track`.
         seed: of the rotations.
         progress: called after each track with the number done and its name.
-        max_scans: tracks with more scans are subsampled evenly.
+        limits: what of a track counts.
     """
     ledgers: dict[str, _Ledger] = {name: _Ledger() for name in methods}
     for done, track in enumerate(tracks, start=1):
-        case = prepare(track, rotate, seed, max_scans)
+        case = prepare(track, rotate, seed, limits)
         for name, method in methods.items():
             _evaluate(name, method, case, ledgers)
         if progress is not None:
             progress(done, track.name)
     about = {name: m.about for name, m in methods.items() if isinstance(m, Described)}
     rows = tuple(ledger.close(name, about.get(name, "")) for name, ledger in ledgers.items())
-    return Results(rotate=rotate, seed=seed, methods=rows)
+    return Results(rotate, seed, rows, limits)
 
 
 def whole_track_name(name: str, method: Method) -> str:

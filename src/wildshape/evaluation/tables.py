@@ -6,43 +6,25 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from wildshape.evaluation.paper import LIDAR_ROWS, VIEW_ROWS, PaperRow
-from wildshape.evaluation.results import Results, Summary, summarise
-from wildshape.evaluation.turning import Rotate
+from wildshape.evaluation.results import Results, Rotate
+from wildshape.evaluation.summary import FIGURES, Figure, Summary, summarise
 from wildshape.io.atomic import write_text
 
+COUNTED = "scans: shape / pose"
 ROTATE: dict[Rotate, str] = {
     "none": "scans as recorded",
     "yaw": "each scan turned by its own random yaw",
     "so3": "each scan turned by its own random rotation",
 }
-# heading, name of the figure, factor, decimals
-COLUMNS = (
-    ("CD, m", "cd", 1, 3),
-    ("precision", "precision", 1, 3),
-    ("coverage", "coverage", 1, 3),
-    ("points", "points", 1, 0),
-    ("CD floor", "cd_floor", 1, 3),
-    ("acc 30, %", "acc30", 100, 1),
-    ("rot, deg", "rot_median_deg", 1, 2),
-    ("trans, m", "trans_median_m", 1, 3),
-    ("acc 30 sym, %", "acc30_sym", 100, 1),
-    ("rot sym, deg", "rot_sym_median_deg", 1, 2),
-)
-_BOXES = (
-    ("box IoU", "box_iou", 1, 3),
-    ("heading 30, %", "heading30", 100, 1),
-    ("heading 30 sym, %", "heading30_sym", 100, 1),
-)
-_PARTIAL = ("CD partial", "cd_partial", 1, 3)
-_PAPER = tuple(column for column in COLUMNS if column[1] in PaperRow.__dataclass_fields__)
+PAPER = tuple(figure for figure in FIGURES if figure.name in PaperRow.__dataclass_fields__)
 
 
 def markdown(runs: Sequence[Results]) -> str:
     """The table of runs that differ in their seed only, mean and standard deviation over seeds."""
     summaries = summarise(runs)
-    columns = _columns(summaries)
-    rows = [[summary.name, *_cells(summary, columns), _counted(summary)] for summary in summaries]
-    heading = ["method", *(column[0] for column in columns), "scans: shape / pose"]
+    columns = columns_of(summaries)
+    rows = [[summary.name, *cells_of(summary, columns)] for summary in summaries]
+    heading = ["method", *(column.heading for column in columns), COUNTED]
     seeds = f"{len(runs)} seed{'s' if len(runs) > 1 else ''}"
     parts = [
         f"### {ROTATE[runs[0].rotate].capitalize()} ({seeds})",
@@ -54,10 +36,10 @@ def markdown(runs: Sequence[Results]) -> str:
 
 def paper_markdown(rows: Sequence[PaperRow] = LIDAR_ROWS) -> str:
     """The rows that the paper prints, under a heading that says that the data differ."""
-    heading = ["data", "method", *(column[0] for column in _PAPER)]
+    heading = ["data", "method", *(column.heading for column in PAPER)]
     cells = [
-        [r.data, r.method, *(number(getattr(r, name), f, d) for _, name, f, d in _PAPER)]
-        for r in rows
+        [row.data, row.method, *(cell(getattr(row, f.name), None, f) for f in PAPER)]
+        for row in rows
     ]
     title = "### The paper's printed figures: other data, so no common benchmark"
     return f"{title}\n\n{pipe_table(heading, cells)}\n"
@@ -71,32 +53,28 @@ def write_table(folder: Path, runs: Sequence[Results], *, views: bool = False) -
     return path
 
 
-def _columns(summaries: Sequence[Summary]) -> list[tuple[str, str, int, int]]:
-    partial = any(summary.mean["cd_partial"] is not None for summary in summaries)
-    boxes = any(summary.mean["box_iou"] is not None for summary in summaries)
-    extra = ([_PARTIAL] if partial else [], _BOXES if boxes else ())
-    return [*COLUMNS[:3], *extra[0], *COLUMNS[3:], *extra[1]]
+def columns_of(summaries: Sequence[Summary]) -> list[Figure]:
+    """The figures that are columns of a table: those that one of its rows has."""
+    known = {
+        name for summary in summaries for name, mean in summary.mean.items() if mean is not None
+    }
+    return [figure for figure in FIGURES if figure.heading and figure.name in known]
 
 
-def _cells(summary: Summary, columns: Sequence[tuple[str, str, int, int]]) -> list[str]:
-    return [
-        number(summary.mean[name], factor, digits) + spread(summary.std[name], factor, digits)
-        for _, name, factor, digits in columns
-    ]
+def cells_of(summary: Summary, columns: Sequence[Figure]) -> list[str]:
+    """A row: the figures, then how many scans they are of."""
+    figures = [cell(summary.mean[f.name], summary.std[f.name], f) for f in columns]
+    return [*figures, f"{summary.completions} / {summary.registrations}"]
 
 
-def number(value: float | None, factor: int, digits: int) -> str:
-    """A cell; a dash where there is no figure."""
-    return "–" if value is None else f"{factor * value:.{digits}f}"  # noqa: RUF001
-
-
-def spread(value: float | None, factor: int, digits: int) -> str:
-    """What follows a mean: the deviation, or nothing."""
-    return "" if value is None or digits == 0 else f" ± {factor * value:.{digits}f}"
-
-
-def _counted(summary: Summary) -> str:
-    return f"{summary.completions} / {summary.registrations}"
+def cell(mean: float | None, std: float | None, figure: Figure) -> str:
+    """A mean and its standard deviation, if there is one; a dash where there is no figure."""
+    if mean is None:
+        return "–"  # noqa: RUF001
+    text = f"{figure.factor * mean:.{figure.digits}f}"
+    if std is None or figure.digits == 0:
+        return text
+    return f"{text} ± {figure.factor * std:.{figure.digits}f}"
 
 
 def notes(summaries: Sequence[Summary]) -> str:

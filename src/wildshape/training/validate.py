@@ -12,7 +12,8 @@ import torch
 from torch import Tensor
 
 from wildshape.evaluation import protocol
-from wildshape.evaluation.results import figures_of
+from wildshape.evaluation.results import Limits
+from wildshape.evaluation.summary import figures_of
 from wildshape.geometry.gravity import mean_up
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.choose_hypothesis import choose_hypothesis
@@ -72,7 +73,7 @@ def truth_figures(
         return {}
     method = {"held out": Learned(Predictor(network, settings))}
     found = protocol.run(
-        method, (store.track(t) for t in known), turn, _SEED, max_scans=_TRUTH_SCANS
+        method, (store.track(t) for t in known), turn, _SEED, limits=Limits(max_scans=_TRUTH_SCANS)
     )
     figures = figures_of(found["held out"])
     return {

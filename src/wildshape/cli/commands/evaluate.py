@@ -122,7 +122,7 @@ def run(settings: Settings) -> None:
         runs = _with_selected(runs, models)
     made = {**output.record["provenance"], "settings": output.record["settings"]}
     drawn = next(iter(evaluated[0].items()))
-    table = write(settings.out, reading, runs, drawn, made, settings.max_scans)
+    table = write(settings.out, reading, runs, drawn, made)
     output.finish(skipped=reading.skipped)
     say_skipped(reading.skipped)
     answer(table, _json(settings.out), as_json=settings.json)

@@ -15,7 +15,8 @@ from wildshape.cli.output import Output, begin
 from wildshape.cli.results.write import FILES, write_results
 from wildshape.cli.terminal import duration
 from wildshape.evaluation.examples import pick
-from wildshape.evaluation.results import Results, as_json, figures_of
+from wildshape.evaluation.results import Results
+from wildshape.evaluation.summary import as_json, figures_of
 from wildshape.inference.evaluated import Learned
 from wildshape.inference.predictor import Predictor
 from wildshape.inference.registration import fuse_scans
@@ -39,7 +40,7 @@ def evaluate(out: Path, models: Mapping[str, Predictor]) -> dict[str, Results]:
     for rotate in _PROTOCOLS:
         found[rotate] = evaluate_once(reading, methods, rotate, 0, _MAX_SCANS)
         folder = out / "evaluation" / rotate
-        write(folder, reading, [found[rotate]], drawn, {}, _MAX_SCANS)
+        write(folder, reading, [found[rotate]], drawn, {})
     return found
 
 

@@ -15,7 +15,8 @@ from jaxtyping import Float
 from wildshape.evaluation.confidence import risk_coverage
 from wildshape.evaluation.examples import Example
 from wildshape.evaluation.metrics import ACCURATE_DEG
-from wildshape.evaluation.results import MethodScores, Results, stated
+from wildshape.evaluation.results import MethodScores, Results
+from wildshape.evaluation.summary import stated
 from wildshape.records import Points
 
 if TYPE_CHECKING:
@@ -23,22 +24,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # From the front left and above, in the object's frame: orthographic, so sizes compare.
-_AZIMUTH_DEG, _ELEVATION_DEG = 40.0, 22.0
+AZIMUTH_DEG, _ELEVATION_DEG = 40.0, 22.0
 _PANELS = ("one scan", "truth", "completed", "fused")
 _WITH_RIVAL = ("one scan", "truth", "ICP, fused", "completed", "fused")
 _MAX_DRAWN = 6000
 
 
-def project(points: Points) -> Float[np.ndarray, "n 3"]:
-    """Right, up and towards the viewer, metres, from the fixed viewpoint."""
-    azimuth, elevation = math.radians(_AZIMUTH_DEG), math.radians(_ELEVATION_DEG)
-    towards = np.asarray(
-        (
-            math.cos(elevation) * math.cos(azimuth),
-            math.cos(elevation) * math.sin(azimuth),
-            math.sin(elevation),
-        )
-    )
+def project(
+    points: Float[np.ndarray, "n 3"], azimuth_deg: float = AZIMUTH_DEG
+) -> Float[np.ndarray, "n 3"]:
+    """Right, up and towards the viewer, metres, from a little above; z is up in `points`."""
+    azimuth, elevation = math.radians(azimuth_deg), math.radians(_ELEVATION_DEG)
+    flat = math.cos(elevation)
+    towards = np.asarray((flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation)))
     right = np.asarray((-math.sin(azimuth), math.cos(azimuth), 0.0))
     return points @ np.stack((right, np.cross(towards, right), towards), axis=1)
 
@@ -136,19 +134,19 @@ def draw_confidence(results: Results) -> Figure | None:
     """Mean CD of the surest scans; None where no method states a confidence."""
     from matplotlib.figure import Figure
 
-    found = {s.name: stated(s.completions) for s in results.methods}
-    curves = {name: (risk_coverage(*pair), pair) for name, pair in found.items() if pair[0]}
-    if not curves:
+    found = {scores.name: stated(scores.completions) for scores in results.methods}
+    rows = {name: pair for name, pair in found.items() if pair[0]}
+    if not rows:
         return None
     figure = Figure(figsize=(5.4, 3.8), layout="constrained")
     ax = figure.subplots()
-    for i, (name, (curve, pair)) in enumerate(curves.items()):
-        assert curve is not None
-        shares = 100 * np.asarray(curve.coverage)
-        best = risk_coverage([-cd for cd in pair[1]], pair[1])
-        assert best is not None
-        ax.plot(shares, curve.risk, color=f"C{i}", label=name)
-        ax.plot(shares, best.risk, color=f"C{i}", linestyle=":", label=f"{name}, perfect order")
+    for i, (name, (confidence, cd)) in enumerate(rows.items()):
+        orders = ((name, confidence, "-"), (f"{name}, perfect order", [-one for one in cd], ":"))
+        for label, order, style in orders:
+            curve = risk_coverage(order, cd)
+            assert curve is not None
+            shares = 100 * np.asarray(curve.coverage)
+            ax.plot(shares, curve.risk, color=f"C{i}", linestyle=style, label=label)
     ax.set_xlabel("scans kept, the surest first, %")
     ax.set_ylabel("their mean Chamfer distance, m")
     ax.set_ylim(bottom=0)
