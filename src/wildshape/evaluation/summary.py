@@ -83,6 +83,7 @@ def _accurate_headings(degrees: list[float]) -> float:
 
 
 _METRES, _DEGREES, _SHARE, _COUNT = "metres", "degrees", "share, 0 to 1", "points"
+_STD = "sample standard deviation over seeds; null for one seed"
 FIGURES = (
     Figure("cd", _METRES, _scans(np.mean, "error.cd"), "CD, m"),
     Figure("precision", _METRES, _scans(np.mean, "error.precision"), "precision"),
@@ -207,7 +208,7 @@ def as_json(runs: Sequence[Results], provenance: Mapping[str, object]) -> dict[s
         "rotate": runs[0].rotate,
         "seeds": [run.seed for run in runs],
         "limits": asdict(runs[0].limits),
-        "units": {figure.name: figure.unit for figure in FIGURES},
+        "units": {**{figure.name: figure.unit for figure in FIGURES}, "std": _STD},
         "provenance": {**_machine(), **provenance},
         "methods": {summary.name: _method_json(summary) for summary in summarise(runs)},
         "risk_coverage": _curves(runs),
