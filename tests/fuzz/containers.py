@@ -242,7 +242,9 @@ def change_glb(rng: Random, data: bytes) -> bytes:
     if len(data) < 20:
         return damage(rng, data)
     size = struct.unpack_from("<I", data, 12)[0]
-    head = change_json(rng, data[20 : 20 + size])
+    head = data[20 : 20 + size]
+    for _ in range(rng.choice((1, 1, 2, 3))):
+        head = change_json(rng, head)
     head += b" " * (-len(head) % 4)
     rest = data[20 + size :]
     total = 20 + len(head) + len(rest)

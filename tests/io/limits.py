@@ -20,6 +20,7 @@ from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
 
+_ROOT = Path(__file__).resolve().parents[2]
 _FREE_BYTES = 64_000_000
 _SPACE_BYTES = 4 << 30  # what a process may map: the machine is safe from any reader
 
@@ -65,10 +66,12 @@ def costs(reader: str, paths: Sequence[Path], cpu_s: int = 20) -> list[Cost]:
         paths: files or folders.
         cpu_s: processor time after which a process is killed.
     """
-    command = [sys.executable, __file__, reader, str(cpu_s)]
+    command = [sys.executable, "-m", "tests.io.limits", reader, str(cpu_s)]
     sent = "".join(f"{path}\n" for path in paths)
     alone = {**os.environ, "OMP_NUM_THREADS": "1"}
-    done = subprocess.run(command, input=sent, text=True, stdout=-1, check=True, env=alone)
+    done = subprocess.run(
+        command, input=sent, text=True, stdout=-1, check=True, env=alone, cwd=_ROOT
+    )
     return [Cost(**json.loads(line)) for line in done.stdout.splitlines()]
 
 

@@ -133,14 +133,23 @@ def read_json(path: Path, expected: str) -> Any:
             memory than they take room in a file.
     """
     with reading(path, expected):
-        text = path.read_text("utf-8")
-        containers = text.count("[") + text.count("{")
-        if _CONTAINER_BYTES * containers > _FREE_BYTES + _RATIO * len(text):
-            raise BadInputError(
-                f"{path}: expected {expected}, found {containers} brackets in {len(text)} letters; "
-                "write or copy it again."
-            )
-        return json.loads(text)
+        return parse_json(path.read_text("utf-8"), path, expected)
+
+
+def parse_json(text: str, path: Path, expected: str) -> Any:
+    """What a text in JSON holds; see `read_json`.
+
+    Raises:
+        BadInputError: hardly anything but brackets.
+        ValueError: no JSON.
+    """
+    containers = text.count("[") + text.count("{")
+    if _CONTAINER_BYTES * containers > _FREE_BYTES + _RATIO * len(text):
+        raise BadInputError(
+            f"{path}: expected {expected}, found {containers} brackets in {len(text)} letters; "
+            "write or copy it again."
+        )
+    return json.loads(text)
 
 
 def lines_of(file: IO[AnyStr], path: Path, longest: int = _LONGEST) -> Iterator[AnyStr]:

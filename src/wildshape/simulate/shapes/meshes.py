@@ -10,9 +10,12 @@ import numpy as np
 
 from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
+from wildshape.simulate.shapes.gltf import read_gltf
 from wildshape.simulate.shapes.solid import Solid
+from wildshape.simulate.shapes.triangles import used
 
-_SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
+_GLTF = (".glb", ".gltf")
+_SUFFIXES = (".ply", ".obj", ".stl", ".off", *_GLTF)
 _PLY_HEADER, _FACE_BYTES = 65536, 7  # a face is `3 0 1 2` at least
 _SMALLEST_M, _LARGEST_M = 0.5, 30.0
 
@@ -44,19 +47,15 @@ def read_mesh(path: Path, metres: bool) -> Solid:
     """
     _check_faces(path)
     try:
-        vertices, faces = _loaded(path)
+        vertices, faces = used(*_loaded(path))
+    except BadInputError:
+        raise
     except Exception as cause:  # trimesh's readers raise nearly anything
         raise BadInputError(
             f"{path} cannot be read as a mesh ({cause}); export it anew."
         ) from cause
     if len(faces) == 0:
         raise BadInputError(f"{path} holds no triangles, expected a surface, not points or lines.")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise BadInputError(
-            f"{path} has triangles with corners that are none of its {len(vertices)} vertices; "
-            "export it anew."
-        )
-    vertices, faces = _used(vertices, faces)
     extent = float(np.ptp(vertices, axis=0).max())
     if not np.isfinite(vertices).all() or extent <= 0:
         raise BadInputError(f"{path} has vertices that are not finite or all equal; repair it.")
@@ -75,7 +74,9 @@ def _loaded(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of a damaged file's numbers
-        mesh = trimesh.load(path, force="mesh", process=False)
+        if path.suffix.lower() in _GLTF:
+            return read_gltf(path)
+        mesh = trimesh.load(path, force="mesh", process=False, skip_materials=True)
         vertices = np.asarray(getattr(mesh, "vertices", np.empty((0, 3))), np.float64)
         faces = np.asarray(getattr(mesh, "faces", np.empty((0, 3))), np.int64)
     if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
@@ -95,12 +96,6 @@ def _check_faces(path: Path) -> None:
             f"{path} promises {int(said[1])} triangles, more than its {size} bytes hold; export it "
             "anew."
         )
-
-
-def _used(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Without vertices that no triangle uses: they would enlarge the box."""
-    used, compact = np.unique(faces, return_inverse=True)
-    return vertices[used], compact.reshape(-1, 3)
 
 
 def _advice(extent: float) -> str:
