@@ -51,7 +51,7 @@ def _glb(header: dict, binary: bytes = _POINTS + _CORNERS) -> bytes:
 def _same(path: Path) -> None:
     """The same surface as trimesh's, corner by corner."""
     vertices, faces = read_gltf(path)
-    theirs = trimesh.load(path, force="mesh", process=False)
+    theirs: Any = trimesh.load(path, force="mesh", process=False)
     ours = vertices[faces].reshape(-1, 9)
     expected = np.asarray(theirs.triangles).reshape(-1, 9)
     order, theirs_order = np.lexsort(ours.round(6).T), np.lexsort(expected.round(6).T)
@@ -60,7 +60,7 @@ def _same(path: Path) -> None:
 
 def test_a_scene_of_moved_turned_and_mirrored_parts_is_trimeshs(tmp_path: Path) -> None:
     rng, scene = np.random.default_rng(0), trimesh.Scene()
-    parent = None
+    parent: Any = None
     for i in range(6):
         T = trimesh.transformations.random_rotation_matrix(rng.random(3))
         T[:3, 3] = rng.normal(size=3)
