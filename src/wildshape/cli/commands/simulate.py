@@ -15,6 +15,7 @@ EXAMPLES = (
     "wildshape simulate cars.store --tracks 200 --seed 1",
     "wildshape simulate views.store --sensor depth-camera --category chair --tracks 50",
     "wildshape simulate mytracks --meshes mymeshes --layout folders",
+    "wildshape simulate street --drive --scans 100 --seed 1",
 )
 
 Out = Annotated[Path, Positional, arg(metavar="OUT", help="packed store, or folder, to write")]
@@ -23,20 +24,29 @@ Meshes = Annotated[
     option(metavar="DIR", help="your own meshes (x forward, z up) instead of our shapes"),
 ]
 
+OF_TRACKS = ("tracks", "category", "occlusion", "ground", "layout", "workers")
+OF_DRIVES = ("speed", "compensated")
+
 
 @dataclass(frozen=True)
 class Settings:
     """Simulate tracks: objects seen by a sensor that passes them, with true poses and shapes.
 
+    With --drive: one drive through a street, all of each scan, in KITTI tracking's layout.
+
     Attributes:
         tracks: how many objects.
-        scans: usable scans a track; by default 24 for a LiDAR, 5 for the depth camera.
+        scans: usable scans a track; by default 24 for a LiDAR, 5 for the depth camera; of a drive
+            all, by default 100.
         seed: the same seed gives the same tracks.
         sensor: what scans.
         category: of our procedural shapes; airplane and chair need the depth camera.
         occlusion: probability that something stands in the way in a LiDAR track.
         ground: leave ground returns at the rim of the object in.
         workers: processes; by default one a core.
+        drive: full scans of a street with traffic, their boxes and the sensor's way.
+        speed: of a drive, mean, metres a second; else drawn from 4 to 10; 0 stands still.
+        compensated: of a drive: the points of a scan as from one place, its middle.
     """
 
     out: Out
@@ -50,6 +60,9 @@ class Settings:
     ground: bool = False
     layout: Layout = "packed"
     workers: Annotated[int | None, option(metavar="N")] = None
+    drive: bool = False
+    speed: Annotated[float | None, option(metavar="V")] = None
+    compensated: bool = False
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -61,14 +74,67 @@ def run(settings: Settings) -> None:
         BadInputError: a setting out of range, a mesh that cannot be used, or an existing output.
         MissingExtraError: the ray caster is not installed.
     """
+    from wildshape.errors import BadInputError
+
+    if settings.seed < 0:
+        raise BadInputError(f"--seed {settings.seed}: expected 0 or more.")
+    _refuse(settings, OF_TRACKS if settings.drive else OF_DRIVES)
+    if settings.drive:
+        _drive(settings)
+    else:
+        _tracks(settings)
+
+
+def _refuse(settings: Settings, foreign: tuple[str, ...]) -> None:
+    """Refuse options that would change nothing.
+
+    Raises:
+        BadInputError: one is given.
+    """
+    from wildshape.errors import BadInputError
+
+    for name in foreign:
+        if getattr(settings, name) != getattr(Settings, name):
+            said = "means nothing with" if settings.drive else "needs"
+            raise BadInputError(f"--{name} {said} --drive; leave it out.")
+
+
+def _drive(settings: Settings) -> None:
+    from wildshape.cli.output import begin
+    from wildshape.cli.terminal import answer, counted, duration, progress
+    from wildshape.simulate.street.drive_folder import FILES, write_drive
+    from wildshape.simulate.street.whole_drive import DriveConfig, WholeDrive
+
+    began = time.monotonic()
+    config = DriveConfig(
+        scans=100 if settings.scans is None else settings.scans,
+        sensor=settings.sensor,  # type: ignore[arg-type]  # the record refuses the camera
+        meshes=settings.meshes,
+        speed=settings.speed,
+        compensated=settings.compensated,
+    )
+    drive = WholeDrive(config, settings.seed)
+    identity = {**asdict(config), "seed": settings.seed}
+    output = begin(settings.out, "simulate", identity, FILES, overwrite=settings.overwrite)
+    with progress("simulating", config.scans) as bar:
+        written = write_drive(drive, settings.out, bar.at)
+    output.finish()
+    seconds = time.monotonic() - began
+    text = (
+        f"simulated {counted(written.scans, 'scan')}, {counted(written.points, 'point')},"
+        f" {counted(written.vehicles, 'vehicle')} in {duration(seconds)}; see {settings.out}"
+    )
+    data = {"out": str(settings.out), **asdict(written), "seconds": round(seconds, 3)}
+    answer(text, data, as_json=settings.json)
+
+
+def _tracks(settings: Settings) -> None:
     from wildshape.cli.packing import write_tracks
     from wildshape.cli.terminal import answer, counted, duration, progress
     from wildshape.errors import BadInputError
     from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
     began = time.monotonic()
-    if settings.seed < 0:
-        raise BadInputError(f"--seed {settings.seed}: expected 0 or more.")
     if settings.workers is not None and settings.workers < 1:
         raise BadInputError(f"--workers {settings.workers}: expected 1 or more.")
     config = SimulationConfig(

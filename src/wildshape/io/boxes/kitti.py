@@ -59,16 +59,36 @@ def write_kitti_labels(
 
 
 def _line(one: Detection, camera: KittiCamera) -> str:
+    kind = _TYPES.get(one.category.lower(), _UNKNOWN)
     box = one.box if one.sensor == "camera" else moved(one.box, camera.T_rect_sensor)
+    line = label_line(one.scan_number, one.track_number, kind, box, camera.projection)
+    return f"{line} {one.score:.6f}"
+
+
+def label_line(
+    frame: int,
+    track: int,
+    kind: str,
+    box: Box,
+    projection: Float[np.ndarray, "3 4"] | None = None,
+) -> str:
+    """A line of label_02, without a score.
+
+    Args:
+        frame: number of the scan.
+        track: number of the object.
+        kind: as KITTI names it, for example `Car`.
+        box: in the rectified camera frame; one that leans is stood upright about its centre.
+        projection: see `KittiCamera`.
+    """
     (x, y, z), (length, width, height) = box.centre, box.size
     forward = pose_of(box).rotation[:, 0]
     turn = math.atan2(-float(forward[2]), float(forward[0]))
     alpha = math.remainder(turn - math.atan2(x, z), 2 * math.pi)
-    image = _NO_IMAGE if camera.projection is None else _image_box(box, camera.projection)
-    numbers = (alpha, *image, height, width, length, x, y + height / 2, z, turn, one.score)
-    kind = _TYPES.get(one.category.lower(), _UNKNOWN)
+    image = _NO_IMAGE if projection is None else _image_box(box, projection)
+    numbers = (alpha, *image, height, width, length, x, y + height / 2, z, turn)
     words = " ".join(f"{number:.6f}" for number in numbers)
-    return f"{one.scan_number} {one.track_number} {kind} -1 -1 {words}"
+    return f"{frame} {track} {kind} -1 -1 {words}"
 
 
 def _image_box(box: Box, projection: Float[np.ndarray, "3 4"]) -> tuple[float, ...]:
