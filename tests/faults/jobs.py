@@ -65,10 +65,17 @@ class Job:
         last = _UNITS.get(self.command)
         if last is None:
             return set()
+        if "--drive" in self.label:  # every scan is finished work
+            scans = under_final_names(out).values()
+            return {_identity(scan) for scan in scans if scan.suffix == ".bin"}
         folders = [file.parent for file in out.rglob(last) if _whole(file, out)]
         files = [f for folder in folders for f in folder.rglob("*") if f.is_file()]
         kept = [f for f in files if f.suffix in (".ply", ".txt") or f.name.startswith("points-")]
-        return {(f.stat().st_ino, f.stat().st_mtime_ns) for f in kept}
+        return {_identity(file) for file in kept}
+
+
+def _identity(file: Path) -> tuple[int, int]:
+    return file.stat().st_ino, file.stat().st_mtime_ns
 
 
 def _whole(file: Path, out: Path) -> bool:
@@ -88,6 +95,10 @@ def steps_saved(out: Path) -> int:
 
     name = "state.safetensors"
     return int(read(out / name)["step"]) if name in under_final_names(out) else 0
+
+
+def _drive(out: Path) -> list[str]:
+    return ["simulate", str(out), "--drive", "--scans", "3", "--sensor", "hdl32"]
 
 
 def make_jobs(folder: Path) -> list[Job]:
@@ -134,4 +145,5 @@ def make_jobs(folder: Path) -> list[Job]:
         Job("complete", "complete --track", complete(few, "--track")),
         Job("simulate", "simulate packed", simulate()),
         Job("simulate", "simulate folders", simulate("--layout", "folders")),
+        Job("simulate", "simulate --drive", _drive),
     ]

@@ -108,7 +108,7 @@ def _drive(settings: Settings) -> None:
     began = time.monotonic()
     config = DriveConfig(
         scans=100 if settings.scans is None else settings.scans,
-        sensor=settings.sensor,  # type: ignore[arg-type]  # the record refuses the camera
+        sensor=settings.sensor,
         meshes=settings.meshes,
         speed=settings.speed,
         compensated=settings.compensated,

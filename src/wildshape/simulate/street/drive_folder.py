@@ -15,6 +15,7 @@ import math
 import shutil
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -65,11 +66,18 @@ def write_drive(
             write_json(rows / f"{name}.json", _rows(made, number, drive))
             _write_bin(scans / f"{name}.bin", made)
         at(number + 1)
-    written = Written()
     if rows.is_dir():
-        written = _join(out, rows, drive.config.scans)
+        _join(out, rows, drive.config.scans)
         shutil.rmtree(rows)
-    return written
+    return _counted(out)
+
+
+def _counted(out: Path) -> Written:
+    scans = list((out / "velodyne" / SEQUENCE).glob("*.bin"))
+    with (out / "truth" / f"{SEQUENCE}.csv").open(encoding="utf-8") as lines:
+        vehicles = {line.split(",")[2] for line in islice(lines, 1, None)}
+    points = sum(scan.stat().st_size for scan in scans) // 16
+    return Written(len(scans), points, len(vehicles))
 
 
 def _write_bin(path: Path, made: DriveScan) -> None:
@@ -78,13 +86,11 @@ def _write_bin(path: Path, made: DriveScan) -> None:
         file.write(columns.astype("<f4").tobytes())
 
 
-def _rows(made: DriveScan, number: int, drive: WholeDrive) -> dict[str, object]:
+def _rows(made: DriveScan, number: int, drive: WholeDrive) -> dict[str, list[str]]:
     """One scan's lines of the files of the whole drive."""
     vehicles = [box for box in made.boxes if box.kind != "Pedestrian"]
     start = drive.sensor_pose(np.zeros(1))[0] @ _T_VELO_IMU
     return {
-        "points": len(made.points),
-        "vehicles": [box.track for box in vehicles],
         "times": [f"{made.time:.6f}"],
         "label_02": [_label(box, number) for box in made.boxes],
         "oxts": [_oxts(made.T_world_sensor @ _T_VELO_IMU, start)],
@@ -93,10 +99,10 @@ def _rows(made: DriveScan, number: int, drive: WholeDrive) -> dict[str, object]:
     }
 
 
-def _join(out: Path, rows: Path, scans: int) -> Written:
+def _join(out: Path, rows: Path, scans: int) -> None:
     """The files of the whole drive, from its scans' lines, one scan at a time."""
 
-    def each() -> Iterator[dict]:
+    def each() -> Iterator[dict[str, list[str]]]:
         for number in range(scans):
             yield json.loads((rows / f"{number:06d}.json").read_text("utf-8"))
 
@@ -114,12 +120,6 @@ def _join(out: Path, rows: Path, scans: int) -> Written:
                 file.write(f"{BOXES_HEADER}\n".encode())
             for row in each():
                 file.write("".join(f"{line}\n" for line in row[name]).encode())
-    found: set[int] = set()
-    points = 0
-    for row in each():
-        found.update(row["vehicles"])
-        points += row["points"]
-    return Written(scans, points, len(found))
 
 
 def _label(box: TrueBox, frame: int) -> str:

@@ -108,7 +108,7 @@ def sign(rng: np.random.Generator) -> Solid:
 
 def bin_(rng: np.random.Generator) -> Solid:
     """A bin or a box of cables."""
-    x, y, top = rng.uniform(0.25, 0.6), rng.uniform(0.25, 0.4), rng.uniform(0.8, 1.5)
+    x, y, top = rng.uniform(0.25, 0.6), rng.uniform(0.2, 0.33), rng.uniform(0.8, 1.5)
     return box((-x, -y, -0.3), (x, y, top))
 
 

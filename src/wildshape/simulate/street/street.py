@@ -17,8 +17,8 @@ from wildshape.simulate.shapes.solid import Solid, cylinder, solid
 LEAD_M = 100.0
 """Metres of street before the start of the drive, and after its end."""
 
-LANE_M = 3.1
-_PARKING_M, _KERB_M, _CROSSFALL, _PLOT_M = 2.2, 0.12, 0.02, 0.2
+LANE_M = 3.3
+_PARKING_M, _KERB_M, _CROSSFALL, _PLOT_M = 2.7, 0.12, 0.02, 0.2
 _STEP_M, _SMOOTH_M = 0.5, 8.0
 _TERRAIN_STEP_M, _TERRAIN_M = 2.0, 85.0
 _WHEELS_M = np.array(((1.3, 0.0), (-1.3, 0.0), (0.0, 0.7), (0.0, -0.7)))
@@ -45,8 +45,9 @@ class Motion:
 
     def at(self, time: np.ndarray | float) -> np.ndarray:
         """Metres along the street at times in seconds."""
-        turn = 2 * np.pi * np.asarray(time, float) / self.period + self.phase
-        return self.start + self.speed * np.asarray(time, float) + self.swing * np.sin(turn)
+        time = np.asarray(time, float)
+        turn = 2 * np.pi * time / self.period + self.phase
+        return np.asarray(self.start + self.speed * time + self.swing * np.sin(turn))
 
 
 @dataclass(frozen=True)
@@ -238,7 +239,7 @@ def random_street(seed: int, seconds: float, speed: float | None, vehicles: Vehi
     drawn = float(rng.uniform(4.0, 10.0))
     mean = drawn if speed is None else speed
     ego = Motion(0.0, mean, 0.4 * mean, 10.0, float(rng.uniform(0, 2 * np.pi)))
-    walk = float(rng.uniform(1.8, 3.0))
+    walk = float(rng.uniform(2.4, 3.4))
     path = _path(float(ego.at(seconds)) + LEAD_M, rng)
     return Street(path, _waves(rng), LANE_M + _PARKING_M, walk, ego, vehicles)
 

@@ -11,7 +11,7 @@ import numpy as np
 from wildshape.simulate.street.street import LANE_M, LEAD_M, Actor, Motion, Street
 
 _KINDS = {"van": "Van", "truck": "Truck"}
-_LONGEST_M = 9.5
+_LONGEST_M, _WIDEST_PARKED_M = 9.5, 2.45
 Seats = Iterator[Actor]
 
 
@@ -43,8 +43,8 @@ def traffic(street: Street, end: float, seconds: float, seed: int) -> tuple[Acto
         actors += _on_plots(stretch, drawn, side, rng)
     actors += _same_lane(stretch, drawn, rng)
     actors += _oncoming(stretch, drawn, rng)
-    people = range(len(actors), len(actors) + int((end + LEAD_M) / 12))
-    actors += [_walker(stretch, (seed, 2, track), rng) for track in people]
+    people = range(int((end + LEAD_M) / 12))
+    actors += [_walker(stretch, (seed, 6, number), rng) for number in people]
     return tuple(replace(actor, track=number) for number, actor in enumerate(actors))
 
 
@@ -70,11 +70,11 @@ def _parked(
         if rng.random() > taken or not street.is_straight(s + 3.0, 6.0):
             s += float(rng.uniform(4.0, 8.0))
             continue
-        actor = next(drawn)
+        actor = next(one for one in drawn if one.size[1] < _WIDEST_PARKED_M)
         length, width, _ = actor.size
         lateral = side * (street.half_m - width / 2 - rng.uniform(0.08, 0.35))
         backward = (side > 0) != (rng.random() < 0.15)
-        heading = np.pi * backward + np.radians(rng.normal(0.0, 1.5))
+        heading = np.pi * backward + np.radians(rng.normal(0.0, 1.0))
         yield replace(
             actor, motion=Motion(s + length / 2), lateral=float(lateral), heading=float(heading)
         )
@@ -127,7 +127,7 @@ def _walker(stretch: _Stretch, seed: tuple[int, ...], rng: np.random.Generator) 
     """A person on a pavement."""
     street = stretch.street
     pace = float(rng.choice((-1.0, 1.0)) * rng.uniform(0.8, 1.6) * (rng.random() < 0.75))
-    beside = street.half_m + 0.8 + rng.uniform(0.0, max(street.walk_m - 1.5, 0.1))
+    beside = street.half_m + 1.15 + rng.uniform(0.0, street.walk_m - 2.3)
     motion = Motion(float(rng.uniform(stretch.low, stretch.high)), pace)
     lateral = float(rng.choice((-1.0, 1.0)) * beside)
     standing = Actor(0, "Pedestrian", (0.0, 0.0, 0.0), motion, lateral, np.pi * (pace < 0), seed)

@@ -8,11 +8,11 @@ Scan i depends on (config, seed, i) alone, so that an interrupted drive goes on 
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from wildshape.errors import BadInputError
+from wildshape.simulate.config import SensorName
 from wildshape.simulate.sensor import SENSORS, SpinningLidar
 from wildshape.simulate.shapes.meshes import mesh_files, read_mesh
 from wildshape.simulate.shapes.solid import Solid, union
@@ -20,6 +20,7 @@ from wildshape.simulate.shapes.vehicle import random_vehicle
 from wildshape.simulate.street.roadside import roadside
 from wildshape.simulate.street.street import LANE_M, LEAD_M, Actor, Street, random_street
 from wildshape.simulate.street.sweep import (
+    NOBODY,
     Echoes,
     Mover,
     Surfaces,
@@ -34,7 +35,6 @@ from wildshape.simulate.street.traffic import traffic
 PERIOD_S = 0.1
 _BLOCK_M = 40.0
 _TILT_DEG, _SWAY_DEG = 0.5, 0.25
-LidarName = Literal["hdl64", "hdl32", "os1-128"]
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class DriveConfig:
     """
 
     scans: int = 100
-    sensor: LidarName = "hdl64"
+    sensor: SensorName = "hdl64"
     meshes: Path | None = None
     speed: float | None = None
     compensated: bool = False
@@ -269,16 +269,21 @@ class WholeDrive:
 
     def _block(self, number: int) -> Surfaces:
         """What stands around a block of the street, as one scene."""
+        solids, owners, ground = self._solids(number)
+        return surfaces(solids, owners, ground)
+
+    def _solids(self, number: int) -> tuple[list[Solid], list[int], int]:
+        """The solids of a block, whose they are, and how many of them, the first, are ground."""
         low, high = number * _BLOCK_M - LEAD_M + 2, (number + 1) * _BLOCK_M + LEAD_M - 2
         near = [actor for actor in self._parked if low < actor.motion.start < high]
         things = [thing for s, thing in self._things if low < s < high]
         ground = self.street.ground(low, high)
-        solids = [*ground, *([union(things)] if things else []), *map(self._placed, near)]
-        owners = [-1] * (len(solids) - len(near)) + [actor.track for actor in near]
-        return surfaces(solids, owners, ground=len(ground))
+        others = [*ground, *([union(things)] if things else [])]
+        solids = [*others, *(self._placed(actor, 0.0) for actor in near)]
+        return solids, [NOBODY] * len(others) + [actor.track for actor in near], len(ground)
 
-    def _placed(self, actor: Actor) -> Solid:
-        T = self.street.pose(actor, np.zeros(1))[0]
+    def _placed(self, actor: Actor, time: float) -> Solid:
+        T = self.street.pose(actor, np.array((time,)))[0]
         shape = self.street.shape(actor)
         return replace(shape, vertices=shape.vertices @ T[:3, :3].T + T[:3, 3])
 

@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`wildshape simulate --drive`."""
+
+import json
+
+import pytest
+import trimesh
+
+DRIVE = ("--drive", "--scans", "2", "--sensor", "hdl32", "--seed", "5")
+
+
+def test_a_drive_is_written_once(wildshape, refused, tmp_path):
+    out = tmp_path / "drive"
+    found = wildshape("simulate", out, *DRIVE, "--json")
+    assert found.code == 0, found
+    said = json.loads(found.out)
+    assert (said["scans"], said["out"]) == (2, str(out))
+    assert said["points"] > 50_000
+    assert said["vehicles"] > 5
+    assert not (out / ".rows").exists()
+    assert "--overwrite" in refused("simulate", out, *DRIVE)
+    assert wildshape("simulate", out, *DRIVE, "--overwrite").code == 0
+    assert "unfinished" not in (out / "wildshape.json").read_text()
+
+
+def test_the_users_meshes_drive_there(wildshape, tmp_path):
+    meshes = tmp_path / "meshes"
+    meshes.mkdir()
+    trimesh.creation.box((4.2, 1.7, 1.4)).export(meshes / "car.ply")
+    found = wildshape("simulate", tmp_path / "drive", *DRIVE, "--meshes", meshes)
+    assert found.code == 0, found
+    rows = (tmp_path / "drive" / "truth" / "0000.csv").read_text().splitlines()[1:]
+    assert len({tuple(row.split(",")[6:9]) for row in rows}) == 1
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (("--drive", "--tracks", "3"), "--tracks means nothing with --drive"),
+        (("--drive", "--ground"), "--ground means nothing with --drive"),
+        (("--speed", "3"), "--speed needs --drive"),
+        (("--drive", "--sensor", "depth-camera"), "needs a LiDAR"),
+        (("--drive", "--scans", "0"), "at least 1"),
+        (("--drive", "--speed", "nan"), "0 to 40"),
+        (("--drive", "--seed", "-1"), "0 or more"),
+    ],
+)
+def test_what_makes_no_drive_is_refused(refused, tmp_path, more, said):
+    out = tmp_path / "drive"
+    assert said in refused("simulate", out, *more)
+    assert not out.exists()

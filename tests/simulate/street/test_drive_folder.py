@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Our reader of KITTI tracking reads what is written; an interrupted drive goes on."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wildshape.datasets.kitti.tracking import KittiTracking
+from wildshape.datasets.kitti.tracking_labels import read_boxes
+from wildshape.datasets.tracks.selection import Selection
+from wildshape.io.poses import read_poses
+from wildshape.simulate.street.drive_folder import BOXES_HEADER, write_drive
+from wildshape.simulate.street.whole_drive import DriveConfig, WholeDrive
+
+CONFIG = DriveConfig(scans=4, sensor="hdl32", noise_m=0.0, compensated=True)
+
+
+@pytest.fixture(scope="module")
+def drive() -> WholeDrive:
+    return WholeDrive(CONFIG, 11)
+
+
+@pytest.fixture(scope="module")
+def written(drive: WholeDrive, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("drive")
+    found = write_drive(drive, out)
+    assert found.scans == 4
+    assert found.points == sum(len(drive.scan(i).points) for i in range(4))
+    return out
+
+
+def _content(folder: Path) -> dict[str, bytes]:
+    files = [file for file in folder.rglob("*") if file.is_file()]
+    return {str(file.relative_to(folder)): file.read_bytes() for file in files}
+
+
+def test_scans_are_kittis(drive: WholeDrive, written: Path) -> None:
+    rows = np.fromfile(written / "velodyne" / "0000" / "000002.bin", "<f4").reshape(-1, 4)
+    made = drive.scan(2)
+    np.testing.assert_array_equal(rows[:, :3], made.points)
+    assert (rows[:, 3] >= 0).all()
+    assert (rows[:, 3] <= 1).all()
+    assert len(list((written / "velodyne" / "0000").glob("*.bin"))) == 4
+
+
+def test_our_reader_of_kitti_tracking_finds_the_vehicles(drive: WholeDrive, written: Path) -> None:
+    boxes = {
+        (number, box.track): box
+        for number in range(4)
+        for box in drive.scan(number).boxes
+        if box.kind != "Pedestrian"
+    }
+    found = 0
+    for track in KittiTracking(written, Selection(min_points=100)).tracks_of("0000"):
+        assert track.T_sensor_object is not None
+        for name, scan, T in zip(
+            track.scan_names, track.scans, track.T_sensor_object.matrix.numpy(), strict=True
+        ):
+            box = boxes[int(name), int(track.name.rsplit("_", 1)[1])]
+            np.testing.assert_allclose(T[:3, 3], box.T_sensor_object[:3, 3], atol=1e-5)
+            ahead = T[:2, 0] / np.linalg.norm(T[:2, 0])
+            true = box.T_sensor_object[:2, 0] / np.linalg.norm(box.T_sensor_object[:2, 0])
+            np.testing.assert_allclose(ahead, true, atol=1e-4)
+            if not box.moving:
+                assert abs(len(scan) - box.points) < 0.1 * box.points + 5
+            found += 1
+    assert found >= 10
+
+
+def test_pedestrians_are_labelled_as_such(drive: WholeDrive, written: Path) -> None:
+    labels = read_boxes(written / "label_02" / "0000.txt")
+    said = {(box.frame, box.track, box.category) for box in labels}
+    true = {(i, box.track, box.kind) for i in range(4) for box in drive.scan(i).boxes}
+    assert said == true
+    assert "Pedestrian" in {kind for *_, kind in said}
+
+
+def test_parked_vehicles_stand_still_in_the_world_of_the_gps(written: Path) -> None:
+    parked = Selection(min_points=50, motion="parked")
+    assert list(KittiTracking(written, parked).tracks_of("0000"))
+
+
+def test_poses_times_and_truth(drive: WholeDrive, written: Path) -> None:
+    poses = read_poses(written / "poses" / "0000.txt").matrix.numpy()
+    np.testing.assert_allclose(poses, [drive.scan(i).T_world_sensor for i in range(4)], atol=1e-9)
+    times = (written / "velodyne" / "0000" / "times.txt").read_text().split()
+    assert [float(time) for time in times] == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    header, *rows = (written / "truth" / "0000.csv").read_text().splitlines()
+    assert header == BOXES_HEADER
+    table = np.array([row.split(",") for row in rows], float)
+    first = [box for box in drive.scan(0).boxes if box.kind != "Pedestrian"]
+    mine = table[table[:, 0] == 0]
+    assert mine[:, 11].tolist() == [box.points for box in first]
+    np.testing.assert_allclose(mine[:, 3:6], [b.T_sensor_object[:3, 3] for b in first], atol=1e-5)
+
+
+@pytest.mark.parametrize("left", [0, 2, 3])
+def test_an_interrupted_drive_goes_on(
+    drive: WholeDrive, written: Path, tmp_path: Path, left: int
+) -> None:
+    """Killed while scan `left` was written: after its lines, before its points."""
+    out = tmp_path / "drive"
+    seen: list[int] = []
+
+    def killed(done: int) -> None:
+        seen.append(done)
+        if done == left + 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_drive(drive, out, killed)
+    (out / "velodyne" / "0000" / f"{left:06d}.bin").unlink()
+    kept = {path: path.stat().st_mtime_ns for path in out.rglob("*.bin")}
+    write_drive(drive, out)
+    assert _content(out) == _content(written)
+    assert all(path.stat().st_mtime_ns == when for path, when in kept.items())
+
+
+def test_killed_while_the_truth_is_written(
+    drive: WholeDrive, written: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "drive"
+    shutil.copytree(written, out)
+    assert write_drive(drive, out).scans == 4
+    assert _content(out) == _content(written)
