@@ -9,6 +9,7 @@ from typing import Literal
 from wildshape.method.multiview import LossConfig
 from wildshape.method.network import NetworkConfig
 from wildshape.training.batches.views import ViewConfig
+from wildshape.training.self_training.pseudo_labels import SelfTrainingConfig
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,7 @@ class Recipe:
         loss: weights of the terms.
         views: how batches are drawn.
         optim: optimiser and schedule.
+        self_training: what a teacher's words become; and how headings are agreed on in any run.
         validate_every: steps between validations and checkpoints.
     """
 
@@ -58,6 +60,7 @@ class Recipe:
     loss: LossConfig = field(default_factory=LossConfig)
     views: ViewConfig = field(default_factory=ViewConfig)
     optim: OptimConfig = field(default_factory=OptimConfig)
+    self_training: SelfTrainingConfig = field(default_factory=SelfTrainingConfig)
     validate_every: int = 1000
 
 

@@ -13,7 +13,7 @@ from wildshape.method.checkpoint import ModelSettings, save_checkpoint
 from wildshape.training.runtime.log import RunLog
 from wildshape.training.runtime.profiler import steps_profiled
 from wildshape.training.runtime.running_mean import Meter, refuse_not_finite
-from wildshape.training.self_training.headings import agreed_poses
+from wildshape.training.self_training.headings import agreed_rotations
 from wildshape.training.setup import Run, setup, split_tracks, step_of
 from wildshape.training.state import save_state
 from wildshape.training.step import Step
@@ -114,7 +114,8 @@ def _agree_if_due(run: Run) -> None:
     due = {int(share * run.recipe.optim.steps) for share in loss.agree_at}
     if state.step in due and run.targets is None:
         with record_function("wildshape: headings"):
-            state.anchors = agreed_poses(state.mean, run.sampler, loss).rotation
+            rules = run.recipe.self_training.headings
+            state.anchors = agreed_rotations(state.mean, run.sampler, loss, rules)
         run.views.hold(state.anchors)
 
 

@@ -124,8 +124,7 @@ def setup(
         load_state(folder, state, identity, store.scan_count)
     sampler = ViewSampler(store, fit_tracks, recipe.views)
     held_out = ViewSampler(store, held_tracks, recipe.views)
-    time_ordered = recipe.loss.time_ordered or recipe.views.sensor == "lidar"
-    targets = _targets(teacher, headings, sampler, folder, identity, taught, time_ordered)
+    targets = _targets(teacher, headings, sampler, folder, identity, taught, recipe)
     views = _views(sampler, targets, seed, processes, recipe, say)
     if state.anchors is not None:
         views.hold(state.anchors)
@@ -181,18 +180,21 @@ def _targets(
     folder: Path,
     identity: dict[str, str],
     taught: Taught,
-    time_ordered: bool,
+    recipe: Recipe,
 ) -> FusedTargets | None:
     """Made once a run, and kept beside it."""
+    config = recipe.self_training
     if teacher is None:
         return None
     if teacher == "truth":
-        return true_targets(sampler)
+        return true_targets(sampler, config)
+    time_ordered = recipe.loss.time_ordered or recipe.views.sensor == "lidar"
     kept = {key: identity[key] for key in ("data", "teacher", "headings") if key in identity}
+    kept["rules"] = _short_hash(repr((config, time_ordered)).encode())
     found = load_targets(folder, kept, sampler.store.scan_count, len(sampler.scans_of))
     if found is None:
         found = fused_targets(
-            teacher, sampler, taught, time_ordered=time_ordered, headings=headings
+            teacher, sampler, taught, config, time_ordered=time_ordered, headings=headings
         )
         save_targets(folder, found, kept)
     return found
@@ -209,7 +211,8 @@ def _views(
     """On a GPU the scans lie there, if they fit; on a CPU they stay in the mapped store."""
     device = processes.device
     if targets is not None:
-        single = FusedSampler(sampler, targets, mirror=recipe.network.mirror)
+        draw = recipe.self_training.draw
+        single = FusedSampler(sampler, targets, draw, mirror=recipe.network.mirror)
         return HostViews(single, seed, processes.rank, device)
     if device.type != "cuda":
         return HostViews(sampler, seed, processes.rank, device)
@@ -229,7 +232,8 @@ def step_of(run: Run, meter: Meter) -> tuple[Step, Callable[[], None]]:
         objective = WeaklySupervised(network, loss, encoding)
     else:
         unit = unit_of(run.sampler.extent_range()[1])
-        objective = SelfTaught(network, loss, run.targets.complete, encoding, unit)
+        rules = run.recipe.self_training.loss
+        objective = SelfTaught(network, loss, run.targets.complete, encoding, unit, rules)
     wrapped = run.processes.wrap(objective)
     step = Step(run.state, wrapped, run.views, meter, run.recipe.optim.clip)
     return step, Captured(step.advance, run.say) if _records(run) else step.advance

@@ -13,7 +13,7 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.predictor import load
 from wildshape.inference.tracks.heading_vote import half_turn
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
-from wildshape.training.self_training import pseudo_labels as fusing
+from wildshape.training.self_training import pseudo_labels
 from wildshape.training.self_training.heading_transfer import (
     _beside,
     check_transfer,
@@ -24,19 +24,19 @@ VEHICLE_M = 5.0
 
 
 def test_views_of_a_camera_look_as_a_lidar_s_weights_say():
-    """Of views posed right but for half turns, those turned are found, in one gauge for all."""
+    """Of views posed right but for half turns, those turned are found, in one way for all."""
     config = SimulationConfig(tracks=4, scans=6, sensor="depth-camera", shape_points=64)
-    hint, rng, right = load(raw=True), np.random.default_rng(0), []
+    asked, rng, right = load(raw=True), np.random.default_rng(0), []
     for track in simulate_tracks(config, 5, workers=1):
         true = poses_of(track)
         true = SE3(true.rotation.double(), VEHICLE_M * true.translation.double())
         turned = torch.from_numpy(rng.random(len(track.scans)) < 0.5)
-        given = SE3(
+        posed = SE3(
             torch.where(turned[:, None, None], (true @ half_turn(0.0)).rotation, true.rotation),
             true.translation,
         )
         scans = [np.float32(VEHICLE_M) * scan for scan in track.scans]
-        signs = transferred_signs(hint, scans, given)
+        signs = transferred_signs(asked, scans, posed)
         right.append(torch.where(turned, -signs, signs))
     share = float((torch.cat(right) > 0).double().mean())
     assert max(share, 1 - share) >= 0.9
@@ -62,24 +62,25 @@ def test_weights_of_a_camera_are_refused():
         check_transfer(load("airplane"))
 
 
-def test_targets_look_as_the_hint_says(car_store, teacher, tmp_path, monkeypatch):
+def test_targets_look_as_the_other_weights_say(car_store, teacher, monkeypatch):
     """Each scan by itself: every other one is said to be turned, and is."""
     asked = []
 
-    def every_other(_hint, scans, _pose):
+    def every_other(_other, scans, *_):
         asked.append(len(scans))
         return 1.0 - 2.0 * (torch.arange(len(scans)) % 2)
 
-    monkeypatch.setattr(fusing, "refine_jointly", lambda _scans, pose, **_: pose)
-    monkeypatch.setattr(fusing, "_chained", lambda _scans, pose: pose)
-    monkeypatch.setattr(fusing, "_levelled", lambda _sampler, poses: poses)
+    def none(_other, scans, *_):
+        return torch.ones(len(scans))
+
+    monkeypatch.setattr(pseudo_labels, "refined", lambda _teacher, track: track)
+    monkeypatch.setattr(pseudo_labels, "levelled", lambda track: track)
     sampler = sampler_of(car_store)
-    signs = torch.ones(1)
-    monkeypatch.setattr(fusing, "transferred_signs", lambda _h, scans, _p: signs.expand(len(scans)))
-    plain = fusing.fused_targets(teacher, sampler, headings=teacher)
-    monkeypatch.setattr(fusing, "transferred_signs", every_other)
-    turned = fusing.fused_targets(teacher, sampler, headings=teacher)
+    monkeypatch.setattr(pseudo_labels, "transferred_signs", none)
+    plain = pseudo_labels.fused_targets(teacher, sampler, headings=teacher)
+    monkeypatch.setattr(pseudo_labels, "transferred_signs", every_other)
+    turned = pseudo_labels.fused_targets(teacher, sampler, headings=teacher)
     assert asked == [len(scans) for scans in sampler.scans_of]
     first = torch.as_tensor(sampler.scans_of[0])
     cosine = (plain.rotation[first] * turned.rotation[first])[:, :, 0].sum(-1)
-    torch.testing.assert_close(cosine, every_other(None, first, None))
+    torch.testing.assert_close(cosine, every_other(None, first))

@@ -3,22 +3,40 @@
 """A teacher's targets: made from scans alone, kept for one run, and what a run makes of them."""
 
 import itertools
+import json
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 from safetensors.torch import load_file
-from tests.cars import drive_by
+from tests.cars import drive_by, poses_of
+from tests.strategies import rotation_about
 from tests.training.self_training.taught import TAUGHT, sampler_of
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.store.store import StoreWriter, open_store
+from wildshape.method.checkpoint import load_checkpoint
+from wildshape.training.batches.views import ViewSampler
 from wildshape.training.loop import StopRequested, fit, setup
+from wildshape.training.self_training import pseudo_labels
+from wildshape.training.self_training.fused_shape import FusionConfig
+from wildshape.training.self_training.headings import PosedTrack
 from wildshape.training.self_training.pseudo_labels import (
+    SelfTrainingConfig,
+    Teacher,
+    chained,
     fused_targets,
+    heading_votes,
+    levelled,
+    looking_one_way,
+    refined,
+    shape_of,
     true_targets,
+    view_tops,
+    with_roof,
 )
 from wildshape.training.self_training.saved_targets import TARGETS, load_targets, save_targets
 from wildshape.training.state import STATE, save_state
@@ -179,3 +197,124 @@ def test_what_is_taught_is_learned(car_store, tmp_path):
         lambda _, values: losses.append(values["loss"]),
     )
     assert losses[-1] < 0.85 * losses[0]
+
+
+@pytest.fixture(scope="module")
+def who(car_store, teacher):
+    config = SelfTrainingConfig()
+    views = sampler_of(car_store)
+    return Teacher.of(teacher, views, config, time_ordered=True, headings=None)
+
+
+def true_track(cars, index, signs=None):
+    """A car as a teacher that knows the truth would pose it, some scans turned."""
+    poses = poses_of(cars[index])
+    count = len(poses)
+    true = SE3(poses.rotation.float(), poses.translation.float())
+    track = PosedTrack(np.arange(count) + index * count, true, 0.0)
+    return track if signs is None else track.turned(signs)
+
+
+def off(track, cars, index):
+    """How far the object's origin lies from where it should, metres, a scan each."""
+    true = poses_of(cars[index]).translation.float()
+    return (track.T_sensor_can.translation - true).norm(dim=-1)
+
+
+def test_a_teacher_reads_the_scans_as_it_was_trained(who, car_store):
+    assert who.asked.config.points == who.settings.input_points
+    assert who.asked.config.turn == "none"
+    assert who.views.config.turn == "facing"
+    assert [list(scans) for scans in who.asked.scans_of] == [
+        list(scans) for scans in who.views.scans_of
+    ]
+    (cloud, *_) = who.clouds(PosedTrack(np.array([5]), SE3.identity(1), 0.0))
+    np.testing.assert_allclose(cloud * who.unit, car_store.scan_points(5), rtol=1e-6)
+
+
+def test_the_scans_of_a_track_that_are_turned_are_named(who, cars):
+    turned = torch.where(torch.arange(12) % 4 == 1, -1.0, 1.0)
+    votes = heading_votes(who, true_track(cars, 1, turned))
+    assert torch.equal(votes, turned) or torch.equal(votes, -turned)
+
+
+def test_refined_scans_lie_nearer_to_each_other(who, cars):
+    """Each shaken by itself; what all have in common stays unknown, so neighbours are compared."""
+    track, true = true_track(cars, 0), poses_of(cars[0]).to(torch.float32)
+    shake = 0.2 * torch.randn(12, 3, generator=torch.Generator().manual_seed(0))
+    shaken = SE3(track.T_sensor_can.rotation, track.T_sensor_can.translation + shake)
+    shaken = track._replace(T_sensor_can=shaken)
+
+    def apart(poses):
+        own = true.inverse() @ poses
+        return float((own[1:] @ own[:-1].inverse()).translation.norm(dim=-1).mean())
+
+    assert apart(refined(who, shaken).T_sensor_can) < 0.5 * apart(shaken.T_sensor_can)
+
+
+def test_poses_by_which_a_scan_would_jump_are_not_taken(cars, monkeypatch):
+    track = true_track(cars, 0)
+    away = SE3(track.T_sensor_can.rotation, track.T_sensor_can.translation + 9.0)
+    monkeypatch.setattr(pseudo_labels, "refine_by_graph", lambda *_: away)
+    assert chained(list(cars[0].scans), track.T_sensor_can) is track.T_sensor_can
+
+
+def test_tracks_turned_as_wholes_look_one_way_again(who, cars):
+    turned = torch.tensor((1.0, -1.0, 1.0, -1.0, 1.0, 1.0))
+    tracks = [true_track(cars, i, sign.expand(12)) for i, sign in enumerate(turned)]
+    found = looking_one_way(who, tracks, [sign.expand(12) for sign in turned])
+    assert max(float(off(track, cars, i).max()) for i, track in enumerate(found)) < 1e-4
+
+
+def test_a_pitched_frame_is_levelled(cars):
+    pitch = rotation_about((0, 1, 0), 0.1).float()
+    track = true_track(cars, 0)
+    pitched = SE3(track.T_sensor_can.rotation @ pitch, track.T_sensor_can.translation)
+    up = levelled(track._replace(T_sensor_can=pitched)).T_sensor_can.rotation[:, 2].mean(0)
+    assert abs(float(up[0])) < 1e-4
+
+
+def test_the_rules_numbers_can_be_set(who, cars):
+    fewer = replace(who.config, fusion=FusionConfig(points=300, lidar_voxel_m=0.3))
+    few = shape_of(replace(who, config=fewer), true_track(cars, 0))
+    assert few.shape == (300, 3)
+    assert len(np.unique(few, axis=0)) < len(np.unique(shape_of(who, true_track(cars, 0)), axis=0))
+
+
+def test_a_roof_above_all_sensors_takes_no_points_away(who):
+    """Walls of 3 m before sensors at 1.7 m: as many points as before, some between the walls."""
+    x, z = np.meshgrid(np.arange(-4, 4.05, 0.1), np.arange(0, 3, 0.1), indexing="ij")
+    walls = [np.stack((x, np.full_like(x, y), z), -1).reshape(-1, 3) for y in (-1.0, 1.0)]
+    shape = np.concatenate(walls).astype(np.float32)
+    place = torch.tensor((0.0, -10.0, -1.7)).expand(3, 3)
+    track = PosedTrack(np.arange(3), SE3(torch.eye(3).expand(3, 3, 3), -place), 0.0)
+    closed = with_roof(who, shape, track, math.inf)
+    assert closed.shape == shape.shape
+    assert np.abs(closed[:, 1]).min() < 0.5
+
+
+def test_a_camera_s_view_ends_above_no_track(car_store):
+    camera = ViewSampler(
+        car_store, np.arange(len(car_store)), replace(TAUGHT.views, sensor="camera")
+    )
+    assert view_tops(camera) == [math.inf] * len(car_store)
+
+
+def test_targets_of_other_rules_are_made_anew(car_store, teacher, tmp_path):
+    """A run with other numbers does not take the targets that lie in its folder."""
+    for points in (64, 128):
+        rules = replace(TAUGHT.self_training, fusion=FusionConfig(points=points))
+        recipe = replace(TAUGHT, self_training=rules)
+        run = setup(recipe, car_store, tmp_path, seed=3, teacher=teacher)
+        assert run.targets is not None
+        assert run.targets.shapes.shape[1] == points
+
+
+def test_the_rules_numbers_are_saved_with_the_run_and_its_model(car_store, tmp_path):
+    rules = replace(TAUGHT.self_training, fusion=FusionConfig(points=64))
+    recipe = replace(TAUGHT, self_training=rules, optim=replace(TAUGHT.optim, steps=1))
+    model = fit(setup(recipe, car_store, tmp_path, seed=3, teacher="truth"))
+    described = json.loads((tmp_path / "run.json").read_text("utf-8"))
+    for provenance in (described, load_checkpoint(model)[1].provenance):
+        assert provenance["recipe"]["self_training"]["fusion"]["points"] == 64
+        assert provenance["recipe"]["self_training"]["draw"]["occlusion"]["rings"] == 0.2

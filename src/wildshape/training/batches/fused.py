@@ -6,6 +6,7 @@ The trainer's reader for self-training (`pseudo_labels.py` makes the targets) an
 """
 
 import math
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -13,13 +14,38 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from wildshape.training.batches.occlusion_augmentation import partly_hidden
+from wildshape.training.batches.occlusion_augmentation import OcclusionConfig, partly_hidden
 from wildshape.training.batches.views import ViewSampler
 
-_PLACES = 2
-_LARGER, _AXIS, _HALF = 0.2, 0.08, 0.5
-_END_ON, _OFTENER = math.cos(math.radians(60)), 3.0
-_CLOSE_M, _CLOSER = 8.0, 4.0
+
+@dataclass(frozen=True)
+class DrawConfig:
+    """Which scans are drawn, and what is changed of them and of their objects.
+
+    Attributes:
+        sensors: places from which its track was seen that come with a scan; each costs a z-buffer.
+        larger: largest logarithm of the factor by which an object is made larger or smaller.
+        axis: share by which each of its axes is stretched besides.
+        reflected: share of the scans that are reflected where objects are mirror-symmetric.
+        end_on_deg: a sensor within this angle of an object's axis saw that end.
+        both_ends: tracks that saw both ends are drawn so many times as often.
+        near_m: LiDAR scans from nearer than this are drawn more often, as their distance squared.
+        near: at most so many times.
+        occlusion: what is taken away of LiDAR scans.
+    """
+
+    sensors: int = 2
+    larger: float = 0.2
+    axis: float = 0.08
+    reflected: float = 0.5
+    end_on_deg: float = 60.0
+    both_ends: float = 3.0
+    near_m: float = 8.0
+    near: float = 4.0
+    occlusion: OcclusionConfig = field(default_factory=OcclusionConfig)
+
+
+_DEFAULT = DrawConfig()
 
 
 class FusedTargets(NamedTuple):
@@ -70,47 +96,60 @@ class FusedBatch(NamedTuple):
 class FusedSampler:
     """Draws batches of single scans; a batch depends on its seeds alone.
 
-    Of some LiDAR scans a part is hidden (`hiding.py`). Every scan is stretched with its object (see
-    `stretching`), turned as scans to be posed are, and rolled as configured. Where objects are
-    mirror-symmetric, half of the scans are reflected: what is seen of an object's left side could
-    as well be seen of its right. Tracks that saw both ends of their object are drawn more often,
-    and of a LiDAR's scans those from close by, which are few and show an object like no others.
+    Of some LiDAR scans a part is hidden (`occlusion_augmentation.py`). Every scan is stretched with
+    its object (see `stretching`), turned as scans to be posed are, and rolled as configured. Where
+    objects are mirror-symmetric, some of the scans are reflected: what is seen of an object's left
+    side could as well be seen of its right. Tracks that saw both ends of their object are drawn
+    more often, and of a LiDAR's scans those from close by, which are few and show an object like no
+    others.
     """
 
-    def __init__(self, views: ViewSampler, targets: FusedTargets, *, mirror: bool = False) -> None:
+    def __init__(
+        self,
+        views: ViewSampler,
+        targets: FusedTargets,
+        config: DrawConfig = _DEFAULT,
+        *,
+        mirror: bool = False,
+    ) -> None:
         """Sample from the sampler's tracks; `mirror`: objects are symmetric in y = 0."""
-        self.views, self.targets, self.mirror = views, targets, mirror
-        share = torch.where(both_ends(targets.sensors), _OFTENER, 1.0).double().numpy()
+        self.views, self.targets, self.config, self.mirror = views, targets, config, mirror
+        seen = both_ends(targets.sensors, config.end_on_deg)
+        share = torch.where(seen, config.both_ends, 1.0).double().numpy()
         self._share = share / share.sum()
         self._shares = [self._shares_in(scans) for scans in views.scans_of]
 
     def draw(self, *seed: int) -> FusedBatch:
         """The batch of these seeds: as many scans as a batch of views has."""
         rng = np.random.default_rng(seed)
-        config, targets = self.views.config, self.targets
-        scans_of = self.views.scans_of
-        tracks = rng.choice(len(scans_of), config.tracks * config.views, p=self._share)
+        targets, scans_of = self.targets, self.views.scans_of
+        count = self.views.config.tracks * self.views.config.views
+        tracks = rng.choice(len(scans_of), count, p=self._share)
         rows = np.asarray([rng.choice(scans_of[track], p=self._shares[track]) for track in tracks])
         points = torch.stack([self._seen(int(scan), rng) for scan in rows])
         at, chosen = torch.from_numpy(rows), torch.from_numpy(tracks)
-        rotation, factors = targets.rotation[at], _factors(len(rows), rng)
+        rotation, factors = targets.rotation[at], _factors(count, rng, self.config)
         stretch = stretching(rotation, factors)
         scans, centres, turn = self.views.turned_points(points @ stretch.mT, rng)
         translation = (turn @ stretch @ targets.translation[at][..., None])[..., 0] - centres
-        some = torch.from_numpy(rng.integers(targets.sensors.shape[1], size=(len(rows), _PLACES)))
+        places = rng.integers(targets.sensors.shape[1], size=(count, self.config.sensors))
+        some = torch.from_numpy(places)
         sensors = targets.sensors[chosen[:, None], some] * factors[:, None]
         shapes = targets.shapes[chosen] * factors[:, None]
         steeper = factors[:, 2] / (factors[:, 0] * factors[:, 1]).sqrt()
         view_top = targets.view_top[chosen] * steeper
         batch = FusedBatch(scans, turn @ rotation, translation, shapes, sensors, view_top)
-        return reflected(batch, rng.random(len(rows)) < _HALF) if self.mirror else batch
+        if not self.mirror:
+            return batch
+        return reflected(batch, rng.random(count) < self.config.reflected)
 
     def _shares_in(self, scans: np.ndarray) -> np.ndarray | None:
         """How likely each scan of a track is drawn; None: alike."""
         if self.views.config.sensor != "lidar":
             return None
         away = self.targets.translation[torch.from_numpy(scans)].norm(dim=-1).double()
-        share = ((_CLOSE_M / away.clamp_min(1e-9)) ** 2).clamp(1.0, _CLOSER).numpy()
+        share = ((self.config.near_m / away.clamp_min(1e-9)) ** 2).clamp(1.0, self.config.near)
+        share = share.numpy()
         return share / share.sum()
 
     def _seen(self, scan: int, rng: np.random.Generator) -> Float[Tensor, "n 3"]:
@@ -119,10 +158,12 @@ class FusedSampler:
         config = self.views.config
         if config.sensor != "lidar":
             return points
-        return partly_hidden(points, rng, config.min_points)
+        return partly_hidden(points, rng, config.min_points, self.config.occlusion)
 
 
-def both_ends(sensors: Float[Tensor, "T O 3"]) -> Bool[Tensor, "T"]:
+def both_ends(
+    sensors: Float[Tensor, "T O 3"], end_on_deg: float = _DEFAULT.end_on_deg
+) -> Bool[Tensor, "T"]:
     """Which tracks saw their object's front and its rear.
 
     From one end the length is a guess, and so is the middle, which is the origin: what such tracks
@@ -130,9 +171,11 @@ def both_ends(sensors: Float[Tensor, "T O 3"]) -> Bool[Tensor, "T"]:
 
     Args:
         sensors: places, canonical frame (x along the object, z up).
+        end_on_deg: a sensor within this angle of the object's axis saw that end.
     """
+    end_on = math.cos(math.radians(end_on_deg))
     along = torch.nn.functional.normalize(sensors[..., :2], dim=-1)[..., 0]
-    return (along > _END_ON).any(-1) & (along < -_END_ON).any(-1)
+    return (along > end_on).any(-1) & (along < -end_on).any(-1)
 
 
 def reflected(batch: FusedBatch, chosen: Bool[np.ndarray, "B"]) -> FusedBatch:
@@ -162,7 +205,8 @@ def stretching(
     return (R_sensor_canonical * factors[:, None]) @ R_sensor_canonical.mT
 
 
-def _factors(count: int, rng: np.random.Generator) -> Float[Tensor, "B 3"]:
+def _factors(count: int, rng: np.random.Generator, config: DrawConfig) -> Float[Tensor, "B 3"]:
     """Lengths of the stretched axes: larger or smaller as a whole, and a little out of shape."""
-    whole = np.exp(rng.uniform(-_LARGER, _LARGER, (count, 1)))
-    return torch.from_numpy((whole * rng.uniform(1 - _AXIS, 1 + _AXIS, (count, 3))).astype("f4"))
+    whole = np.exp(rng.uniform(-config.larger, config.larger, (count, 1)))
+    axes = rng.uniform(1 - config.axis, 1 + config.axis, (count, 3))
+    return torch.from_numpy((whole * axes).astype("f4"))

@@ -5,6 +5,8 @@
 Beyond the paper, for self-training: what the whole track showed is taught of such a scan too.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
 from jaxtyping import Bool, Float
@@ -12,59 +14,91 @@ from torch import Tensor
 
 from wildshape.geometry.projection.field_of_view import slope
 
-_BEFORE, _STRIP = 0.2, (0.1, 0.6)
-_BESIDE, _SIDE, _LEFT = 0.2, (0.2, 0.7), 0.5
-_LOWER, _HIGHER, _FEET = 0.3, 0.1, 0.5
-_FEWER, _RING_DEG, _APART_DEG = 0.2, 0.25, (0.7, 2.2)
+
+@dataclass(frozen=True)
+class OcclusionConfig:
+    """How often a part of a LiDAR scan is taken away, and how much; each kind by itself.
+
+    Attributes:
+        strip: share of the scans in which something stands before the object.
+        strip_width: of the scan's azimuths that it hides: from a pole to the better half.
+        side: share of the scans of which one side is hidden.
+        side_width: of the scan's azimuths that are hidden then.
+        left: share of those of which the left side is hidden.
+        top: share of the scans, of objects that rise above the sensor's horizon, that are cut at
+            some elevation, more often a low one: many sensors hardly look up.
+        feet: share of the scans of which something low hides the feet.
+        feet_height: most of the scan's elevations that are hidden then.
+        rings: share of the scans that are thinned to rings of beams.
+        ring_deg: height of a ring.
+        ring_apart_deg: of rings, as of sensors of fifty to sixteen beams.
+    """
+
+    strip: float = 0.2
+    strip_width: tuple[float, float] = (0.1, 0.6)
+    side: float = 0.2
+    side_width: tuple[float, float] = (0.2, 0.7)
+    left: float = 0.5
+    top: float = 0.3
+    feet: float = 0.1
+    feet_height: float = 0.5
+    rings: float = 0.2
+    ring_deg: float = 0.25
+    ring_apart_deg: tuple[float, float] = (0.7, 2.2)
+
+
+_DEFAULT = OcclusionConfig()
 
 
 def partly_hidden(
-    points: Float[Tensor, "n 3"], rng: np.random.Generator, fewest: int
+    points: Float[Tensor, "n 3"],
+    rng: np.random.Generator,
+    fewest: int,
+    config: OcclusionConfig = _DEFAULT,
 ) -> Float[Tensor, "n 3"]:
     """The points of a LiDAR scan, or as many points of a part of it.
-
-    In a fifth of the scans a vertical strip is missing, from a pole's width to the better half; in
-    a fifth what lies left or right of some direction, up to 70 %; in three of ten whose object
-    rises above the sensor's horizon, what lies above some elevation, more often a low one:
-    many sensors hardly look up; in one of ten up to the lower half, behind something low; of a
-    fifth there are rings of beams alone, as far apart as a sensor of sixteen to fifty has them.
 
     Args:
         points: sensor frame, z up.
         rng: decides.
         fewest: points that have to be left; else the scan stays as it is.
+        config: how often what is hidden.
     """
     kept = torch.ones(len(points), dtype=torch.bool)
-    if rng.random() < _BEFORE:
-        kept &= ~_strip(points, rng)
-    if rng.random() < _BESIDE:
-        kept &= _one_side(points, rng)
-    if rng.random() < _LOWER:
+    if rng.random() < config.strip:
+        kept &= ~_strip(points, rng, config)
+    if rng.random() < config.side:
+        kept &= _one_side(points, rng, config)
+    if rng.random() < config.top:
         slopes = slope(points)
         kept &= slopes <= max(rng.uniform(0.0, 1.0) ** 2 * float(slopes.max()), 0.0)
-    if rng.random() < _HIGHER:
-        kept &= _elevation_place(points) >= rng.uniform(0.0, _FEET)
-    if rng.random() < _FEWER:
-        kept &= _rings(points, rng)
+    if rng.random() < config.feet:
+        kept &= _elevation_place(points) >= rng.uniform(0.0, config.feet_height)
+    if rng.random() < config.rings:
+        kept &= _rings(points, rng, config)
     rows = torch.nonzero(kept)[:, 0]
     if len(rows) < fewest or len(rows) == len(points):
         return points
     return points[rows[torch.from_numpy(rng.integers(len(rows), size=len(points)))]]
 
 
-def _strip(points: Float[Tensor, "n 3"], rng: np.random.Generator) -> Bool[Tensor, "n"]:
+def _strip(
+    points: Float[Tensor, "n 3"], rng: np.random.Generator, config: OcclusionConfig
+) -> Bool[Tensor, "n"]:
     """Points between two directions of the ground plane."""
     place = _azimuth_place(points)
-    width = rng.uniform(*_STRIP)
+    width = rng.uniform(*config.strip_width)
     start = rng.uniform(0.0, 1.0) - width / 2
     return (place >= start) & (place <= start + width)
 
 
-def _one_side(points: Float[Tensor, "n 3"], rng: np.random.Generator) -> Bool[Tensor, "n"]:
+def _one_side(
+    points: Float[Tensor, "n 3"], rng: np.random.Generator, config: OcclusionConfig
+) -> Bool[Tensor, "n"]:
     """Points left, or right, of a direction of the ground plane."""
-    hidden = rng.uniform(*_SIDE)
+    hidden = rng.uniform(*config.side_width)
     place = _azimuth_place(points)
-    return place <= 1 - hidden if rng.random() < _LEFT else place >= hidden
+    return place <= 1 - hidden if rng.random() < config.left else place >= hidden
 
 
 def _azimuth_place(points: Float[Tensor, "n 3"]) -> Float[Tensor, "n"]:
@@ -84,8 +118,10 @@ def _elevation_place(points: Float[Tensor, "n 3"]) -> Float[Tensor, "n"]:
     return (slopes - low) / max(high - low, 1e-9)
 
 
-def _rings(points: Float[Tensor, "n 3"], rng: np.random.Generator) -> Bool[Tensor, "n"]:
-    """Points of beams at even elevations, a quarter of a degree high each."""
-    apart = rng.uniform(*_APART_DEG)
+def _rings(
+    points: Float[Tensor, "n 3"], rng: np.random.Generator, config: OcclusionConfig
+) -> Bool[Tensor, "n"]:
+    """Points of beams at even elevations."""
+    apart = rng.uniform(*config.ring_apart_deg)
     elevation = torch.rad2deg(torch.atan(slope(points)))
-    return (elevation - rng.uniform(0.0, apart)).remainder(apart) < _RING_DEG
+    return (elevation - rng.uniform(0.0, apart)).remainder(apart) < config.ring_deg

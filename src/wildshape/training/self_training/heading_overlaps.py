@@ -9,6 +9,8 @@ changes that. A problem of signs (Z2 synchronisation), as `headings.py` has them
 the views lie to each other would say nothing: opposite sides lie nearest when one is turned.
 """
 
+from dataclasses import dataclass
+
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -16,8 +18,22 @@ from torch import Tensor
 from wildshape.inference.tracks.heading_vote import half_turn
 from wildshape.ops.nearest import nearest
 
-_FAR, _SMALLEST_M = 0.1, 1e-9
+_SMALLEST_M = 1e-9
 _ACROSS = (1.0, -1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class OverlapConfig:
+    """How views contradict each other.
+
+    Attributes:
+        far: a point counts for no more than this share of the object's diagonal; poses err, too.
+    """
+
+    far: float = 0.1
+
+
+_DEFAULT = OverlapConfig()
 
 
 @torch.no_grad()
@@ -25,6 +41,7 @@ def agreeing_signs(
     clouds: Float[Tensor, "V n 3"],
     sensors: Float[Tensor, "V 3"],
     middle_x: float = 0.0,
+    config: OverlapConfig = _DEFAULT,
     *,
     mirror: bool,
 ) -> Float[Tensor, "V"]:
@@ -35,10 +52,11 @@ def agreeing_signs(
             right but for half turns.
         sensors: where each was taken, the same frame.
         middle_x: of the object's length, there.
+        config: what counts.
         mirror: the object is symmetric in the plane y = 0.
     """
     size = clouds.flatten(0, 1)
-    far = _FAR * float((size.amax(0) - size.amin(0)).norm()) + _SMALLEST_M
+    far = config.far * float((size.amax(0) - size.amin(0)).norm()) + _SMALLEST_M
     seen = clouds
     if mirror:
         seen = torch.cat((clouds, clouds * clouds.new_tensor(_ACROSS)), dim=1)
@@ -63,9 +81,9 @@ def _contradiction(
 
     Beside the outline or in front of the surface, whichever is more; metres, at most `far` a point.
     """
-    given, own = clouds - sensor, view - sensor
-    distance, known = given.norm(dim=-1), own.norm(dim=-1).clamp_min(_SMALLEST_M)
-    rays = given / distance.clamp_min(_SMALLEST_M)[..., None]
+    other, own = clouds - sensor, view - sensor
+    distance, known = other.norm(dim=-1), own.norm(dim=-1).clamp_min(_SMALLEST_M)
+    rays = other / distance.clamp_min(_SMALLEST_M)[..., None]
     found = nearest(rays, (own / known[:, None]).expand(len(clouds), -1, -1))
     beside = distance * found.distance_squared.sqrt()
     before = known[found.index] - distance

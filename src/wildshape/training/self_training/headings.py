@@ -3,15 +3,16 @@
 """All tracks agree on which way is front (beyond the paper), without a label.
 
 A near-symmetric object settles in either of two headings, a half turn apart, each track as chance
-has it (METHOD 12.2). Facts that need no label decide: within a track an object does not turn
-around between neighbouring scans, or, where the scans come in no order (`LossConfig.time_ordered`
-is false), they contradict each other if not posed alike (`heading_overlaps.py`); across tracks, the
+has it (METHOD 12.2). What needs no label decides: within a track an object does not turn around
+between neighbouring scans, or, where the scans come in no order (`LossConfig.time_ordered` is
+false), they contradict each other if not posed alike (`heading_overlaps.py`); across tracks, the
 profiles of fused scans are more alike when turned the same way (`heading_profiles.py`). Each is a
 problem of signs (Z2 synchronisation), solved by a leading eigenvector. Which of the two ways is
 called front stays open: nobody says.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -21,169 +22,227 @@ from torch import Tensor
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.choose_hypothesis import choose_hypothesis
+from wildshape.inference.choose_hypothesis import CostRule, choose_hypothesis
 from wildshape.inference.tracks.heading_vote import continuous_signs, turned_where
 from wildshape.method.multiview import LossConfig
 from wildshape.method.network import ShapePoseNet
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.self_training.heading_contradictions import (
+    ContradictionConfig,
     EndOn,
     end_on,
     own_signs,
     uncontradicted_signs,
 )
-from wildshape.training.self_training.heading_overlaps import agreeing_signs
-from wildshape.training.self_training.heading_profiles import agreed_signs, profile, together
+from wildshape.training.self_training.heading_overlaps import OverlapConfig, agreeing_signs
+from wildshape.training.self_training.heading_profiles import (
+    ProfileConfig,
+    Profiles,
+    agreed_signs,
+    profile,
+    together,
+)
 
 NOT_FINITE = (
     "training stopped: the loss is not finite; resume from the last checkpoint with a smaller"
     " learning rate, or check the data's units."
 )
-_BATCH, _POINTS = 64, 256
+_BATCH = 64  # scans at once; decides memory alone
 
 
-class AgreedPoses(NamedTuple):
-    """`T_sensor_canonical` of every scan of a store, as recorded, headings agreed on.
+@dataclass(frozen=True)
+class HeadingConfig:
+    """How headings are agreed on.
 
     Attributes:
-        rotation: zero for unused scans.
-        translation: metres; zero for unused scans.
+        scan_points: of each scan, where scans and tracks are compared.
+        overlap: how views that come in no order contradict each other.
+        profile: how alike tracks are.
+        contradiction: when a trained network's own word counts for more than the profiles.
     """
 
-    rotation: Float[Tensor, "S 3 3"]
-    translation: Float[Tensor, "S 3"]
+    scan_points: int = 256
+    overlap: OverlapConfig = field(default_factory=OverlapConfig)
+    profile: ProfileConfig = field(default_factory=ProfileConfig)
+    contradiction: ContradictionConfig = field(default_factory=ContradictionConfig)
+
+
+_DEFAULT = HeadingConfig()
+
+
+class PosedTrack(NamedTuple):
+    """A track's scans and their poses, as recorded.
+
+    Attributes:
+        scans: rows of the store.
+        T_sensor_can: one a scan.
+        middle_x: of the object's length in the canonical frame, metres.
+    """
+
+    scans: np.ndarray
+    T_sensor_can: SE3
+    middle_x: float
+
+    def turned(self, signs: Float[Tensor, "V"]) -> "PosedTrack":
+        """The scans of sign -1 turned by half a turn about the object's middle."""
+        return self._replace(T_sensor_can=turned_where(self.T_sensor_can, signs, self.middle_x))
 
 
 @torch.no_grad()
-def agreed_poses(
+def agreed_rotations(
     network: ShapePoseNet,
     sampler: ViewSampler,
-    config: LossConfig,
-    refined: Callable[[np.ndarray, SE3], SE3] = lambda _, pose: pose,
-    progress: Callable[[int, int], None] = lambda *_: None,
-    fused: Callable[[ViewSampler, np.ndarray, SE3], Tensor] | None = None,
-    transferred: Callable[[np.ndarray, SE3], Tensor] | None = None,
-    *,
-    settled: bool = False,
-) -> AgreedPoses:
-    """Pose all scans, refine each track, and let all tracks look one way.
+    loss: LossConfig,
+    config: HeadingConfig = _DEFAULT,
+) -> Float[Tensor, "S 3 3"]:
+    """`R_sensor_canonical` of every scan of a store, as recorded, once all tracks look one way.
+
+    Zero for scans that are not trained on.
 
     Args:
         network: poses the scans.
         sampler: of the tracks trained on.
-        config: decides which branch speaks, and whether the scans of a track follow each other.
-        refined: from a track's scans and their poses to better poses.
-        progress: called with the tracks done, and their number.
-        fused: a track's object from its scans and their poses, to be compared with others; by
-            default some points of each scan.
-        transferred: from a track's scans and their poses to +1 or -1 for each, as someone else
-            would have it look (`heading_transfer.py`); then nothing need be agreed on.
-        settled: the network has been trained to its end: what it says of a scan is worth something
-            against what all tracks together say (`heading_contradictions.py`).
+        loss: decides which branch speaks, and whether the scans of a track follow each other.
+        config: how headings are agreed on.
+
+    Raises:
+        BadInputError: the network's weights are no longer finite.
+    """
+    posed = [pose_track(network, sampler, loss, scans) for scans in sampler.scans_of]
+    ordered, mirror = loss.time_ordered, network.config.mirror
+    votes = [
+        signs_within(sampler, track, config, time_ordered=ordered, mirror=mirror) for track in posed
+    ]
+    tracks = [track.turned(signs) for track, signs in zip(posed, votes)]
+    clouds = [some_of_each(sampler, track, config.scan_points).flatten(0, 1) for track in tracks]
+    profiles = together([profile(cloud, config.profile) for cloud in clouds])
+    tracks = turned_as_wholes(tracks, signs_across(profiles, votes, config.profile))
+    return by_scan(tracks, len(sampler.store.scan_sizes)).rotation
+
+
+@torch.no_grad()
+def pose_track(
+    network: ShapePoseNet, sampler: ViewSampler, rule: CostRule, scans: np.ndarray
+) -> PosedTrack:
+    """A track's scans as the network poses them, each under its own shape.
+
+    Args:
+        network: poses the scans.
+        sampler: prepares scans as the network was trained on them.
+        rule: what a hypothesis costs.
+        scans: rows of the store.
 
     Raises:
         BadInputError: the network's weights are no longer finite.
     """
     if not all(bool(torch.isfinite(p).all()) for p in network.parameters()):
         raise BadInputError(NOT_FINITE)
-    count = len(sampler.store.scan_sizes)
-    agreed = AgreedPoses(torch.zeros(count, 3, 3), torch.zeros(count, 3))
-    profiles, kept, middles = [], [], []
-    fused = fused or _fused
-    for done, scans in enumerate(sampler.scans_of):
-        T_sensor_can, middle_x = _poses(network, sampler, config, scans)
-        if transferred is not None:
-            votes = transferred(scans, T_sensor_can)
-        else:
-            mirror = network.config.mirror
-            votes = _own_signs(sampler, config, scans, T_sensor_can, middle_x, mirror=mirror)
-        T_voted_can = refined(scans, turned_where(T_sensor_can, votes, middle_x))
-        rows = torch.from_numpy(scans)
-        agreed.rotation[rows] = T_voted_can.rotation
-        agreed.translation[rows] = T_voted_can.translation
-        if transferred is None:
-            profiles.append(profile(fused(sampler, scans, T_voted_can)))
-        kept.append(votes)
-        middles.append(middle_x)
-        progress(done + 1, len(sampler.scans_of))
-    if transferred is not None:
-        return agreed
-    all_profiles = together(profiles)
-    signs = agreed_signs(all_profiles)
-    # Of the two ways that all may look, take the one that most scans look already.
-    looks = torch.stack([(s * sign).sum() for s, sign in zip(kept, signs)]).sum()
-    signs = signs * torch.where(looks < 0, -1.0, 1.0)
-    if settled:
-        found = [_end_on(agreed, *one) for one in zip(sampler.scans_of, kept, signs)]
-        counts = EndOn(*(torch.cat(parts) for parts in zip(*found)))
-        signs = own_signs(uncontradicted_signs(all_profiles, signs, counts), kept)
-    for scans, sign, middle_x in zip(sampler.scans_of, signs, middles):
-        rows = torch.from_numpy(scans)
-        given = SE3(agreed.rotation[rows], agreed.translation[rows])
-        turned = turned_where(given, sign.expand(len(rows)), middle_x)
-        agreed.rotation[rows], agreed.translation[rows] = turned.rotation, turned.translation
-    return agreed
-
-
-def _own_signs(
-    sampler: ViewSampler,
-    config: LossConfig,
-    scans: np.ndarray,
-    T_sensor_can: SE3,
-    middle_x: float,
-    *,
-    mirror: bool,
-) -> Float[Tensor, "V"]:
-    """+1 or -1 for each of a track's scans, so that they look one way, whichever."""
-    if config.time_ordered:
-        return continuous_signs(T_sensor_can.rotation)
-    clouds = some_of_each(sampler, scans, T_sensor_can)
-    sensors = T_sensor_can.inverse().translation
-    return agreeing_signs(clouds, sensors, middle_x, mirror=mirror)
-
-
-def _end_on(
-    poses: AgreedPoses, scans: np.ndarray, votes: Float[Tensor, "V"], sign: Float[Tensor, ""]
-) -> EndOn:
-    """How the network's own headings of one track's scans stand against the track's."""
-    rows = torch.from_numpy(scans)
-    T_sensor_can = SE3(poses.rotation[rows], poses.translation[rows])
-    return end_on(votes, T_sensor_can.inverse().translation, sign)
-
-
-def _poses(
-    network: ShapePoseNet, sampler: ViewSampler, config: LossConfig, scans: np.ndarray
-) -> tuple[SE3, float]:
-    """`T_sensor_canonical` of scans as recorded, each under its own shape; the shapes' middle x."""
     rng = np.random.default_rng(0)
     device = next(network.parameters()).device
     found, middles = [], []
     for start in range(0, len(scans), _BATCH):
         rows = [int(s) for s in scans[start : start + _BATCH]]
         inputs, centres, turn = (t.to(device) for t in sampler.gather_as_posed(rows, rng))
-        said = choose_hypothesis(network, inputs, centres, config)
+        said = choose_hypothesis(network, inputs, centres, rule)
         chosen, x = said.pose, said.shapes[..., 0]
         translation = (turn.mT @ (chosen.translation[:, 0] + centres)[..., None])[..., 0]
         middles.append((x.amin(1) + x.amax(1)) / 2)
         found.append(((turn.mT @ chosen.rotation[:, 0]).cpu(), translation.cpu()))
     rotations, translations = zip(*found)
     middle_x = float(torch.cat(middles).median())
-    return SE3(torch.cat(rotations), torch.cat(translations)), middle_x
+    return PosedTrack(scans, SE3(torch.cat(rotations), torch.cat(translations)), middle_x)
 
 
-def _fused(sampler: ViewSampler, scans: np.ndarray, T_sensor_can: SE3) -> Float[Tensor, "n 3"]:
-    """The object of a track, roughly."""
-    return some_of_each(sampler, scans, T_sensor_can).flatten(0, 1)
+def signs_within(
+    sampler: ViewSampler,
+    track: PosedTrack,
+    config: HeadingConfig = _DEFAULT,
+    *,
+    time_ordered: bool,
+    mirror: bool,
+) -> Float[Tensor, "V"]:
+    """+1 or -1 for each of a track's scans: turn those of -1 and they look one way, whichever.
+
+    Args:
+        sampler: gives the scans.
+        track: posed.
+        config: how headings are agreed on.
+        time_ordered: the scans follow each other.
+        mirror: the object is symmetric in the plane y = 0.
+    """
+    if time_ordered:
+        return continuous_signs(track.T_sensor_can.rotation)
+    clouds = some_of_each(sampler, track, config.scan_points)
+    sensors = track.T_sensor_can.inverse().translation
+    return agreeing_signs(clouds, sensors, track.middle_x, config.overlap, mirror=mirror)
 
 
-def some_of_each(
-    sampler: ViewSampler, scans: np.ndarray, T_sensor_can: SE3
-) -> Float[Tensor, "V n 3"]:
-    """A few hundred points of each of a track's scans, in the canonical frame."""
+def signs_across(
+    profiles: Profiles, votes: Sequence[Float[Tensor, "_"]], config: ProfileConfig
+) -> Float[Tensor, "J"]:
+    """+1 or -1 for each track: turn those of -1 and all look one way.
+
+    Of the two ways that all may look, it is the one that most scans look already.
+
+    Args:
+        profiles: of the tracks.
+        votes: +1 for each scan of a track that looked, as the network posed it, as the track does.
+        config: how alike tracks are.
+    """
+    signs = agreed_signs(profiles, config)
+    looks = torch.stack([(own * sign).sum() for own, sign in zip(votes, signs)]).sum()
+    return signs * torch.where(looks < 0, -1.0, 1.0)
+
+
+def settled_signs(
+    tracks: Sequence[PosedTrack],
+    votes: Sequence[Float[Tensor, "_"]],
+    profiles: Profiles,
+    signs: Float[Tensor, "J"],
+    config: HeadingConfig = _DEFAULT,
+) -> Float[Tensor, "J"]:
+    """The signs of tracks as a network trained to its end would have them.
+
+    What it says of a scan is worth something against what all tracks together say.
+
+    Args:
+        tracks: before `signs`.
+        votes: as in `signs_across`.
+        profiles: of the tracks.
+        signs: agreed on by profiles.
+        config: how headings are agreed on.
+    """
+    rule = config.contradiction
+    counts = [
+        end_on(own, track.T_sensor_can.inverse().translation, sign, rule)
+        for track, own, sign in zip(tracks, votes, signs)
+    ]
+    seen = EndOn(*(torch.cat(parts) for parts in zip(*counts)))
+    signs = uncontradicted_signs(profiles, signs, seen, rule, config.profile)
+    return own_signs(signs, list(votes), rule)
+
+
+def turned_as_wholes(tracks: Sequence[PosedTrack], signs: Float[Tensor, "J"]) -> list[PosedTrack]:
+    """The tracks, all scans of those of sign -1 turned."""
+    return [t.turned(sign.expand(len(t.scans))) for t, sign in zip(tracks, signs)]
+
+
+def by_scan(tracks: Sequence[PosedTrack], scans: int) -> SE3:
+    """`T_sensor_canonical` of every scan of the store, float32; zeros for those of no track."""
+    rotation, translation = torch.zeros(scans, 3, 3), torch.zeros(scans, 3)
+    for track in tracks:
+        rows = torch.from_numpy(track.scans)
+        rotation[rows] = track.T_sensor_can.rotation.float()
+        translation[rows] = track.T_sensor_can.translation.float()
+    return SE3(rotation, translation)
+
+
+def some_of_each(sampler: ViewSampler, track: PosedTrack, count: int) -> Float[Tensor, "V n 3"]:
+    """So many points of each of a track's scans, in the canonical frame."""
     rng = np.random.default_rng(0)
     clouds = []
-    for index, scan in enumerate(scans):
+    for index, scan in enumerate(track.scans):
         points = sampler.store.scan_points(int(scan))
-        picked = torch.from_numpy(points[rng.integers(len(points), size=_POINTS)])
-        clouds.append(T_sensor_can[index].inverse().apply(picked))
+        picked = torch.from_numpy(points[rng.integers(len(points), size=count)])
+        clouds.append(track.T_sensor_can[index].inverse().apply(picked))
     return torch.stack(clouds)

@@ -2,16 +2,46 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is minimised when poses and shapes are known: from fused tracks, or from truth (oracle)."""
 
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 from torch.profiler import record_function
 
+from wildshape.geometry.projection.field_of_view import within_view
+from wildshape.geometry.projection.visibility import FacingBins, facing_bins
 from wildshape.method.multiview import LossConfig
 from wildshape.method.network import Encoding, ShapePoseNet
+from wildshape.method.observation import masked_mean
+from wildshape.ops.nearest import nearest_both
+from wildshape.ops.zbuffer import visible
 from wildshape.training.batches.fused import FusedBatch
 from wildshape.training.objectives import Objective, template_deviation
-from wildshape.training.self_training.loss import pose_terms, seen_from, shape_terms
 
-_BELIEF = 0.1
+_SMALLEST = 1e-12
+_SIDES = torch.tensor([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+
+
+@dataclass(frozen=True)
+class TaughtLossConfig:
+    """How far a network is from what it is taught. Lengths are for vehicles.
+
+    Attributes:
+        belief: weight of the cross-entropy that teaches the selector the winner.
+        cell_m: bins in which nearer points of a shape hide others from a sensor.
+        far_m: farther apart, real scans say nothing; coverage counts up to twice as far.
+        strays: share of a target's points beyond its box on each axis.
+    """
+
+    belief: float = 0.1
+    cell_m: float = 0.25
+    far_m: float = 0.4
+    strays: float = 0.02
+
+
+_DEFAULT = TaughtLossConfig()
 
 
 class SelfTaught(nn.Module):
@@ -23,6 +53,7 @@ class SelfTaught(nn.Module):
         complete: the target shapes are whole; else only what the sensors saw is taught.
         encoding: how the network encodes (see there).
         unit: metres of the unit in which losses are taken (`unit_of`).
+        distances: what counts as far.
     """
 
     def __init__(
@@ -32,10 +63,11 @@ class SelfTaught(nn.Module):
         complete: bool,
         encoding: Encoding | None = None,
         unit: float = 1.0,
+        distances: TaughtLossConfig = _DEFAULT,
     ) -> None:
         super().__init__()
         self.network, self.config = network, config
-        self.complete, self.unit = complete, unit
+        self.complete, self.unit, self.distances = complete, unit, distances
         self.encoding: Encoding | None = encoding
 
     def forward(self, batch: FusedBatch, template: float | Tensor) -> Objective:  # noqa: ARG002
@@ -45,15 +77,20 @@ class SelfTaught(nn.Module):
             poses, shapes = self.network.poses(code), self.network.canonical(code) / self.unit
         translation, batch = poses.translation / self.unit, self._in_units(batch)
         pose = pose_terms(
-            poses.rotation, translation, batch.rotation, batch.translation, batch.shapes
+            poses.rotation,
+            translation,
+            batch.rotation,
+            batch.translation,
+            batch.shapes,
+            self.distances,
         )
         belief = poses.log_belief.gather(1, pose.winner[:, None]).mean()
-        shape = shape_terms(shapes, batch.shapes, self._known(shapes, batch))
+        shape = shape_terms(shapes, batch.shapes, self._known(shapes, batch), self.distances)
         deviation = template_deviation(shapes)
         precision, coverage, distance = (
             part.mean() for part in (shape.precision, shape.coverage, pose.distance)
         )
-        loss = distance + precision + coverage - _BELIEF * belief
+        loss = distance + precision + coverage - self.distances.belief * belief
         loss = loss + self.config.template_end * deviation
         lengths = {
             "pose": distance,
@@ -77,4 +114,115 @@ class SelfTaught(nn.Module):
         if self.complete:
             return None
         mirror = self.network.config.mirror
-        return seen_from(shapes.detach(), batch.sensors, batch.view_top, mirror)
+        return seen_from(shapes.detach(), batch.sensors, batch.view_top, mirror, self.distances)
+
+
+class PoseTerms(NamedTuple):
+    """Loss of the poses.
+
+    Attributes:
+        distance: of the winning branch, a scan each, metres.
+        winner: that branch.
+    """
+
+    distance: Float[Tensor, "B"]
+    winner: Int[Tensor, "B"]
+
+
+def pose_terms(
+    rotation: Float[Tensor, "B K 3 3"],
+    translation: Float[Tensor, "B K 3"],
+    true_rotation: Float[Tensor, "B 3 3"],
+    true_translation: Float[Tensor, "B 3"],
+    shapes: Float[Tensor, "B G 3"],
+    config: TaughtLossConfig = _DEFAULT,
+) -> PoseTerms:
+    """How far the corners of the object's box lie from where they belong; hindsight's winner.
+
+    One length in metres for rotation and translation, whatever the object's size.
+
+    Args:
+        rotation: of every branch.
+        translation: of the same.
+        true_rotation: the target.
+        true_translation: the target.
+        shapes: target shapes, canonical frame.
+        config: how many of a shape's points are strays.
+    """
+    strays = int(config.strays * shapes.shape[1])
+    half = shapes.abs().mT.contiguous().topk(strays + 1, dim=-1).values[..., -1]
+    corners = half[:, None] * _SIDES.to(half)
+    posed = corners[:, None] @ rotation.mT + translation[:, :, None]
+    true = corners @ true_rotation.mT + true_translation[:, None]
+    distance = (posed - true[:, None]).square().sum(-1).clamp_min(_SMALLEST).sqrt().mean(-1)
+    winner = distance.detach().argmin(-1)
+    return PoseTerms(distance.gather(1, winner[:, None])[:, 0], winner)
+
+
+class ShapeTerms(NamedTuple):
+    """Loss of the shapes, metres, an object each.
+
+    Attributes:
+        precision: predicted points to the target.
+        coverage: target points to the prediction.
+    """
+
+    precision: Float[Tensor, "B"]
+    coverage: Float[Tensor, "B"]
+
+
+def shape_terms(
+    shapes: Float[Tensor, "B P 3"],
+    targets: Float[Tensor, "B G 3"],
+    known: Bool[Tensor, "B P"] | None,
+    config: TaughtLossConfig = _DEFAULT,
+) -> ShapeTerms:
+    """Both ways of the Chamfer distance between canonical shapes.
+
+    Args:
+        shapes: predicted.
+        targets: what the track showed, or the truth.
+        known: predicted points about which the targets can say something (`seen_from`); None: all.
+            Where the targets are of real scans, far distances say nothing either.
+        config: what is far.
+    """
+    to_target, to_shape = nearest_both(shapes.detach(), targets)
+    precision = _distance(shapes, targets, to_target.index)
+    coverage = _distance(targets, shapes, to_shape.index)
+    if known is None:
+        return ShapeTerms(precision.mean(-1), coverage.mean(-1))
+    near = masked_mean(precision.clamp_max(config.far_m), known)
+    return ShapeTerms(near, coverage.clamp_max(2 * config.far_m).mean(-1))
+
+
+def _distance(source: Tensor, target: Tensor, index: Tensor) -> Tensor:
+    found = target.gather(1, index[..., None].expand(-1, -1, 3))
+    return (source - found).square().sum(-1).clamp_min(_SMALLEST).sqrt()
+
+
+@torch.no_grad()
+def seen_from(
+    shapes: Float[Tensor, "B P 3"],
+    sensors: Float[Tensor, "B O 3"],
+    view_top: Float[Tensor, "B"],
+    mirror: bool,
+    config: TaughtLossConfig = _DEFAULT,
+) -> Bool[Tensor, "B P"]:
+    """The points of canonical shapes that at least one of the sensors would see.
+
+    Args:
+        shapes: predicted, canonical frame, z up.
+        sensors: places in the same frame, level.
+        view_top: slope above which they see nothing.
+        mirror: the object is symmetric in y = 0: what was seen of one side is known of the other.
+        config: in which bins points hide others.
+    """
+    seen = torch.zeros(shapes.shape[:2], dtype=torch.bool, device=shapes.device)
+    sides = (1.0, -1.0) if mirror else (1.0,)
+    for place in sensors.unbind(1):
+        for side in sides:
+            at = place * place.new_tensor((1.0, side, 1.0))
+            rays = shapes - at[:, None]
+            bins = facing_bins(rays, rays.mean(1), FacingBins(config.cell_m))
+            seen |= visible(bins.index, bins.depth, bins.count) & within_view(rays, view_top)
+    return seen

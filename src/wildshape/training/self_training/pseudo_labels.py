@@ -3,51 +3,175 @@
 """Self-training: what a trained network and the scans of a whole track teach the next network.
 
 Beyond the paper (METHOD 11.3). A network trained as the paper has it poses every scan; the scans of
-a track are then made to fit each other (`joint_icp.py`, `pose_graph.py`), headings
-agreed on (`headings.py`), and fused. The fused, reflected cloud and the refined poses are
+a track are then made to fit each other (`joint_icp.py`, `pose_graph.py`), headings agreed on
+(`headings.py`), and fused (`fused_shape.py`). The fused, reflected cloud and the refined poses are
 targets that a network can be taught from ONE scan of the track. No label enters.
+
+Each rule is a file of its own with its numbers in a frozen record; `SelfTrainingConfig` holds the
+records and `fused_targets` calls the rules, one after the other.
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, Float32
+from jaxtyping import Float, Float32
 from torch import Tensor
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.gravity import level_turn
-from wildshape.geometry.ground import skirt
 from wildshape.geometry.projection.field_of_view import slope, view_top
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.predictor import load
+from wildshape.inference.config import TrackConfig
+from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.prepare import unit_of
 from wildshape.inference.tracks.joint_icp import refine_jointly, stayed_near
 from wildshape.inference.tracks.pose_outliers import without_outliers
-from wildshape.method.checkpoint import load_checkpoint
-from wildshape.method.multiview import LossConfig
-from wildshape.records import Points, SensorKind
-from wildshape.training.batches.fused import FusedTargets
+from wildshape.method.checkpoint import ModelSettings, load_checkpoint
+from wildshape.method.network import ShapePoseNet
+from wildshape.records import Points
+from wildshape.training.batches.fused import DrawConfig, FusedTargets
 from wildshape.training.batches.views import ViewSampler
-from wildshape.training.self_training.heading_transfer import check_transfer, transferred_signs
-from wildshape.training.self_training.headings import AgreedPoses, agreed_poses
-from wildshape.training.self_training.pose_graph import refine_by_graph
-from wildshape.training.self_training.unseen_roof import unseen_roof
+from wildshape.training.self_training.fused_shape import (
+    FusionConfig,
+    exactly,
+    fused_shape,
+    sensors_of,
+    with_unseen_roof,
+)
+from wildshape.training.self_training.heading_profiles import profile, together
+from wildshape.training.self_training.heading_transfer import (
+    TransferConfig,
+    check_transfer,
+    transferred_signs,
+)
+from wildshape.training.self_training.headings import (
+    HeadingConfig,
+    PosedTrack,
+    by_scan,
+    pose_track,
+    settled_signs,
+    signs_across,
+    signs_within,
+    turned_as_wholes,
+)
+from wildshape.training.self_training.objective import TaughtLossConfig
+from wildshape.training.self_training.pose_graph import PoseGraphConfig, refine_by_graph
+from wildshape.training.self_training.unseen_roof import RoofConfig
 
-_POINTS, _SENSORS, _SCAN_POINTS = 2048, 8, 640
-# Of vehicles (`unit_of`); a camera's points are dense and need no mean over so many.
-_VOXEL_M: dict[SensorKind, float] = {"lidar": 0.1, "camera": 0.05}
-_NEIGHBOURS, _STRAY = 4, 6.0
 Progress = Callable[[int, int], None]
 
 
+@dataclass(frozen=True)
+class SelfTrainingConfig:
+    """Everything that decides what a network is taught by another, but the networks.
+
+    It is saved with every model and run, in the recipe. Lengths are for vehicles; they shrink with
+    smaller objects (`unit_of`).
+
+    Attributes:
+        headings: which way tracks look; also agreed on in the midst of a run without a teacher.
+        transfer: which way views look, asked of weights of another sensor.
+        track: outliers among the poses, and how scans are moved onto the mean of all.
+        graph: how scans are laid on their neighbours.
+        fusion: how scans become a shape.
+        roof: which roofs nobody saw.
+        draw: which scans are drawn, and what is changed of them.
+        loss: how far the network is from what it is taught.
+    """
+
+    headings: HeadingConfig = field(default_factory=HeadingConfig)
+    transfer: TransferConfig = field(default_factory=TransferConfig)
+    track: TrackConfig = field(default_factory=TrackConfig)
+    graph: PoseGraphConfig = field(default_factory=PoseGraphConfig)
+    fusion: FusionConfig = field(default_factory=FusionConfig)
+    roof: RoofConfig = field(default_factory=RoofConfig)
+    draw: DrawConfig = field(default_factory=DrawConfig)
+    loss: TaughtLossConfig = field(default_factory=TaughtLossConfig)
+
+
+_DEFAULT = SelfTrainingConfig()
+
+
+@dataclass(frozen=True)
+class Teacher:
+    """Who poses the scans, and what is known of them.
+
+    Attributes:
+        network: poses the scans.
+        settings: of its checkpoint.
+        views: of the tracks trained on, as the next network reads them.
+        asked: of the same tracks, as the teacher reads them.
+        time_ordered: the scans of a track follow each other (`LossConfig.time_ordered`).
+        headings: is asked which way each scan looks; None if the tracks agree among themselves.
+        config: the rules' numbers.
+    """
+
+    network: ShapePoseNet
+    settings: ModelSettings
+    views: ViewSampler
+    asked: ViewSampler
+    time_ordered: bool
+    headings: Predictor | None
+    config: SelfTrainingConfig
+
+    @classmethod
+    def of(
+        cls,
+        checkpoint: Path,
+        views: ViewSampler,
+        config: SelfTrainingConfig,
+        *,
+        time_ordered: bool,
+        headings: Path | None,
+    ) -> "Teacher":
+        """From checkpoints.
+
+        Raises:
+            BadInputError: a checkpoint cannot be used.
+        """
+        network, settings = load_checkpoint(checkpoint)
+        turn = "facing" if settings.facing else "none"
+        read = replace(
+            views.config, points=settings.input_points, turn=turn, sensor=settings.sensor
+        )
+        asked = ViewSampler(views.store, np.arange(len(views.store)), read)
+        asked.scans_of = views.scans_of
+        other = None if headings is None else load(headings, raw=True)
+        if other is not None:
+            check_transfer(other)
+        return cls(network, settings, views, asked, time_ordered, other, config)
+
+    @property
+    def mirror(self) -> bool:
+        """Objects are symmetric in the plane y = 0."""
+        return self.settings.network.mirror
+
+    @property
+    def is_lidar(self) -> bool:
+        """The scans are of a LiDAR, which is held level and sees the ground."""
+        return self.settings.sensor == "lidar"
+
+    @property
+    def unit(self) -> float:
+        """Metres of the unit in which the rules' lengths are meant."""
+        return unit_of(self.settings.extent_m[1])
+
+    def clouds(self, track: PosedTrack) -> list[Points]:
+        """The scans of a track, in units."""
+        scans = (self.views.store.scan_points(int(scan)) for scan in track.scans)
+        return [scan / np.float32(self.unit) for scan in scans]
+
+
+@torch.no_grad()
 def fused_targets(
     teacher: Path,
     sampler: ViewSampler,
     progress: Progress = lambda *_: None,
+    config: SelfTrainingConfig = _DEFAULT,
     *,
     time_ordered: bool = True,
     headings: Path | None = None,
@@ -58,94 +182,100 @@ def fused_targets(
         teacher: poses the scans.
         sampler: of the tracks trained on.
         progress: called with the tracks done, and their number.
+        config: the rules' numbers.
         time_ordered: the scans of a track follow each other (`LossConfig.time_ordered`).
         headings: another checkpoint, asked which way each scan looks (`heading_transfer.py`).
 
     Raises:
         BadInputError: a checkpoint cannot be used.
     """
-    network, settings = load_checkpoint(teacher)
-    views = replace(
-        sampler.config,
-        points=settings.input_points,
-        turn="facing" if settings.facing else "none",
-        sensor=settings.sensor,
+    who = Teacher.of(teacher, sampler, config, time_ordered=time_ordered, headings=headings)
+    tracks, votes = [], []
+    for done, scans in enumerate(sampler.scans_of):
+        posed = pose_track(who.network, who.asked, who.settings, scans)
+        votes.append(heading_votes(who, posed))
+        tracks.append(refined(who, posed.turned(votes[-1])))
+        progress(done + 1, len(sampler.scans_of))
+    if who.headings is None:
+        tracks = looking_one_way(who, tracks, votes)
+    if who.is_lidar:
+        tracks = [levelled(track) for track in tracks]
+    shapes = [shape_of(who, track) for track in tracks]
+    tops = view_tops(sampler)
+    if who.is_lidar:
+        shapes = [with_roof(who, *known) for known in zip(shapes, tracks, tops)]
+    return _targets(sampler, tracks, shapes, tops, config, complete=False)
+
+
+def heading_votes(teacher: Teacher, track: PosedTrack) -> Float[Tensor, "V"]:
+    """+1 or -1 for each scan of a track: turn those of -1 and they look one way."""
+    config, unit = teacher.config, teacher.unit
+    if teacher.headings is not None:
+        in_units = _scaled(track.T_sensor_can, 1 / unit)
+        return transferred_signs(teacher.headings, teacher.clouds(track), in_units, config.transfer)
+    return signs_within(
+        teacher.asked,
+        track,
+        config.headings,
+        time_ordered=teacher.time_ordered,
+        mirror=teacher.mirror,
     )
-    asked = ViewSampler(sampler.store, np.arange(len(sampler.store)), views)
-    asked.scans_of = sampler.scans_of
-    loss = LossConfig(
-        beta=settings.beta,
-        projection=settings.projection,
-        belief=settings.belief,
-        time_ordered=time_ordered,
-    )
-    mirror = settings.network.mirror
-    unit = unit_of(settings.extent_m[1])
-    voxel = unit * _VOXEL_M[settings.sensor]
-
-    def in_units(scans: np.ndarray) -> list[Points]:
-        return [sampler.store.scan_points(int(scan)) / np.float32(unit) for scan in scans]
-
-    def refined(scans: np.ndarray, T_sensor_can: SE3) -> SE3:
-        clouds = in_units(scans)
-        start = _scaled(without_outliers(T_sensor_can) if time_ordered else T_sensor_can, 1 / unit)
-        found = refine_jointly(clouds, start, mirror=mirror)
-        return _scaled(_chained(clouds, found) if time_ordered else found, unit)
-
-    def fused(_: ViewSampler, scans: np.ndarray, T_sensor_can: SE3) -> Tensor:
-        return torch.from_numpy(_shape(sampler, scans, T_sensor_can, mirror, voxel))
-
-    def transferred(scans: np.ndarray, T_sensor_can: SE3) -> Tensor:
-        assert hint is not None
-        return transferred_signs(hint, in_units(scans), _scaled(T_sensor_can, 1 / unit))
-
-    hint = None if headings is None else load(headings, raw=True)
-    if hint is not None:
-        check_transfer(hint)
-    poses = agreed_poses(
-        network, asked, loss, refined, progress, fused, transferred if hint else None, settled=True
-    )
-    if settings.sensor == "lidar":
-        poses = _levelled(sampler, poses)
-    shapes = [
-        _shape(sampler, scans, _of(poses, scans), mirror, voxel) for scans in sampler.scans_of
-    ]
-    tops = _view_tops(sampler)
-    if settings.sensor == "lidar":
-        shapes = [
-            _closed(shape, _sensors(poses, scans), top, mirror)
-            for shape, scans, top in zip(shapes, sampler.scans_of, tops)
-        ]
-    return _targets(sampler, poses, shapes, tops, complete=False)
 
 
-def _levelled(sampler: ViewSampler, poses: AgreedPoses) -> AgreedPoses:
-    """Every track in a frame that does not pitch against its sensors (`geometry/gravity.py`)."""
-    rotation = poses.rotation.clone()
-    for scans in sampler.scans_of:
-        rows = torch.from_numpy(scans)
-        rotation[rows] = rotation[rows] @ level_turn(rotation[rows])
-    return poses._replace(rotation=rotation)
+def refined(teacher: Teacher, track: PosedTrack) -> PosedTrack:
+    """The scans of a track moved onto each other, and those in time order onto their neighbours."""
+    config, clouds = teacher.config, teacher.clouds(track)
+    ordered, given = teacher.time_ordered, track.T_sensor_can
+    start = without_outliers(given, config.track) if ordered else given
+    start = _scaled(start, 1 / teacher.unit)
+    found = refine_jointly(clouds, start, mirror=teacher.mirror, config=config.track.coarse)
+    if ordered:
+        found = chained(clouds, found, config)
+    return track._replace(T_sensor_can=_scaled(found, teacher.unit))
 
 
-def _chained(scans: list[Points], T_sensor_can: SE3) -> SE3:
+def chained(scans: list[Points], T_sensor_can: SE3, config: SelfTrainingConfig = _DEFAULT) -> SE3:
     """Poses that fit their neighbours, unless a scan would jump."""
-    found = refine_by_graph(scans, T_sensor_can)
-    return found if stayed_near(T_sensor_can, found) else T_sensor_can
+    found = refine_by_graph(scans, T_sensor_can, config.graph)
+    return found if stayed_near(T_sensor_can, found, config.track) else T_sensor_can
 
 
-def _of(poses: AgreedPoses, scans: np.ndarray) -> SE3:
-    """`T_sensor_canonical` of some scans."""
-    rows = torch.from_numpy(scans)
-    return SE3(poses.rotation[rows], poses.translation[rows])
+def looking_one_way(
+    teacher: Teacher, tracks: Sequence[PosedTrack], votes: Sequence[Float[Tensor, "_"]]
+) -> list[PosedTrack]:
+    """The tracks turned so that all look one way, as profiles and the teacher itself say."""
+    config = teacher.config.headings
+    clouds = [torch.from_numpy(shape_of(teacher, track)) for track in tracks]
+    profiles = together([profile(cloud, config.profile) for cloud in clouds])
+    signs = signs_across(profiles, votes, config.profile)
+    signs = settled_signs(tracks, votes, profiles, signs, config)
+    return turned_as_wholes(tracks, signs)
 
 
-def _scaled(T_a_b: SE3, factor: float) -> SE3:
-    """The same transform where lengths are so many times as large."""
-    return SE3(T_a_b.rotation, T_a_b.translation * factor)
+def levelled(track: PosedTrack) -> PosedTrack:
+    """A track in a frame that does not pitch against its sensors (`geometry/gravity.py`)."""
+    given = track.T_sensor_can
+    rotation = given.rotation @ level_turn(given.rotation)
+    return track._replace(T_sensor_can=SE3(rotation, given.translation))
 
 
-def _view_tops(sampler: ViewSampler) -> list[float]:
+def shape_of(teacher: Teacher, track: PosedTrack) -> Float32[np.ndarray, "G 3"]:
+    """What the scans of a track show together."""
+    config = teacher.config.fusion
+    voxel = teacher.unit * config.voxel_m(teacher.settings.sensor)
+    return fused_shape(teacher.views, track, config, mirror=teacher.mirror, voxel_m=voxel)
+
+
+def with_roof(
+    teacher: Teacher, shape: Float32[np.ndarray, "G 3"], track: PosedTrack, top: float
+) -> Float32[np.ndarray, "G 3"]:
+    """With the roof that none of the track's sensors could see; `top` is where their view ended."""
+    config = teacher.config
+    sensors = sensors_of(track, config.fusion.sensors)
+    return with_unseen_roof(shape, sensors, top, config.roof, mirror=teacher.mirror)
+
+
+def view_tops(sampler: ViewSampler) -> list[float]:
     """Where each track's view ended above; a camera's ends where its image does: not on objects."""
     if sampler.config.sensor != "lidar":
         return [math.inf] * len(sampler.scans_of)
@@ -156,98 +286,45 @@ def _view_tops(sampler: ViewSampler) -> list[float]:
     return [view_top([highest(int(scan)) for scan in scans]) for scans in sampler.scans_of]
 
 
-def _closed(shape: np.ndarray, sensors: Tensor, top: float, mirror: bool) -> np.ndarray:
-    """With the roof that no sensor could see, as many points as before."""
-    roof = unseen_roof(torch.from_numpy(shape), sensors, top, mirror=mirror)
-    return _exactly(np.concatenate((shape, roof.numpy())))
-
-
-def true_targets(sampler: ViewSampler) -> FusedTargets:
+def true_targets(sampler: ViewSampler, config: SelfTrainingConfig = _DEFAULT) -> FusedTargets:
     """The truth as targets: the oracle, the upper bound of METHOD 9.
 
     Raises:
         BadInputError: a track has no true poses or no true shape.
     """
     store = sampler.store
-    count = len(store.scan_sizes)
-    poses = AgreedPoses(torch.zeros(count, 3, 3), torch.zeros(count, 3))
     starts = np.asarray(store.track_starts)
-    shapes = []
+    tracks, shapes = [], []
     for scans in sampler.scans_of:
-        track = int(np.searchsorted(starts, scans[0], side="right")) - 1
-        known, shape = store.poses_of(track), store.shape_of(track)
+        number = int(np.searchsorted(starts, scans[0], side="right")) - 1
+        known, shape = store.poses_of(number), store.shape_of(number)
         if known is None or shape is None:
             raise BadInputError(
-                f"{store.path}: track {store.names[track]} has no true poses or shape; the oracle"
+                f"{store.path}: track {store.names[number]} has no true poses or shape; the oracle"
                 " needs both."
             )
-        own = known[torch.from_numpy(scans - starts[track])]
-        rows = torch.from_numpy(scans)
-        poses.rotation[rows], poses.translation[rows] = (
-            own.rotation.float(),
-            own.translation.float(),
-        )
-        shapes.append(_exactly(np.asarray(shape)))
-    return _targets(sampler, poses, shapes, [math.inf] * len(shapes), complete=True)
+        own = known[torch.from_numpy(scans - starts[number])].to(torch.float32)
+        tracks.append(PosedTrack(scans, own, 0.0))
+        shapes.append(exactly(np.asarray(shape), config.fusion.points))
+    return _targets(sampler, tracks, shapes, [math.inf] * len(shapes), config, complete=True)
 
 
 def _targets(
     sampler: ViewSampler,
-    poses: AgreedPoses,
-    shapes: list[np.ndarray],
-    tops: list[float],
+    tracks: Sequence[PosedTrack],
+    shapes: Sequence[np.ndarray],
+    tops: Sequence[float],
+    config: SelfTrainingConfig,
     *,
     complete: bool,
 ) -> FusedTargets:
-    sensors = torch.stack([_sensors(poses, scans) for scans in sampler.scans_of])
+    poses = by_scan(tracks, len(sampler.store.scan_sizes))
+    sensors = torch.stack([sensors_of(track, config.fusion.sensors) for track in tracks])
     found = torch.from_numpy(np.stack(shapes))
-    ends = torch.tensor(tops)
+    ends = torch.tensor(list(tops))
     return FusedTargets(poses.rotation, poses.translation, found, sensors, ends, complete=complete)
 
 
-def _sensors(poses: AgreedPoses, scans: np.ndarray) -> Float[Tensor, "O 3"]:
-    """Where the sensor stood, seen from the object, at times spread over the track."""
-    rows = torch.from_numpy(scans[np.linspace(0, len(scans) - 1, _SENSORS).round().astype(int)])
-    return -(poses.rotation[rows].mT @ poses.translation[rows][..., None])[..., 0]
-
-
-def _shape(
-    sampler: ViewSampler, scans: np.ndarray, T_sensor_can: SE3, mirror: bool, voxel_m: float
-) -> Float32[np.ndarray, "G 3"]:
-    """A track's scans in the canonical frame, reflected, thinned, without strays and ground."""
-    rng = np.random.default_rng(0)
-    clouds = []
-    for index, scan in enumerate(scans):
-        points = sampler.store.scan_points(int(scan))
-        picked = torch.from_numpy(points[rng.permutation(len(points))[:_SCAN_POINTS]])
-        clouds.append(T_sensor_can[index].inverse().apply(picked).numpy())
-    fused = np.concatenate(clouds)
-    if mirror:
-        fused = np.concatenate((fused, fused * np.asarray((1, -1, 1), np.float32)))
-    thinned = _voxel_means(fused, voxel_m)
-    kept = thinned[_near_others(thinned)]
-    return _exactly(kept[~skirt(kept)] if sampler.config.sensor == "lidar" else kept)
-
-
-def _near_others(points: Float32[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
-    """All but strays. What is merely thin stays: of a roof, seen at a glance, there is no more."""
-    from scipy.spatial import KDTree
-
-    apart = KDTree(points).query(points, k=_NEIGHBOURS + 1)[0][:, 1:].mean(axis=1)
-    return apart <= _STRAY * np.median(apart)
-
-
-def _voxel_means(points: Float32[np.ndarray, "n 3"], edge_m: float) -> Float32[np.ndarray, "m 3"]:
-    """The mean of the points in each cube: even density, and less noise than its points."""
-    cell = np.floor(points / np.float32(edge_m)).astype(np.int64)
-    _, place = np.unique(cell, axis=0, return_inverse=True)
-    place = place.reshape(-1)
-    count = np.bincount(place)
-    sums = [np.bincount(place, points[:, axis], len(count)) for axis in range(3)]
-    return (np.stack(sums, axis=1) / count[:, None]).astype(np.float32)
-
-
-def _exactly(points: np.ndarray) -> Float32[np.ndarray, "G 3"]:
-    """A seeded choice of as many points as every target has, repeated if there are fewer."""
-    order = np.random.default_rng(0).permutation(len(points))
-    return np.ascontiguousarray(points[order[np.arange(_POINTS) % len(points)]], np.float32)
+def _scaled(T_a_b: SE3, factor: float) -> SE3:
+    """The same transform where lengths are so many times as large."""
+    return SE3(T_a_b.rotation, T_a_b.translation * factor)

@@ -10,7 +10,7 @@ from tests import naive
 from tests.strategies import clouds, rotation_about
 
 from wildshape.geometry.transforms.rotation import rotation_z
-from wildshape.training.self_training.loss import pose_terms, seen_from, shape_terms
+from wildshape.training.self_training.objective import pose_terms, seen_from, shape_terms
 
 
 def box(half=(2.0, 0.9, 0.7), count=2000, seed=0):
