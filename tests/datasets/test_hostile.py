@@ -68,7 +68,7 @@ def test_a_tracklet_long_after_the_last_scan_costs_nothing(tmp_path):
     np.zeros((4, 4), np.float32).tofile(scan)
     source = KittiRaw(path.parent)
     assert list(all_tracks(source)) == []
-    assert source.rejected["scan: the frame has no velodyne file"] == 1
+    assert source.rejected["scan: the frame has no LiDAR file"] == 1
 
 
 def test_xml_bombs_keep_to_the_rule(tmp_path):

@@ -12,8 +12,8 @@ from tests.cars import poses_of
 from wildshape.baselines.local_icp import LocalIcp
 from wildshape.datasets.argoverse2.log import read_boxes, read_sensor_pose, read_sweep, taken_by
 from wildshape.datasets.argoverse2.reader import Argoverse2, find_logs
-from wildshape.datasets.tracks.accumulation import fuse_by_truth
-from wildshape.datasets.tracks.box_crop import Crop, points_in_box
+from wildshape.datasets.tracks.labelled_boxes import Crop, points_in_box
+from wildshape.datasets.tracks.truth import fuse_by_truth
 from wildshape.errors import BadInputError
 
 ROOT = Path(__file__).parents[2].parent / "shared" / "data" / "real" / "argoverse2"

@@ -12,10 +12,10 @@ from wildshape.baselines.identity import Identity, OneScan
 from wildshape.baselines.local_icp import LocalIcp
 from wildshape.datasets.kitti.raw import KittiRaw
 from wildshape.datasets.kitti.tracklets import read_tracklets
-from wildshape.datasets.tracks.accumulation import fuse_by_truth, shape_mirrored
-from wildshape.datasets.tracks.box_crop import Crop, points_in_box
+from wildshape.datasets.tracks.labelled_boxes import Crop, points_in_box
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.datasets.tracks.source import all_tracks
+from wildshape.datasets.tracks.truth import fuse_by_truth, shape_mirrored
 from wildshape.evaluation.protocol import run
 from wildshape.evaluation.summary import figures_of
 

@@ -11,8 +11,8 @@ from tests.cars import poses_of
 
 from wildshape.baselines.local_icp import LocalIcp
 from wildshape.datasets.kitti.tracking import KittiTracking
-from wildshape.datasets.tracks.accumulation import fuse_by_truth, shape_partial
-from wildshape.datasets.tracks.box_crop import Crop
+from wildshape.datasets.tracks.labelled_boxes import Crop
+from wildshape.datasets.tracks.truth import fuse_by_truth, shape_partial
 
 ROOT = Path(__file__).parents[2].parent / "shared" / "data" / "real" / "kitti_tracking"
 TRAINING = ROOT / "training"
@@ -42,7 +42,7 @@ def test_six_cars_and_a_truck_of_five_frames(tracks):
     ]
     boxes = [row for row in labels if row[2] in ("Car", "Van", "Truck")]
     missing = [row for row in boxes if not 328 <= int(row[0]) <= 332]
-    assert source.rejected["scan: the frame has no velodyne file"] == len(missing)
+    assert source.rejected["scan: the frame has no LiDAR file"] == len(missing)
 
 
 def matrix(name, columns):

@@ -10,7 +10,7 @@ import pytest
 from wildshape.datasets.pandaset.pandas_pickle import read_pickled_table
 from wildshape.datasets.pandaset.reader import PandaSet
 from wildshape.datasets.pandaset.scene import PANDARGT, read_cuboids, read_drive, read_sweep
-from wildshape.datasets.tracks.accumulation import fuse_by_truth
+from wildshape.datasets.tracks.truth import fuse_by_truth
 
 ROOT = Path(__file__).parents[2].parent / "shared" / "data" / "real" / "pandaset_1frame"
 SCENE = ROOT / "001"

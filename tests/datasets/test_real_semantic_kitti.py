@@ -14,7 +14,7 @@ from tests.datasets.write_semantic_kitti import row
 from wildshape.datasets.kitti.raw import read_velodyne
 from wildshape.datasets.semantic_kitti.reader import PAPER, SemanticKitti
 from wildshape.datasets.semantic_kitti.sequence import open_sequence
-from wildshape.datasets.tracks.accumulation import fuse_by_truth, shape_mirrored, shape_partial
+from wildshape.datasets.tracks.truth import fuse_by_truth, shape_mirrored, shape_partial
 from wildshape.geometry.transforms.se3 import SE3
 
 ROOT = Path(__file__).parents[2].parent / "shared" / "data" / "real" / "semantickitti"

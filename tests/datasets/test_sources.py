@@ -7,9 +7,8 @@ import pytest
 from tests.cars import drive_by
 
 from wildshape.datasets.kitti.raw import KittiRaw
-from wildshape.datasets.tracks.folder import Folder
-from wildshape.datasets.tracks.packed import Packed
 from wildshape.datasets.tracks.source import Source, all_tracks
+from wildshape.datasets.tracks.whole_tracks import Folder, Packed
 from wildshape.errors import BadInputError
 from wildshape.io.store.store import StoreWriter
 from wildshape.io.tracks import write_track

@@ -11,7 +11,7 @@ from dataclasses import replace
 from tests.training.worker import SMALLEST
 
 from wildshape.cli.main import main
-from wildshape.datasets.tracks import filtering as groups
+from wildshape.datasets.tracks import parts as groups
 from wildshape.training import recipes
 
 STEPS, SAVED_EVERY = 45, 20

@@ -14,7 +14,7 @@ from tests.fuzz.scans import track
 from tests.fuzz.target import Arrays, Target, numbers_of
 
 from wildshape.cli.results.boxes import BoxOrder
-from wildshape.datasets.tracks.packed import Packed
+from wildshape.datasets.tracks.whole_tracks import Packed
 from wildshape.io.poses import write_poses
 from wildshape.io.scans.writers import write_ply
 from wildshape.io.store.index import file_record

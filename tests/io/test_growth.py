@@ -13,7 +13,7 @@ import pytest
 import torch
 
 from wildshape.cli.input.tracks import Reading
-from wildshape.datasets.tracks.folder import Folder
+from wildshape.datasets.tracks.whole_tracks import Folder
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io import tracks

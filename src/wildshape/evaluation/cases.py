@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from wildshape.datasets.tracks.accumulation import shape_mirrored, shape_partial
+from wildshape.datasets.tracks.truth import shape_mirrored, shape_partial
 from wildshape.evaluation.metrics import hull_area, true_box
 from wildshape.evaluation.results import Limits, Rotate, Skipped
 from wildshape.geometry.box import FittedBox

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wildshape.datasets.tracks.accumulation import fuse_by_truth
+from wildshape.datasets.tracks.truth import fuse_by_truth
 from wildshape.io.atomic import atomic_write
 from wildshape.records import Track
 from wildshape.report.content import Cell, Cloud, Figure, Report, ReportObject, Table

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float
 
-from wildshape.datasets.tracks.accumulation import fuse_by_truth
+from wildshape.datasets.tracks.truth import fuse_by_truth
 from wildshape.records import Points, Track
 from wildshape.report.content import GREEN, GREY, ORANGE
 from wildshape.report.histograms import literal

@@ -13,7 +13,7 @@ from tests.datasets.write_kitti_raw import SIZE, in_velo, write_drive
 from tests.refusal import refusal_of
 
 from wildshape.datasets.kitti.raw import KittiRaw
-from wildshape.datasets.tracks.box_crop import Crop
+from wildshape.datasets.tracks.labelled_boxes import Crop
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.datasets.tracks.source import all_tracks
 from wildshape.errors import BadInputError
@@ -53,7 +53,7 @@ def test_a_vehicle_becomes_a_track(drive):
     assert source.rejected == {
         "object: category Pedestrian": 1,
         "scan: fewer than 100 points on the object": 3,
-        "scan: the frame has no velodyne file": 1,
+        "scan: the frame has no LiDAR file": 1,
         "object: fewer than 1 scans left": 1,
     }
 

@@ -76,7 +76,7 @@ def test_oxts_puts_a_parked_car_in_one_place(scene, tmp_path):
 
     training = write_sequence(tmp_path / "training", scene, oxts=True)
     sequence, parked = _open(training, "0001"), poses_of(tracks(training)[NAMES["parked"]])
-    places = np.array([sequence.place(i, parked[i]) for i in range(FRAMES)], dtype=float)
+    places = np.array([sequence._place(i, parked[i]) for i in range(FRAMES)], dtype=float)
     assert np.ptp(places, axis=0) == pytest.approx(0, abs=1e-3)
 
 
@@ -93,7 +93,7 @@ def test_frames_without_a_scan_and_other_types_are_counted(training):
     (track,) = source.tracks_of("0001")
     assert track.scan_names == ("000000", "000001", "000003", "000004")
     assert source.rejected == {
-        "scan: the frame has no velodyne file": 1,
+        "scan: the frame has no LiDAR file": 1,
         "object: category Cyclist": 1,
     }
     (cyclist,) = KittiTracking(training, Selection(categories=("Cyclist",))).tracks_of("0001")

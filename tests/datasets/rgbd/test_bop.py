@@ -81,7 +81,7 @@ refused = refusal_of(lambda root: list(all_tracks(Bop(root))))
 
 
 def test_missing_and_damaged_files_are_named(tmp_path):
-    refused(tmp_path, r"expected a BOP data set, split or scene .* found nothing")
+    refused(tmp_path, r"expected a BOP data set, split or scene .* found an empty folder")
     write_bop(tmp_path, count=2)
     scene = tmp_path / "test" / "000001"
     camera, truth = scene / "scene_camera.json", scene / "scene_gt.json"

@@ -134,7 +134,10 @@ refused = refusal_of(lambda root: list(all_tracks(Rgbd(root))))
 
 def test_missing_and_damaged_files_are_named(tmp_path):
     folder = tmp_path / "kitchen"
-    refused(tmp_path, "expected folders with camera.json, depth and masks in them, found nothing")
+    refused(
+        tmp_path,
+        "expected folders with camera.json, .* in them, found an empty folder",
+    )
     write_sequence(folder, count=2)
     camera, mask = folder / "camera.json", folder / "masks" / "000001.png"
     good = camera.read_text(), mask.read_bytes()

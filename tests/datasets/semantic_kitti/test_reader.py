@@ -23,8 +23,8 @@ from tests.datasets.write_semantic_kitti import (
 from tests.refusal import refusal_of
 
 from wildshape.datasets.semantic_kitti.reader import PAPER, SPLITS, SemanticKitti
-from wildshape.datasets.tracks.accumulation import fuse_by_truth, shape_mirrored, shape_partial
 from wildshape.datasets.tracks.selection import Selection
+from wildshape.datasets.tracks.truth import fuse_by_truth, shape_mirrored, shape_partial
 from wildshape.errors import BadInputError
 
 FRAMES = 6
@@ -175,7 +175,7 @@ def test_objects_are_handed_out_right_after_their_last_frame(tmp_path):
     assert next(stream).name == PARKED
     scan.unlink()
     list(stream)
-    assert "scan: the frame has no velodyne file" in source.rejected
+    assert "scan: the frame has no LiDAR file" in source.rejected
 
 
 def test_few_points_are_no_scan_and_every_second_frame(sequence, scene):
@@ -205,7 +205,7 @@ def test_frames_without_a_scan_are_counted(sequence):
     (sequence / "velodyne" / "000002.bin").unlink()
     source = SemanticKitti(sequence)
     assert [len(track.scans) for track in source.tracks_of("00")] == [FRAMES - 1] * 2
-    assert source.rejected == {"scan: the frame has no velodyne file": 2}
+    assert source.rejected == {"scan: the frame has no LiDAR file": 2}
 
 
 def test_readers_can_be_sent_to_workers(sequence):
@@ -218,7 +218,7 @@ refused = refusal_of(tracks)
 
 def test_a_wrong_root_says_what_was_expected_and_found(tmp_path):
     refused(tmp_path / "nowhere", "nowhere: no such folder; give SemanticKITTI's folder with seq")
-    refused(tmp_path, "found nothing; give")
+    refused(tmp_path, "found an empty folder; give")
     (tmp_path / "label_02").mkdir()
     refused(tmp_path, "found label_02; give")
 

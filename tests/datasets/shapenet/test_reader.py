@@ -123,7 +123,7 @@ refused = refusal_of(lambda root, **options: list(all_tracks(ShapeNetViews(root,
 def test_wrong_folders_and_categories_are_named(written, tmp_path):
     root, _ = written
     refused(root / "renders", "expected DPC's data folder.*found 03001627")
-    refused(tmp_path / "no", "found nothing")
+    refused(tmp_path / "no", "in it, no such folder")
     refused(root, "'boat' is no category", selection=Selection(categories=("boat",)))
     refused(root, "holds none of 02958343", selection=Selection(categories=("car",)))
     with pytest.raises(BadInputError, match="part 'x'"):

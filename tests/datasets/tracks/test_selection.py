@@ -7,9 +7,9 @@ import re
 import numpy as np
 import pytest
 
-from wildshape.datasets.tracks.folder import Folder
 from wildshape.datasets.tracks.selection import LARGEST_M, Selection
 from wildshape.datasets.tracks.source import all_tracks
+from wildshape.datasets.tracks.whole_tracks import Folder
 from wildshape.inference.shipped_weights import SHIPPED
 from wildshape.io.scans.points import write_ply
 from wildshape.method.checkpoint import load_checkpoint

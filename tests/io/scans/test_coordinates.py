@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from wildshape.datasets.tracks.folder import Folder
+from wildshape.datasets.tracks.whole_tracks import Folder
 from wildshape.errors import BadInputError
 from wildshape.io.inputs import open_tracks
 from wildshape.io.scans.points import Coordinates, read_points, read_scan

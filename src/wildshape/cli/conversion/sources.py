@@ -28,8 +28,8 @@ SOURCES = {
     "shapenet-views": "wildshape.datasets.shapenet.reader:ShapeNetViews",
     "rgbd": "wildshape.datasets.rgbd.reader:Rgbd",
     "bop": "wildshape.datasets.rgbd.bop:Bop",
-    "folder": "wildshape.datasets.tracks.folder:Folder",
-    "packed": "wildshape.datasets.tracks.packed:Packed",
+    "folder": "wildshape.datasets.tracks.whole_tracks:Folder",
+    "packed": "wildshape.datasets.tracks.whole_tracks:Packed",
 }
 """Name on the command line -> module and class; imported when it is asked for."""
 

@@ -13,7 +13,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int64, UInt8
 
 from wildshape.datasets.argoverse2.feather import POSE, poses, read_feather
-from wildshape.datasets.tracks.measurements import check_boxes, measured
+from wildshape.datasets.tracks.labelled_boxes import check_boxes
+from wildshape.datasets.tracks.selection import measured
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points

@@ -5,6 +5,7 @@
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,13 @@ from wildshape.datasets.argoverse2.log import (
     read_sweep,
     taken_by,
 )
-from wildshape.datasets.tracks.box_crop import Crop, points_in_box
 from wildshape.datasets.tracks.gathering import Gathering
+from wildshape.datasets.tracks.labelled_boxes import (
+    Crop,
+    LabelledObject,
+    crop_objects,
+)
+from wildshape.datasets.tracks.parts import found_in, part_name
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
@@ -39,7 +45,6 @@ VEHICLES = (
 )
 """The rigid ones: articulated buses and trains bend."""
 _SWEEPS = "sensors/lidar"
-_SOURCE = "Argoverse 2 sensor, labelled box"
 
 
 @dataclass
@@ -67,7 +72,7 @@ class Argoverse2:
             BadInputError: no log with labels at or below `root`.
         """
         root = Path(self.root)
-        return [_part(log, root) for log in find_logs(root)]
+        return [part_name(log, root) for log in find_logs(root)]
 
     def tracks_of(self, part: str) -> Iterator[Track]:
         """Tracks of a log, at its end: an object may leave sight and come back.
@@ -79,14 +84,14 @@ class Argoverse2:
         log = root if (root / LABELS).is_file() else root / part
         boxes = read_boxes(log)
         wanted = self._wanted(boxes)
-        gathering = Gathering(self.selection, VLP32C)
-        frames = _Frames(log, read_sensor_pose(log, self.lidar), read_city_poses(log), boxes)
+        gathering = Gathering(self.selection, VLP32C, self.rejected)
+        T_sensor_ego = read_sensor_pose(log, self.lidar).inverse()
+        frames = _Frames(log, T_sensor_ego, read_city_poses(log), boxes, self.lidar)
         for number, stamp in enumerate(np.unique(boxes.timestamps[wanted]).tolist()):
-            rows = np.flatnonzero(wanted & (boxes.timestamps == stamp))
-            self._crop_frame(frames, stamp, number, rows, gathering)
+            rows = np.flatnonzero(wanted & (boxes.timestamps == stamp)).tolist()
+            objects = [frames.object(row, number) for row in rows]
+            crop_objects(objects, str(stamp), partial(frames.scan, stamp), self.crop, gathering)
         yield from gathering.finished()
-        for reason, count in gathering.rejected.items():
-            self.rejected[reason] += count
 
     def _wanted(self, boxes: Boxes) -> np.ndarray:
         wanted = np.isin(boxes.categories.astype(str), self.selection.categories or VEHICLES)
@@ -95,57 +100,42 @@ class Argoverse2:
             self.rejected[f"object: category {category}"] += 1
         return wanted
 
-    def _crop_frame(
-        self, frames: "_Frames", stamp: int, number: int, rows: np.ndarray, to: Gathering
-    ) -> None:
-        boxes, log = frames.boxes, frames.log
-        active = []
-        for row in rows.tolist():
-            category = str(boxes.categories[row]).lower()
-            if to.wants(_name(log, boxes, row), number, category=category, source=_SOURCE):
-                active.append(row)
-        sweep = log / _SWEEPS / f"{stamp}.feather"
-        if active and not sweep.is_file():
-            self.rejected["scan: the frame has no LiDAR file"] += len(active)
-        elif active:
-            try:
-                points, lasers = read_sweep(sweep)
-            except BadInputError as damage:
-                to.miss(len(active), damage)
-                return
-            points = points[taken_by(self.lidar, lasers)]
-            self._crop_sweep(frames, int(sweep.stem), points, active, to)
-
-    def _crop_sweep(
-        self, frames: "_Frames", stamp: int, points: Points, rows: list[int], to: Gathering
-    ) -> None:
-        T_sensor_ego = frames.T_ego_sensor.inverse()
-        cloud = T_sensor_ego.apply_numpy(points)
-        T_city_ego = frames.city_pose(stamp)
-        boxes = frames.boxes
-        for row in rows:
-            T_ego_object = boxes.T_ego_object[row]
-            T = T_sensor_ego @ T_ego_object
-            length, width, height = boxes.sizes[row].tolist()
-            to.add(
-                _name(frames.log, boxes, row),
-                str(stamp),
-                points_in_box(cloud, T, (length, width, height), self.crop),
-                T,
-                (T_city_ego @ T_ego_object).translation.numpy(),
-            )
-
 
 @dataclass(frozen=True)
 class _Frames:
     """What the frames of a log share."""
 
     log: Path
-    T_ego_sensor: SE3
+    T_sensor_ego: SE3
     T_city_ego: dict[int, SE3]
     boxes: Boxes
+    lidar: Lidar
 
-    def city_pose(self, stamp: int) -> SE3:
+    def object(self, row: int, frame: int) -> LabelledObject:
+        """A box as cut out of the sensor's scan of a frame."""
+        boxes = self.boxes
+        T_ego_object = boxes.T_ego_object[row]
+        length, width, height = boxes.sizes[row].tolist()
+        T_city_ego = self._city_pose(int(boxes.timestamps[row]))
+        return LabelledObject(
+            name=f"{self.log.resolve().name}_{boxes.tracks[row]}",
+            last_frame=frame,
+            category=str(boxes.categories[row]).lower(),
+            source="Argoverse 2 sensor, labelled box",
+            size=(length, width, height),
+            T_sensor_object=self.T_sensor_ego @ T_ego_object,
+            place=(T_city_ego @ T_ego_object).translation.numpy(),
+        )
+
+    def scan(self, stamp: int) -> Points | None:
+        """The sweep of a frame in the sensor's frame; None if it has no file."""
+        path = self.log / _SWEEPS / f"{stamp}.feather"
+        if not path.is_file():
+            return None
+        points, lasers = read_sweep(path)
+        return self.T_sensor_ego.apply_numpy(points[taken_by(self.lidar, lasers)])
+
+    def _city_pose(self, stamp: int) -> SE3:
         if stamp not in self.T_city_ego:
             raise BadInputError(
                 f"{self.log}: city_SE3_egovehicle.feather has no pose for the labelled sweep "
@@ -169,16 +159,7 @@ def find_logs(root: Path) -> list[Path]:
         logs = sorted(path.parent for path in root.glob(f"{level}{LABELS}"))
         if logs:
             return logs
-    found = sorted(path.name for path in root.iterdir())
     raise BadInputError(
         f"{root}: expected <split>/<log>/{LABELS} of Argoverse 2's sensor data set (split train or "
-        f"val; test has no labels), found {', '.join(found[:5]) or 'an empty folder'}."
+        f"val; test has no labels), {found_in(root)}."
     )
-
-
-def _part(log: Path, root: Path) -> str:
-    return log.name if log == root else log.relative_to(root).as_posix()
-
-
-def _name(log: Path, boxes: Boxes, row: int) -> str:
-    return f"{log.resolve().name}_{boxes.tracks[row]}"

@@ -8,19 +8,25 @@ Scans and tracklets share the velodyne frame (x forward, y left, z up), so no ca
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from wildshape.datasets.kitti.raw_world import world_poses
 from wildshape.datasets.kitti.tracklets import Tracklet, read_tracklets
-from wildshape.datasets.tracks.box_crop import Crop, points_in_box
 from wildshape.datasets.tracks.gathering import Gathering
-from wildshape.datasets.tracks.measurements import measured
-from wildshape.datasets.tracks.selection import Selection
+from wildshape.datasets.tracks.labelled_boxes import (
+    Crop,
+    LabelledObject,
+    crop_objects,
+    described,
+)
+from wildshape.datasets.tracks.parts import part_name
+from wildshape.datasets.tracks.selection import Selection, measured
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.guard import reading
+from wildshape.io.scans.arrays import read_rows
 from wildshape.records import Points, Sensor, Track
 
 HDL64E = Sensor(kind="lidar", resolution_deg=(0.18, 0.42))
@@ -54,7 +60,7 @@ class KittiRaw:
             BadInputError: no drive below `root`, or none with tracklets.
         """
         root = Path(self.root)
-        return [_part(drive, root) for drive in find_drives(root)]
+        return [part_name(drive, root) for drive in find_drives(root)]
 
     def tracks_of(self, part: str) -> Iterator[Track]:
         """Tracks of a drive, each as soon as its object is labelled no more.
@@ -71,20 +77,21 @@ class KittiRaw:
 
     def _drive_tracks(self, drive: Path) -> Iterator[Track]:
         tracklets = read_tracklets(drive / _TRACKLETS)
-        wanted = {f"{drive.name}_{i:04d}": t for i, t in enumerate(tracklets) if self._is_wanted(t)}
-        gathering = Gathering(self.selection, HDL64E)
+        gathering = Gathering(self.selection, HDL64E, self.rejected)
         files = scan_files(drive)
         world = {} if self.selection.motion == "any" else world_poses(drive)
         labelled: dict[int, dict[str, Tracklet]] = defaultdict(dict)
-        for name, tracklet in wanted.items():
-            for frame in tracklet.frames:
-                labelled[frame][name] = tracklet
-        for frame in sorted(labelled):
-            self._crop_frame(labelled[frame], frame, files, world.get(frame), gathering)
+        for number, tracklet in enumerate(tracklets):
+            if self._is_wanted(tracklet):
+                for frame in tracklet.frames:
+                    labelled[frame][f"{drive.name}_{number:04d}"] = tracklet
+        for frame, there in sorted(labelled.items()):
+            path, pose = files.get(frame), world.get(frame)
+            objects = [_object(name, tracklet, frame, pose) for name, tracklet in there.items()]
+            read = partial(read_velodyne, path) if path else lambda: None
+            crop_objects(objects, f"{frame:010d}", read, self.crop, gathering)
             yield from gathering.finished(before=frame)
         yield from gathering.finished()
-        for reason, count in gathering.rejected.items():
-            self.rejected[reason] += count
 
     def _is_wanted(self, tracklet: Tracklet) -> bool:
         if tracklet.category not in (self.selection.categories or VEHICLES):
@@ -92,34 +99,12 @@ class KittiRaw:
             return False
         return True
 
-    def _crop_frame(
-        self,
-        tracklets: dict[str, Tracklet],
-        frame: int,
-        files: dict[int, Path],
-        T_world_velo: SE3 | None,
-        to: Gathering,
-    ) -> None:
-        active = {
-            name: t
-            for name, t in tracklets.items()
-            if to.wants(name, frame, category=t.category.lower(), source=_source(t))
-        }
-        if not active:
-            return
-        if frame not in files:
-            self.rejected["scan: the frame has no velodyne file"] += len(active)
-            return
-        try:
-            cloud = read_velodyne(files[frame])
-        except BadInputError as damage:
-            to.miss(len(active), damage)
-            return
-        for name, tracklet in active.items():
-            T = tracklet.T_velo_object[frame - tracklet.first_frame]
-            points = points_in_box(cloud, T, tracklet.size, self.crop)
-            place = None if T_world_velo is None else (T_world_velo @ T).translation.numpy()
-            to.add(name, f"{frame:010d}", points, T, place)
+
+def _object(name: str, tracklet: Tracklet, frame: int, T_world_velo: SE3 | None) -> LabelledObject:
+    T = tracklet.T_velo_object[frame - tracklet.first_frame]
+    place = None if T_world_velo is None else (T_world_velo @ T).translation.numpy()
+    source = described("KITTI raw", tracklet.size)
+    return LabelledObject(name, frame, tracklet.category.lower(), source, tracklet.size, T, place)
 
 
 def find_drives(root: Path) -> list[Path]:
@@ -173,22 +158,5 @@ def read_velodyne(path: Path) -> Points:
     Raises:
         BadInputError: the file is no sequence of x y z intensity in float32.
     """
-    with reading(path, "a velodyne scan"):
-        raw = np.fromfile(path, dtype="<f4")
-        size = path.stat().st_size
-        if size % 16 or size == 0:
-            raise BadInputError(
-                f"{path}: {size} bytes, expected a multiple of 16 (float32 x y z intensity); the "
-                "file is truncated, download it again."
-            )
-    points = raw.reshape(-1, 4)[:, :3]
-    return np.ascontiguousarray(points[measured(points)], dtype=np.float32)
-
-
-def _part(drive: Path, root: Path) -> str:
-    return drive.name if drive == root else drive.relative_to(root).as_posix()
-
-
-def _source(tracklet: Tracklet) -> str:
-    length, width, height = tracklet.size
-    return f"KITTI raw, labelled box {length:.2f} x {width:.2f} x {height:.2f} m"
+    points = read_rows(path, "x y z intensity")
+    return np.ascontiguousarray(points[measured(points)])

@@ -5,6 +5,7 @@
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,14 @@ from wildshape.datasets.kitti.calibration import read_calibration, rigid
 from wildshape.datasets.kitti.oxts import read_oxts
 from wildshape.datasets.kitti.raw import HDL64E, read_velodyne
 from wildshape.datasets.kitti.tracking_labels import CATEGORIES, LabelledBox, read_boxes
-from wildshape.datasets.tracks.box_crop import Crop, points_in_box
 from wildshape.datasets.tracks.gathering import Gathering
+from wildshape.datasets.tracks.labelled_boxes import (
+    Crop,
+    LabelledObject,
+    crop_objects,
+    described,
+)
+from wildshape.datasets.tracks.parts import found_in
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError, SharedInputError
 from wildshape.geometry.transforms.se3 import SE3
@@ -62,25 +69,23 @@ class KittiTracking:
         sequence = _open(self._training(), part)
         frames = self._wanted(sequence.labels)
         last = {box.track: box.frame for boxes in frames.values() for box in boxes}
-        gathering = Gathering(self.selection, HDL64E)
+        gathering = Gathering(self.selection, HDL64E, self.rejected)
         for frame, boxes in frames.items():
             # The last frame is known: an object may be unlabelled for a while and come back.
-            offered = [b for b in boxes if _wants(gathering, part, b, last[b.track])]
-            self._cut(sequence, frame, offered, gathering)
+            objects = [sequence.object(box, last[box.track]) for box in boxes]
+            path = sequence.scans.get(frame)
+            read = partial(read_velodyne, path) if path else lambda: None
+            crop_objects(objects, f"{frame:06d}", read, self.crop, gathering)
             yield from gathering.finished(before=frame + 1)
-        for reason, count in gathering.rejected.items():
-            self.rejected[reason] += count
 
     def _training(self) -> Path:
         root = Path(self.root)
         for folder in (root / "training", root):
             if (folder / _LABELS).is_dir():
                 return folder
-        inside = sorted(entry.name for entry in root.iterdir()) if root.is_dir() else []
-        found = f"found {' '.join(inside[:8]) or 'nothing'}" if root.is_dir() else "no such folder"
         raise BadInputError(
-            f"{root}: {found}; give KITTI tracking's folder with training/{_LABELS} in it, or "
-            "training."
+            f"{root}: {found_in(root)}; give KITTI tracking's folder with training/{_LABELS}"
+            " in it, or training."
         )
 
     def _wanted(self, labels: list[LabelledBox]) -> dict[int, list[LabelledBox]]:
@@ -99,25 +104,6 @@ class KittiTracking:
             if box.category in categories:
                 frames[box.frame].append(box)
         return frames
-
-    def _cut(
-        self, sequence: "_Sequence", frame: int, boxes: list[LabelledBox], to: Gathering
-    ) -> None:
-        if not boxes:
-            return
-        if frame not in sequence.scans:
-            self.rejected["scan: the frame has no velodyne file"] += len(boxes)
-            return
-        try:
-            cloud = read_velodyne(sequence.scans[frame])
-        except BadInputError as damage:
-            to.miss(len(boxes), damage)
-            return
-        for box in boxes:
-            T_velo_object = sequence.T_velo_rect @ box.T_rect_object
-            points = points_in_box(cloud, T_velo_object, box.size, self.crop)
-            place = sequence.place(frame, T_velo_object)
-            to.add(_name(sequence.name, box), f"{frame:06d}", points, T_velo_object, place)
 
 
 @dataclass(frozen=True)
@@ -138,7 +124,20 @@ class _Sequence:
     T_velo_rect: SE3
     T_world_velo: SE3 | None
 
-    def place(self, frame: int, T_velo_object: SE3) -> np.ndarray | None:
+    def object(self, box: LabelledBox, last_frame: int) -> LabelledObject:
+        """A box as cut out of the velodyne's scan."""
+        T_velo_object = self.T_velo_rect @ box.T_rect_object
+        return LabelledObject(
+            name=f"{self.name}_{box.track:04d}",
+            last_frame=last_frame,
+            category=box.category.lower(),
+            source=described("KITTI tracking", box.size),
+            size=box.size,
+            T_sensor_object=T_velo_object,
+            place=self._place(box.frame, T_velo_object),
+        )
+
+    def _place(self, frame: int, T_velo_object: SE3) -> np.ndarray | None:
         """Where an object stands in the world, `(3,)` metres, if that is known."""
         if self.T_world_velo is None:
             return None
@@ -175,14 +174,3 @@ def _scan_files(folder: Path) -> dict[int, Path]:
             f"{folder}: no .bin scans; KITTI tracking's velodyne archive brings them."
         )
     return files
-
-
-def _wants(gathering: Gathering, part: str, box: LabelledBox, last: int) -> bool:
-    length, width, height = box.size
-    source = f"KITTI tracking, labelled box {length:.2f} x {width:.2f} x {height:.2f} m"
-    category = box.category.lower()
-    return gathering.wants(_name(part, box), last, category=category, source=source)
-
-
-def _name(part: str, box: LabelledBox) -> str:
-    return f"{part}_{box.track:04d}"

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from wildshape.datasets.tracks.measurements import check_boxes
+from wildshape.datasets.tracks.labelled_boxes import check_boxes
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 

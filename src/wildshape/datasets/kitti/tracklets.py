@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from wildshape.datasets.tracks.measurements import check_boxes
+from wildshape.datasets.tracks.labelled_boxes import check_boxes
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3

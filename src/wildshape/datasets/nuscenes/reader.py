@@ -8,6 +8,7 @@ Scans keep LIDAR_TOP's own frame (x right, y forward, z up): points are rows of 
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +16,17 @@ import numpy as np
 from wildshape.datasets.nuscenes.index import CHANNELS, cache_folder, index_of, lidar_of
 from wildshape.datasets.nuscenes.json_rows import json_rows
 from wildshape.datasets.nuscenes.scene import Frame, Labelled, Scene, read_scene
-from wildshape.datasets.tracks.box_crop import Crop, points_in_box
 from wildshape.datasets.tracks.gathering import Gathering
-from wildshape.datasets.tracks.measurements import measured
-from wildshape.datasets.tracks.selection import Selection
+from wildshape.datasets.tracks.labelled_boxes import (
+    Crop,
+    LabelledObject,
+    crop_objects,
+    described,
+)
+from wildshape.datasets.tracks.parts import found_in
+from wildshape.datasets.tracks.selection import Selection, measured
 from wildshape.errors import BadInputError
-from wildshape.io.guard import reading
+from wildshape.io.scans.arrays import read_rows
 from wildshape.io.scans.points import read_points
 from wildshape.records import Points, Sensor, Track
 
@@ -67,8 +73,8 @@ class NuScenes:
         beside = (f"samples/{channel}", "lidar", "train_lidar", f"data/{channel}")
         if not any((tables.parent / folder).is_dir() for folder in beside):
             raise BadInputError(
-                f"{tables.parent}: expected samples/{channel} beside {tables.name}, found "
-                f"{_found(tables.parent)}; unpack the data set's file blobs there."
+                f"{tables.parent}: expected samples/{channel} beside {tables.name}, "
+                f"{found_in(tables.parent)}; unpack the data set's file blobs there."
             )
         labels = tables / "sample_annotation.json"
         if next(json_rows(labels), None) is None:
@@ -86,17 +92,20 @@ class NuScenes:
         with index_of(tables, self.cache or cache_folder(), channel) as db:
             scene = read_scene(db, part, sweeps=self.sweeps)
         if not any(_file(tables, frame).is_file() for frame in scene.frames):
-            self._count(f"scene: none of its {channel} files is here")
+            self.rejected[f"scene: none of its {channel} files is here"] += 1
             return
-        gathering = Gathering(self.selection, HDL32E if channel == CHANNELS[0] else Sensor("lidar"))
+        sensor = HDL32E if channel == CHANNELS[0] else Sensor("lidar")
+        gathering = Gathering(self.selection, sensor, self.rejected)
         wanted = self._wanted(scene)
         for number, frame in enumerate(scene.frames):
-            boxes = scene.boxes_at(frame)
-            boxes = {token: box for token, box in boxes.items() if token in wanted}
-            self._crop_frame(_file(tables, frame), frame, number, boxes, wanted, gathering)
+            objects = [
+                self._object(wanted[token], box, frame, number)
+                for token, box in scene.boxes_at(frame).items()
+                if token in wanted
+            ]
+            read = partial(read_sweep, _file(tables, frame))
+            crop_objects(objects, frame.name, read, self.crop, gathering)
         yield from gathering.finished()
-        for reason, count in gathering.rejected.items():
-            self._count(reason, count)
 
     def _wanted(self, scene: Scene) -> dict[str, tuple[str, str]]:
         """Name and category of the objects to be taken, by token."""
@@ -107,44 +116,23 @@ class NuScenes:
                 name = f"{part}_{token[:_TOKEN_LETTERS]}"
                 wanted[token] = (name, category.removeprefix("vehicle."))
             else:
-                self._count(f"object: category {category}")
+                self.rejected[f"object: category {category}"] += 1
         return wanted
 
-    def _crop_frame(
-        self,
-        path: Path,
-        frame: Frame,
-        number: int,
-        boxes: dict[str, Labelled],
-        wanted: dict[str, tuple[str, str]],
-        to: Gathering,
-    ) -> None:
-        active = []
-        for token, box in boxes.items():
-            name, category = wanted[token]
-            if to.wants(name, number, category=category, source=self._source(box)):
-                active.append((name, box))
-        if not active:
-            return
-        try:
-            cloud = read_sweep(path)
-        except BadInputError as damage:
-            to.miss(len(active), damage)
-            return
-        T_sensor_global = frame.T_global_sensor.inverse()
-        for name, box in active:
-            T = T_sensor_global @ box.T_global_object
-            points = points_in_box(cloud, T, box.size, self.crop)
-            place = box.T_global_object.translation.numpy()
-            to.add(name, frame.name, points, T, place)
-
-    def _source(self, box: Labelled) -> str:
-        length, width, height = box.size
-        text = f"nuScenes, labelled box {length:.2f} x {width:.2f} x {height:.2f} m"
-        return f"{text}, interpolated between key frames" if self.sweeps else text
-
-    def _count(self, reason: str, count: int = 1) -> None:
-        self.rejected[reason] = self.rejected.get(reason, 0) + count
+    def _object(
+        self, named: tuple[str, str], box: Labelled, frame: Frame, number: int
+    ) -> LabelledObject:
+        name, category = named
+        source = described("nuScenes", box.size)
+        return LabelledObject(
+            name=name,
+            last_frame=number,
+            category=category,
+            source=f"{source}, interpolated between key frames" if self.sweeps else source,
+            size=box.size,
+            T_sensor_object=frame.T_global_sensor.inverse() @ box.T_global_object,
+            place=box.T_global_object.translation.numpy(),
+        )
 
 
 def _file(tables: Path, frame: Frame) -> Path:
@@ -166,7 +154,7 @@ def find_tables(root: Path) -> Path:
         raise BadInputError(f"{root}: no such folder; expected {_LAYOUT}.")
     found = [path.parent for name in _TABLES for path in sorted(root.glob(f"{name}/scene.json"))]
     if not found:
-        raise BadInputError(f"{root}: expected {_LAYOUT}, found {_found(root)}.")
+        raise BadInputError(f"{root}: expected {_LAYOUT}, {found_in(root)}.")
     if len(found) > 1:
         raise BadInputError(
             f"{root}: holds {' and '.join(path.name for path in found)}, which may share scenes; "
@@ -189,21 +177,9 @@ def read_sweep(path: Path) -> Points:
     if path.suffix == ".pcd":  # TruckScenes
         points = read_points(path)
         return points[measured(points)]
-    with reading(path, "a sweep of nuScenes"):
-        size = path.stat().st_size
-        if size % 20 or size == 0:
-            raise BadInputError(
-                f"{path}: {size} bytes, expected a multiple of 20 (float32 x y z intensity ring); "
-                "the file is truncated, unpack it again."
-            )
-        points = np.fromfile(path, dtype="<f4").reshape(-1, 5)[:, :3]
-    return np.ascontiguousarray(points[measured(points)], dtype=np.float32)
+    points = read_rows(path, "x y z intensity ring")
+    return np.ascontiguousarray(points[measured(points)])
 
 
 def _is_of(category: str, words: tuple[str, ...]) -> bool:
     return any(f".{word}." in f".{category}." for word in words)
-
-
-def _found(folder: Path) -> str:
-    names = sorted(path.name for path in folder.iterdir())
-    return ", ".join(names[:5]) or "an empty folder"

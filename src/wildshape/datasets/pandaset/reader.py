@@ -5,6 +5,7 @@
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,9 @@ from wildshape.datasets.pandaset.scene import (
     read_drive,
     read_sweep,
 )
-from wildshape.datasets.tracks.box_crop import Crop, rows_in_box
 from wildshape.datasets.tracks.gathering import Gathering
+from wildshape.datasets.tracks.labelled_boxes import Crop, rows_in_box
+from wildshape.datasets.tracks.parts import found_in, part_name
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
 from wildshape.records import Points, Sensor, Track
@@ -65,7 +67,7 @@ class PandaSet:
             BadInputError: no labelled scene at or below `root`.
         """
         root = Path(self.root)
-        return [_part(scene, root) for scene in find_scenes(root)]
+        return [part_name(scene, root) for scene in find_scenes(root)]
 
     def tracks_of(self, part: str) -> Iterator[Track]:
         """Tracks of a scene, at its end: an object may leave sight and come back.
@@ -77,15 +79,15 @@ class PandaSet:
         scene = root if _is_scene(root) else root / part
         labels = sorted((scene / CUBOIDS).glob(f"*{_FILE}"))
         drive = read_drive(scene, 1 + max(map(_number, labels), default=-1))
-        gathering = Gathering(self.selection, PANDAR64_SENSOR)
+        gathering = Gathering(self.selection, PANDAR64_SENSOR, self.rejected)
         left_out: dict[str, str] = {}
         for path in labels:
             cuboids = read_cuboids(path)
             rows = self._wanted(cuboids, left_out)
             self._crop_frame(_Frame(scene, _number(path), drive, cuboids), rows, gathering)
         yield from gathering.finished()
-        for reason, count in (Counter(left_out.values()) + gathering.rejected).items():
-            self.rejected[reason] += count
+        for reason in left_out.values():
+            self.rejected[reason] += 1
 
     def _wanted(self, cuboids: Cuboids, left_out: dict[str, str]) -> list[int]:
         """Rows to take; why an object is not taken is noted under its name."""
@@ -106,15 +108,10 @@ class PandaSet:
             category = str(cuboids.categories[row]).lower()
             if to.wants(frame.track(row), frame.number, category=category, source=_SOURCE):
                 active.append(row)
-        if active and not frame.sweep.is_file():
-            self.rejected["scan: the frame has no LiDAR file"] += len(active)
-        elif active:
-            try:
-                cloud, times = read_sweep(frame.sweep)
-            except BadInputError as damage:
-                to.miss(len(active), damage)
-                return
-            self._crop_sweep(frame, active, cloud, times, to)
+        read = partial(read_sweep, frame.sweep) if frame.sweep.is_file() else lambda: None
+        swept = to.read(read, len(active))
+        if swept is not None:
+            self._crop_sweep(frame, active, *swept, to)
 
     def _crop_sweep(
         self, frame: "_Frame", rows: list[int], cloud: Points, times: np.ndarray, to: Gathering
@@ -166,19 +163,14 @@ def find_scenes(root: Path) -> list[Path]:
         scenes = sorted(path.parents[1] for path in root.glob(f"{level}{CUBOIDS}"))
         if any(map(_is_scene, scenes)):
             return [scene for scene in scenes if _is_scene(scene)]
-    found = sorted(path.name for path in root.iterdir())
     raise BadInputError(
-        f"{root}: expected PandaSet's <scene>/{CUBOIDS}/00{_FILE} and <scene>/{SWEEPS}, found "
-        f"{', '.join(found[:5]) or 'an empty folder'}."
+        f"{root}: expected PandaSet's <scene>/{CUBOIDS}/00{_FILE} and <scene>/{SWEEPS}, "
+        f"{found_in(root)}."
     )
 
 
 def _is_scene(folder: Path) -> bool:
     return (folder / CUBOIDS).is_dir() and (folder / SWEEPS).is_dir()
-
-
-def _part(scene: Path, root: Path) -> str:
-    return scene.name if scene == root else scene.relative_to(root).as_posix()
 
 
 def _number(path: Path) -> int:

@@ -19,7 +19,7 @@ import torch
 from jaxtyping import Float
 
 from wildshape.datasets.pandaset.pandas_pickle import read_pickled_table
-from wildshape.datasets.tracks.measurements import check_boxes
+from wildshape.datasets.tracks.labelled_boxes import check_boxes
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
 from wildshape.geometry.transforms.se3 import SE3, between

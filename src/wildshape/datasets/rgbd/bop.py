@@ -22,6 +22,7 @@ from wildshape.datasets.rgbd.bop_scene import Frame, Scene, Thing, model_shape, 
 from wildshape.datasets.rgbd.depth_image import read_png
 from wildshape.datasets.rgbd.reader import Cut, cut_out
 from wildshape.datasets.tracks.gathering import Gathering
+from wildshape.datasets.tracks.parts import found_in
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
 from wildshape.records import Intrinsics, Sensor, Track
@@ -57,10 +58,9 @@ class Bop:
         depths = ("scene_gt.json", "*/scene_gt.json", "*/*/scene_gt.json")
         found = sorted(file.parent for pattern in depths for file in root.glob(pattern))
         if not found:
-            inside = sorted(entry.name for entry in root.iterdir()) if root.is_dir() else []
             raise BadInputError(
                 f"{root}: expected a BOP data set, split or scene (scene_gt.json in folders such"
-                f" as test/000001), found {' '.join(inside[:8]) or 'nothing'}."
+                f" as test/000001), {found_in(root)}."
             )
         return [file.relative_to(root).as_posix() for file in found]
 
@@ -74,7 +74,9 @@ class Bop:
             BadInputError: a file of the scene is missing or damaged.
         """
         scene = open_scene(Path(self.root) / part)
-        gathering = Gathering(self.selection, Sensor("camera", intrinsics=scene.camera))
+        gathering = Gathering(
+            self.selection, Sensor("camera", intrinsics=scene.camera), self.rejected
+        )
         offers: Counter[tuple[int, int]] = Counter()
         for number, frame in enumerate(scene.frames):
             chosen = []
@@ -88,8 +90,6 @@ class Bop:
             self._crop_frame(scene, frame, chosen, gathering)
             yield from self._shaped(gathering.finished(before=number - _HELD), scene)
         yield from self._shaped(gathering.finished(), scene)
-        for reason, count in gathering.rejected.items():
-            self.rejected[reason] += count
 
     def _wanted(self, frame: Frame) -> list[Thing]:
         wanted = self.selection.categories
@@ -108,7 +108,7 @@ class Bop:
                 depth = scene.read_depth(frame) if depth is None else depth
                 self._add(scene, frame, thing, name, depth, to)
             except BadInputError as damage:
-                to.miss(1, damage)
+                to.damage.miss("scan", damage)
 
     def _add(
         self, scene: Scene, frame: Frame, thing: Thing, name: str, depth: np.ndarray, to: Gathering

@@ -15,6 +15,7 @@ Nothing is known about the objects' poses, and nothing needs to be.
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from jaxtyping import Bool, Float
 from wildshape.datasets.rgbd.depth_image import back_project, read_png, supported
 from wildshape.datasets.rgbd.sequence import Sequence, instances_of, open_sequence
 from wildshape.datasets.tracks.gathering import Gathering
+from wildshape.datasets.tracks.parts import found_in
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
 from wildshape.records import Intrinsics, Points, Sensor, Track
@@ -77,12 +79,11 @@ class Rgbd:
         root = Path(self.root)
         if (root / "depth").is_dir():
             return ["."]
-        found = sorted(entry.name for entry in root.iterdir()) if root.is_dir() else []
-        sequences = [name for name in found if (root / name / "depth").is_dir()]
+        sequences = sorted(depth.parent.name for depth in root.glob("*/depth") if depth.is_dir())
         if not sequences:
             raise BadInputError(
-                f"{root}: expected folders with camera.json, depth and masks in them, found"
-                f" {' '.join(found[:8]) or 'nothing'}."
+                f"{root}: expected folders with camera.json, depth and masks in them,"
+                f" {found_in(root)}."
             )
         return sequences
 
@@ -93,22 +94,20 @@ class Rgbd:
             BadInputError: camera.json, a depth image, a mask or poses.txt is missing or damaged.
         """
         sequence = open_sequence(Path(self.root) / part)
-        gathering = Gathering(self.selection, Sensor("camera", intrinsics=sequence.camera))
+        gathering = Gathering(
+            self.selection, Sensor("camera", intrinsics=sequence.camera), self.rejected
+        )
         names = _Names(sequence.name, self.gap, self.longest * self.selection.every)
         for frame, path in enumerate(sequence.depth):
             self._add_frame(sequence, frame, path, gathering, names)
             yield from gathering.finished(before=frame - self.gap)
         yield from gathering.finished()
-        for reason, count in gathering.rejected.items():
-            self.rejected[reason] += count
 
     def _add_frame(
         self, sequence: Sequence, frame: int, path: Path, to: Gathering, names: "_Names"
     ) -> None:
-        try:
-            masks = dict(self._wanted(sequence, path))
-        except BadInputError as damage:
-            to.miss(1, damage)
+        masks = to.read(lambda: dict(self._wanted(sequence, path)), 1)
+        if masks is None:
             return
         chosen = {
             instance: mask
@@ -120,12 +119,8 @@ class Rgbd:
                 source=f"RGB-D {sequence.name}",
             )
         }
-        if not chosen:
-            return
-        try:
-            depth = sequence.read_depth(path)
-        except BadInputError as damage:
-            to.miss(len(chosen), damage)
+        depth = to.read(partial(sequence.read_depth, path), len(chosen))
+        if depth is None:
             return
         for instance, mask in chosen.items():
             points = cut_out(depth, mask, sequence.camera, self.cut)

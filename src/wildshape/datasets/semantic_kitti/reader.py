@@ -10,6 +10,7 @@ the sensor may come by again after minutes.
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -107,13 +108,11 @@ class SemanticKitti:
         sequence = open_sequence(folder, part, self.labels, kinds)
         schedule = self._schedule(count_points(sequence.files, kinds))
         # What moved is known by class; places would tell nothing more.
-        gathering = Gathering(replace(self.selection, motion="any"), HDL64E)
+        gathering = Gathering(replace(self.selection, motion="any"), HDL64E, self.rejected)
         for frame, visits in sorted(schedule.items()):
             self._cut(sequence, frame, visits, gathering)
             yield from self._finished(gathering, frame)
         yield from gathering.finished()  # nothing is left; says so if no file could be read
-        for reason, count in gathering.rejected.items():
-            self.rejected[reason] += count
 
     def _schedule(self, counts: dict[int, dict[int, int]]) -> dict[int, list[Visit]]:
         """Which objects are to be cut out of which frame."""
@@ -131,22 +130,15 @@ class SemanticKitti:
     def _cut(self, sequence: Sequence, frame: int, visits: list[Visit], to: Gathering) -> None:
         # The object's last frame is known: that it may be handed out after, and not before.
         wanted = [v for v in visits if to.wants(frame=v.frames[-1], **sequence.words(v))]
-        path = sequence.scan_file(frame)
-        if not path.is_file():
-            self._count("scan: the frame has no velodyne file", len(wanted))
+        found = to.read(partial(sequence.labelled_points, frame), len(wanted))
+        if found is None:
             return
-        if not wanted:
-            return
-        try:
-            labels, points = sequence.labelled_points(frame)
-        except BadInputError as damage:
-            to.miss(len(wanted), damage)
-            return
+        labels, points = found
         for visit in wanted:
             poses = sequence.T_velo_world
             pose = None if poses is None or sequence.kind(visit).moved else poses[frame]
             name = sequence.words(visit)["name"]
-            to.add(name, path.stem, points[labels == visit.label], pose)
+            to.add(name, sequence.scan_file(frame).stem, points[labels == visit.label], pose)
 
     def _finished(self, gathering: Gathering, frame: int) -> Iterator[Track]:
         """Tracks that end at a frame; those of stationary objects in the object's own frame."""

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict
 
-import numpy as np
-
 from wildshape.datasets.kitti.calibration import read_calibration, read_odometry, rigid
 from wildshape.datasets.semantic_kitti.labels import (
     LABELS_CURE,
@@ -18,10 +16,11 @@ from wildshape.datasets.semantic_kitti.labels import (
     on_objects,
     read_labels,
 )
-from wildshape.datasets.tracks.measurements import measured
+from wildshape.datasets.tracks.parts import found_in
+from wildshape.datasets.tracks.selection import measured
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.guard import reading
+from wildshape.io.scans.arrays import read_rows
 from wildshape.records import Points
 
 _SCANS = "velodyne"
@@ -71,29 +70,26 @@ class Sequence:
         """The velodyne file of a frame, which may be missing."""
         return self.folder / _SCANS / f"{self.files[frame].stem}.bin"
 
-    def labelled_points(self, frame: int) -> tuple[Labels, Points]:
+    def labelled_points(self, frame: int) -> tuple[Labels, Points] | None:
         """Label and position of the points that lie on objects of the kinds asked for.
+
+        None where the frame has no scan.
 
         Raises:
             BadInputError: the scan is truncated, or is not as long as its labels.
         """
         path = self.scan_file(frame)
-        with reading(path, "a velodyne scan"):
-            size = path.stat().st_size
-            if size % 16:
-                raise BadInputError(
-                    f"{path}: {size} bytes, expected a multiple of 16 (float32 x y z intensity); "
-                    "the file is truncated, download it again."
-                )
-            raw = np.fromfile(path, dtype="<f4")
+        if not path.is_file():
+            return None
+        raw = read_rows(path, "x y z intensity")
         labels = read_labels(self.files[frame])
-        if len(raw) != 4 * len(labels):
+        if len(raw) != len(labels):
             raise BadInputError(
-                f"{path}: {len(raw) // 4} points, but {self.files[frame]} has {len(labels)} "
+                f"{path}: {len(raw)} points, but {self.files[frame]} has {len(labels)} "
                 "labels; they are not of the same frame, download both again."
             )
         index = on_objects(labels, self.kinds)
-        points = raw.reshape(-1, 4)[index, :3]
+        points = raw[index]
         kept = measured(points)
         return labels[index[kept]], points[kept]
 
@@ -137,11 +133,9 @@ def find_sequences(root: Path) -> dict[str, Path]:
         found = {folder.name: folder for folder in folders if _is_sequence(folder)}
         if found:
             return found
-    inside = sorted(entry.name for entry in root.iterdir()) if root.is_dir() else []
-    what = f"found {' '.join(inside[:8]) or 'nothing'}" if root.is_dir() else "no such folder"
     raise BadInputError(
-        f"{root}: {what}; give SemanticKITTI's folder with sequences/00/velodyne in it, or one "
-        "sequence."
+        f"{root}: {found_in(root)}; give SemanticKITTI's folder with"
+        " sequences/00/velodyne in it, or one sequence."
     )
 
 

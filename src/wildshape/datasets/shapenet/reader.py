@@ -17,8 +17,8 @@ import numpy as np
 
 from wildshape.datasets.rgbd.depth_image import back_project
 from wildshape.datasets.shapenet.files import View, read_model_list, read_shape, read_view
-from wildshape.datasets.tracks.damage import Damage
-from wildshape.datasets.tracks.filtering import groups, members
+from wildshape.datasets.tracks.gathering import Damage
+from wildshape.datasets.tracks.parts import found_in, groups, members
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import stack
@@ -90,10 +90,9 @@ class ShapeNetViews:
         """The categories that are wanted and there."""
         renders = Path(self.root) / "renders"
         if not renders.is_dir():
-            found = sorted(e.name for e in self.root.iterdir()) if self.root.is_dir() else []
             raise BadInputError(
-                f"{self.root}: expected DPC's data folder with renders and splits in it, found"
-                f" {' '.join(found[:8]) or 'nothing'}."
+                f"{self.root}: expected DPC's data folder with renders and splits in it,"
+                f" {found_in(self.root)}."
             )
         wanted = [synset_of(name) for name in self.selection.categories] or list(CATEGORIES)
         there = [synset for synset in wanted if (renders / synset).is_dir()]

@@ -1,18 +1,60 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Crops of objects, as they come frame by frame, gathered into tracks."""
+"""Crops of objects, as they come frame by frame, gathered into tracks; damaged pieces counted."""
 
-from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
-from wildshape.datasets.tracks.damage import Damage
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.records import Points, Sensor, Track
+
+Scan = TypeVar("Scan")
+
+_NAMED = 3
+
+
+class Damage:
+    """What could not be read of a part: passed over and counted, unless there is nothing else.
+
+    Attributes:
+        rejected: where pieces are counted that were left out (see `Source`).
+        read: how many pieces could be read.
+    """
+
+    def __init__(self, rejected: dict[str, int]) -> None:
+        self.rejected, self.read = rejected, 0
+        self._errors: list[BadInputError] = []
+
+    def miss(self, what: str, error: BadInputError, count: int = 1) -> None:
+        """Go on without a piece; the first of a part are named, the others are only counted.
+
+        Args:
+            what: a word for the piece: `scan`, `object`.
+            error: what is wrong with it.
+            count: how many pieces are lost by it.
+        """
+        self.note(error)
+        named = error in self._errors
+        reason = f"{what}: {error}" if named else f"{what}: damaged, as others"
+        self.rejected[reason] = self.rejected.get(reason, 0) + count
+
+    def note(self, error: BadInputError) -> None:
+        """Remember what is wrong with a piece that is counted elsewhere."""
+        self._errors = [*self._errors, error][:_NAMED]
+
+    def settle(self) -> None:
+        """At a part's end.
+
+        Raises:
+            BadInputError: the first damage that was met, if nothing at all could be read.
+        """
+        if self._errors and not self.read:
+            raise self._errors[0]
 
 
 @dataclass
@@ -33,15 +75,17 @@ class Gathering:
     """Collects the scans of many objects at once; holds only those that may still be seen.
 
     Attributes:
+        selection: which objects and scans.
+        sensor: that took the scans.
         rejected: how much was left out, by reason (see `Source`).
         damage: frames that could not be read.
     """
 
-    def __init__(self, selection: Selection, sensor: Sensor) -> None:
-        self.selection, self.sensor = selection, sensor
-        self.rejected: Counter[str] = Counter()
+    def __init__(self, selection: Selection, sensor: Sensor, rejected: dict[str, int]) -> None:
+        """Nothing yet; what is left out is added to `rejected`."""
+        self.selection, self.sensor, self.rejected = selection, sensor, rejected
         self._objects: dict[str, _Object] = {}
-        self.damage = Damage(self.rejected)
+        self.damage = Damage(rejected)
 
     def wants(self, name: str, frame: int, *, category: str, source: str) -> bool:
         """Whether this frame of an object is to be cropped at all (`Selection.every`).
@@ -56,6 +100,24 @@ class Gathering:
         seen.offered += 1
         seen.last_frame = frame
         return (seen.offered - 1) % self.selection.every == 0
+
+    def read(self, read: Callable[[], Scan | None], wanted: int) -> Scan | None:
+        """What a frame's file holds; None, and counted why, where it is missing or damaged.
+
+        Args:
+            read: the file; None where there is none.
+            wanted: how many objects are to be cut out of it; for none it is not read.
+        """
+        if not wanted:
+            return None
+        try:
+            scan = read()
+        except BadInputError as error:
+            self.damage.miss("scan", error, wanted)
+            return None
+        if scan is None:
+            self.reject("scan: the frame has no LiDAR file", wanted)
+        return scan
 
     def add(
         self,
@@ -77,7 +139,7 @@ class Gathering:
         self.damage.read += 1
         objection = self.selection.objection_to_scan(points)
         if objection:
-            self.rejected[objection] += 1
+            self.reject(objection)
             return
         seen = self._objects[name]
         seen.scans.append(np.ascontiguousarray(points, np.float32))
@@ -87,9 +149,9 @@ class Gathering:
         if place is not None:
             seen.places.append(np.asarray(place, np.float64))
 
-    def miss(self, objects: int, error: BadInputError) -> None:
-        """Go on without a frame whose file is damaged, of which objects were to be cut out."""
-        self.damage.miss("scan", error, objects)
+    def reject(self, reason: str, count: int = 1) -> None:
+        """Count what is left out."""
+        self.rejected[reason] = self.rejected.get(reason, 0) + count
 
     def finished(self, before: int | None = None) -> Iterator[Track]:
         """Tracks of the objects last seen before a frame; of all that are held by default.
@@ -106,7 +168,7 @@ class Gathering:
             places = np.stack(seen.places) if len(seen.places) == len(seen.scans) > 0 else None
             objection = self.selection.objection_to_track(track, places)
             if objection:
-                self.rejected[objection] += 1
+                self.reject(objection)
             else:
                 yield track
 

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from wildshape.records import Points, Track
 
 Motion = Literal["any", "moving", "parked"]
-_MOVED_M, _FARTHEST_M = 1.0, 10_000.0
+_FARTHEST_RETURN_M = 1000.0
+_FARTHEST_M = 10_000.0
 _SECTORS, _FULL = 36, 0.9
 LARGEST_M = 20.5
 """What the shipped weights for vehicles take for one: 1.5 times the largest that they learned."""
@@ -30,6 +31,8 @@ class Selection:
         categories: the data set's own words; empty: the reader's usual ones.
         largest_m: a scan with a longer diagonal is left out, metres: it is of more than an object.
         motion: keep all objects, those that moved over the track, or those that stood.
+        moved_m: places that spread over more than this are of an object that moved, metres: labels
+            of one that stands differ by some decimetres.
     """
 
     every: int = 1
@@ -40,6 +43,7 @@ class Selection:
     largest_m: float = float("inf")
     categories: tuple[str, ...] = ()
     motion: Motion = "any"
+    moved_m: float = 1.0
 
     def objection_to_scan(self, points: Points) -> str:
         """Why the points on an object are no scan to keep; empty if they are."""
@@ -71,7 +75,7 @@ class Selection:
             return ""
         if places is None:
             return "object: not known whether it moves"
-        moves = has_moved(places)
+        moves = bool(np.linalg.norm(np.ptp(places, axis=0)) > self.moved_m)
         return "" if moves == (self.motion == "moving") else f"object: not {self.motion}"
 
 
@@ -89,6 +93,7 @@ def _too_large(points: Points, largest_m: float) -> str:
     return f"scan: over {largest_m:g} m across, no single object: {cure}, or raise --largest-m"
 
 
-def has_moved(places: Float[np.ndarray, "V 3"]) -> bool:
-    """Whether places `(V, 3)`, metres, spread over more than a metre."""
-    return bool(np.linalg.norm(np.ptp(places, axis=0)) > _MOVED_M)
+def measured(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
+    """Which rows are returns of a sensor at the origin: finite, and no farther than 1 km."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray((np.abs(points) <= _FARTHEST_RETURN_M).all(axis=1))

@@ -1,17 +1,68 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Shapes for tracks that have poses alone: the truth builder's options (METHOD 8)."""
+"""Truth for real tracks: scans accumulated by the labelled poses (METHOD 8).
+
+For evaluation only. Training never needs it.
+"""
 
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from wildshape.datasets.tracks.accumulation import VOXEL_M, fuse_by_truth, mirrored
+from wildshape.errors import BadInputError
 from wildshape.geometry.outliers import radius_inliers, statistical_inliers, voxel_thin
 from wildshape.records import Points, Track
 
-_LOWEST = 0.005
+VOXEL_M = 0.04
+
+
+def fuse_by_truth(track: Track) -> Points:
+    """All scans `(n, 3)` in the object frame, metres, as they are.
+
+    Raises:
+        BadInputError: the track has no poses.
+    """
+    if track.T_sensor_object is None:
+        raise BadInputError(f"{track.name}: no poses, so its scans cannot be accumulated as truth.")
+    T_object_sensor = track.T_sensor_object.inverse()
+    moved = [T_object_sensor[i].apply_numpy(scan) for i, scan in enumerate(track.scans)]
+    return np.concatenate(moved) if moved else np.zeros((0, 3), np.float32)
+
+
+def shape_partial(track: Track, *, floor: float | None = None, voxel: float = VOXEL_M) -> Points:
+    """What the sensor saw of the object over the track: `(g, 3)` in the object frame, metres.
+
+    Args:
+        track: with poses, x forward along the object's heading.
+        floor: object-frame height under which points are ground; None where the reader has
+            already removed it.
+        voxel: edge of the cubes the cloud is thinned by, metres.
+
+    Raises:
+        BadInputError: the track has no poses.
+    """
+    return voxel_thin(_clean(track, floor), voxel)
+
+
+def shape_mirrored(track: Track, *, floor: float | None = None, voxel: float = VOXEL_M) -> Points:
+    """`shape_partial` with its reflection at the object's own x-z plane (y -> -y) added.
+
+    Raises:
+        BadInputError: the track has no poses.
+    """
+    return voxel_thin(_mirrored(_clean(track, floor)), voxel)
+
+
+def _mirrored(points: Points) -> Points:
+    return np.concatenate((points, points * np.asarray((1, -1, 1), points.dtype)))
+
+
+def _clean(track: Track, floor: float | None) -> Points:
+    points = fuse_by_truth(track)
+    if floor is not None:
+        points = points[points[:, 2] >= floor]
+    return points[statistical_inliers(points)]
 
 
 @dataclass(frozen=True)
@@ -26,6 +77,9 @@ class TruthBuilder:
         neighbours: see `radius`.
         strip: height above the lowest points that is left out as ground, metres; for readers
             that have not already done so.
+        lowest: share of the points that may lie under the ground from which `strip` counts: one
+            stray point must not be what it is measured from.
+        voxel: edge of the cubes that the shape is thinned by, metres.
     """
 
     kind: Literal["partial", "mirrored"] = "partial"
@@ -33,9 +87,11 @@ class TruthBuilder:
     radius: float = 0.15
     neighbours: int = 8
     strip: float = 0.0
+    lowest: float = 0.005
+    voxel: float = VOXEL_M
 
     def with_shape(self, track: Track) -> Track | None:
-        """The track with its shape, thinned to the density of `shape_partial`.
+        """The track with its shape.
 
         None where there is nothing to build it from: no poses, or no point that is left.
         """
@@ -43,8 +99,8 @@ class TruthBuilder:
             return None
         points = self._clean(fuse_by_truth(track))
         if self.kind == "mirrored":
-            points = mirrored(points)
-        return replace(track, shape=voxel_thin(points, VOXEL_M)) if len(points) else None
+            points = _mirrored(points)
+        return replace(track, shape=voxel_thin(points, self.voxel)) if len(points) else None
 
     def _clean(self, points: Points) -> Points:
         if self.outliers == "statistical":
@@ -53,6 +109,5 @@ class TruthBuilder:
             points = points[radius_inliers(points, self.radius, self.neighbours)]
         if self.strip <= 0 or not len(points):
             return points
-        # Not the very lowest: one stray point must not be what ground is measured from.
-        floor = np.quantile(points[:, 2], _LOWEST) + self.strip
+        floor = np.quantile(points[:, 2], self.lowest) + self.strip
         return points[points[:, 2] >= floor]

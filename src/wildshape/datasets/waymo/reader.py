@@ -12,10 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from wildshape.datasets.tracks.box_crop import Crop, points_in_box
 from wildshape.datasets.tracks.gathering import Gathering
-from wildshape.datasets.tracks.measurements import measured
-from wildshape.datasets.tracks.selection import Selection
+from wildshape.datasets.tracks.labelled_boxes import (
+    Crop,
+    LabelledObject,
+    crop_objects,
+    described,
+)
+from wildshape.datasets.tracks.parts import found_in
+from wildshape.datasets.tracks.selection import Selection, measured
 from wildshape.datasets.waymo.range_image import at_frame_time, points_of_pixels
 from wildshape.datasets.waymo.tables import (
     COMPONENTS,
@@ -70,44 +75,25 @@ class Waymo:
         """
         tables = _tables(Path(self.root), part)
         boxes = self._wanted(read_boxes(tables["lidar_box"]))
-        gathering = Gathering(self.selection, TOP)
+        gathering = Gathering(self.selection, TOP, self.rejected)
         unseen = set(boxes)
         for number, frame in enumerate(frames(tables, boxes)):
             unseen.remove(frame.microseconds)
-            self._crop_frame(frame, number, part, gathering)
+            objects = [frame.object(box, part, number) for box in frame.boxes]
+            name = str(frame.microseconds)
+            crop_objects(objects, name, frame.points, self.crop, gathering)
         for time in unseen:
-            self._count("scan: the frame has no range image of TOP", len(boxes[time]))
+            gathering.reject("scan: the frame has no range image of TOP", len(boxes[time]))
         yield from gathering.finished()
-        for reason, count in gathering.rejected.items():
-            self._count(reason, count)
 
     def _wanted(self, boxes: dict[int, list[Labelled]]) -> dict[int, list[Labelled]]:
         categories = self.selection.categories or ("vehicle",)
         known = {box.token: box.category for labelled in boxes.values() for box in labelled}
         for category in known.values():
             if category not in categories:
-                self._count(f"object: category {category}")
+                self.rejected[f"object: category {category}"] += 1
         kept = {t: [b for b in found if b.category in categories] for t, found in boxes.items()}
         return {time: labelled for time, labelled in kept.items() if labelled}
-
-    def _crop_frame(self, frame: "Frame", number: int, part: str, to: Gathering) -> None:
-        active = []
-        for box in frame.boxes:
-            name = f"{part}_{box.token}"
-            if to.wants(name, number, category=box.category, source=_source(box)):
-                active.append((name, box))
-        if not active:
-            return
-        cloud = frame.points()
-        T_sensor_vehicle = frame.calibration.T_vehicle_sensor.inverse()
-        for name, box in active:
-            T = T_sensor_vehicle @ box.T_vehicle_object
-            place = (frame.T_world_vehicle @ box.T_vehicle_object).translation.numpy()
-            points = points_in_box(cloud, T, box.size, self.crop)
-            to.add(name, str(frame.microseconds), points, T, place)
-
-    def _count(self, reason: str, count: int = 1) -> None:
-        self.rejected[reason] = self.rejected.get(reason, 0) + count
 
 
 @dataclass(frozen=True)
@@ -120,6 +106,18 @@ class Frame:
     calibration: Calibration
     T_world_vehicle: SE3
     boxes: list[Labelled]
+
+    def object(self, box: Labelled, part: str, number: int) -> LabelledObject:
+        """A box as cut out of the sensor's scan."""
+        return LabelledObject(
+            name=f"{part}_{box.token}",
+            last_frame=number,
+            category=box.category,
+            source=described("Waymo Open Dataset", box.size),
+            size=box.size,
+            T_sensor_object=self.calibration.T_vehicle_sensor.inverse() @ box.T_vehicle_object,
+            place=(self.T_world_vehicle @ box.T_vehicle_object).translation.numpy(),
+        )
 
     def points(self) -> Points:
         """All points `(n, 3)` in the sensor's frame at the frame's time, metres."""
@@ -182,8 +180,7 @@ def _not_waymo(root: Path) -> BadInputError:
             f"{root}: holds .tfrecord files, Waymo's version 1; download version 2 (parquet), the "
             f"components {', '.join(COMPONENTS)}."
         )
-    found = ", ".join(sorted(path.name for path in root.iterdir())[:5])
-    return BadInputError(f"{root}: expected {_LAYOUT}, found {found or 'an empty folder'}.")
+    return BadInputError(f"{root}: expected {_LAYOUT}, {found_in(root)}.")
 
 
 def _absent(split: Path) -> list[str]:
@@ -211,8 +208,3 @@ def _of_other_time(path: Path, time: int, other: str) -> BadInputError:
         f"{path}: frame {time} has no counterpart of its size in {other}/{path.name}; download "
         "both again, from one release."
     )
-
-
-def _source(box: Labelled) -> str:
-    length, width, height = box.size
-    return f"Waymo Open Dataset, labelled box {length:.2f} x {width:.2f} x {height:.2f} m"

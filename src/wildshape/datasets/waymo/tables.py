@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from wildshape.datasets.tracks.measurements import check_boxes
+from wildshape.datasets.tracks.labelled_boxes import check_boxes
 from wildshape.datasets.waymo.range_image import uniform_inclinations
 from wildshape.errors import BadInputError, MissingExtraError
 from wildshape.geometry.transforms.rotation import rotation_z

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Float32
 
 from wildshape.errors import BadInputError
-from wildshape.io.guard import check_promise, check_unpacked
+from wildshape.io.guard import check_promise, check_unpacked, reading
 
 _Unpacking = Any  # a zipfile.ZipExtFile; zipfile itself says IO[bytes]
 _PIECE_BYTES = 4_000_000
@@ -21,21 +21,34 @@ _ROWS = 16  # an array of so many columns and 3 or 4 rows is no scan, but one on
 _NAMES = ("points", "xyz", "pcd", "arr_0", "data")
 
 
-def read_kitti_bin(path: Path) -> Float[np.ndarray, "n 3"]:
+def read_kitti_bin(path: Path) -> Float32[np.ndarray, "n 3"]:
     """KITTI's velodyne scans: float32 x y z intensity, little endian, nothing else.
 
     Raises:
         BadInputError: the size is no multiple of 16 bytes.
     """
-    size = path.stat().st_size
-    if size % 16:
-        raise BadInputError(
-            f"{path}: expected 16 bytes a point (KITTI: float32 x y z intensity), found "
-            f"{size} bytes, "
-            "which 16 does not divide: truncated or another format."
-        )
-    check_promise(path, "points", size // 16, size, size)
-    return np.fromfile(path, "<f4").reshape(-1, 4)[:, :3]
+    return read_rows(path, "x y z intensity")
+
+
+def read_rows(path: Path, columns: str) -> Float32[np.ndarray, "n 3"]:
+    """The x y z of a file of bare float32 rows, little endian.
+
+    Args:
+        path: of the file.
+        columns: names of all, x y z first.
+
+    Raises:
+        BadInputError: missing, or its size is no multiple of a row's, or 0.
+    """
+    with reading(path, f"float32 {columns}"):
+        size, width = path.stat().st_size, 4 * len(columns.split())
+        if size % width or not size:
+            raise BadInputError(
+                f"{path}: {size} bytes, expected a multiple of {width} (float32 {columns}, a point"
+                " a row): truncated or another format; copy or download it again."
+            )
+        check_promise(path, "points", size // width, size, size)
+        return np.fromfile(path, "<f4").reshape(size // width, -1)[:, :3]
 
 
 def read_npy(path: Path) -> Float[np.ndarray, "n 3"]:

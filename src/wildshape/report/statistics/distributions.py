@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int
 
-from wildshape.datasets.tracks.accumulation import fuse_by_truth
+from wildshape.datasets.tracks.truth import fuse_by_truth
 from wildshape.geometry.box import fit_box
 from wildshape.records import Points, SensorKind, Track
 from wildshape.report.statistics.histogram import ANGLES, LENGTHS, Tally

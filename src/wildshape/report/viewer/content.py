@@ -5,7 +5,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from wildshape.datasets.tracks.accumulation import shape_partial
+from wildshape.datasets.tracks.truth import shape_partial
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Box, Points, Track
 

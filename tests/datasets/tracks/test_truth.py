@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import KDTree
 from tests.cars import car_surface, drive_by, poses_of
 
-from wildshape.datasets.tracks.accumulation import fuse_by_truth, shape_mirrored, shape_partial
+from wildshape.datasets.tracks.truth import fuse_by_truth, shape_mirrored, shape_partial
 from wildshape.errors import BadInputError
 
 

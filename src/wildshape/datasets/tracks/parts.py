@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the parts of a data set are called: folders below its root, or groups of numbered tracks."""
+
+import re
+from pathlib import Path
+
+from wildshape.errors import BadInputError
+
+_LEAST, _MOST_PARTS = 32, 1000
+
+
+def part_name(folder: Path, root: Path) -> str:
+    """A folder as seen from the root, of which it may be the whole."""
+    return folder.name if folder == root else folder.relative_to(root).as_posix()
+
+
+def found_in(folder: Path) -> str:
+    """What a folder holds, for an error: the first names."""
+    if not folder.is_dir():
+        return "no such folder"
+    names = sorted(path.name for path in folder.iterdir())
+    return f"found {', '.join(names[:8]) or 'an empty folder'}"
+
+
+def groups(count: int) -> list[str]:
+    """Names such as `000000-000031` of groups that cover tracks 0 to `count` - 1.
+
+    At least 32 tracks a group, so that a part is worth its files, and at most a thousand groups.
+    """
+    size = max(_LEAST, -(-count // _MOST_PARTS))
+    return [f"{i:06d}-{min(i + size, count) - 1:06d}" for i in range(0, count, size)]
+
+
+def members(group: str) -> range:
+    """The tracks of a group.
+
+    Raises:
+        BadInputError: no name that `groups` gives.
+    """
+    found = re.fullmatch(r"(\d+)-(\d+)", group)
+    if not found:
+        raise BadInputError(f"part '{group}': expected two numbers such as 000000-000031.")
+    return range(int(found[1]), int(found[2]) + 1)
