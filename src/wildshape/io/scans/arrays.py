@@ -3,6 +3,7 @@
 """Files that hold nothing but an array: KITTI .bin, .npy, .npz."""
 
 import math
+import os
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -40,15 +41,15 @@ def read_rows(path: Path, columns: str) -> Float32[np.ndarray, "n 3"]:
     Raises:
         BadInputError: missing, or its size is no multiple of a row's, or 0.
     """
-    with reading(path, f"float32 {columns}"):
-        size, width = path.stat().st_size, 4 * len(columns.split())
+    with reading(path, f"float32 {columns}"), path.open("rb") as file:
+        size, width = os.fstat(file.fileno()).st_size, 4 * len(columns.split())
         if size % width or not size:
             raise BadInputError(
                 f"{path}: {size} bytes, expected a multiple of {width} (float32 {columns}, a point"
                 " a row): truncated or another format; copy or download it again."
             )
         check_promise(path, "points", size // width, size, size)
-        return np.fromfile(path, "<f4").reshape(size // width, -1)[:, :3]
+        return np.fromfile(file, "<f4").reshape(size // width, -1)[:, :3]
 
 
 def read_npy(path: Path) -> Float[np.ndarray, "n 3"]:
