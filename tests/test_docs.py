@@ -219,6 +219,27 @@ def is_found(name: str) -> bool:
         return False
 
 
+@pytest.mark.parametrize("page", SPOKEN)
+def test_the_rows_of_a_table_have_as_many_cells_as_its_head(page):
+    for table in tables((ROOT / page).read_text(encoding="utf-8")):
+        assert len({cells(row) for row in table}) == 1, table[0]
+
+
+def tables(text: str) -> list[list[str]]:
+    """The rows of each table that is not in a block of code."""
+    plain = re.sub(r"^```.*?^```$", "", text, flags=re.DOTALL | re.MULTILINE)
+    return [found.splitlines() for found in re.findall(r"(?:^\|.*\n)+", plain, re.MULTILINE)]
+
+
+def cells(row: str) -> int:
+    """How many cells a row has; a bar between back quotes parts none."""
+    return re.sub(r"`[^`]*`", "", row).strip().count("|") - 1
+
+
+def test_a_row_with_a_cell_too_many_is_found():
+    assert [cells(row) for row in tables("| a | `b\|c` |\n| d | e | f |\n")[0]] == [2, 3]
+
+
 def test_contributors_find_every_room():
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (`[^|]+`) \|", text, re.MULTILINE)
