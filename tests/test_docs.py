@@ -237,7 +237,7 @@ def cells(row: str) -> int:
 
 
 def test_a_row_with_a_cell_too_many_is_found():
-    assert [cells(row) for row in tables("| a | `b\|c` |\n| d | e | f |\n")[0]] == [2, 3]
+    assert [cells(row) for row in tables("| a | `b|c` |\n| d | e | f |\n")[0]] == [2, 3]
 
 
 def test_contributors_find_every_room():
