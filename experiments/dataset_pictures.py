@@ -32,7 +32,7 @@ from wildshape.io.atomic import atomic_write
 from wildshape.records import Track
 from wildshape.report.content import GREEN, ORANGE, Cloud, ReportObject
 from wildshape.report.picture import write_picture
-from wildshape.report.thumbnails import PANELS, draw_track
+from wildshape.report.statistics.thumbnails import PANELS, draw_track
 
 WRITERS = {
     "folder": "tests.datasets.write_folder:picture_scene",

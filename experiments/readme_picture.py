@@ -12,7 +12,7 @@ from typing import Annotated
 import tyro
 
 from wildshape.inference.predictor import load
-from wildshape.report.parts import track_object
+from wildshape.report.content import track_object
 from wildshape.report.picture import write_picture
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
@@ -39,7 +39,9 @@ def main(settings: Settings) -> None:
         done = model.complete(track.scans[track.middle], track.sensor)
         T_middle_scan = model.register_track(track.scans, track.sensor)
         objects.append(
-            track_object(track, completed=done.points, box=done.box, T_middle_scan=T_middle_scan)
+            track_object(
+                track, completed=done.points, box=done.box, fused={"fused by us": T_middle_scan}
+            )
         )
     write_picture(objects, settings.out)
 

@@ -25,7 +25,7 @@ from wildshape.io.store.origin import origin_of
 from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.io.tracks import write_track
 from wildshape.report.content import Report
-from wildshape.report.folder import report_from_folder
+from wildshape.report.page.folder import report_from_folder
 from wildshape.report.statistics.statistics import statistics_of_store
 from wildshape.report.viewer.content import Source
 from wildshape.report.viewer.sources import from_results, worst_first

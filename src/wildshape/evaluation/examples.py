@@ -11,6 +11,7 @@ from wildshape.evaluation.cases import Case, prepare
 from wildshape.evaluation.method import Completer, Method, Registrar
 from wildshape.evaluation.protocol import complete_scans
 from wildshape.evaluation.results import MethodScores, Results
+from wildshape.inference.registration import fuse_scans
 from wildshape.records import Points, Track
 
 
@@ -88,8 +89,8 @@ def _example(
     if completed is None or case.truth is None or case.T_sensor_object is None:
         return None
     T_object_middle = case.T_sensor_object[case.middle].inverse()
-    fused = _fuse(method, case) if isinstance(method, Registrar) else None
-    other = None if rival is None else _fuse(rival, case)
+    fused = _fused(method, case) if isinstance(method, Registrar) else None
+    other = None if rival is None else _fused(rival, case)
     return Example(
         label=label,
         track=case.name,
@@ -102,7 +103,5 @@ def _example(
     )
 
 
-def _fuse(method: Registrar, case: Case) -> Points:
-    T_middle_scan = method.register_track(case.inputs(), case.sensor)
-    moved = [T_middle_scan[i].apply_numpy(scan) for i, scan in enumerate(case.scans)]
-    return np.concatenate(moved)
+def _fused(method: Registrar, case: Case) -> Points:
+    return fuse_scans(case.scans, method.register_track(case.inputs(), case.sensor))

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from wildshape.evaluation.paper import LIDAR_ROWS, VIEW_ROWS, PaperRow
-from wildshape.evaluation.results import Results, Rotate
+from wildshape.evaluation.results import Results
 from wildshape.evaluation.summary import FIGURES, Figure, Summary, summarise
 from wildshape.io.atomic import write_text
 
 COUNTED = "scans: shape / pose"
-ROTATE: dict[Rotate, str] = {
+ROTATE: dict[str, str] = {
     "none": "scans as recorded",
     "yaw": "each scan turned by its own random yaw",
     "so3": "each scan turned by its own random rotation",

@@ -6,12 +6,14 @@ All clouds and the box of one object are in ONE frame, a sensor's, metres: they 
 camera, so a shift between two panels is a shift in metres.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from wildshape.records import Box, Points, SensorKind
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.registration import fuse_scans
+from wildshape.records import Box, Points, SensorKind, Track
 
 # Okabe & Ito 2008: told apart by colour-blind readers, on white and on black.
 ORANGE, BLUE, GREEN, PINK, SKY, GREY = (
@@ -94,7 +96,7 @@ class ReportObject:
     Attributes:
         clouds: one a panel, at most eight (a browser keeps about sixteen 3D contexts alive).
         box: oriented box in the clouds' frame, drawn in each panel.
-        facts: (label, value) pairs under the name.
+        details: (label, value) pairs under the name.
         sensor: tells which way is up; the sensor stands at the origin.
         scans: what is known of each scan of it.
     """
@@ -103,7 +105,7 @@ class ReportObject:
     subtitle: str = ""
     clouds: tuple[Cloud, ...] = ()
     box: Box | None = None
-    facts: tuple[tuple[str, str], ...] = ()
+    details: tuple[tuple[str, str], ...] = ()
     sensor: SensorKind = "lidar"
     scans: Table | None = None
 
@@ -143,3 +145,41 @@ class Report:
     figures: tuple[Figure, ...] = ()
     findings: tuple[str, ...] = ()
     index: tuple[Table, ...] = ()
+
+
+def track_object(
+    track: Track,
+    *,
+    completed: Points | None = None,
+    box: Box | None = None,
+    fused: Mapping[str, SE3] | None = None,
+    details: Sequence[tuple[str, str]] = (),
+) -> ReportObject:
+    """A track as a row of panels, everything in the sensor frame of its middle scan.
+
+    Args:
+        track: its truth, where it has one, becomes a panel.
+        completed: `(m, 3)` from the middle scan, in that scan's frame, metres.
+        box: in the same frame.
+        fused: label of a panel -> `T_middle_scan`, one a scan, which fuses the track.
+        details: (label, value) pairs.
+    """
+    middle = track.middle
+    scan = track.scans[middle]
+    clouds = [Cloud("input scan", scan, size=2.6)]
+    if track.shape is not None and track.T_sensor_object is not None:
+        clouds.append(Cloud("truth", track.T_sensor_object[middle].apply_numpy(track.shape)))
+    for label, T_middle_scan in (fused or {}).items():
+        clouds.append(Cloud(label, fuse_scans(track.scans, T_middle_scan)))
+    if completed is not None:
+        clouds.append(Cloud("completed", completed))
+    number = f"scan {track.scan_names[middle]} of {len(track.scans)}"
+    about = (track.category, number, f"{len(scan)} points", track.source)
+    return ReportObject(
+        name=track.name,
+        subtitle=", ".join(part for part in about if part),
+        clouds=tuple(clouds),
+        box=box,
+        details=tuple(details),
+        sensor=track.sensor.kind,
+    )

@@ -129,6 +129,25 @@ def read_result(folder: Path, inputs: Inputs) -> TrackResult:
     return found
 
 
+def errors_of_scores(scores: Path, method: str) -> dict[str, dict[str, list[float]]]:
+    """Errors of one method's row in scores.json, by track: `cd`, `rotation_deg`, `translation_m`.
+
+    Raises:
+        BadInputError: the file is damaged.
+    """
+    found: dict[str, dict[str, list[float]]] = {"cd": {}, "rotation_deg": {}, "translation_m": {}}
+    with reading(scores, "what evaluate writes"):
+        runs = json.loads(scores.read_text("utf-8"))["runs"]
+        for row in (row for run in runs for row in run["methods"] if row["name"] == method):
+            for scan in row["completions"]:
+                cd = float(scan["error"]["precision"]) + float(scan["error"]["coverage"])
+                found["cd"].setdefault(str(scan["track"]), []).append(cd)
+            for scan in row["registrations"]:
+                for name in ("rotation_deg", "translation_m"):
+                    found[name].setdefault(str(scan["track"]), []).append(float(scan[name]))
+    return found
+
+
 def doubt_of(entry: Mapping[str, Any]) -> str:
     """Why a scan's result is not to be trusted: its warning, or its reasons in plain words."""
     reasons = ", ".join(str(reason).replace("_", " ") for reason in entry.get("reasons") or ())

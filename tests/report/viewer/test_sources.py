@@ -93,8 +93,12 @@ def test_worst_objects_come_first(tmp_path: Path) -> None:
         return {"track": name, "error": {"precision": precision, "coverage": 0.1}}
 
     methods = [
-        {"name": "icp", "completions": [row("a", 9.0)]},
-        {"name": "wildshape", "completions": [row("a", 0.1), row("a", 0.3), row("b", 0.4)]},
+        {"name": "icp", "completions": [row("a", 9.0)], "registrations": []},
+        {
+            "name": "wildshape",
+            "completions": [row("a", 0.1), row("a", 0.3), row("b", 0.4)],
+            "registrations": [],
+        },
     ]
     path = tmp_path / "scores.json"
     path.write_text(json.dumps({"runs": [{"methods": methods}]}), encoding="utf-8")

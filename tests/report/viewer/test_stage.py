@@ -12,7 +12,7 @@ import numpy as np
 from tests.report.viewer.made import perfect, track
 
 from wildshape.report.viewer.colours import COLOURINGS, GUESSED, by_distance, by_height
-from wildshape.report.viewer.facts import facts
+from wildshape.report.viewer.details import details
 from wildshape.report.viewer.fusing import BEFORE
 from wildshape.report.viewer.stage import POINTS_A_CLOUD, Stage, Wish
 
@@ -83,9 +83,9 @@ def test_every_colouring_and_every_fact_can_be_shown() -> None:
     for colouring in COLOURINGS:
         stage.show(Wish(2, colouring=colouring))
         seen.append(painted.colors.copy())
-        assert "car &lt;b&gt;" in facts(stage, Wish(2, colouring=colouring))
+        assert "car &lt;b&gt;" in details(stage, Wish(2, colouring=colouring))
     assert all((a != b).any() for a, b in pairwise(seen))
-    assert "not yet" in facts(stage, Wish(0))
+    assert "not yet" in details(stage, Wish(0))
 
 
 def test_colours_say_how_far_and_how_high() -> None:

@@ -142,7 +142,7 @@ def _write(
     settings: Settings, files: list[Path], found: "Statistics", source: "TrackSource"
 ) -> list[Path]:
     from wildshape.io.atomic import write_json
-    from wildshape.report.sheet import write_sheet, write_statistics_page
+    from wildshape.report.statistics.sheet import write_sheet, write_statistics_page
 
     tracks = _shown(source) if any(file.suffix != ".json" for file in files) else []
     for file in files:
@@ -158,7 +158,7 @@ def _write(
 def _shown(source: "TrackSource") -> "list[Track]":
     """A few tracks from the first to the last, of those that can be read."""
     from wildshape.errors import BadInputError
-    from wildshape.report.thumbnails import spread
+    from wildshape.report.statistics.thumbnails import spread
 
     shown = []
     for number in spread(len(source), _THUMBNAILS):

@@ -45,8 +45,8 @@ def run(settings: Settings) -> None:
     """
     from wildshape.cli.output import refuse_file
     from wildshape.cli.terminal import answer
-    from wildshape.report.folder import report_from_folder
-    from wildshape.report.page import write_report
+    from wildshape.report.page.folder import report_from_folder
+    from wildshape.report.page.html import write_report
 
     out = settings.out or settings.folder / "report.html"
     refuse_file(out, overwrite=settings.overwrite)

@@ -22,9 +22,10 @@ from wildshape.inference.predictor import Predictor
 from wildshape.inference.registration import fuse_scans
 from wildshape.io.scans.writers import write_cloud
 from wildshape.records import Completion, Track
-from wildshape.report.content import Cloud, Report, ReportObject
-from wildshape.report.page import write_report
-from wildshape.report.parts import metrics_table, track_object, training_curves
+from wildshape.report.content import Cloud, Report, ReportObject, track_object
+from wildshape.report.page.curves import training_curves
+from wildshape.report.page.html import write_report
+from wildshape.report.page.metrics import metrics_table
 
 _PROTOCOLS: tuple[Literal["yaw", "none"], ...] = ("yaw", "none")
 _BASELINES, _MAX_SCANS, _SHOWN = ("identity", "local-icp", "one-scan"), 6, 3
@@ -78,23 +79,23 @@ def _object(out: Path, track: Track, label: str, models: Mapping[str, Predictor]
     }
     name, predictor = list(models.items())[-1]
     T_middle_scan = predictor.register_track(track.scans, track.sensor)
+    by_icp = LocalIcp().register_track(track.scans, track.sensor)
     write_cloud(out / "fused" / f"{track.name}.ply", fuse_scans(track.scans, T_middle_scan))
     shown = track_object(
         track,
         box=done[name].box,
-        T_middle_scan=T_middle_scan,
-        T_middle_scan_icp=LocalIcp().register_track(track.scans, track.sensor),
-        facts=_facts(label, name, done[name]),
+        fused={"fused by us": T_middle_scan, "ICP fused": by_icp},
+        details=_details(label, name, done[name]),
     )
     clouds = tuple(Cloud(f"completed, {n}", d.points, "#0072b2") for n, d in done.items())
     return replace(shown, clouds=(*shown.clouds, *clouds))
 
 
-def _facts(label: str, name: str, done: Completion) -> list[tuple[str, str]]:
+def _details(label: str, name: str, done: Completion) -> list[tuple[str, str]]:
     size = " x ".join(f"{side:.2f}" for side in done.box.size)
-    facts = [("chosen", label), ("fused and boxed by", name), ("box", f"{size} m")]
-    facts.append(("confidence", f"{done.confidence:.2f}"))
-    return facts + ([("warning", done.warning)] if done.warning else [])
+    details = [("chosen", label), ("fused and boxed by", name), ("box", f"{size} m")]
+    details.append(("confidence", f"{done.confidence:.2f}"))
+    return details + ([("warning", done.warning)] if done.warning else [])
 
 
 def verdict(results: Mapping[str, Results], ours: Sequence[str]) -> list[str]:

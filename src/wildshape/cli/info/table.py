@@ -7,8 +7,8 @@ import sys
 from typing import TYPE_CHECKING
 
 from wildshape.cli.terminal import printable
-from wildshape.report.histograms import number
-from wildshape.report.sheet import read_line, summary_line
+from wildshape.report.statistics.drawing import number
+from wildshape.report.statistics.sheet import read_line, summary_line
 from wildshape.report.statistics.statistics import Statistics
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from wildshape.errors import BadInputError, MissingExtraError
 from wildshape.report.viewer.content import Source
-from wildshape.report.viewer.facts import facts
+from wildshape.report.viewer.details import details
 from wildshape.report.viewer.panel import Panel
 from wildshape.report.viewer.stage import Stage
 from wildshape.report.viewer.visitors import answering_only, checked_hosts, prove
@@ -64,7 +64,7 @@ class Page:
             if self.stage is not None:
                 wish = self.panel.wish()
                 self.stage.show(wish)
-                self.panel.said.content = facts(self.stage, wish, self.status or self.source.note)
+                self.panel.said.content = details(self.stage, wish, self.status or self.source.note)
 
     def play(self) -> None:
         """Go on by a scan, where that is asked for."""

@@ -2,15 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the viewer's tracks come from: results that lie on disk, or scans and a model."""
 
-import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from wildshape.errors import BadInputError
-from wildshape.io.guard import reading
 from wildshape.records import Completion, Points, Sensor, Track, as_text
 from wildshape.report.results import (
     OBJECTS,
@@ -18,6 +16,7 @@ from wildshape.report.results import (
     TrackResult,
     box_of,
     doubt_of,
+    errors_of_scores,
     find,
     read_result,
 )
@@ -96,19 +95,8 @@ def worst_first(scores: Path, method: str) -> list[tuple[str, float]]:
     Raises:
         BadInputError: the file is damaged.
     """
-    sums: dict[str, list[float]] = {}
-    with reading(scores, "what evaluate writes"):
-        for row in _completions(json.loads(scores.read_text("utf-8")), method):
-            error = row["error"]
-            sums.setdefault(row["track"], []).append(error["precision"] + error["coverage"])
-    return sorted(((t, float(np.mean(v))) for t, v in sums.items()), key=lambda pair: -pair[1])
-
-
-def _completions(scores: dict[str, Any], method: str) -> Iterator[dict[str, Any]]:
-    for run in scores["runs"]:
-        for row in run["methods"]:
-            if row["name"] == method:
-                yield from row["completions"]
+    cds = errors_of_scores(scores, method)["cd"]
+    return sorted(((t, float(np.mean(v))) for t, v in cds.items()), key=lambda pair: -pair[1])
 
 
 def _complete(model: Completes, track: Track, first: int) -> Iterator[tuple[int, CompletedScan]]:

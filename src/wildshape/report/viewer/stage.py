@@ -11,9 +11,9 @@ import torch
 
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.registration import fuse_scans
 from wildshape.records import Box, Points, Track
 from wildshape.report.content import BLUE, GREEN, GREY, ORANGE
-from wildshape.report.parts import fuse
 from wildshape.report.scene import box_segments, thin
 from wildshape.report.viewer.colours import PLAIN, WRONG, Rgb, by_height, completed_colours, rgb
 from wildshape.report.viewer.content import CompletedScan, true_shape
@@ -238,7 +238,7 @@ class Stage:
     def _fused(self, way: str) -> Node:
         if ("fused", way) in self.nodes:
             return self.nodes["fused", way]
-        fused = fuse(self.track.scans, self.ways[way].T_middle_scan).astype(np.float32)
+        fused = fuse_scans(self.track.scans, self.ways[way].T_middle_scan)
         return self._cloud("fused", way, thin(fused, POINTS_FUSED), GREEN, _FUSED_DOT_M)
 
     def _cloud(

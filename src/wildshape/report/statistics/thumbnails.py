@@ -10,10 +10,11 @@ import numpy as np
 from jaxtyping import Float
 
 from wildshape.datasets.tracks.truth import fuse_by_truth
+from wildshape.evaluation.pictures import project
 from wildshape.records import Points, Track
 from wildshape.report.content import GREEN, GREY, ORANGE
-from wildshape.report.histograms import literal
 from wildshape.report.scene import thin, upright
+from wildshape.report.statistics.drawing import literal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 SCANS = 3
 PANELS = SCANS + 1
 _POINTS = 2500
-_AZIMUTH_DEG, _ELEVATION_DEG = 40.0, 22.0
 
 
 def draw_track(row: Sequence["Axes"], track: Track) -> None:
@@ -69,7 +69,7 @@ def _scans(track: Track) -> list[Float[np.ndarray, "n 3"]]:
     for number in _chosen(track):
         scan = thin(track.scans[number], _POINTS)
         if poses is not None:
-            clouds.append(_project(poses[number].inverse().apply_numpy(scan), _AZIMUTH_DEG))
+            clouds.append(project(poses[number].inverse().apply_numpy(scan)))
         else:
             clouds.append(_from_sensor(scan, track))
     return clouds
@@ -78,7 +78,7 @@ def _scans(track: Track) -> list[Float[np.ndarray, "n 3"]]:
 def _whole(track: Track) -> Float[np.ndarray, "n 3"] | None:
     if track.T_sensor_object is None:
         return None
-    return _project(thin(fuse_by_truth(track), 2 * _POINTS), _AZIMUTH_DEG)
+    return project(thin(fuse_by_truth(track), 2 * _POINTS))
 
 
 def _from_sensor(scan: Points, track: Track) -> Float[np.ndarray, "n 3"]:
@@ -86,17 +86,7 @@ def _from_sensor(scan: Points, track: Track) -> Float[np.ndarray, "n 3"]:
     points = upright(scan.astype(np.float64), track.sensor.kind)
     middle = np.median(points, axis=0)
     back = math.degrees(math.atan2(-middle[1], -middle[0]))
-    return _project(points - middle, back)
-
-
-def _project(points: np.ndarray, azimuth_deg: float) -> Float[np.ndarray, "n 3"]:
-    """Orthographic, from an azimuth and a little above; z is up in `points`."""
-    azimuth, elevation = math.radians(azimuth_deg), math.radians(_ELEVATION_DEG)
-    flat = math.cos(elevation)
-    towards = np.asarray((flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation)))
-    right = np.asarray((-math.sin(azimuth), math.cos(azimuth), 0.0))
-    axes = np.stack((right, np.cross(towards, right), towards), axis=1)
-    return np.asarray(points, np.float64) @ axes
+    return project(points - middle, back)
 
 
 def _bounds(clouds: Sequence[np.ndarray]) -> tuple[float, float, float, float]:

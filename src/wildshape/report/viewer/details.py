@@ -15,7 +15,7 @@ from wildshape.report.viewer.stage import POINTS_A_CLOUD, Stage, Wish
 _ROW = "<div style='display:flex;gap:.8em;justify-content:space-between'><span style='opacity:.65'>"
 
 
-def facts(stage: Stage, wish: Wish, status: str = "") -> str:
+def details(stage: Stage, wish: Wish, status: str = "") -> str:
     """A piece of HTML; every name is escaped."""
     track = stage.track
     about = ", ".join(part for part in (track.category, track.source) if part)

@@ -12,7 +12,7 @@ import pytest
 
 from wildshape.records import Box
 from wildshape.report.content import Cloud, Curve, Figure, Report, ReportObject, Table
-from wildshape.report.page import render, write_report
+from wildshape.report.page.html import render, write_report
 
 EVIL = "<script>alert('x')</script> & \"co\" </script>"
 PNG = base64.b64decode(

@@ -19,12 +19,23 @@ from string import Template
 import numpy as np
 
 from wildshape.io.atomic import write_text
-from wildshape.report.content import SERIES_COLORS, Cloud, Curve, Numbers, Report, ReportObject
+from wildshape.report.content import (
+    SERIES_COLORS,
+    Cell,
+    Cloud,
+    Curve,
+    Numbers,
+    Report,
+    ReportObject,
+    Table,
+)
 from wildshape.report.picture import still
 from wildshape.report.scene import AXES, Scene, scene_of
-from wildshape.report.table import html_table
 
 _MAX_CURVE_POINTS = 2000
+_DASH, _SPREAD = "\N{EN DASH}", " ± "
+_NUMERIC = f"0123456789-+±{_DASH}"
+_WIDE = 12  # columns from which a table is drawn smaller
 _STEPS = 65534  # int16 from -32767 to 32767 across the scene
 
 
@@ -42,7 +53,7 @@ def render(report: Report) -> str:
     """The page's text."""
     from plotly.offline import get_plotlyjs
 
-    template = files("wildshape.report") / "template"
+    template = files("wildshape.report.page") / "template"
     scenes = [scene_of(shown) for shown in report.objects]
     return Template((template / "page.html").read_text(encoding="utf-8")).substitute(
         title=escape(report.title),
@@ -52,8 +63,8 @@ def render(report: Report) -> str:
         objects_hidden="" if report.objects else "hidden",
         cost=_cost(report),
         findings=_findings(report.findings),
-        index="".join(_section(t.title, html_table(t)) for t in report.index),
-        tables="".join(_section(t.title, html_table(t)) for t in report.tables),
+        index="".join(_section(t.title, _html_table(t)) for t in report.index),
+        tables="".join(_section(t.title, _html_table(t)) for t in report.tables),
         curves=_curves(report.curves),
         figures=_figures(report),
         notes=_notes(report.notes),
@@ -80,7 +91,7 @@ def _data(report: Report, scenes: list[Scene]) -> dict:
         {
             "name": shown.name,
             "subtitle": shown.subtitle,
-            "facts": shown.facts,
+            "details": shown.details,
             "axes": AXES[shown.sensor],
             **_scene(scene),
         }
@@ -199,9 +210,9 @@ def _stills(report: Report, scenes: list[Scene]) -> str:
 
 def _still(shown: ReportObject, scene: Scene) -> str:
     image = f'<img alt="{escape(shown.name)}" src="{_png(still(scene))}">' if scene.clouds else ""
-    facts = "; ".join(f"{label} {value}" for label, value in shown.facts)
-    table = f"<div class=scans>{html_table(shown.scans)}</div>" if shown.scans else ""
-    return f"{image}<p>{escape(facts)}</p>{table}"
+    details = "; ".join(f"{label} {value}" for label, value in shown.details)
+    table = f"<div class=scans>{_html_table(shown.scans)}</div>" if shown.scans else ""
+    return f"{image}<p>{escape(details)}</p>{table}"
 
 
 def _png(png: bytes) -> str:
@@ -226,3 +237,52 @@ def _readable(value: object) -> str:
     if isinstance(value, dict | list | tuple):
         return json.dumps(value, indent=1, default=str)
     return os.fspath(value) if isinstance(value, os.PathLike) else str(value)
+
+
+def _html_table(table: Table) -> str:
+    """With its caption, without its title; a sortable one is sorted by the page's script."""
+    right = [i > 0 and _numeric([r[i] for r in table.rows]) for i in range(len(table.columns))]
+    head = "".join(
+        f"<th scope=col{_class(right[i])}>{escape(name)}</th>"
+        for i, name in enumerate(table.columns)
+    )
+    rows = "".join(_table_row(table, i, right) for i in range(len(table.rows)))
+    caption = f"<p class=caption>{escape(table.caption)}</p>" if table.caption else ""
+    kinds = ["sortable"] * table.sortable + ["wide"] * (len(table.columns) > _WIDE)
+    kind = f' class="{" ".join(kinds)}"' if kinds else ""
+    grid = f"<table{kind}><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+    return f"<div class=scroll>{grid}</div>{caption}"
+
+
+def _table_row(table: Table, number: int, right: list[bool]) -> str:
+    cells = "".join(
+        f"<td{_class(is_right)}>{_content(cell)}</td>"
+        for cell, is_right in zip(table.rows[number], right, strict=True)
+    )
+    ours = " class=ours" if number in table.emphasis else ""
+    to = table.objects[number] if number < len(table.objects) else None
+    return f"<tr{ours}{'' if to is None else f' data-object={to} tabindex=0'}>{cells}</tr>"
+
+
+def _class(right: bool) -> str:
+    return " class=number" if right else ""
+
+
+def _numeric(cells: list[Cell]) -> bool:
+    """Whether a column holds numbers, some perhaps written as `82.1 ± 1.3` or `–`."""
+    return all(not isinstance(cell, str) or cell[:1] in _NUMERIC for cell in cells)
+
+
+def _content(cell: Cell) -> str:
+    """The text; a deviation may stand below its mean where the page is narrow."""
+    text = escape(_text(cell))
+    mean, spread, deviation = text.partition(_SPREAD)
+    if spread and mean[:1] in _NUMERIC:
+        return f"{mean} <small>± {deviation}</small>"
+    return text
+
+
+def _text(cell: Cell) -> str:
+    if cell is None or (isinstance(cell, float) and not math.isfinite(cell)):
+        return _DASH
+    return format(cell, ".3g") if isinstance(cell, float) else str(cell)

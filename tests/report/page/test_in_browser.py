@@ -12,8 +12,8 @@ import pytest
 from tests.report.chromium import CHROMIUM, Page, browser, colourful, eventually, moved
 
 from wildshape.report.content import Cloud, Curve, Report, ReportObject, Table
-from wildshape.report.page import write_report
-from wildshape.report.parts import metrics_table
+from wildshape.report.page.html import write_report
+from wildshape.report.page.metrics import metrics_table
 
 pytestmark = pytest.mark.skipif(
     CHROMIUM is None, reason="did not run: no chromium on PATH to open the report with"

@@ -1,23 +1,64 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Figures in plain language: what an evaluation or a folder of results says, a sentence each."""
+"""What `metrics.json` says, as a table and as sentences."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from wildshape.report.parts import is_ours
+from wildshape.baselines.named import NAMES
+from wildshape.evaluation.summary import FIGURES
+from wildshape.evaluation.tables import ROTATE, cell
+from wildshape.report.content import Table
 
+_TRAINED_RIVALS = ("dpc", "oracle")  # and what their names begin, such as dpc-lidar
 _SURE = 0.5
-_HOW = {"none": "as recorded", "yaw": "turned in yaw", "so3": "turned at random"}
+
+
+def metrics_table(metrics: Mapping[str, Any]) -> Table:
+    """The content of `metrics.json` as a table; our rows, those of no baseline, are bold."""
+    methods: dict[str, dict[str, Any]] = dict(metrics.get("methods") or {})
+    known = {name for row in methods.values() for name in row if row[name] is not None}
+    columns = [figure for figure in FIGURES if figure.heading and figure.name in known]
+    rotate = str(metrics.get("rotate", ""))
+    rows = [
+        (name, *(cell(row.get(f.name), (row.get("std") or {}).get(f.name), f) for f in columns))
+        for name, row in methods.items()
+    ]
+    counts = [
+        max((row.get("scans_counted") or {}).values(), default=None) for row in methods.values()
+    ]
+    return Table(
+        title=ROTATE.get(rotate, rotate or "evaluation").capitalize(),
+        columns=("method", *(figure.heading for figure in columns), "scans"),
+        rows=tuple((*row, count) for row, count in zip(rows, counts, strict=True)),
+        caption=_caption(methods, len(metrics.get("seeds") or ()) or 1),
+        emphasis=tuple(i for i, name in enumerate(methods) if is_ours(name)),
+    )
+
+
+def _caption(methods: Mapping[str, Mapping[str, Any]], seeds: int) -> str:
+    skipped = sum(sum((m.get("scans_skipped") or {}).values()) for m in methods.values())
+    parts = (
+        "CD = precision + coverage, Euclidean, metres; rotation and translation are medians against"
+        " the middle scan; sym counts a half turn as right; CD floor is what so few points allow.",
+        f"Mean ± standard deviation of {seeds} seeds." if seeds > 1 else "",
+        f"{skipped} scans skipped, all methods together." if skipped else "",
+    )
+    return " ".join(part for part in parts if part)
+
+
+def is_ours(method: str) -> bool:
+    """Whether a row is a model of ours: none of the baselines, DPC's variants or the oracle."""
+    return method not in NAMES and not method.lower().startswith(_TRAINED_RIVALS)
 
 
 def of_metrics(metrics: Mapping[str, Any]) -> list[str]:
     """What metrics.json says of each of our rows, beside the best of the others."""
     methods: dict[str, Mapping[str, Any]] = dict(metrics.get("methods") or {})
     rivals = {name: figures for name, figures in methods.items() if not is_ours(name)}
-    turned = _HOW.get(str(metrics.get("rotate")), "")
+    turned = ROTATE.get(str(metrics.get("rotate")), "scans as recorded")
     lines = []
     for name, figures in methods.items():
         if is_ours(name):
@@ -30,7 +71,7 @@ def _ours(
 ) -> Iterator[str]:
     if _known(figures, "acc30", "rot_median_deg", "trans_median_m"):
         yield (
-            f"Registration, scans {turned}: {name} brings {_percent(figures['acc30'])} of them "
+            f"Registration, {turned}: {name} brings {_percent(figures['acc30'])} of them "
             "within 30° of their true orientation to the track's middle scan, with a median error "
             f"of {figures['rot_median_deg']:.1f}° and {figures['trans_median_m']:.2f} m"
             f"{_beside(rivals, 'acc30', best=max, text=_percent)}."

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects in the order in which to look at them: the largest error, or least confidence, first."""
 
-import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,10 +12,9 @@ import torch
 
 from wildshape.evaluation.metrics import completion_error, registration_error
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.guard import reading
 from wildshape.records import Track
 from wildshape.report.content import Cell, Table
-from wildshape.report.results import TrackResult, doubt_of
+from wildshape.report.results import TrackResult, doubt_of, errors_of_scores
 from wildshape.report.scene import thin
 
 _TRUTH_POINTS = 4096
@@ -109,12 +107,7 @@ def objects_of_scores(scores: Path, method: str) -> Table | None:
     Raises:
         BadInputError: scores.json is damaged.
     """
-    with reading(scores, "what evaluate writes"):
-        runs = json.loads(scores.read_text("utf-8"))["runs"]
-        methods = [m for run in runs for m in run["methods"] if m["name"] == method]
-        cds = _by_track((r, _cd_of(r)) for m in methods for r in m["completions"])
-        turns = _by_track((r, r["rotation_deg"]) for m in methods for r in m["registrations"])
-        shifts = _by_track((r, r["translation_m"]) for m in methods for r in m["registrations"])
+    cds, turns, shifts = errors_of_scores(scores, method).values()
     if not {**cds, **turns}:
         return None
     order = sorted(
@@ -190,17 +183,6 @@ def _more(entry: dict[str, Any]) -> tuple[str, str]:
     box = entry.get("box") or {}
     size = " \N{MULTIPLICATION SIGN} ".join(f"{side:.2f}" for side in box.get("size") or ())
     return size, doubt_of(entry)
-
-
-def _cd_of(row: dict[str, Any]) -> float:
-    return float(row["error"]["precision"]) + float(row["error"]["coverage"])
-
-
-def _by_track(rows: Iterable[tuple[dict[str, Any], float]]) -> dict[str, list[float]]:
-    found: dict[str, list[float]] = {}
-    for row, value in rows:
-        found.setdefault(str(row["track"]), []).append(float(value))
-    return found
 
 
 def _score_row(

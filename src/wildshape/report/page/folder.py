@@ -14,12 +14,21 @@ from typing import Any
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.registration import to_middle
 from wildshape.io.guard import reading
 from wildshape.io.scans.points import read_points
 from wildshape.records import Track, as_text
-from wildshape.report.content import Cloud, Figure, Report, ReportObject, Table
-from wildshape.report.parts import is_ours, metrics_table, track_object, training_curves
-from wildshape.report.ranking import (
+from wildshape.report.content import Cloud, Figure, Report, ReportObject, Table, track_object
+from wildshape.report.page.curves import training_curves
+from wildshape.report.page.metrics import (
+    is_ours,
+    metrics_table,
+    of_confidences,
+    of_errors,
+    of_metrics,
+    of_run,
+)
+from wildshape.report.page.ranking import (
     Judged,
     index_of,
     judge,
@@ -27,7 +36,6 @@ from wildshape.report.ranking import (
     scans_of,
     worst_first,
 )
-from wildshape.report.readings import of_confidences, of_errors, of_metrics, of_run
 from wildshape.report.results import (
     MARKER,
     METRICS,
@@ -174,13 +182,13 @@ def _object(judged: Judged, result: TrackResult) -> ReportObject:
     if track is None:
         return _completed_only(result)
     name = track.scan_names[track.middle]
-    entry = result.entry(name)
+    entry, T_middle_scan = result.entry(name), _registered(result, track)
     shown = track_object(
         track,
         completed=result.completed(name),
         box=box_of(entry),
-        T_middle_scan=_registered(result, track),
-        facts=(*_errors(judged), *_facts(entry)),
+        fused={} if T_middle_scan is None else {"fused by us": T_middle_scan},
+        details=(*_errors(judged), *_details(entry)),
     )
     return replace(shown, scans=scans_of(result))
 
@@ -196,7 +204,7 @@ def _completed_only(result: TrackResult) -> ReportObject:
         subtitle=f"scan {scan}; {missing}",
         clouds=(Cloud("completed", read_points(result.folder / "completed" / f"{scan}.ply")),),
         box=box_of(entry),
-        facts=_facts(entry),
+        details=_details(entry),
         scans=scans_of(result),
     )
 
@@ -206,7 +214,7 @@ def _registered(result: TrackResult, track: Track) -> SE3 | None:
     T_sensor_can = result.poses() if len(track.scans) > 1 else None
     if T_sensor_can is None or len(T_sensor_can) != len(track.scans):
         return None
-    return T_sensor_can[track.middle] @ T_sensor_can.inverse()
+    return to_middle(T_sensor_can)
 
 
 def _errors(judged: Judged) -> tuple[tuple[str, str], ...]:
@@ -217,7 +225,7 @@ def _errors(judged: Judged) -> tuple[tuple[str, str], ...]:
     return tuple((label, text.format(value)) for label, value, text in known if value is not None)
 
 
-def _facts(entry: dict[str, Any]) -> tuple[tuple[str, str], ...]:
+def _details(entry: dict[str, Any]) -> tuple[tuple[str, str], ...]:
     known = {
         "confidence": lambda value: f"{value:.2f}",
         "box": lambda box: " x ".join(f"{side:.2f}" for side in box["size"]) + " m",

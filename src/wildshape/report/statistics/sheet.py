@@ -9,14 +9,22 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wildshape.datasets.tracks.truth import fuse_by_truth
+from wildshape.inference.registration import to_middle
 from wildshape.io.atomic import atomic_write
 from wildshape.records import Track
-from wildshape.report.content import Cell, Cloud, Figure, Report, ReportObject, Table
-from wildshape.report.histograms import INK, SOFT, draw_panel, is_rose, literal, number, panels_of
-from wildshape.report.page import write_report
+from wildshape.report.content import Cell, Figure, Report, ReportObject, Table, track_object
+from wildshape.report.page.html import write_report
+from wildshape.report.statistics.drawing import (
+    INK,
+    SOFT,
+    draw_panel,
+    is_rose,
+    literal,
+    number,
+    panels_of,
+)
 from wildshape.report.statistics.statistics import Quantity, Statistics
-from wildshape.report.thumbnails import PANELS, draw_track
+from wildshape.report.statistics.thumbnails import PANELS, draw_track
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -171,17 +179,5 @@ def _row(quantity: Quantity) -> tuple[Cell, ...]:
 
 def _in_3d(track: Track) -> ReportObject:
     """A track as linked panels in the frame of its middle scan."""
-    middle = track.middle
-    clouds = [Cloud("input scan", track.scans[middle], size=2.6)]
-    if track.T_sensor_object is not None:
-        pose = track.T_sensor_object[middle]
-        clouds.append(Cloud("fused by truth", pose.apply_numpy(fuse_by_truth(track))))
-        if track.shape is not None:
-            clouds.append(Cloud("truth", pose.apply_numpy(track.shape)))
-    words = (track.category, f"{len(track.scans)} scans", track.source)
-    return ReportObject(
-        name=track.name,
-        subtitle=", ".join(word for word in words if word),
-        clouds=tuple(clouds),
-        sensor=track.sensor.kind,
-    )
+    poses = track.T_sensor_object
+    return track_object(track, fused={} if poses is None else {"fused by truth": to_middle(poses)})

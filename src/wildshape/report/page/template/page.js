@@ -198,7 +198,7 @@
     $("subtitle").textContent = object.subtitle;
     $("overlay_label").hidden = object.clouds.length < 2;
     const range = object.arrow ? [["range", object.distance.toFixed(1) + " m"]] : [];
-    $("facts").replaceChildren(...[...range, ...object.facts].map(([label, value]) => {
+    $("details").replaceChildren(...[...range, ...object.details].map(([label, value]) => {
       const row = document.createElement("div");
       row.append(Object.assign(document.createElement("dt"), { textContent: label }),
         Object.assign(document.createElement("dd"), { textContent: value }));
