@@ -261,14 +261,14 @@ class Completion:
 
         Args:
             scan: the points completed, sensor frame; the mesh is then coloured by confidence, and
-                has the vertex attribute `confidence` (`geometry/mesh_confidence.py`).
+                has the vertex attribute `confidence` (`geometry/meshing.py`).
         """
         from wildshape.geometry.meshing import closed_mesh
 
         mesh = closed_mesh(self.pose.inverse().apply_numpy(self.points))
         mesh.apply_transform(self.pose.matrix.numpy())
         if scan is not None:
-            from wildshape.geometry.mesh_confidence import colour_by_confidence
+            from wildshape.geometry.meshing import colour_by_confidence
 
             colour_by_confidence(mesh, scan, self.confidence)
         return mesh

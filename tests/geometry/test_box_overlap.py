@@ -10,8 +10,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wildshape.geometry.box import FittedBox
-from wildshape.geometry.box_overlap import box_iou, shared_volume
+from wildshape.geometry.box import FittedBox, box_iou, shared_volume
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from wildshape.geometry.mesh_confidence import colour_by_confidence, place_confidence
+from wildshape.geometry.meshing import colour_by_confidence, place_confidence
 from wildshape.io.scans.writers import MESH_FORMATS, write_mesh
 
 CENTRE = np.array([40.0, -25.0, -1.0])

@@ -10,8 +10,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from wildshape.geometry.box import FittedBox
-from wildshape.geometry.box_overlap import box_iou
+from wildshape.geometry.box import FittedBox, box_iou
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.ops.nearest import nearest_both, nearest_distance

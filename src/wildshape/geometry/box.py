@@ -1,6 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The oriented box of a complete shape, upright in its canonical frame."""
+"""Oriented boxes: the upright one of a complete shape, and the volume that two of them share.
+
+The shared part is convex, whatever the rotations. Its corners are corners of one box inside the
+other, and points where an edge of one passes through a face of the other; qhull takes the volume
+of their hull.
+"""
 
 from typing import NamedTuple
 
@@ -14,7 +19,7 @@ from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rot
 # A box of edge 2 about the origin; its edges join corners that differ in one coordinate.
 SIGNS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
 EDGES = [(i, j) for i in range(8) for j in range(i) if np.abs(SIGNS[i] - SIGNS[j]).sum() == 2]
-_ANGLES, _TRIM = 90, 0.002
+_INSIDE, _FLAT = 1e-9, 1e-12  # of a box's diagonal: rounding
 
 
 class FittedBox(NamedTuple):
@@ -36,13 +41,19 @@ def box_axes(quaternion_wxyz: tuple[float, ...]) -> Float[np.ndarray, "3 3"]:
     return rotation_from_quaternion(torch.tensor(quaternion_wxyz, dtype=torch.float64)).numpy()
 
 
-def fit_box(points: Float[Tensor, "n 3"]) -> FittedBox:
-    """The upright rectangle of least area around all but the outermost 0.2 % at each side."""
-    angles = torch.arange(_ANGLES, dtype=points.dtype) * (torch.pi / 2 / _ANGLES)
-    low, high = _trimmed_range(_along_axes(points, angles))
-    across = (high - low)[:-1].view(2, _ANGLES)
+def fit_box(points: Float[Tensor, "n 3"], *, count: int = 90, trim: float = 0.002) -> FittedBox:
+    """The upright rectangle of least area around all but the outermost points at each side.
+
+    Args:
+        points: z up, metres.
+        count: of the directions tried within a quarter turn: one a degree.
+        trim: share of the points left out at each side, for a few strays are far out.
+    """
+    angles = torch.arange(count, dtype=points.dtype) * (torch.pi / 2 / count)
+    low, high = _trimmed_range(_along_axes(points, angles), trim)
+    across = (high - low)[:-1].view(2, count)
     best = int((across[0] * across[1]).argmin())
-    axes = torch.tensor((best, _ANGLES + best, 2 * _ANGLES))
+    axes = torch.tensor((best, count + best, 2 * count))
     angle, centre, size = angles[best], (low + high)[axes] / 2, (high - low)[axes]
     rotation = rotation_z(angle)
     position = rotation @ centre
@@ -62,7 +73,58 @@ def _along_axes(points: Float[Tensor, "n 3"], angles: Float[Tensor, "a"]) -> Ten
     return torch.cat((x * cos + y * sin, y * cos - x * sin, z[None]))
 
 
-def _trimmed_range(rows: Float[Tensor, "k n"]) -> tuple[Tensor, Tensor]:
-    outermost = int(_TRIM * rows.shape[1]) + 1
+def _trimmed_range(rows: Float[Tensor, "k n"], trim: float) -> tuple[Tensor, Tensor]:
+    outermost = int(trim * rows.shape[1]) + 1
     low = rows.topk(outermost, dim=1, largest=False).values[:, -1]
     return low, rows.topk(outermost, dim=1).values[:, -1]
+
+
+def box_iou(a: FittedBox, b: FittedBox) -> float:
+    """Intersection over union of two boxes in one frame, 0 to 1."""
+    shared = shared_volume(a, b)
+    union = float(a.size.prod()) + float(b.size.prod()) - shared
+    return shared / union if union > 0 else 0.0
+
+
+def shared_volume(a: FittedBox, b: FittedBox) -> float:
+    """Cubic metres that two boxes in one frame share."""
+    # In the axes of `a` and in units of its diagonal: tolerances then mean the same everywhere.
+    unit = float(a.size.norm())
+    if unit == 0 or float((a.centre - b.centre).norm()) >= (unit + float(b.size.norm())) / 2:
+        return 0.0
+    half_a, half_b = (box.size.double().numpy() / (2 * unit) for box in (a, b))
+    turn = (a.rotation.double().mT @ b.rotation.double()).numpy()
+    shift = (a.rotation.double().mT @ (b.centre - a.centre).double()).numpy() / unit
+    corners_b = SIGNS * half_b @ turn.T + shift
+    corners_a = (SIGNS * half_a - shift) @ turn  # seen from b
+    from_b = _inside(np.concatenate((corners_b, _through(corners_b, half_a))), half_a)
+    from_a = _inside(np.concatenate((corners_a, _through(corners_a, half_b))), half_b)
+    return _hull_volume(np.concatenate((from_b, from_a @ turn.T + shift))) * unit**3
+
+
+def _through(corners: Float[np.ndarray, "8 3"], half: Float[np.ndarray, "3"]) -> np.ndarray:
+    """`(n, 3)`: where a box's edges pass through the planes of another's faces, in its axes."""
+    start, end = (corners[[edge[k] for edge in EDGES]] for k in (0, 1))
+    faces = np.stack((-half, half))[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (faces - start) / (end - start)
+    met = (share >= 0) & (share <= 1)
+    face, edge, axis = np.nonzero(met)
+    points = start[edge] + share[met][:, None] * (end - start)[edge]
+    points[np.arange(len(points)), axis] = faces[face, 0, axis]
+    return points
+
+
+def _inside(points: Float[np.ndarray, "n 3"], half: Float[np.ndarray, "3"]) -> np.ndarray:
+    return points[(np.abs(points) <= half + _INSIDE).all(1)]
+
+
+def _hull_volume(points: Float[np.ndarray, "n 3"]) -> float:
+    from scipy.spatial import ConvexHull, QhullError
+
+    if len(points) < 4 or np.linalg.svd(points - points[0], compute_uv=False)[2] < _FLAT:
+        return 0.0
+    try:
+        return float(ConvexHull(points).volume)
+    except QhullError:  # a sliver thinner than qhull can tell from flat
+        return 0.0

@@ -6,26 +6,48 @@ Crops of vehicles often hold some ground around the wheels: a skirt, low, and fu
 anything above it. Fused scans must not teach it as shape, and a shape must not be drawn to it.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Bool, Float
 
-_LOW, _ABOVE, _BEYOND, _ENDS, _FEWEST = 0.2, 0.35, 0.08, 0.01, 50
+
+@dataclass(frozen=True)
+class SkirtRule:
+    """What counts as ground around a vehicle.
+
+    Attributes:
+        low_m: a point of the skirt is lower than this above the lowest, metres.
+        above_m: what is higher than this above the lowest is the body, metres: over any kerb.
+        beyond_m: a point of the skirt is so far outside of the body, metres.
+        ends: share of the points that may be strays at each end.
+        fewest: points of the body without which nothing is said.
+    """
+
+    low_m: float = 0.2
+    above_m: float = 0.35
+    beyond_m: float = 0.08
+    ends: float = 0.01
+    fewest: int = 50
 
 
 def skirt(
-    points: Float[np.ndarray, "n 3"], shape: Float[np.ndarray, "m 3"] | None = None
+    points: Float[np.ndarray, "n 3"],
+    shape: Float[np.ndarray, "m 3"] | None = None,
+    rule: SkirtRule = SkirtRule(),
 ) -> Bool[np.ndarray, "n"]:
     """The points that are low and beside everything higher of the vehicle.
 
     Args:
         points: canonical frame, z up, metres.
         shape: the vehicle, the same frame; by default what the points are of.
+        rule: see there.
     """
     whole = points if shape is None else shape
-    low = np.quantile(whole[:, 2], _ENDS)
-    body = whole[whole[:, 2] > low + _ABOVE, :2]
-    if len(body) < _FEWEST:
+    low = np.quantile(whole[:, 2], rule.ends)
+    body = whole[whole[:, 2] > low + rule.above_m, :2]
+    if len(body) < rule.fewest:
         return np.zeros(len(points), dtype=bool)
-    near, far = np.quantile(body, (_ENDS, 1 - _ENDS), axis=0)
-    beside = (points[:, :2] < near - _BEYOND) | (points[:, :2] > far + _BEYOND)
-    return (points[:, 2] < low + _LOW) & beside.any(axis=1)
+    near, far = np.quantile(body, (rule.ends, 1 - rule.ends), axis=0)
+    beside = (points[:, :2] < near - rule.beyond_m) | (points[:, :2] > far + rule.beyond_m)
+    return (points[:, 2] < low + rule.low_m) & beside.any(axis=1)

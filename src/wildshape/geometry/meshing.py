@@ -1,18 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""A closed mesh around a completed shape, in its canonical frame.
+"""A closed mesh around a completed shape, in its canonical frame, and how far it is believed.
 
 The points are swollen until they touch, what is hidden from five of the six sides is filled (a
 LiDAR never sees an underside), and the solid is worn down again by as much as it was swollen: until
 its surface lies in the middle of the points around, which are a layer, not a sheet. That surface is
 a level set, which marching cubes closes whatever the points are.
+
+A place of the mesh is measured beside a scan's points, and guessed elsewhere.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, UInt8
 
 from wildshape.errors import BadInputError, MissingExtraError
 from wildshape.ops.nearest import nearest
@@ -20,13 +23,35 @@ from wildshape.ops.nearest import nearest
 if TYPE_CHECKING:
     import trimesh
 
-_CELLS = 96  # along the longest side
-_REACH = 0.05  # of the longest side: what lies closer than twice that is joined
-_SIDES = 5
-_SMALLEST_BODY = 0.01  # of all cells inside
-_MARGIN, _BAND = 3, 10  # cells
-_AROUND, _ROUNDS = 0.015, 3  # of the longest side
-_FEW = 0.02  # of the densest place: where there are fewer points, none are followed
+_MARGIN = 3  # cells around the swollen points
+# Blue to orange (Okabe & Ito's two, a light grey between): told apart by colour-blind readers.
+_SCALE = np.array([(0, 114, 178), (196, 200, 206), (213, 94, 0)], np.float64)
+
+
+@dataclass(frozen=True)
+class MeshConfig:
+    """How a mesh is made.
+
+    Attributes:
+        cells: of the grid along the longest side.
+        reach: how far points are swollen, of the longest side: what lies closer than twice that is
+            joined.
+        sides: from so many of six a place is hidden that lies inside: a LiDAR sees no underside.
+        smallest_body: of all cells inside; smaller bodies are crumbs and left out.
+        band: cells about the surface sought, in which depth is measured and not counted.
+        around: of the longest side: the neighbourhood in whose mean the surface is centred.
+        rounds: of centring.
+        few: of the densest place: where there are fewer points, none are followed.
+    """
+
+    cells: int = 96
+    reach: float = 0.05
+    sides: int = 5
+    smallest_body: float = 0.01
+    band: int = 10
+    around: float = 0.015
+    rounds: int = 3
+    few: float = 0.02
 
 
 class _Grid(NamedTuple):
@@ -37,11 +62,14 @@ class _Grid(NamedTuple):
     step: float
 
 
-def closed_mesh(points: Float[np.ndarray, "n 3"]) -> "trimesh.Trimesh":
+def closed_mesh(
+    points: Float[np.ndarray, "n 3"], config: MeshConfig = MeshConfig()
+) -> "trimesh.Trimesh":
     """The closed surface of a solid whose outside is where the points are.
 
     Args:
         points: complete shape, canonical frame (z up, mirror plane y = 0); any unit.
+        config: see there.
 
     Raises:
         BadInputError: the points have no extent.
@@ -53,12 +81,13 @@ def closed_mesh(points: Float[np.ndarray, "n 3"]) -> "trimesh.Trimesh":
     extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
     if not extent > 0:
         raise BadInputError("a shape whose points are all equal has no surface.")
-    reach = _REACH * extent
-    grid = _grid_around(points, extent / _CELLS, reach)
-    depth = _depth(points, grid, reach, march)
+    reach = config.reach * extent
+    grid = _grid_around(points, extent / config.cells, reach)
+    depth = _depth(points, grid, reach, march, config)
     level = float(np.median(_interpolate(depth, grid, points)))
-    depth = _centred(depth, grid, points, level)
-    vertices, faces, *_ = march(_large_bodies(depth, level), level, gradient_direction="ascent")
+    depth = _centred(depth, grid, points, level, config)
+    depth = _large_bodies(depth, level, config.smallest_body)
+    vertices, faces, *_ = march(depth, level, gradient_direction="ascent")
     return trimesh.Trimesh(vertices * grid.step + grid.start, faces, process=False)
 
 
@@ -83,32 +112,36 @@ def _grid_around(points: np.ndarray, step: float, reach: float) -> _Grid:
     return _Grid(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1), start, step)
 
 
-def _depth(points: np.ndarray, grid: _Grid, reach: float, march) -> np.ndarray:
+def _depth(
+    points: np.ndarray, grid: _Grid, reach: float, march: Any, config: MeshConfig
+) -> np.ndarray:
     """How far inside the filled, swollen solid each place is; 0 outside."""
     from scipy.ndimage import binary_fill_holes, distance_transform_edt
 
     apart = _distance(grid.places, points)
     swollen = apart < reach
-    solid = np.asarray(binary_fill_holes(swollen | (_blocked_sides(swollen) >= _SIDES)))
+    solid = np.asarray(binary_fill_holes(swollen | (_blocked_sides(swollen) >= config.sides)))
     skin, *_ = march(np.where(solid & ~swollen, 0.0, apart), reach)
     depth = np.asarray(distance_transform_edt(solid)) * grid.step
     # Counted in cells near the surface that is sought would be stairs.
-    close = solid & (np.abs(depth - reach) < _BAND * grid.step)
+    close = solid & (np.abs(depth - reach) < config.band * grid.step)
     depth[close] = _distance(grid.places[close], skin * grid.step + grid.start)
     return depth
 
 
-def _centred(depth: np.ndarray, grid: _Grid, points: np.ndarray, level: float) -> np.ndarray:
+def _centred(
+    depth: np.ndarray, grid: _Grid, points: np.ndarray, level: float, config: MeshConfig
+) -> np.ndarray:
     """The same with the points as deep as `level` in the mean of every neighbourhood."""
     from scipy.ndimage import gaussian_filter
 
-    width = _AROUND * float(np.ptp(points, axis=0).max()) / grid.step
+    width = config.around * float(np.ptp(points, axis=0).max()) / grid.step
     cells = tuple(np.rint((points - grid.start) / grid.step).astype(int).T)
     number = np.zeros(depth.shape)
     np.add.at(number, cells, 1.0)
     number = gaussian_filter(number, width)
-    few = _FEW * float(number.max())
-    for _ in range(_ROUNDS):
+    few = config.few * float(number.max())
+    for _ in range(config.rounds):
         deeper = np.zeros(depth.shape)
         np.add.at(deeper, cells, _interpolate(depth, grid, points) - level)
         shift = gaussian_filter(deeper, width) / (number + few)
@@ -139,8 +172,8 @@ def _interpolate(field: np.ndarray, grid: _Grid, points: np.ndarray) -> np.ndarr
     return map_coordinates(field, ((points - grid.start) / grid.step).T, order=1)
 
 
-def _large_bodies(depth: np.ndarray, level: float) -> np.ndarray:
-    """The field without bubbles, and without crumbs: bodies of less than a hundredth of all."""
+def _large_bodies(depth: np.ndarray, level: float, smallest: float) -> np.ndarray:
+    """The field without bubbles, and without crumbs: bodies of less than that share of all."""
     from scipy.ndimage import binary_fill_holes, label
 
     solid = np.asarray(binary_fill_holes(depth > level))
@@ -148,6 +181,51 @@ def _large_bodies(depth: np.ndarray, level: float) -> np.ndarray:
     found = label(solid)
     bodies = np.asarray(found[0])  # pyright: ignore[reportIndexIssue]
     size = np.bincount(bodies.ravel())
-    crumbs = size < _SMALLEST_BODY * size[1:].sum()
+    crumbs = size < smallest * size[1:].sum()
     crumbs[0] = False
     return np.where(crumbs[bodies], 0.0, depth)
+
+
+def share_colours(shares: Float[np.ndarray, "n"]) -> UInt8[np.ndarray, "n 3"]:
+    """One colour, red green blue, for each share of 0 to 1."""
+    places = np.linspace(0.0, 1.0, len(_SCALE))
+    columns = [np.interp(shares, places, _SCALE[:, i]) for i in range(3)]
+    return np.stack(columns, axis=1).astype(np.uint8)
+
+
+def place_confidence(
+    places: Float[np.ndarray, "n 3"],
+    scan: Float[np.ndarray, "m 3"],
+    confidence: float,
+    *,
+    guessed_m: float = 0.5,
+    guessed: float = 0.65,
+) -> Float[np.ndarray, "n"]:
+    """The chance that each place lies within 20 cm of the true surface, 0 to 1, roughly.
+
+    1 on a measured point, falling linearly with the distance to any, to `guessed` at `guessed_m`.
+    Of 120,000 places of 60 simulated cars, within 20 cm of the true surface are all that lie within
+    10 cm of a measured point, and of those beyond half a metre six in ten (confidence 0.93).
+
+    Args:
+        places: in the scan's frame, metres.
+        scan: the points measured.
+        confidence: of the whole completion.
+        guessed_m: from any measured point, beyond which a place is a guess, metres.
+        guessed: the chance of a guess, times the completion's confidence.
+    """
+    # In double and about the middle of the scan: far from the sensor float32 counts in millimetres.
+    middle = np.asarray(scan, np.float64).mean(0)
+    a, b = (torch.from_numpy((np.asarray(p) - middle)[None]).float() for p in (places, scan))
+    apart = nearest(a, b).distance_squared[0].clamp_min(0).sqrt().numpy()
+    return 1.0 - (1.0 - guessed * confidence) * np.minimum(apart / guessed_m, 1.0)
+
+
+def colour_by_confidence(
+    mesh: "trimesh.Trimesh", scan: Float[np.ndarray, "m 3"], confidence: float
+) -> None:
+    """Colour a mesh's vertices, blue for 1 to orange for 0; they get the attribute `confidence`."""
+    found = place_confidence(mesh.vertices.view(np.ndarray), scan, confidence)
+    visual: Any = mesh.visual
+    visual.vertex_colors = share_colours(1.0 - found)
+    mesh.vertex_attributes["confidence"] = found.astype(np.float32)

@@ -10,7 +10,7 @@ the result: `poor_fit` (the label-free cost is above 1.5 times the 90th percenti
 in training), `low_confidence` (below 0.1).
 """
 
-from wildshape.geometry.sensor_place import surrounded
+from wildshape.geometry.projection.line_of_sight import surrounded
 from wildshape.inference.prepare import MIN_POINTS, extent
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.records import Completion, Points, Sensor

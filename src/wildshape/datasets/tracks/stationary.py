@@ -13,10 +13,6 @@ from wildshape.geometry.outliers import radius_inliers, voxel_thin
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 
-_VOXEL_M = 0.05
-_RADIUS_M, _NEIGHBOURS = 0.25, 5
-_FEW = 32
-
 
 @dataclass(frozen=True)
 class StationaryFrame:
@@ -55,14 +51,26 @@ def stand(scans: tuple[Points, ...], T_sensor_world: SE3) -> StationaryFrame:
     )
 
 
-def without_lonely(points: Points) -> Points:
-    """Thinned to 5 cm, and without points that have fewer than 5 others within 25 cm.
+def without_lonely(
+    points: Points,
+    *,
+    voxel: float = 0.05,
+    radius: float = 0.25,
+    neighbours: int = 5,
+    fewest: int = 32,
+) -> Points:
+    """Thinned, and without points that have too few others around them.
 
-    A cloud of which hardly anything would be left stays as it is: it is thin all over.
+    Args:
+        points: accumulated scans of one object, metres.
+        voxel: edge of the cubes that the cloud is thinned by, metres.
+        radius: within which a point needs `neighbours` others, metres.
+        neighbours: see `radius`.
+        fewest: a cloud of which fewer would be left stays as it is: it is thin all over.
     """
-    thinned = voxel_thin(points, _VOXEL_M)
-    kept = thinned[radius_inliers(thinned, _RADIUS_M, _NEIGHBOURS)]
-    return kept if len(kept) >= _FEW else thinned
+    thinned = voxel_thin(points, voxel)
+    kept = thinned[radius_inliers(thinned, radius, neighbours)]
+    return kept if len(kept) >= fewest else thinned
 
 
 def _spread(moved: list[Points]) -> float:

@@ -5,10 +5,12 @@
 Every scan is taken from the origin, so the direction in which an object lies needs no label. Turned
 so that the object lies straight ahead, scans that differ by a turn of the sensor about its vertical
 become the same scan, and of a free rotation nothing is left but the roll about the line of sight.
+So it is worth knowing whether a sensor can have stood at the origin at all.
 """
 
 from typing import NamedTuple
 
+import numpy as np
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
@@ -16,6 +18,7 @@ from torch import Tensor
 from wildshape.geometry.projection.visibility import facing_rotation
 
 _AHEAD, _SMALLEST_M = (1.0, 0.0, 0.0), 1e-6
+_STEPS = 200
 # Axes x forward, y left, z up of a depth camera's own x right, y down, z forward.
 _CAMERA = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 
@@ -79,3 +82,28 @@ def roll_angle(R_facing_object: Float[Tensor, "B 3 3"]) -> Float[Tensor, "B"]:
     """The angle to `roll` by so that the object's z axis points up beside the line of sight."""
     up = R_facing_object[:, :, 2]
     return torch.atan2(up[:, 1], up[:, 2])
+
+
+def surrounded(points: Float[np.ndarray, "n 3"], near: float = 0.01) -> bool:
+    """Whether the points lie on all sides of the origin: in their convex hull, or as good as.
+
+    Frank-Wolfe steps to the hull's point nearest to the origin. As soon as all points lie before
+    a plane through the origin it is outside; for a real scan that is seen at the first step.
+
+    Args:
+        points: of one object, sensor frame.
+        near: of the extent: no sensor comes as near to the hull of what it sees.
+    """
+    exact = points.astype(np.float64)
+    reach = near * float(np.linalg.norm(np.ptp(exact, axis=0)))
+    place = exact.mean(0)
+    for _ in range(_STEPS):
+        if float(place @ place) <= reach**2:
+            return True
+        ahead = exact @ place
+        back = exact[int(ahead.argmin())]
+        if float(ahead.min()) > 0.0:
+            return False
+        step = place - back
+        place = place - step * min(1.0, float(place @ step) / float(step @ step))
+    return False

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, UInt8
 
-from wildshape.geometry.mesh_confidence import share_colours
+from wildshape.geometry.meshing import share_colours
 from wildshape.ops.nearest import nearest
 from wildshape.records import Points
 

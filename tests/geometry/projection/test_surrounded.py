@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import ConvexHull
 from tests.cars import drive_by
 
-from wildshape.geometry.sensor_place import surrounded
+from wildshape.geometry.projection.line_of_sight import surrounded
 
 
 def test_no_scan_surrounds_its_sensor_until_it_is_moved_to_its_centre() -> None:
