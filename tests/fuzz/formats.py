@@ -27,7 +27,7 @@ MUTATIONS: dict[str, tuple[Mutation, ...]] = {
     ".pkl.gz": (containers.change_pickle, containers.change_pickle, containers.change_gzip),
     ".json.gz": (containers.change_gzip,),
     ".feather": (tables.change_feather,),
-    ".parquet": (tables.change_parquet,),
+    ".parquet": (tables.change_parquet, tables.change_footer),
 }
 BOMBS: dict[str, tuple[Callable[[], bytes], ...]] = {
     ".ply": (headers.empty_faces, headers.empty_faces_text),

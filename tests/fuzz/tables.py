@@ -40,6 +40,13 @@ def change_parquet(rng: Random, data: bytes) -> bytes:
     return file.getvalue()
 
 
+def change_footer(rng: Random, data: bytes) -> bytes:
+    """Some bytes of a parquet file's footer, its length right."""
+    length = int.from_bytes(data[-8:-4], "little")
+    footer = damage(rng, data[-8 - length : -8])
+    return data[: -8 - length] + footer + len(footer).to_bytes(4, "little") + data[-4:]
+
+
 def _changed_table(rng: Random, table: Any) -> Any:
     """A column lost, renamed, of another type, with other values; rows lost, doubled, mixed."""
     import pyarrow as pa

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 
 from wildshape.datasets.tracks.labelled_boxes import check_boxes
+from wildshape.datasets.waymo.footer import row_groups
 from wildshape.datasets.waymo.range_image import uniform_inclinations
 from wildshape.errors import BadInputError, MissingExtraError
 from wildshape.geometry.transforms.rotation import rotation_z
@@ -222,12 +223,10 @@ def _check_type(kind: Any, name: str, path: Path) -> None:
 def _check_rows(metadata: Any, names: tuple[str, ...], path: Path) -> None:
     """Refuse rows and values that are many only because they are all the same."""
     most = _FREE_ROWS + path.stat().st_size // _ROW_BYTES
-    groups = [metadata.row_group(i) for i in range(metadata.num_row_groups)]
-    for group in groups:
-        columns = [group.column(i) for i in range(group.num_columns)]
-        wanted = [c for c in columns if c.path_in_schema.startswith(names)]
-        values = max((column.num_values for column in wanted), default=0)
-        if metadata.num_rows > most or values > _MOST_VALUES * max(group.num_rows, 1):
+    for group in row_groups(path):
+        wanted = [count for name, count in group.values if name.startswith(names)]
+        values = max(wanted, default=0)
+        if metadata.num_rows > most or values > _MOST_VALUES * max(group.rows, 1):
             raise BadInputError(
                 f"{path}: claims {metadata.num_rows} rows and {values} values in "
                 f"{path.stat().st_size} bytes; download it again."
