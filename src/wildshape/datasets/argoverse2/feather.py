@@ -8,15 +8,17 @@ from typing import Any
 import numpy as np
 import torch
 
+from wildshape.datasets.argoverse2.unpacked import unpacked_bytes
 from wildshape.errors import BadInputError, MissingExtraError
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.guard import reading
+from wildshape.io.guard import check_unpacked, reading
 
 Columns = dict[str, np.ndarray]
 _QUATERNION, _TRANSLATION = ("qw", "qx", "qy", "qz"), ("tx_m", "ty_m", "tz_m")
 POSE = _QUATERNION + _TRANSLATION
 _WHOLE = ("timestamp_ns", "laser_number")
+_MAGIC_BYTES = 8
 _TEXTS = ("track_uuid", "category", "sensor_name")
 
 
@@ -32,30 +34,50 @@ def read_feather(path: Path, names: tuple[str, ...], brings: str) -> Columns:
         BadInputError: the file is missing, damaged or lacks a column.
         MissingExtraError: pyarrow is not installed.
     """
-    feather = _pyarrow_feather()
+    _check_pyarrow()
     if not path.is_file():
         raise BadInputError(f"{path}: no such file; {brings}.")
     with reading(path, "a feather table"):
-        found = _column_names(path)
+        # No memory map: a file cut off under it would end the program.
+        data = path.read_bytes()
+        found = _column_names(data)
         absent = [name for name in names if name not in found]
         if absent:
             raise BadInputError(
                 f"{path}: no column {absent[0]} among {', '.join(found)}; {brings}."
             )
-        # No memory map: a file cut off under it would end the program.
-        table = feather.read_table(path, columns=list(names), memory_map=False)
+        check_unpacked(path, unpacked_bytes(_stream(data)), len(data))
+        table = _table(data, [found.index(name) for name in names])
         table.validate(full=True)  # damaged texts would be read outside of the file
         for name in names:
             _check_column(table[name], name, path, brings)
         return {name: table[name].to_numpy() for name in names}
 
 
-def _column_names(path: Path) -> list[str]:
+def _column_names(data: bytes) -> list[str]:
     """What the table has, before a column is unpacked."""
+    import pyarrow
     from pyarrow import ipc
 
-    with path.open("rb") as file, ipc.open_file(file) as table:
+    with ipc.open_file(pyarrow.BufferReader(data)) as table:
         return table.schema.names
+
+
+def _stream(data: bytes) -> Any:
+    """What lies between the magic and the footer, which could list a batch many times."""
+    import pyarrow
+
+    stream = pyarrow.BufferReader(data)
+    stream.seek(_MAGIC_BYTES)
+    return stream
+
+
+def _table(data: bytes, columns: list[int]) -> Any:
+    from pyarrow import ipc
+
+    wanted = ipc.IpcReadOptions(included_fields=sorted(columns))
+    with ipc.open_stream(_stream(data), options=wanted) as stream:
+        return stream.read_all()
 
 
 def _check_column(column: Any, name: str, path: Path, brings: str) -> None:
@@ -89,12 +111,11 @@ def poses(columns: Columns, path: Path) -> SE3:
     return SE3(rotation_from_quaternion(quaternion), translation)
 
 
-def _pyarrow_feather() -> Any:
+def _check_pyarrow() -> None:
     try:
-        from pyarrow import feather
+        import pyarrow  # noqa: F401
     except ImportError as error:
         raise MissingExtraError(
             "feather files are read by pyarrow, which is not installed: "
             "pip install 'wildshape[arrow]'."
         ) from error
-    return feather
