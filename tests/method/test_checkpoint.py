@@ -54,6 +54,15 @@ def test_round_trip(network, tmp_path, projection):
             assert torch.equal(a, b)
 
 
+def test_a_checkpoint_from_before_a_number_was_a_field_means_its_default(saved):
+    with safe_open(saved, framework="pt") as file:
+        described = json.loads(file.metadata()["settings"])
+    for name in ("neighbours", "centres"):
+        del described["network"][name]
+    rewritten(saved, metadata={"settings": json.dumps(described)})
+    assert load_checkpoint(saved)[1] == settings()
+
+
 def test_unlimited_extent_survives(network, tmp_path):
     open_ended = dataclasses.replace(settings(), extent_m=(0.0, float("inf")))
     save_checkpoint(tmp_path / "m.safetensors", network, open_ended)

@@ -3,6 +3,7 @@
 """What holds for every point network that can be the encoder, and what two of them compute."""
 
 from dataclasses import replace
+from typing import get_args
 
 import pytest
 import torch
@@ -12,16 +13,17 @@ from torch.nn.functional import leaky_relu, relu
 
 from wildshape.method.checkpoint import load_checkpoint, save_checkpoint
 from wildshape.method.encoders.dgcnn import EdgeConv
+from wildshape.method.encoders.named import Backbone, encoder_of
 from wildshape.method.encoders.neighbourhood import first_copies, nearest_distinct
 from wildshape.method.encoders.pointnet2 import SetAbstraction, farthest_points
-from wildshape.method.network import ENCODERS, ShapePoseNet
+from wildshape.method.network import ShapePoseNet
 
-EVERY = pytest.mark.parametrize("name", ENCODERS)
+EVERY = pytest.mark.parametrize("name", get_args(Backbone))
 
 
 def encoder(name, seed=0):
     torch.manual_seed(seed)
-    return ENCODERS[name]((8, 12, 16, 24)).double()
+    return encoder_of(name, (8, 12, 16, 24), neighbours=16, centres=(128, 32)).double()
 
 
 @EVERY
@@ -51,9 +53,11 @@ def test_gradients_reach_every_weight_and_are_true(name):
     weight = clouds(5, 2, 24)
     (net(points) * weight).sum().backward()
     for label, parameter in net.named_parameters():
+        assert parameter.grad is not None, label
         assert float(parameter.grad.abs().max()) > 0, label
     step = {label: clouds(6, *p.shape) for label, p in net.named_parameters()}
-    slope = sum(float((p.grad * step[label]).sum()) for label, p in net.named_parameters())
+    grads = {label: p.grad for label, p in net.named_parameters() if p.grad is not None}
+    slope = sum(float((grad * step[label]).sum()) for label, grad in grads.items())
     values = []
     for size in (1e-6, -1e-6):
         moved = {label: p.detach() + size * step[label] for label, p in net.named_parameters()}
@@ -77,9 +81,19 @@ def test_a_network_with_it_is_saved_and_loaded(name, tmp_path):
     torch.testing.assert_close(network.encode(points).detach(), loaded.encode(points).detach())
 
 
+@pytest.mark.parametrize("name", ["pointnet2", "dgcnn"])
+def test_how_many_neighbours_count_is_a_number_of_the_network(name):
+    torch.manual_seed(0)
+    widths, centres = (8, 12, 16, 24), (128, 32)
+    fewer, more = (encoder_of(name, widths, neighbours=n, centres=centres) for n in (2, 16))
+    fewer.load_state_dict(more.state_dict())
+    points = clouds(1, 1, 60, 3).float()
+    assert not torch.allclose(fewer(points), more(points))
+
+
 def test_edge_convolution_is_that_of_a_loop_over_edges():
     torch.manual_seed(0)
-    layer, features = EdgeConv(5, 7).double(), clouds(7, 2, 40, 5)
+    layer, features = EdgeConv(5, 7, 16).double(), clouds(7, 2, 40, 5)
     distinct = torch.ones(2, 40, dtype=torch.bool)
     found = layer(features, distinct)
     index = nearest_distinct(features, features, distinct, 16)
@@ -93,7 +107,7 @@ def test_edge_convolution_is_that_of_a_loop_over_edges():
 
 def test_set_abstraction_is_that_of_a_loop_over_neighbourhoods():
     torch.manual_seed(0)
-    layer = SetAbstraction(4, 6, centres=5).double()
+    layer = SetAbstraction(4, 6, centres=5, neighbours=16).double()
     places, features = clouds(8, 1, 30, 3), clouds(9, 1, 30, 4)
     centres, found = layer(places, features)
     index = nearest_distinct(centres, places, first_copies(places), 16)

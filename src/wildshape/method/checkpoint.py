@@ -30,6 +30,8 @@ _BOUNDS = {
     "network.branches": (1.0, 2.0**10),
     "network.start": (0.0, 1e3),
     "network.scale": (1e-3, 1e4),
+    "network.neighbours": (1.0, 2.0**10),
+    "network.centres": (1.0, 2.0**16),
     "input_points": (1.0, 2.0**16),
     "projection.d_azimuth": (1e-3, math.pi),
     "projection.d_pitch": (1e-3, math.pi),

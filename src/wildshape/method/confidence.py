@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-_LEAST = 1e-3
 _MOST = 700.0  # the logarithm of the largest float, nearly
 
 
@@ -79,7 +78,11 @@ class Calibration:
 
 
 def fit_calibration(
-    facts: Sequence[Facts], cd: Float[np.ndarray, "n"], fitted_on: str = "", ridge: float = 1.0
+    facts: Sequence[Facts],
+    cd: Float[np.ndarray, "n"],
+    fitted_on: str = "",
+    ridge: float = 1.0,
+    ridge_of_cost: float = 1e-3,
 ) -> Calibration:
     """Ridge regression of the logarithm of true Chamfer distances.
 
@@ -87,14 +90,15 @@ def fit_calibration(
         facts: of completions.
         cd: their true Chamfer distances, metres.
         fitted_on: what they are, in words.
-        ridge: what holds the weights of all facts but the cost, which orders errors well by itself.
+        ridge: what holds the weights of all facts but the cost near zero.
+        ridge_of_cost: the same of the cost, which orders errors well by itself; at most `ridge`.
     """
-    given = np.asarray(facts, dtype=np.float64)
+    known = np.asarray(facts, dtype=np.float64)
     target = np.log(np.maximum(cd, 1e-6))
-    middle, width = given.mean(0), given.std(0) + 1e-6
-    scaled = (given - middle) / width
+    middle, width = known.mean(0), known.std(0) + 1e-6
+    scaled = (known - middle) / width
     held = np.full(scaled.shape[1], ridge)
-    held[Facts._fields.index("log_cost")] = min(ridge, _LEAST)
+    held[Facts._fields.index("log_cost")] = min(ridge, ridge_of_cost)
     normal = scaled.T @ scaled + np.diag(held)
     slope = np.linalg.solve(normal, scaled.T @ (target - target.mean()))
     left = target - target.mean() - scaled @ slope

@@ -11,20 +11,15 @@ from torch import Tensor, nn
 from torch.profiler import record_function
 
 from wildshape.errors import BadInputError
-from wildshape.method.encoders.dgcnn import DGCNNEncoder
+from wildshape.method.encoders.named import Backbone, encoder_of
 from wildshape.method.encoders.pcn import PCNEncoder
 from wildshape.method.encoders.pcn_static import encode_static
 from wildshape.method.encoders.pcn_winners import encode_winners
-from wildshape.method.encoders.pointnet2 import PointNet2Encoder
 from wildshape.method.heads import PoseDecoder, ShapeDecoder
 
 # How codes with a gradient are computed: through the winning points (CPU), searched in float32 or
 # in bfloat16; in passes of fixed shape (GPU), or those with products in bfloat16.
 Encoding = Literal["winners", "winners-bf16", "static", "bf16"]
-
-# Any point network can be the encoder (paper, section 4.1).
-Backbone = Literal["pcn", "pointnet2", "dgcnn"]
-ENCODERS = {"pcn": PCNEncoder, "pointnet2": PointNet2Encoder, "dgcnn": DGCNNEncoder}
 
 
 @dataclass(frozen=True)
@@ -45,6 +40,9 @@ class NetworkConfig:
             Longer along x than along y, it puts a mirror plane along the object, not across.
         scale: metres of one network unit, about half an object's length; 1 in the paper.
         backbone: which point network the encoder is; the paper's is PCN's.
+        neighbours: of a point, where the encoder looks at neighbourhoods (`pointnet2`, `dgcnn`);
+            fewer than the 20 to 32 of their papers, for scans of few points.
+        centres: of neighbourhoods in the two levels of `pointnet2`; a quarter of its paper's.
     """
 
     encoder: tuple[int, int, int, int] = (128, 256, 512, 1024)
@@ -58,6 +56,8 @@ class NetworkConfig:
     start: tuple[float, float, float] = (0.5, 0.5, 0.5)
     scale: float = 1.0
     backbone: Backbone = "pcn"
+    neighbours: int = 16
+    centres: tuple[int, int] = (128, 32)
 
     def __post_init__(self) -> None:
         """Refuse what would silently give another number of points."""
@@ -97,7 +97,12 @@ class ShapePoseNet(nn.Module):
         super().__init__()
         self.config = config
         code = config.encoder[-1]
-        self.encoder = ENCODERS[config.backbone](config.encoder)
+        self.encoder = encoder_of(
+            config.backbone,
+            config.encoder,
+            neighbours=config.neighbours,
+            centres=config.centres,
+        )
         self.shape = ShapeDecoder(code, config.decoder, config.points, config.mirror, config.start)
         self.pose = PoseDecoder(code, config.pose, config.branches, config.spread, config.selector)
 

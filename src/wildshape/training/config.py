@@ -20,7 +20,8 @@ class OptimConfig:
         steps: gradient steps.
         lr: learning rate at the first step.
         decay: factor of the learning rate every `decay_every` steps.
-        decay_every: see `decay`; 0 falls along a half cosine to a hundredth instead.
+        decay_every: see `decay`; 0 falls along a half cosine to the share `end` of `lr` instead.
+        end: see `decay_every`.
         warmup: steps over which the learning rate rises from zero.
         average: decay of the running mean of the weights that is kept; 0 keeps the last.
         clip: largest norm of the gradient; 0 is none.
@@ -34,11 +35,30 @@ class OptimConfig:
     lr: float = 1e-4
     decay: float = 0.7
     decay_every: int = 100_000
+    end: float = 0.01
     warmup: int = 0
     average: float = 0.0
     clip: float = 0.0
     precision: Literal["bf16", "fp32"] = "bf16"
     search: Literal["bf16", "fp32"] = "fp32"
+
+
+@dataclass(frozen=True)
+class ValidationConfig:
+    """What a validation looks at, and for how long.
+
+    Attributes:
+        batches: of held-out tracks, from which the label-free figures are; a median needs some
+            hundred scans.
+        truth_tracks: held-out tracks with truth that are completed and registered.
+        truth_scans: of each.
+        level_tracks: held-out tracks from whose middle scans it is found which way is up.
+    """
+
+    batches: int = 8
+    truth_tracks: int = 8
+    truth_scans: int = 6
+    level_tracks: int = 128
 
 
 @dataclass(frozen=True)
@@ -53,6 +73,8 @@ class Recipe:
         optim: optimiser and schedule.
         self_training: what a teacher's words become; and how headings are agreed on in any run.
         validate_every: steps between validations and checkpoints.
+        validation: what a validation looks at.
+        held_out: one track in so many is validated on and not fitted; none if there are fewer.
     """
 
     name: str
@@ -62,9 +84,8 @@ class Recipe:
     optim: OptimConfig = field(default_factory=OptimConfig)
     self_training: SelfTrainingConfig = field(default_factory=SelfTrainingConfig)
     validate_every: int = 1000
-
-
-_LAST = 0.01
+    validation: ValidationConfig = field(default_factory=ValidationConfig)
+    held_out: int = 20
 
 
 def learning_rate(step: int, config: OptimConfig) -> float:
@@ -73,7 +94,7 @@ def learning_rate(step: int, config: OptimConfig) -> float:
     if config.decay_every:
         return rise * config.lr * config.decay ** (step // config.decay_every)
     fall = (1 + math.cos(math.pi * min(1.0, step / config.steps))) / 2
-    return rise * config.lr * (_LAST + (1 - _LAST) * fall)
+    return rise * config.lr * (config.end + (1 - config.end) * fall)
 
 
 def template_weight(step: int, steps: int, config: LossConfig) -> float:

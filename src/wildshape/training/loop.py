@@ -22,7 +22,6 @@ from wildshape.training.validate import Validation, truth_figures, usual_up, val
 __all__ = ["MODEL", "Progress", "Run", "StopRequested", "fit", "setup", "split_tracks"]
 
 MODEL = "model.safetensors"
-_VALIDATION_BATCHES = 8
 _LOG_EVERY, _LOG_EVERY_GPU = 25, 250  # reading the figures waits for a GPU to be done
 Progress = Callable[[int, dict[str, Any]], None]
 
@@ -129,15 +128,18 @@ def checkpoint(run: Run) -> dict[str, Any]:
         run.processes.wait()
         return {}
     device = run.processes.device.type
-    found = validate(run.state.mean, run.held_out, run.recipe.loss, _VALIDATION_BATCHES, device)
+    config, mean = run.recipe.validation, run.state.mean
+    found = validate(mean, run.held_out, run.recipe.loss, config.batches, device)
     refuse_not_finite(found.observation, run.state.step)
     settings = model_settings(run, found)
-    settings = replace(settings, up=usual_up(run.state.mean, settings, run.held_out))
+    up = usual_up(mean, settings, run.held_out, config.level_tracks)
+    settings = replace(settings, up=up)
     turn = run.recipe.views.turn
     protocol = "yaw" if turn == "facing" else turn  # scans that face their object bear any yaw
-    truth = truth_figures(run.state.mean, settings, run.sampler.store, run.held_tracks, protocol)
+    store, held = run.sampler.store, run.held_tracks
+    truth = truth_figures(mean, settings, store, held, protocol, config)
     settings = replace(settings, metrics=settings.metrics | truth)
-    save_checkpoint(run.folder / MODEL, run.state.mean, settings)
+    save_checkpoint(run.folder / MODEL, mean, settings)
     save_state(run.folder, run.state, run.identity)
     run.processes.wait()
     return {f"validation/{name}": value for name, value in settings.metrics.items()}

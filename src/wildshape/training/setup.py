@@ -35,7 +35,6 @@ from wildshape.training.self_training.saved_targets import load_targets, save_ta
 from wildshape.training.state import STATE, TrainState, load_state
 from wildshape.training.step import Step, Views
 
-_HELD_OUT = 20
 _RESIDENT_SHARE = 0.5
 Say = Callable[[str], None]
 Taught = Callable[[int, int], None]
@@ -115,7 +114,7 @@ def setup(
     say = say if processes.leads else _silent
     _use_exact_products(processes.device)
     state = _new_state(recipe, start, seed, processes.device)
-    fit_tracks, held_tracks = split_tracks(len(store))
+    fit_tracks, held_tracks = split_tracks(len(store), recipe.held_out)
     identity = _identity(recipe, store, seed, processes, start, teacher)
     if headings is not None:
         identity["headings"] = _short_hash(headings.read_bytes())
@@ -271,10 +270,10 @@ def _network(recipe: Recipe, start: Path | None) -> ShapePoseNet:
     return network.train()
 
 
-def split_tracks(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Tracks to fit and tracks held out: one in 20, the same for every seed; all if few."""
+def split_tracks(count: int, one_in: int = 20) -> tuple[np.ndarray, np.ndarray]:
+    """Tracks to fit and tracks held out: one in so many, the same for every seed; all if few."""
     order = np.random.default_rng(0).permutation(count)
-    held = count // _HELD_OUT if count >= _HELD_OUT else 0
+    held = count // one_in if count >= one_in else 0
     return (order[held:], order[:held]) if held else (order, order)
 
 

@@ -24,9 +24,9 @@ from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.multiview import LossConfig, multiview_loss
 from wildshape.method.network import Poses, ShapePoseNet
 from wildshape.training.batches.views import Batch, ViewSampler
+from wildshape.training.config import ValidationConfig
 
 _SEED = 20_200_823
-_TRUTH_TRACKS, _TRUTH_SCANS, _LEVEL_TRACKS = 8, 6, 128
 _TRUTH = ("cd", "acc30", "rot_median_deg", "trans_median_m")
 
 
@@ -56,6 +56,7 @@ def truth_figures(
     store: Store,
     tracks: Sequence[int] | np.ndarray,
     turn: Literal["none", "yaw", "so3"],
+    config: ValidationConfig,
 ) -> dict[str, float]:
     """Registration and completion of held-out tracks against their truth, where they have it.
 
@@ -67,13 +68,19 @@ def truth_figures(
         store: holds the tracks.
         tracks: indices; the first few that have poses are used.
         turn: rotation protocol of METHOD 8, that of training.
+        config: how many tracks and scans.
     """
-    known = [int(t) for t in tracks if store.poses_of(int(t)) is not None][:_TRUTH_TRACKS]
+    known = [int(t) for t in tracks if store.poses_of(int(t)) is not None]
+    known = known[: config.truth_tracks]
     if not known:
         return {}
     method = {"held out": Learned(Predictor(network, settings))}
     found = protocol.run(
-        method, (store.track(t) for t in known), turn, _SEED, limits=Limits(max_scans=_TRUTH_SCANS)
+        method,
+        (store.track(t) for t in known),
+        turn,
+        _SEED,
+        limits=Limits(max_scans=config.truth_scans),
     )
     figures = figures_of(found["held out"])
     return {
@@ -82,7 +89,7 @@ def truth_figures(
 
 
 def usual_up(
-    network: ShapePoseNet, settings: ModelSettings, sampler: ViewSampler
+    network: ShapePoseNet, settings: ModelSettings, sampler: ViewSampler, tracks: int
 ) -> tuple[float, float, float] | None:
     """Which way is up in the canonical frame, as LiDARs that are held level say; None if none is.
 
@@ -91,11 +98,12 @@ def usual_up(
     Args:
         network: in evaluation.
         settings: of the checkpoint.
-        sampler: of held-out tracks; the middle scans of the first few are posed.
+        sampler: of held-out tracks.
+        tracks: so many of them; their middle scans are posed.
     """
     if settings.sensor != "lidar" or not settings.facing:
         return None
-    middles = [int(scans[len(scans) // 2]) for scans in sampler.scans_of[:_LEVEL_TRACKS]]
+    middles = [int(scans[len(scans) // 2]) for scans in sampler.scans_of[:tracks]]
     scans = [sampler.store.scan_points(middle) for middle in middles]
     up = mean_up(Predictor(network, settings, raw=True).poses(scans).rotation)
     if up is None:

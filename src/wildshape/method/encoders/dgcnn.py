@@ -13,8 +13,7 @@ from torch.nn.functional import leaky_relu
 
 from wildshape.method.encoders.neighbourhood import first_copies, nearest_distinct
 
-_NEIGHBOURS = 16
-_LEAK = 0.2
+_LEAK = 0.2  # of the activation, as in the paper
 
 
 class DGCNNEncoder(nn.Module):
@@ -22,12 +21,14 @@ class DGCNNEncoder(nn.Module):
 
     Args:
         widths: (a, b, c, d).
+        neighbours: of a point, itself among them.
     """
 
-    def __init__(self, widths: tuple[int, int, int, int] = (64, 128, 256, 1024)) -> None:
+    def __init__(self, widths: tuple[int, int, int, int], neighbours: int) -> None:
         super().__init__()
         a, b, c, d = widths
-        self.edge1, self.edge2, self.edge3 = EdgeConv(3, a), EdgeConv(a, b), EdgeConv(b, c)
+        layers = ((3, a), (a, b), (b, c))
+        self.edge1, self.edge2, self.edge3 = (EdgeConv(*sizes, neighbours) for sizes in layers)
         self.point4 = nn.Linear(a + b + c, d)
 
     def forward(self, points: Float[Tensor, "B N 3"]) -> Float[Tensor, "B d"]:
@@ -46,8 +47,9 @@ class EdgeConv(nn.Module):
     `B x_j` alone, one product a point instead of one an edge.
     """
 
-    def __init__(self, inner: int, outer: int) -> None:
+    def __init__(self, inner: int, outer: int, neighbours: int) -> None:
         super().__init__()
+        self.neighbours = neighbours
         self.own = nn.Linear(inner, outer)
         self.near = nn.Linear(inner, outer, bias=False)
 
@@ -55,7 +57,7 @@ class EdgeConv(nn.Module):
         self, features: Float[Tensor, "B N c"], distinct: Bool[Tensor, "B N"]
     ) -> Float[Tensor, "B N d"]:
         """Features of every point from its nearest ones, itself among them."""
-        index = nearest_distinct(features, features, distinct, _NEIGHBOURS)
+        index = nearest_distinct(features, features, distinct, self.neighbours)
         near = self.near(features)
         return leaky_relu(self.own(features) - near + largest_near(near, index), _LEAK)
 

@@ -14,22 +14,23 @@ from torch.nn.functional import relu
 
 from wildshape.method.encoders.neighbourhood import first_copies, nearest_distinct, rows_of
 
-_CENTRES = (128, 32)
-_NEIGHBOURS = 16
-
 
 class PointNet2Encoder(nn.Module):
     """Points to code: two set abstractions of widths a and b, then a shared MLP c-d and max.
 
     Args:
         widths: (a, b, c, d).
+        centres: of neighbourhoods in the two levels.
+        neighbours: of a centre.
     """
 
-    def __init__(self, widths: tuple[int, int, int, int] = (128, 256, 512, 1024)) -> None:
+    def __init__(
+        self, widths: tuple[int, int, int, int], centres: tuple[int, int], neighbours: int
+    ) -> None:
         super().__init__()
         a, b, c, d = widths
-        self.level1 = SetAbstraction(0, a, _CENTRES[0])
-        self.level2 = SetAbstraction(a, b, _CENTRES[1])
+        self.level1 = SetAbstraction(0, a, centres[0], neighbours)
+        self.level2 = SetAbstraction(a, b, centres[1], neighbours)
         self.point3 = nn.Linear(3 + b, c)
         self.point4 = nn.Linear(c, d)
 
@@ -50,11 +51,12 @@ class SetAbstraction(nn.Module):
         inner: length of the features.
         outer: of the new ones, and of the hidden layer.
         centres: how many; all points where there are fewer.
+        neighbours: of a centre.
     """
 
-    def __init__(self, inner: int, outer: int, centres: int) -> None:
+    def __init__(self, inner: int, outer: int, centres: int, neighbours: int) -> None:
         super().__init__()
-        self.centres = centres
+        self.centres, self.neighbours = centres, neighbours
         self.edge1 = nn.Linear(3 + inner, outer)
         self.edge2 = nn.Linear(outer, outer)
 
@@ -64,7 +66,7 @@ class SetAbstraction(nn.Module):
         """Places of the centres and their features."""
         chosen = farthest_points(places, self.centres)
         centres = places.gather(1, chosen[..., None].expand(-1, -1, 3))
-        index = nearest_distinct(centres, places, first_copies(places), _NEIGHBOURS)
+        index = nearest_distinct(centres, places, first_copies(places), self.neighbours)
         near = rows_of(torch.cat((places, features), dim=-1), index)
         apart = near[..., :3] - centres[:, :, None]
         edges = relu(self.edge1(torch.cat((apart, near[..., 3:]), dim=-1)))

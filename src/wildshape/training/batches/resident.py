@@ -18,13 +18,7 @@ from wildshape.geometry.centring import scan_centre
 from wildshape.geometry.projection.line_of_sight import Facing, face, roll
 from wildshape.geometry.transforms.rotation import rotation_from_uniform, rotation_z
 from wildshape.ops.counter_random import integers, random_bits, uniform
-from wildshape.training.batches.views import (
-    ROLL_RAD,
-    Batch,
-    ViewConfig,
-    ViewSampler,
-    centre_turns_along,
-)
+from wildshape.training.batches.views import Batch, ViewConfig, ViewSampler, centre_turns_along
 
 _MOST_CENTRE_POINTS = 4096
 _POINTS_AT_ONCE = 1 << 22
@@ -155,7 +149,7 @@ def _turns(draws: Float[Tensor, "B 3"], config: ViewConfig) -> Float[Tensor, "B 
             return rotation_from_uniform(draws)
         case "facing":
             free, radius = draws[:, 1] < config.roll, (-2 * (1 - draws[:, 2]).log()).sqrt()
-            return roll(torch.where(free, angle, ROLL_RAD * radius * angle.cos()))
+            return roll(torch.where(free, angle, config.roll_rad * radius * angle.cos()))
 
 
 def _spread(first: Int64[Tensor, "B"], sizes: Int64[Tensor, "B"], count: int) -> Tensor:

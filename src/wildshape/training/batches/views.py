@@ -18,7 +18,6 @@ from wildshape.io.store.store import Store
 from wildshape.records import SensorKind
 
 Turn = Literal["none", "yaw", "so3", "facing"]
-ROLL_RAD = 0.1
 
 
 @dataclass(frozen=True)
@@ -34,6 +33,7 @@ class ViewConfig:
             `none` (the paper), `yaw` or `so3`; or `facing`: turned towards its object and, as a
             share `roll` of them, rolled about the line of sight (`line_of_sight.py`).
         roll: share of the scans rolled at random under `facing`; the others hardly roll.
+        roll_rad: standard deviation of the roll of those others; sensors are not quite level.
         sensor: decides the centring, `lidar` the frustum's middle, `camera` the box's, and which
             way is up where scans are turned towards their object.
         min_points: scans with fewer are never drawn.
@@ -45,6 +45,7 @@ class ViewConfig:
     window: int = 20
     turn: Turn = "none"
     roll: float = 0.0
+    roll_rad: float = 0.1
     sensor: SensorKind = "lidar"
     min_points: int = 100
 
@@ -119,7 +120,7 @@ class ViewSampler:
         config = self.config
         if config.turn == "facing":
             scans, centres, turn = self.gather_as_posed([int(s) for s in rows], rng)
-            rolled = _rolls(len(rows), config.roll, rng)
+            rolled = _rolls(len(rows), config, rng)
             return scans @ rolled.mT, centres, rolled @ turn
         scans, centres = self.gather([int(s) for s in rows], rng)
         rotation = _turns(len(rows), config.turn, int(rng.integers(2**62)))
@@ -136,7 +137,7 @@ class ViewSampler:
         config = self.config
         if config.turn == "facing":
             frames = [face(scan, sensor_kind=config.sensor) for scan in points]
-            turn = _rolls(len(points), config.roll, rng)
+            turn = _rolls(len(points), config, rng)
             turn = turn @ torch.stack([frame.turn for frame in frames])
             centres = torch.stack([frame.centre for frame in frames])
         else:
@@ -237,10 +238,11 @@ def centre_turns_along(config: ViewConfig) -> bool:
     return config.turn in ("none", "facing") or in_yaw
 
 
-def _rolls(count: int, share: float, rng: np.random.Generator) -> Float[Tensor, "B 3 3"]:
+def _rolls(count: int, config: ViewConfig, rng: np.random.Generator) -> Float[Tensor, "B 3 3"]:
     """Turns about the line of sight: any for a share of the scans, a few degrees for the others."""
-    free = rng.random(count) < share
-    angle = np.where(free, rng.uniform(-np.pi, np.pi, count), rng.normal(0.0, ROLL_RAD, count))
+    free = rng.random(count) < config.roll
+    any_roll, little = rng.uniform(-np.pi, np.pi, count), rng.normal(0.0, config.roll_rad, count)
+    angle = np.where(free, any_roll, little)
     return roll(torch.from_numpy(angle.astype(np.float32)))
 
 
