@@ -20,11 +20,10 @@ import numpy as np
 import torch
 
 from wildshape.baselines.fast_global import FastGlobal
-from wildshape.baselines.gicp import Gicp
 from wildshape.baselines.global_icp import GlobalIcp
+from wildshape.baselines.icp import Gicp, LocalIcp, MultiStartIcp
 from wildshape.baselines.kiss_matcher import KissMatcher
-from wildshape.baselines.local_icp import LocalIcp
-from wildshape.baselines.multi_start_icp import MultiStartIcp
+from wildshape.baselines.pairs import Chained
 from wildshape.errors import MissingExtraError
 from wildshape.evaluation.metrics import ACCURATE_DEG
 from wildshape.evaluation.protocol import run
@@ -48,7 +47,7 @@ class RegistersOnly:
 
 @dataclass(frozen=True)
 class Search:
-    """One baseline: how it is made, what is tried, and under which protocol."""
+    """One baseline of pairs: how it is made, what is tried, and under which protocol."""
 
     make: Callable[..., Any]
     grid: dict[str, tuple[float, ...]]
@@ -84,7 +83,7 @@ SEARCHES = {
 }
 
 
-def tried(method: object, tracks: list[Track], rotate: Rotate) -> dict[str, float]:
+def tried(method: Chained, tracks: list[Track], rotate: Rotate) -> dict[str, float]:
     """The criterion, and what a reader wants beside it."""
     scores = run({"it": RegistersOnly(method.register_track)}, tracks, rotate, seed=0)["it"]
     figures = figures_of(scores)
@@ -99,7 +98,7 @@ def searched(name: str, search: Search, tracks: list[Track]) -> dict[str, Any]:
     """All settings of a baseline, and the best."""
     rows = []
     for settings in search.settings():
-        rows.append({**settings, **tried(search.make(**settings), tracks, search.rotate)})
+        rows.append({**settings, **tried(Chained(search.make(**settings)), tracks, search.rotate)})
         print(name, rows[-1], flush=True)
     best = min(rows, key=lambda row: row["criterion_deg"])
     chosen = {key: best[key] for key in search.grid}

@@ -17,7 +17,8 @@ from experiments.tables.rows import default_form, views_form
 from experiments.tables.table import Block, Row, Shipped, Trained
 from experiments.tables.train import Workshop
 
-from wildshape.baselines.local_icp import LocalIcp
+from wildshape.baselines.icp import LocalIcp
+from wildshape.baselines.pairs import Chained
 from wildshape.cli.input.tracks import Reading
 from wildshape.cli.models import load_model
 from wildshape.evaluation.examples import Example, gather
@@ -70,7 +71,12 @@ def _draw(
         draw_examples(examples).savefig(file, dpi=130, format="webp")
     drawn = {example.label: {"track": example.track, "cd_m": example.cd} for example in examples}
     name = best.results.methods[0].name
-    return {"method": name, "rival": LocalIcp().about, "objects": drawn, "measured": best.made}
+    return {
+        "method": name,
+        "rival": LocalIcp().about,
+        "objects": drawn,
+        "measured": best.made,
+    }
 
 
 def _selected(name: str, measured: tuple[Measured, ...]) -> Measured:
@@ -85,5 +91,5 @@ def _examples(shop: Workshop, block: Block, best: Measured) -> list[Example]:
         best.results,
         best.results.methods[0].name,
         Learned(load_model(model, shop.device, raw=model is not None)),
-        rival=LocalIcp(),
+        rival=Chained(LocalIcp()),
     )

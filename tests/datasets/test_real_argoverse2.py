@@ -9,7 +9,7 @@ import pytest
 import torch
 from tests.cars import poses_of
 
-from wildshape.baselines.local_icp import LocalIcp
+from wildshape.baselines.icp import LocalIcp
 from wildshape.datasets.argoverse2.log import read_boxes, read_sensor_pose, read_sweep, taken_by
 from wildshape.datasets.argoverse2.reader import Argoverse2, find_logs
 from wildshape.datasets.tracks.labelled_boxes import Crop, points_in_box
@@ -100,7 +100,7 @@ def test_boxes_agree_with_icp_on_well_seen_cars(tracks):
     for track in seen:
         T_object_sensor = poses_of(track).inverse()
         T_box = poses_of(track)[1] @ T_object_sensor[0]
-        T_icp = LocalIcp().align(track.scans[0], track.scans[1])
+        T_icp = LocalIcp().align(track.scans[0], track.scans[1], track.sensor)
         middle = torch.as_tensor(track.scans[0].mean(axis=0, keepdims=True), dtype=torch.float64)
         apart = float((T_icp.apply(middle) - T_box.apply(middle)).norm())
         agree += apart < 0.1 and np.degrees(float((T_box.inverse() @ T_icp).angle())) < 2

@@ -9,7 +9,7 @@ import pytest
 from tests.cars import known
 
 from wildshape.baselines.identity import Identity, OneScan
-from wildshape.baselines.local_icp import LocalIcp
+from wildshape.baselines.named import baseline
 from wildshape.datasets.kitti.raw import KittiRaw
 from wildshape.datasets.kitti.tracklets import read_tracklets
 from wildshape.datasets.tracks.labelled_boxes import Crop, points_in_box
@@ -73,7 +73,7 @@ def test_baselines_come_out_as_measured_before(tracks):
 
     Those were taken with another crop and truth density, hence the margins.
     """
-    methods = {"identity": Identity(), "icp": LocalIcp(), "scan": OneScan()}
+    methods = {"identity": Identity(), "icp": baseline("local-icp"), "scan": OneScan()}
     results = run(methods, all_tracks(KittiRaw(ROOT, Selection(every=2))))
     identity, icp, scan = (known(figures_of(results[name])) for name in methods)
     assert identity["acc30"] == icp["acc30"] == 1

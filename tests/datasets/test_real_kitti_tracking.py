@@ -9,7 +9,7 @@ import pytest
 import torch
 from tests.cars import poses_of
 
-from wildshape.baselines.local_icp import LocalIcp
+from wildshape.baselines.icp import LocalIcp
 from wildshape.datasets.kitti.tracking import KittiTracking
 from wildshape.datasets.tracks.labelled_boxes import Crop
 from wildshape.datasets.tracks.truth import fuse_by_truth, shape_partial
@@ -82,7 +82,7 @@ def test_boxes_agree_with_icp_on_well_seen_cars(tracks):
             if len(track.scans[i]) < 300:
                 continue
             T_box = poses_of(track)[i + 1] @ poses_of(track)[i].inverse()
-            T_icp = LocalIcp().align(track.scans[i], track.scans[i + 1])
+            T_icp = LocalIcp().align(track.scans[i], track.scans[i + 1], track.sensor)
             middle = torch.as_tensor(track.scans[i].mean(axis=0, keepdims=True), dtype=torch.double)
             apart = float((T_icp.apply(middle) - T_box.apply(middle)).norm())
             turned = np.degrees(float((T_box.inverse() @ T_icp).angle()))

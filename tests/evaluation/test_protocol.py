@@ -9,7 +9,7 @@ import torch
 from tests.cars import drive_by, known, poses_of
 
 from wildshape.baselines.identity import Identity, OneScan
-from wildshape.baselines.local_icp import LocalIcp
+from wildshape.baselines.named import baseline
 from wildshape.errors import BadInputError
 from wildshape.evaluation.cases import turn_track
 from wildshape.evaluation.protocol import run
@@ -33,12 +33,12 @@ class Recorder:
         return answer
 
     def register_track(self, scans, sensor):
-        T = LocalIcp().register_track(scans, sensor)
+        T = baseline("local-icp").register_track(scans, sensor)
         self.answers.append(T.matrix.numpy().tobytes())
         return T
 
     def complete_track(self, scans, sensor):
-        answer = LocalIcp().complete_track(scans, sensor)
+        answer = baseline("local-icp").complete_track(scans, sensor)
         self.answers.append(answer.tobytes())
         return answer
 
@@ -122,7 +122,7 @@ def test_identity_is_right_on_a_straight_road_and_by_chance_under_yaw():
 
 def test_local_icp_row_beats_identity_by_cd_where_the_track_is_easy():
     tracks = [drive_by(f"t{seed}", step=0.5, seed=seed) for seed in range(2)]
-    methods = {"identity": Identity(), "icp": LocalIcp(), "scan": OneScan()}
+    methods = {"identity": Identity(), "icp": baseline("local-icp"), "scan": OneScan()}
     results = run(methods, tracks)
     figures = {name: known(figures_of(results[name])) for name in methods}
     assert figures["icp"]["rot_median_deg"] < 5

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from tests.cars import drive_by
 
+from wildshape.baselines.icp import LocalIcp
 from wildshape.baselines.identity import OneScan
-from wildshape.baselines.local_icp import LocalIcp
+from wildshape.baselines.pairs import Chained
 from wildshape.evaluation.examples import gather, pick
 from wildshape.evaluation.metrics import CompletionError
 from wildshape.evaluation.paper import ABLATION_ROWS, LIDAR_ROWS, VIEW_ROWS
@@ -132,8 +133,9 @@ def test_examples_are_picked_by_error():
     assert pick(MethodScores("m", (), (), ())) == {}
 
 
-class Method(OneScan, LocalIcp):
-    pass
+class Method(OneScan, Chained):
+    def __init__(self):
+        Chained.__init__(self, LocalIcp())
 
 
 def test_examples_and_figures(tmp_path):
@@ -150,7 +152,7 @@ def test_examples_and_figures(tmp_path):
     assert [p.name for p in paths] == ["errors.png", "examples.png"]
     assert all(p.read_bytes()[:4] == b"\x89PNG" for p in paths)
     assert len(draw_examples(examples).axes) == 3 * 4
-    beside = gather(tracks, results, "m", Method(), rival=LocalIcp())
+    beside = gather(tracks, results, "m", Method(), rival=Chained(LocalIcp()))
     icp, ours = beside[0].rival, examples[0].fused
     assert icp is not None
     assert ours is not None

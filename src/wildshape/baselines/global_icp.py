@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Global-ICP of the paper's section 4: features find a start, ICP does the rest (METHOD 9)."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from wildshape.baselines.fast_global import FastGlobal
 from wildshape.baselines.icp import point_to_point
 from wildshape.baselines.kiss_matcher import KissMatcher
-from wildshape.baselines.pairs import Cloud, chain, from_here, fuse
+from wildshape.baselines.pairs import Cloud, from_here
 from wildshape.errors import MissingExtraError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor
@@ -16,7 +15,7 @@ from wildshape.records import Points, Sensor
 
 @dataclass(frozen=True)
 class GlobalIcp:
-    """Features of consecutive scans matched, then point-to-point ICP, chained to the middle scan.
+    """Features of a pair of scans matched, then point-to-point ICP.
 
     Attributes:
         coarse: finds the start of a pair.
@@ -37,17 +36,9 @@ class GlobalIcp:
             f" voxel {self.coarse.voxel:g} m, threshold {self.distance:g} m"
         )
 
-    def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:  # noqa: ARG002
-        """`T_middle_scan`, one a scan."""
-        return chain(scans, self.align)
-
-    def complete_track(self, scans: Sequence[Points], sensor: Sensor) -> Points:
-        """The fused scans, `(m, 3)` in the middle scan's frame."""
-        return fuse(scans, self.register_track(scans, sensor))
-
-    def align(self, source: Points, target: Points) -> SE3:
+    def align(self, source: Points, target: Points, sensor: Sensor) -> SE3:
         """`T_target_source`."""
-        T_target_source = self.coarse.align(source, target)
+        T_target_source = self.coarse.align(source, target, sensor)
         moved = T_target_source.apply_numpy(source)
         return from_here(moved, target, self._solve) @ T_target_source
 

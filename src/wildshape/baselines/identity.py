@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from wildshape.baselines.pairs import centroid, fuse
+from wildshape.baselines.pairs import centroid
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.registration import fuse_scans
 from wildshape.records import Points, Sensor
 
 
@@ -30,7 +31,7 @@ class Identity:
 
     def complete_track(self, scans: Sequence[Points], sensor: Sensor) -> Points:
         """The fused scans, `(m, 3)` in the middle scan's frame."""
-        return fuse(scans, self.register_track(scans, sensor))
+        return fuse_scans(scans, self.register_track(scans, sensor))
 
 
 @dataclass(frozen=True)

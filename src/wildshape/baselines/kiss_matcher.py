@@ -3,7 +3,6 @@
 """KISS-Matcher (Lim et al., ICRA 2025): features and a robust solver, no start needed."""
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -12,14 +11,11 @@ from types import ModuleType
 
 import numpy as np
 
-from wildshape.baselines.pairs import about_centroids, chain, fuse
+from wildshape.baselines.pairs import about_centroids
 from wildshape.errors import MissingExtraError
 from wildshape.geometry.outliers import radius_inliers, voxel_thin
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor
-
-# The library's radius of a normal, in voxels; and how many features, on how many points each.
-_NORMAL_RADIUS, _ENOUGH, _NEIGHBOURS = 3.0, 10, 5
 
 
 def load_kiss_matcher() -> ModuleType:
@@ -39,16 +35,23 @@ def load_kiss_matcher() -> ModuleType:
 
 @dataclass(frozen=True)
 class KissMatcher:
-    """Consecutive scans matched by features, chained to the middle scan.
+    """A pair of scans matched by features.
 
     Clouds stay in their sensors' frames: the library turns normals towards the origin.
 
     Attributes:
         voxel: edge of the cubes the clouds are thinned by, metres; scales every radius.
+        normal_radius: within which the library looks for a normal's points, in voxels.
+        features: a cloud with fewer points that can have a normal is not matched: without features
+            the library ends the whole process (measured).
+        neighbours: points that a normal needs within its radius.
     """
 
     # From experiments/search_baselines.py.
     voxel: float = 0.1
+    normal_radius: float = 3.0
+    features: int = 10
+    neighbours: int = 5
 
     def __post_init__(self) -> None:
         """Refuse at once what could not run later.
@@ -68,26 +71,22 @@ class KissMatcher:
         """The library."""
         return f"KISS-Matcher {version('kiss-matcher')}"
 
-    def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:  # noqa: ARG002
-        """`T_middle_scan`, one a scan."""
-        return chain(scans, self.align)
-
-    def complete_track(self, scans: Sequence[Points], sensor: Sensor) -> Points:
-        """The fused scans, `(m, 3)` in the middle scan's frame."""
-        return fuse(scans, self.register_track(scans, sensor))
-
-    def align(self, source: Points, target: Points) -> SE3:
+    def align(self, source: Points, target: Points, sensor: Sensor) -> SE3:  # noqa: ARG002
         """`T_target_source`; centroids aligned, no rotation, where nothing matches."""
         library = load_kiss_matcher()
         _settle_on_one_thread()
         clouds = [voxel_thin(points, self.voxel) for points in (source, target)]
-        # Without features on either side the library ends the whole process (measured).
-        if min(_featured(cloud, _NORMAL_RADIUS * self.voxel) for cloud in clouds) >= _ENOUGH:
+        if min(map(self._featured, clouds)) >= self.features:
             config = library.KISSMatcherConfig(voxel_size=self.voxel, use_voxel_sampling=False)
             found = library.KISSMatcher(config).estimate(*(list(cloud) for cloud in clouds))
             if found.valid:
                 return _transform(found.rotation, found.translation)
         return about_centroids(source, target, lambda *_: SE3.identity())
+
+    def _featured(self, cloud: Points) -> int:
+        """Points with a neighbourhood large enough for a normal."""
+        reach = self.normal_radius * self.voxel
+        return int(radius_inliers(cloud, reach, self.neighbours).sum())
 
 
 @cache
@@ -108,11 +107,6 @@ def _settle_on_one_thread() -> None:
         library.KISSMatcher(library.KISSMatcherConfig(voxel_size=0.2)).match(cloud, cloud)
     finally:
         os.sched_setaffinity(0, cores)
-
-
-def _featured(cloud: Points, radius: float) -> int:
-    """Points with a neighbourhood large enough for a normal."""
-    return int(radius_inliers(cloud, radius, _NEIGHBOURS).sum())
 
 
 def _transform(rotation: np.ndarray, translation: np.ndarray) -> SE3:

@@ -1,37 +1,80 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The baselines by the name of their row, with the settings that our tables use."""
+"""The baselines by the name of their row, with the settings that our tables use.
 
-from collections.abc import Callable
+Each is imported when it is asked for: their names cost nothing.
+"""
 
-from wildshape.baselines.gicp import Gicp
-from wildshape.baselines.global_icp import GlobalIcp, available
-from wildshape.baselines.identity import Identity, OneScan
-from wildshape.baselines.kiss_matcher import KissMatcher
-from wildshape.baselines.local_icp import LocalIcp
-from wildshape.baselines.multi_start_icp import MultiStartIcp
+from typing import TYPE_CHECKING
+
 from wildshape.errors import BadInputError
 
-Baseline = Identity | OneScan | LocalIcp | GlobalIcp | MultiStartIcp | Gicp | KissMatcher
+if TYPE_CHECKING:
+    from wildshape.baselines.identity import Identity, OneScan
+    from wildshape.baselines.pairs import Chained, Pair
 
 
-def _global_icp() -> GlobalIcp:
-    return GlobalIcp(available())
+def _chained(pair: "Pair") -> "Chained":
+    from wildshape.baselines.pairs import Chained
+
+    return Chained(pair)
 
 
-_MAKERS: dict[str, Callable[[], Baseline]] = {
-    "identity": Identity,
-    "one-scan": OneScan,
-    "local-icp": LocalIcp,
+def _identity() -> "Identity":
+    from wildshape.baselines.identity import Identity
+
+    return Identity()
+
+
+def _one_scan() -> "OneScan":
+    from wildshape.baselines.identity import OneScan
+
+    return OneScan()
+
+
+def _local_icp() -> "Chained":
+    from wildshape.baselines.icp import LocalIcp
+
+    return _chained(LocalIcp())
+
+
+def _global_icp() -> "Chained":
+    from wildshape.baselines.global_icp import GlobalIcp, available
+
+    return _chained(GlobalIcp(available()))
+
+
+def _multi_start_icp() -> "Chained":
+    from wildshape.baselines.icp import MultiStartIcp
+
+    return _chained(MultiStartIcp())
+
+
+def _gicp() -> "Chained":
+    from wildshape.baselines.icp import Gicp
+
+    return _chained(Gicp())
+
+
+def _kiss_matcher() -> "Chained":
+    from wildshape.baselines.kiss_matcher import KissMatcher
+
+    return _chained(KissMatcher())
+
+
+_MAKERS = {
+    "identity": _identity,
+    "one-scan": _one_scan,
+    "local-icp": _local_icp,
     "global-icp": _global_icp,
-    "multi-start-icp": MultiStartIcp,
-    "gicp": Gicp,
-    "kiss-matcher": KissMatcher,
+    "multi-start-icp": _multi_start_icp,
+    "gicp": _gicp,
+    "kiss-matcher": _kiss_matcher,
 }
 NAMES = tuple(_MAKERS)
 
 
-def baseline(name: str) -> Baseline:
+def baseline(name: str) -> "Identity | OneScan | Chained":
     """One of `NAMES`, ready to run.
 
     Raises:

@@ -3,16 +3,58 @@
 """From pairs of neighbouring scans to a whole track: how every ICP baseline works (METHOD 9)."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
 from jaxtyping import Float
 
 from wildshape.geometry.transforms.se3 import SE3, stack
-from wildshape.records import Points
+from wildshape.inference.registration import fuse_scans
+from wildshape.records import Points, Sensor
 
 Cloud = Float[np.ndarray, "_ 3"]
 Solve = Callable[[Cloud, Cloud], SE3]
+
+
+@runtime_checkable
+class Pair(Protocol):
+    """Registers a pair of scans."""
+
+    @property
+    def about(self) -> str:
+        """The method, its engine and its settings in a line."""
+        ...
+
+    def align(self, source: Points, target: Points, sensor: Sensor) -> SE3:
+        """`T_target_source`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Chained:
+    """A method of pairs, chained over the neighbours of a track to its middle scan.
+
+    Attributes:
+        pair: registers one scan to the next.
+    """
+
+    pair: Pair
+
+    @property
+    def about(self) -> str:
+        """The method and its settings in a line."""
+        return self.pair.about
+
+    def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:
+        """`T_middle_scan`, one a scan."""
+        return chain(scans, partial(self.pair.align, sensor=sensor))
+
+    def complete_track(self, scans: Sequence[Points], sensor: Sensor) -> Points:
+        """The fused scans, `(m, 3)` in the middle scan's frame."""
+        return fuse_scans(scans, self.register_track(scans, sensor))
 
 
 def chain(scans: Sequence[Points], align: Callable[[Points, Points], SE3]) -> SE3:
@@ -52,12 +94,6 @@ def _about(
     T = solve(source - source_centre, target - target_centre)
     shift = torch.as_tensor(target_centre) - T.rotation @ torch.as_tensor(source_centre)
     return SE3(T.rotation, T.translation + shift)
-
-
-def fuse(scans: Sequence[Points], T_middle_scan: SE3) -> Points:
-    """All scans moved and put together, `(m, 3)` in the middle scan's frame."""
-    moved = [T_middle_scan[i].apply_numpy(scan) for i, scan in enumerate(scans)]
-    return np.concatenate(moved)
 
 
 def centroid(points: Points) -> Float[np.ndarray, "3"]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import arg
 
+from wildshape.baselines.named import NAMES
 from wildshape.cli.options import (
     AT_ORIGIN,
     AsJson,
@@ -41,10 +42,8 @@ Models = Annotated[
     listed("M,M", Path),
     option(help="checkpoints, folders of runs, names of shipped weights; else `default`"),
 ]
-# As in baselines/named.py, which is not read for a mere `--help`; a test holds them together.
-BASELINES = "identity, one-scan, local-icp, global-icp, multi-start-icp, gicp, kiss-matcher"
 Baselines = Annotated[
-    tuple[str, ...], listed("A,B", words=1), option(help=f"of {BASELINES}; or none")
+    tuple[str, ...], listed("A,B", words=1), option(help=f"of {', '.join(NAMES)}; or none")
 ]
 
 

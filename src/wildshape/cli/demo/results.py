@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from wildshape.baselines.local_icp import LocalIcp
+from wildshape.baselines.icp import LocalIcp
+from wildshape.baselines.pairs import Chained
 from wildshape.cli.demo.tracks import TEST, DemoData
 from wildshape.cli.evaluation import choose_baselines, evaluate_once, write
 from wildshape.cli.input.tracks import Reading
@@ -79,7 +80,7 @@ def _object(out: Path, track: Track, label: str, models: Mapping[str, Predictor]
     }
     name, predictor = list(models.items())[-1]
     T_middle_scan = predictor.register_track(track.scans, track.sensor)
-    by_icp = LocalIcp().register_track(track.scans, track.sensor)
+    by_icp = Chained(LocalIcp()).register_track(track.scans, track.sensor)
     write_cloud(out / "fused" / f"{track.name}.ply", fuse_scans(track.scans, T_middle_scan))
     shown = track_object(
         track,

@@ -5,8 +5,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from wildshape.baselines.icp import LocalIcp
 from wildshape.baselines.identity import Identity
-from wildshape.baselines.local_icp import LocalIcp
+from wildshape.baselines.pairs import Chained
 from wildshape.evaluation.metrics import ACCURATE_DEG, RegistrationError, registration_error
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.registration import to_middle
@@ -57,7 +58,7 @@ def _moves(way: str, track: Track, made: Mapping[int, CompletedScan]) -> SE3 | N
     if way == BEFORE:
         return Identity().register_track(track.scans, track.sensor)
     if way == ICP:
-        return LocalIcp().register_track(track.scans, track.sensor)
+        return Chained(LocalIcp()).register_track(track.scans, track.sensor)
     if way == TRUTH:
         return None if track.T_sensor_object is None else to_middle(track.T_sensor_object)
     poses = [made[i].pose for i in range(len(track.scans)) if i in made]
