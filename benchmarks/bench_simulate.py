@@ -8,15 +8,16 @@ python benchmarks/bench_simulate.py [--small]
 import os
 import resource
 import time
+from typing import get_args
 
 from machine import header
 from outcome import Outcome
 from turns import begin, options, set_clock
 
-from wildshape.simulate.config import SensorName
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+from wildshape.simulate.sensor import SensorName
 
-_SENSORS: tuple[SensorName, ...] = ("hdl64", "hdl32", "os1-128", "depth-camera")
+_SENSORS: tuple[SensorName, ...] = get_args(SensorName)
 _SCANS_BAR, _BARRED = 1000, "hdl64"
 
 

@@ -3,6 +3,7 @@
 """Whole tracks: truth fits the scans, and a seed makes the same bytes with any workers."""
 
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -10,8 +11,8 @@ from scipy.spatial import KDTree
 
 from wildshape.errors import BadInputError
 from wildshape.records import Track
-from wildshape.simulate.config import SensorName
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+from wildshape.simulate.sensor import SensorName
 from wildshape.simulate.shapes.solid import box
 
 
@@ -26,7 +27,7 @@ def _tracks(config: SimulationConfig, seed: int = 0, workers: int = 1) -> list[T
     return list(simulate_tracks(config, seed, workers))
 
 
-@pytest.mark.parametrize("sensor", ["hdl64", "hdl32", "os1-128", "depth-camera"])
+@pytest.mark.parametrize("sensor", get_args(SensorName))
 def test_points_carried_back_lie_on_the_truth_shape(sensor: SensorName) -> None:
     lidar = sensor != "depth-camera"
     config = SimulationConfig(tracks=2, sensor=sensor, scans=6 if lidar else 3)

@@ -5,11 +5,11 @@
 import numpy as np
 import pytest
 
+from wildshape.simulate.one_track import back_project, depth_image, random_pose, view
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.sensor import DEPTH_CAMERA
 from wildshape.simulate.shapes.solid import box
 from wildshape.simulate.shapes.unit_shapes import airplane
-from wildshape.simulate.view import back_project, depth_image, random_pose, view
 
 
 def test_back_projection_is_exact_on_a_plane() -> None:

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Literal
 
 from wildshape.errors import BadInputError
-from wildshape.simulate.sensor import SENSORS, DepthCamera, SpinningLidar
+from wildshape.simulate.sensor import SENSORS, DepthCamera, SensorName, SpinningLidar
 
-SensorName = Literal["hdl64", "hdl32", "os1-128", "depth-camera"]
 Category = Literal["car", "airplane", "chair"]
 
 
@@ -30,6 +29,12 @@ class SimulationConfig:
         dropout: share of pulses or pixels lost at random; None: 0.05 LiDAR, 0 camera.
         noise_m: sigma of the range noise, metres; None: the sensor's own (camera: 0).
         shape_points: points of the complete truth shape.
+        min_points: a scan with fewer points on the object is not usable (METHOD 2).
+        near_m: smallest range of the object from a LiDAR, metres.
+        far_m: largest range, metres; less where too few scans of an object are usable.
+        whole_pass: share of the LiDAR tracks that are spread over as much of a pass as there is,
+            every k-th scan; the others are every scan of a short stretch, as a sensor that loses
+            its object early leaves it.
     """
 
     tracks: int = 100
@@ -43,6 +48,10 @@ class SimulationConfig:
     dropout: float | None = None
     noise_m: float | None = None
     shape_points: int = 8192
+    min_points: int = 100
+    near_m: float = 4.0
+    far_m: float = 30.0
+    whole_pass: float = 2 / 3
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated.

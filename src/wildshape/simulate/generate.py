@@ -12,8 +12,7 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.parallel.processes import in_order
 from wildshape.records import Intrinsics, Sensor, Track
 from wildshape.simulate.config import SimulationConfig
-from wildshape.simulate.drive import RawTrack
-from wildshape.simulate.job import Job
+from wildshape.simulate.one_track import Job, RawTrack
 from wildshape.simulate.sensor import DepthCamera, SpinningLidar
 from wildshape.simulate.shapes.meshes import mesh_files
 

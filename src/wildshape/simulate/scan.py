@@ -10,8 +10,6 @@ from wildshape.simulate.raycast import Hits, Scene
 from wildshape.simulate.sensor import SpinningLidar
 from wildshape.simulate.shapes.solid import Solid
 
-_RIM_M = 0.3
-
 
 @dataclass(frozen=True)
 class Returns:
@@ -21,13 +19,18 @@ class Returns:
         noise_m: sigma of the range noise, metres.
         dropout: share of pulses lost at random.
         glass: share of pulses on glass that do come back.
-        ground: whether ground returns within 0.3 m of the object's box are left in.
+        ground: whether ground returns near the object's box are left in.
+        rim_m: how near, metres.
+        grazing: a pulse that meets a surface at a smaller cosine comes back less often, in
+            proportion.
     """
 
     noise_m: float
     dropout: float
     glass: float
     ground: bool
+    rim_m: float = 0.3
+    grazing: float = 0.12
 
 
 def window(T_object_sensor: np.ndarray, half: np.ndarray) -> tuple[float, ...]:
@@ -110,7 +113,7 @@ def scan(
         The points, and how many of them lie on the object (the others on the ground).
     """  # fmt: skip
     half = target.bounds[1]
-    grown = half + ((_RIM_M, _RIM_M, 0.0) if returns.ground else 0.0)
+    grown = half + ((returns.rim_m, returns.rim_m, 0.0) if returns.ground else 0.0)
     phase = float(rng.uniform(0, sensor.azimuth_step_deg))
     toward = rays(sensor, window(T_object_sensor, grown), phase, T_object_sensor[:3, :3])
     origin = T_object_sensor[:3, 3]
@@ -119,7 +122,7 @@ def scan(
     distance = hits.distance.astype(np.float64)
     on_target = int(kept.sum())
     if returns.ground:
-        below = _ground(hits, toward, origin, half)
+        below = _ground(hits, toward, origin, half, returns.rim_m)
         lost = rng.random(len(below)) < returns.dropout
         distance = np.where(below > 0, below, distance)
         kept = np.where(below > 0, ~lost, kept)
@@ -134,19 +137,21 @@ def _returned(
 ) -> np.ndarray:
     """`(n,)` bool: pulses on the target that come back strong enough to be told."""
     hit = np.flatnonzero((hits.solid == 0) & (hits.distance < sensor.max_range_m))
-    chance = (1.0 - returns.dropout) * np.minimum(hits.cosine[hit] / 0.12, 1.0)
+    chance = (1.0 - returns.dropout) * np.minimum(hits.cosine[hit] / returns.grazing, 1.0)
     chance[target.glass[hits.face[hit]]] *= returns.glass
     kept = np.zeros(len(hits.face), bool)
     kept[hit] = rng.random(len(hit)) < chance
     return kept
 
 
-def _ground(hits: Hits, toward: np.ndarray, origin: np.ndarray, half: np.ndarray) -> np.ndarray:
+def _ground(
+    hits: Hits, toward: np.ndarray, origin: np.ndarray, half: np.ndarray, rim_m: float
+) -> np.ndarray:
     """`(n,)` range of the ground where a pulse meets it first, near the object; else 0."""
     down = np.minimum(toward[:, 2], -1e-9)
     reach = (-half[2] - origin[2]) / down
     at = origin[:2] + reach[:, None] * toward[:, :2]
-    near = (np.abs(at) <= half[:2] + _RIM_M).all(1)
+    near = (np.abs(at) <= half[:2] + rim_m).all(1)
     return np.where(near & (reach < hits.distance), reach, 0.0)
 
 

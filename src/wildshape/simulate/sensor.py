@@ -3,8 +3,15 @@
 """The sensors that are simulated: spinning LiDARs with their real beam tables, a depth camera."""
 
 from dataclasses import dataclass
+from itertools import pairwise
+from statistics import median
+from typing import TYPE_CHECKING, Literal
 
-import numpy as np
+if TYPE_CHECKING:
+    import numpy as np
+
+SensorName = Literal["hdl64", "hdl32", "os1-128", "depth-camera"]
+"""The names of `SENSORS`, which the command line offers."""
 
 
 @dataclass(frozen=True)
@@ -32,16 +39,18 @@ class SpinningLidar:
     @property
     def resolution_deg(self) -> tuple[float, float]:
         """Azimuth step and median elevation step, degrees."""
-        steps = -np.diff(np.asarray(self.elevation_deg))
-        return self.azimuth_step_deg, round(float(np.median(steps)), 4)
+        steps = (above - below for above, below in pairwise(self.elevation_deg))
+        return self.azimuth_step_deg, round(median(steps), 4)
 
     @property
-    def ring_phase_deg(self) -> np.ndarray:
+    def ring_phase_deg(self) -> "np.ndarray":
         """`(rings,)` azimuth of each ring's first firing, degrees within one step.
 
         The lasers of an HDL-64E stand at azimuths of their own (its calibration file's
         `rotCorrection`); the golden ratio spreads ours over one step as evenly.
         """
+        import numpy as np
+
         rings = len(self.elevation_deg)
         golden = (np.arange(rings) * 0.6180339887498949) % 1.0
         return golden * self.azimuth_step_deg if self.stagger else np.zeros(rings)
@@ -85,7 +94,8 @@ class DepthCamera:
 
 
 def _uniform(top: float, bottom: float, count: int) -> tuple[float, ...]:
-    return tuple(float(e) for e in np.linspace(top, bottom, count))
+    step = (bottom - top) / (count - 1)
+    return (*(top + i * step for i in range(count - 1)), bottom)
 
 
 # Velodyne HDL-64E S2: upper block of 32 at 1/3 degree, lower block of 32 at 1/2 degree.

@@ -6,9 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_RATE_HZ = 10.0
-_CLEARANCE_M = 0.8
-
 
 @dataclass(frozen=True)
 class Drive:
@@ -27,28 +24,37 @@ class Drive:
 
 
 def drive_by(
-    height: float, half: np.ndarray, near: float, far: float, rng: np.random.Generator
+    height: float,
+    half: np.ndarray,
+    near: float,
+    far: float,
+    rng: np.random.Generator,
+    *,
+    rate_hz: float = 10.0,
+    clearance_m: float = 0.8,
 ) -> Drive:
     """A random pass of a sensor along a parked object.
 
     Straight (45 %), a bend of constant curvature (30 %) or a 90-degree turn (25 %); passing at
-    2.5-12 m to the side, 3-12 m/s, a scan each 0.1 s; the object stands along the road (45 %),
+    2.5-12 m to the side, 3-12 m/s; the object stands along the road (45 %),
     against it (35 %) or across (20 %), each +-8 degrees.
 
     Args:
         height: of the sensor above the road, metres.
         half: `(3,)` half lengths of the object's box, metres: its centre is half[2] above the
-            road, and the sensor's way keeps 0.8 m clear of it.
+            road.
         near: smallest range of the object's centre, metres.
         far: largest range, metres.
         rng: the only source of chance.
+        rate_hz: scans a second.
+        clearance_m: the sensor's way keeps so far from the object's box, metres.
 
     Returns:
         All scan poses within the ranges; possibly none.
     """
     kind = str(rng.choice(("straight", "bend", "turn"), p=(0.45, 0.30, 0.25)))
     speed = float(rng.uniform(3.0, 12.0))
-    s = np.arange(-45.0, 45.0, speed / _RATE_HZ) + rng.uniform(0, speed / _RATE_HZ)
+    s = np.arange(-45.0, 45.0, speed / rate_hz) + rng.uniform(0, speed / rate_hz)
     path = _path(kind, s, rng)
     place = _beside(path, kind, rng)
     yaw = place[2]
@@ -58,7 +64,7 @@ def drive_by(
     T_object_world[:3, 3] = -turn.T @ (place[0], place[1], half[2])
     T_object_sensor = T_object_world @ _sensor_poses(path, height, rng)
     at = T_object_sensor[:, :2, 3]
-    clear = bool((np.abs(at) - half[:2]).max(1).min() > _CLEARANCE_M)
+    clear = bool((np.abs(at) - half[:2]).max(1).min() > clearance_m)
     distance = np.linalg.norm(at, axis=1)
     keep = (distance >= near) & (distance <= far) & clear
     return Drive(kind, T_object_sensor[keep], speed)

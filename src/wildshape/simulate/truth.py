@@ -8,16 +8,19 @@ from wildshape.errors import BadInputError
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.shapes.solid import Solid
 
-_ROUNDS = 12
-
 
 def visible_surface(
-    solid: Solid, scene: Scene, count: int, lowest_deg: float, rng: np.random.Generator
+    solid: Solid,
+    scene: Scene,
+    count: int,
+    lowest_deg: float,
+    rng: np.random.Generator,
+    directions: int = 12,
 ) -> np.ndarray:
     """`(count, 3)` float32 points on the outer visible surface, uniform by area.
 
     Points are drawn uniformly by area over all triangles; one counts as visible if it is the
-    first hit from far away in at least one of 12 random directions. What is inside a closed
+    first hit from far away in at least one of some random directions. What is inside a closed
     body, or under a car, is therefore not in it.
 
     Args:
@@ -28,6 +31,7 @@ def visible_surface(
             road (a LiDAR, higher than a car's floor, never looks up at it), -90 for objects seen
             from everywhere.
         rng: the only source of chance.
+        directions: from which each point is looked at.
 
     Raises:
         BadInputError: nearly nothing of the surface can be seen from outside.
@@ -35,7 +39,7 @@ def visible_surface(
     found, have = [], 0
     for _ in range(12):
         points, normals = _on_surface(solid, int(1.5 * (count - have)) + 64, rng)
-        seen = points[_seen(points, normals, solid, scene, lowest_deg, rng)]
+        seen = points[_seen(points, normals, solid, scene, lowest_deg, rng, directions)]
         found.append(seen)
         have += len(seen)
         if have >= count:
@@ -68,8 +72,9 @@ def _seen(
     scene: Scene,
     lowest_deg: float,
     rng: np.random.Generator,
+    directions: int,
 ) -> np.ndarray:
-    """`(n,)` bool: the first thing met from far away in one of `_ROUNDS` directions."""
+    """`(n,)` bool: the first thing met from far away in one of the directions."""
     low, high = solid.bounds
     far = 2 * float(np.linalg.norm(high - low))
     # The side from which a point is looked at first, where most are seen at once: that of its
@@ -77,7 +82,7 @@ def _seen(
     side = normals if solid.closed else points - (low + high) / 2
     seen = np.zeros(len(points), bool)
     pool = _directions(2048, lowest_deg, rng)
-    for turn in range(_ROUNDS):
+    for turn in range(directions):
         left = np.flatnonzero(~seen)
         toward = pool[rng.integers(0, len(pool), len(left))]
         if solid.closed or turn % 2 == 0:

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from tyro.conf import Positional, arg
 
 from wildshape.cli.options import AsJson, Layout, Overwrite, option
+from wildshape.simulate.sensor import SensorName
 
 EXAMPLES = (
     "wildshape simulate cars.store --tracks 200 --seed 1",
@@ -53,7 +54,7 @@ class Settings:
     tracks: Annotated[int, arg(metavar="N")] = 100
     scans: Annotated[int | None, option(metavar="N")] = None
     seed: Annotated[int, arg(metavar="S")] = 0
-    sensor: Literal["hdl64", "hdl32", "os1-128", "depth-camera"] = "hdl64"
+    sensor: SensorName = "hdl64"
     meshes: Meshes = None
     category: Literal["car", "airplane", "chair"] = "car"
     occlusion: Annotated[float, arg(metavar="P")] = 0.3

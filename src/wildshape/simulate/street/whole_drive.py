@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from wildshape.errors import BadInputError
-from wildshape.simulate.config import SensorName
-from wildshape.simulate.sensor import SENSORS, SpinningLidar
+from wildshape.simulate.sensor import SENSORS, SensorName, SpinningLidar
 from wildshape.simulate.shapes.meshes import mesh_files, read_mesh
 from wildshape.simulate.shapes.solid import Solid, union
 from wildshape.simulate.shapes.vehicle import random_vehicle
