@@ -107,9 +107,9 @@ def draw(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
 
 def _completed(method: Completer, case: Case) -> Points:
     """The completion of a track's middle scan, in the object's true frame."""
-    points = complete_scans(method, case)[case.middle]
-    assert points is not None
-    return _in_object(case, points)
+    answer = complete_scans(method, case)[case.middle]
+    assert answer is not None
+    return _in_object(case, answer.points)
 
 
 def _in_object(case: Case, points: Points) -> Points:

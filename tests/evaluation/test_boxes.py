@@ -11,7 +11,7 @@ import torch
 from tests.cars import drive_by, poses_of
 
 from wildshape.evaluation.metrics import BoxScore, CompletionError, box_score, true_box
-from wildshape.evaluation.protocol import run
+from wildshape.evaluation.protocol import Spoken, run
 from wildshape.evaluation.results import CompletionScore, MethodScores
 from wildshape.evaluation.summary import figures_of, write_metrics
 from wildshape.evaluation.tables import markdown
@@ -84,10 +84,10 @@ class Boxing:
     def complete(self, points, sensor):
         return points
 
-    def complete_boxed(self, scans, sensor):
+    def complete_many(self, scans, sensor):
         moved = self.box._replace(centre=self.box.centre + self.shift)
         boxes = [carried(moved, self.poses[i]) for i in range(len(scans))]
-        return [(scan, 0.5, box) for scan, box in zip(scans, boxes, strict=True)]
+        return [Spoken(scan, 0.5, box) for scan, box in zip(scans, boxes, strict=True)]
 
 
 class Silent:

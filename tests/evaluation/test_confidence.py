@@ -12,7 +12,7 @@ from tests.cars import drive_by
 
 from wildshape.evaluation.confidence import rank_correlation, risk_coverage
 from wildshape.evaluation.pictures import draw_confidence, write_figures
-from wildshape.evaluation.protocol import run
+from wildshape.evaluation.protocol import Spoken, run
 from wildshape.evaluation.summary import figures_of, write_metrics
 
 TRACKS = [drive_by(name=f"drive {i}", scans=5, seed=i) for i in range(2)]
@@ -24,8 +24,8 @@ class Sure:
     def complete(self, points, sensor):
         return points
 
-    def complete_surely(self, scans, sensor):
-        return [(scan + np.float32(i), 1 / (1 + i)) for i, scan in enumerate(scans)]
+    def complete_many(self, scans, sensor):
+        return [Spoken(scan + np.float32(i), 1 / (1 + i)) for i, scan in enumerate(scans)]
 
 
 class Silent:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 from tests.cars import drive_by, poses_of
+from tests.models import CONFIG, SETTINGS
 
 from wildshape.baselines.dpc.checkpoint import DpcSettings
 from wildshape.baselines.dpc.completer import Dpc
@@ -19,21 +20,17 @@ from wildshape.errors import MissingExtraError
 from wildshape.evaluation.examples import gather
 from wildshape.evaluation.protocol import run
 from wildshape.evaluation.summary import figures_of
-from wildshape.geometry.projection.visibility import FacingBins
 from wildshape.geometry.transforms.rotation import random_rotation
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.evaluated import Learned
 from wildshape.inference.predictor import Predictor
-from wildshape.method.checkpoint import ModelSettings
-from wildshape.method.network import NetworkConfig, ShapePoseNet
-from wildshape.records import Box
+from wildshape.method.network import ShapePoseNet
+from wildshape.records import Box, Completion
 
 LEARNED, DPC = "learned", "dpc-lidar"
 OFFERED = (
     "complete",
     "complete_many",
-    "complete_surely",
-    "complete_boxed",
     "complete_track",
     "register_track",
 )
@@ -42,24 +39,7 @@ OFFERED = (
 def learned():
     """A network that learned nothing: what it sees is all that matters here."""
     torch.manual_seed(0)
-    network = NetworkConfig(
-        encoder=(16, 16, 32, 32),
-        decoder=(32, 32),
-        pose=(16, 16),
-        points=300,
-        mirror=True,
-        scale=2.0,
-    )
-    settings = ModelSettings(
-        network=network,
-        sensor="lidar",
-        input_points=128,
-        projection=FacingBins(0.3),
-        beta=0.25,
-        extent_m=(2.0, 6.0),
-        cost_m=(0.1, 0.3),
-    )
-    return Learned(Predictor(ShapePoseNet(network).eval(), settings))
+    return Learned(Predictor(ShapePoseNet(CONFIG).eval(), SETTINGS))
 
 
 def dpc():
@@ -101,6 +81,8 @@ def to_the_bit(answer):
     """A pose, a cloud, a number, a box, or several of them."""
     if isinstance(answer, tuple):
         return tuple(to_the_bit(part) for part in answer)
+    if isinstance(answer, Completion):
+        return to_the_bit((answer.points, answer.confidence, answer.box, answer.pose))
     if isinstance(answer, SE3 | np.ndarray):
         array = answer.matrix.numpy() if isinstance(answer, SE3) else answer
         return array.shape, array.tobytes()

@@ -8,16 +8,19 @@ import pytest
 import torch
 from tests.cars import drive_by, known, poses_of
 
+from wildshape.baselines.icp import LocalIcp
 from wildshape.baselines.identity import Identity, OneScan
-from wildshape.baselines.named import baseline
+from wildshape.baselines.pairs import Chained
 from wildshape.errors import BadInputError
 from wildshape.evaluation.cases import turn_track
-from wildshape.evaluation.protocol import run
+from wildshape.evaluation.protocol import Spoken, run
 from wildshape.evaluation.results import Limits, Skipped
 from wildshape.evaluation.summary import figures_of
 from wildshape.geometry.transforms.rotation import random_rotation
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Sensor
+
+LOCAL_ICP = Chained(LocalIcp())
 
 
 class Recorder:
@@ -33,12 +36,12 @@ class Recorder:
         return answer
 
     def register_track(self, scans, sensor):
-        T = baseline("local-icp").register_track(scans, sensor)
+        T = LOCAL_ICP.register_track(scans, sensor)
         self.answers.append(T.matrix.numpy().tobytes())
         return T
 
     def complete_track(self, scans, sensor):
-        answer = baseline("local-icp").complete_track(scans, sensor)
+        answer = LOCAL_ICP.complete_track(scans, sensor)
         self.answers.append(answer.tobytes())
         return answer
 
@@ -122,7 +125,7 @@ def test_identity_is_right_on_a_straight_road_and_by_chance_under_yaw():
 
 def test_local_icp_row_beats_identity_by_cd_where_the_track_is_easy():
     tracks = [drive_by(f"t{seed}", step=0.5, seed=seed) for seed in range(2)]
-    methods = {"identity": Identity(), "icp": baseline("local-icp"), "scan": OneScan()}
+    methods = {"identity": Identity(), "icp": LOCAL_ICP, "scan": OneScan()}
     results = run(methods, tracks)
     figures = {name: known(figures_of(results[name])) for name in methods}
     assert figures["icp"]["rot_median_deg"] < 5
@@ -173,7 +176,7 @@ class Picky(OneScan):
         return points[:0] if len(points) == 40 else points
 
     def complete_many(self, scans, sensor):
-        return (self.complete(scan, sensor) for scan in scans)
+        return (Spoken(self.complete(scan, sensor)) for scan in scans)
 
 
 def test_what_is_left_out_is_counted_with_its_reason():

@@ -97,7 +97,7 @@ def _example(
         cd=cd,
         scan=T_object_middle.apply_numpy(case.scans[case.middle]),
         truth=case.truth.shape,
-        completed=T_object_middle.apply_numpy(completed),
+        completed=T_object_middle.apply_numpy(completed.points),
         fused=None if fused is None else T_object_middle.apply_numpy(fused),
         rival=None if other is None else T_object_middle.apply_numpy(other),
     )

@@ -22,33 +22,31 @@ class Completer(Protocol):
 
 
 @runtime_checkable
+class Answer(Protocol):
+    """What a method says of a scan, as `records.Completion` does; None where it says nothing."""
+
+    @property
+    def points(self) -> Points:
+        """The complete shape `(m, 3)` in the scan's frame, metres."""
+        ...
+
+    @property
+    def confidence(self) -> float | None:
+        """How far the method trusts it, 0 to 1."""
+        ...
+
+    @property
+    def box(self) -> Box | None:
+        """Of the object, in the scan's frame."""
+        ...
+
+
+@runtime_checkable
 class BatchCompleter(Completer, Protocol):
-    """Completes several scans, each on its own, faster together."""
+    """Completes several scans, each on its own, faster together, and may say more of each."""
 
-    def complete_many(self, scans: list[Points], sensor: Sensor) -> Iterable[Points]:
+    def complete_many(self, scans: list[Points], sensor: Sensor) -> Iterable[Answer]:
         """`complete` of each scan, in order."""
-        ...
-
-
-@runtime_checkable
-class Confident(Completer, Protocol):
-    """Completes scans and says how far it trusts each."""
-
-    def complete_surely(
-        self, scans: list[Points], sensor: Sensor
-    ) -> Iterable[tuple[Points, float]]:
-        """`complete` of each scan, in order, and the confidence in it, 0 to 1."""
-        ...
-
-
-@runtime_checkable
-class Boxed(Completer, Protocol):
-    """Completes scans, says how far it trusts each, and draws a box around each object."""
-
-    def complete_boxed(
-        self, scans: list[Points], sensor: Sensor
-    ) -> Iterable[tuple[Points, float, Box]]:
-        """`complete` of each scan, in order, the confidence in it, and the object's box."""
         ...
 
 

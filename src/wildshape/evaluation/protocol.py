@@ -5,7 +5,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -13,10 +13,9 @@ import torch
 from wildshape.errors import BadInputError
 from wildshape.evaluation.cases import Case, Truth, prepare
 from wildshape.evaluation.method import (
+    Answer,
     BatchCompleter,
-    Boxed,
     Completer,
-    Confident,
     Described,
     Method,
     Registrar,
@@ -38,7 +37,7 @@ from wildshape.evaluation.results import (
     Skipped,
 )
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.records import Box, Points, Track
+from wildshape.records import Box, Points, Sensor, Track
 
 ALL_SCANS = Limits()
 Progress = Callable[[int, str], None]
@@ -125,40 +124,30 @@ def _score_scans(method: Completer, case: Case, ledger: _Ledger) -> None:
         for i in range(len(case.scans)):
             ledger.skip(case, i, "completion: no true shape")
         return
-    for i, answer in enumerate(_answers(method, case)):
+    for i, answer in enumerate(complete_scans(method, case)):
         _score_completion(answer, case, case.truth, case.T_sensor_object, i, ledger)
 
 
-class _Answer(NamedTuple):
-    """What a method says of a scan; None where it says nothing."""
+class Spoken(NamedTuple):
+    """The answer of a method that says nothing but a shape."""
 
-    points: Points | None
+    points: Points
     confidence: float | None = None
     box: Box | None = None
 
 
-def _answers(method: Completer, case: Case) -> list[_Answer]:
-    """As `complete_scans`, with confidence and box of those that state them."""
-    with suppress(BadInputError):
-        if isinstance(method, Boxed):
-            return [_Answer(*one) for one in method.complete_boxed(case.inputs(), case.sensor)]
-        if isinstance(method, Confident):
-            return [_Answer(*one) for one in method.complete_surely(case.inputs(), case.sensor)]
-    return [_Answer(predicted) for predicted in complete_scans(method, case)]
-
-
-def complete_scans(method: Completer, case: Case) -> Sequence[Points | None]:
-    """One cloud a scan in that scan's frame; None where the method refused it."""
+def complete_scans(method: Completer, case: Case) -> Sequence[Answer | None]:
+    """One answer a scan, in that scan's frame; None where the method refused it."""
     if isinstance(method, BatchCompleter):
         # One scan's refusal must not cost the others theirs: then each goes alone.
         with suppress(BadInputError):
             return list(method.complete_many(case.inputs(), case.sensor))
-    return [_complete(method, scan, case) for scan in case.inputs()]
+    return [_spoken(method.complete, scan, case) for scan in case.inputs()]
 
 
-def _complete(method: Completer, scan: Points, case: Case) -> Points | None:
+def _spoken(complete: Callable[[Any, Sensor], Points], given: Any, case: Case) -> Spoken | None:
     try:
-        return method.complete(scan, case.sensor)
+        return Spoken(complete(given, case.sensor))
     except BadInputError:
         return None
 
@@ -167,26 +156,22 @@ def _score_whole(method: TrackCompleter, case: Case, ledger: _Ledger) -> None:
     if case.truth is None or case.T_sensor_object is None:
         ledger.skip(case, case.middle, "completion: no true shape")
         return
-    try:
-        predicted = method.complete_track(case.inputs(), case.sensor)
-    except BadInputError:
-        predicted = None
-    whole = (case.truth, case.T_sensor_object, case.middle, ledger)
-    _score_completion(_Answer(predicted), case, *whole)
+    answer = _spoken(method.complete_track, case.inputs(), case)
+    _score_completion(answer, case, case.truth, case.T_sensor_object, case.middle, ledger)
 
 
 def _score_completion(
-    answer: _Answer,
+    answer: Answer | None,
     case: Case,
     truth: Truth,
     T_sensor_object: SE3,
     i: int,
     ledger: _Ledger,
 ) -> None:
-    predicted = answer.points
-    if predicted is None:
+    if answer is None:
         ledger.skip(case, i, f"completion: {REFUSED}")
         return
+    predicted = answer.points
     if len(predicted) == 0 or not np.isfinite(predicted).all():
         ledger.skip(case, i, f"completion: {NOT_FINITE}")
         return

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.predictor import Predictor
 from wildshape.inference.registration import to_middle
-from wildshape.records import Box, Completion, Points, Sensor
+from wildshape.records import Completion, Points, Sensor
 
 
 @dataclass(frozen=True)
@@ -29,33 +29,13 @@ class Learned:
         """
         return self.predictor.complete(points, sensor).points
 
-    def complete_many(self, scans: list[Points], sensor: Sensor) -> list[Points]:
-        """`complete` of each scan, in order; in batches.
+    def complete_many(self, scans: list[Points], sensor: Sensor) -> list[Completion]:
+        """Of each scan, in order, shape, confidence and box; in batches.
 
         Raises:
             BadInputError: one of them has fewer than 16 finite points.
         """
-        return [done.points for done in self.predictor.complete_many(scans, sensor)]
-
-    def complete_surely(self, scans: list[Points], sensor: Sensor) -> list[tuple[Points, float]]:
-        """`complete_many`, with the confidence in each, 0 to 1.
-
-        Raises:
-            BadInputError: one of them has fewer than 16 finite points.
-        """
-        done = self.predictor.complete_many(scans, sensor)
-        return [(item.points, item.confidence) for item in done]
-
-    def complete_boxed(
-        self, scans: list[Points], sensor: Sensor
-    ) -> list[tuple[Points, float, Box]]:
-        """`complete_surely`, with the object's box.
-
-        Raises:
-            BadInputError: one of them has fewer than 16 finite points.
-        """
-        done = self.predictor.complete_many(scans, sensor)
-        return [(item.points, item.confidence, item.box) for item in done]
+        return list(self.predictor.complete_many(scans, sensor))
 
     def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:
         """`T_middle_scan`, one a scan: takes each scan to the frame of the middle scan.
@@ -89,33 +69,13 @@ class LearnedTrack:
         """
         return self.predictor.complete(points, sensor).points
 
-    def complete_many(self, scans: list[Points], sensor: Sensor) -> list[Points]:
-        """The track's shape in the frame of each of its scans.
+    def complete_many(self, scans: list[Points], sensor: Sensor) -> list[Completion]:
+        """The track's shape in the frame of each of its scans, confidence and box.
 
         Raises:
             BadInputError: one of them has fewer than 16 finite points.
         """
-        return [done.points for done in self._completed(scans, sensor)]
-
-    def complete_surely(self, scans: list[Points], sensor: Sensor) -> list[tuple[Points, float]]:
-        """`complete_many`, with the confidence in each, 0 to 1.
-
-        Raises:
-            BadInputError: one of them has fewer than 16 finite points.
-        """
-        done = self._completed(scans, sensor)
-        return [(item.points, item.confidence) for item in done]
-
-    def complete_boxed(
-        self, scans: list[Points], sensor: Sensor
-    ) -> list[tuple[Points, float, Box]]:
-        """`complete_surely`, with the object's box.
-
-        Raises:
-            BadInputError: one of them has fewer than 16 finite points.
-        """
-        done = self._completed(scans, sensor)
-        return [(item.points, item.confidence, item.box) for item in done]
+        return self.predictor.complete_track(scans, sensor)
 
     def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:
         """`T_middle_scan`, one a scan.
@@ -123,7 +83,4 @@ class LearnedTrack:
         Raises:
             BadInputError: a scan has fewer than 16 finite points.
         """
-        return to_middle(stack([done.pose for done in self._completed(scans, sensor)]))
-
-    def _completed(self, scans: Sequence[Points], sensor: Sensor) -> list[Completion]:
-        return self.predictor.complete_track(scans, sensor)
+        return to_middle(stack([done.pose for done in self.complete_many(list(scans), sensor)]))

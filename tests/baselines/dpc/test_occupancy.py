@@ -3,9 +3,12 @@
 """The differentiable projection against what can be worked out by hand."""
 
 import math
+from typing import NamedTuple
 
 import pytest
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from wildshape.baselines.dpc.occupancy import (
     gaussian,
@@ -13,7 +16,6 @@ from wildshape.baselines.dpc.occupancy import (
     let_by,
     occupancy,
     project,
-    rays_through,
     smooth,
     splat,
 )
@@ -36,6 +38,25 @@ def wall(away, size=16, each=2):
     right, down = torch.meshgrid(at, at, indexing="ij")
     plane = torch.stack((right, down, torch.full_like(right, away)), dim=-1)
     return plane.view(1, -1, 3)
+
+
+class Rays(NamedTuple):
+    """Where each ray ends.
+
+    Attributes:
+        ends: probability of each voxel along the ray.
+        escape: probability that it meets nothing; all sum to 1.
+    """
+
+    ends: Float[Tensor, "*batch S S S"]
+    escape: Float[Tensor, "*batch S S"]
+
+
+def rays_through(volume: Float[Tensor, "*batch S S S"]) -> Rays:
+    """Where each ray ends: `o_k` times what `o_j < k` let by."""
+    passed = let_by(volume)
+    before = torch.cat((torch.ones_like(passed[..., :1, :, :]), passed[..., :-1, :, :]), dim=-3)
+    return Rays(before - passed, passed[..., -1, :, :])
 
 
 def test_a_single_point_lands_on_its_pixel():

@@ -8,7 +8,6 @@ the sensor these give the probability that it ends in each voxel, and with it si
 """
 
 from itertools import product
-from typing import NamedTuple
 
 import torch
 from jaxtyping import Float
@@ -18,18 +17,6 @@ from wildshape.baselines.dpc.viewing_volume import RangeImage
 
 _FULL = 1 - 1e-5  # of an occupancy, so that its logarithm is finite
 _REACH = 3.5  # half width of the smoothing kernel, sigmas
-
-
-class Rays(NamedTuple):
-    """Where each ray ends.
-
-    Attributes:
-        ends: probability of each voxel along the ray.
-        escape: probability that it meets nothing; all sum to 1.
-    """
-
-    ends: Float[Tensor, "*batch S S S"]
-    escape: Float[Tensor, "*batch S S"]
 
 
 def splat(points: Float[Tensor, "B n 3"], size: int) -> Float[Tensor, "B S S S"]:
@@ -110,13 +97,6 @@ def let_by(volume: Float[Tensor, "*batch S S S"]) -> Float[Tensor, "*batch S S S
     passed = torch.log1p(-volume.clamp(max=_FULL)).flatten(-2)
     so_far = torch.ones(size, size, dtype=volume.dtype, device=volume.device).tril()
     return (so_far @ passed).exp().view_as(volume)
-
-
-def rays_through(volume: Float[Tensor, "*batch S S S"]) -> Rays:
-    """Where each ray ends: `o_k` times what `o_j < k` let by."""
-    passed = let_by(volume)
-    before = torch.cat((torch.ones_like(passed[..., :1, :, :]), passed[..., :-1, :, :]), dim=-3)
-    return Rays(before - passed, passed[..., -1, :, :])
 
 
 def image_of(passed: Float[Tensor, "*batch S S S"]) -> RangeImage:
