@@ -1,51 +1,36 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""An output folder and its `wildshape.json`: which command made it, and whether it is finished.
+"""Where commands write: folders begun and gone on with (`io/output.py`), and single files."""
 
-An existing output is refused; a half-finished one of the same command and settings is gone on
-with; two are never mixed; `--overwrite` removes what the earlier command wrote and nothing else.
-"""
-
-import json
 import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from wildshape.cli.terminal import say
 from wildshape.errors import BadInputError
-from wildshape.io.atomic import lock_folder, write_json
-from wildshape.io.provenance import provenance
+from wildshape.io import output
+from wildshape.io.output import (
+    MARKER,
+    Output,
+    is_begun,
+    keep_apart,
+    remove_leftovers,
+    unfinished,
+)
 
-MARKER = "wildshape.json"
-_LEFTOVER = ".*.part"  # as `io/atomic.py` names what it has not finished
-
-
-@dataclass(frozen=True)
-class Output:
-    """A folder being written.
-
-    Attributes:
-        path: the folder.
-        record: what `wildshape.json` holds.
-        resumed: whether finished work of an earlier, interrupted run lies in it.
-    """
-
-    path: Path
-    record: dict[str, Any]
-    resumed: bool = False
-
-    def abandon(self) -> None:
-        """Leave no trace of a command that was refused before it wrote anything."""
-        if [entry.name for entry in self.path.iterdir()] == [MARKER]:
-            (self.path / MARKER).unlink()
-            self.path.rmdir()
-
-    def finish(self, **more: object) -> None:
-        """Say that everything is there."""
-        write_json(self.path / MARKER, {**self.record, **more, "status": "finished"})
+__all__ = [
+    "MARKER",
+    "Output",
+    "begin",
+    "command_line",
+    "is_begun",
+    "keep_apart",
+    "refuse_file",
+    "remove_leftovers",
+    "unfinished",
+]
 
 
 def begin(
@@ -56,68 +41,11 @@ def begin(
     *,
     overwrite: bool = False,
 ) -> Output:
-    """Start, or go on with, the output of a command.
-
-    Args:
-        path: the folder.
-        command: for example `complete`.
-        settings: JSON values; whatever changes the content of the output.
-        files: patterns of the files that the command may write below `path`.
-        overwrite: remove an earlier output first.
-
-    Raises:
-        BadInputError: something else is there, or a finished output without `overwrite`, or
-            another process is writing there.
-    """
-    settings = json.loads(json.dumps(settings, default=str))
-    resumed = False
-    if path.exists() and not path.is_dir():
-        raise BadInputError(f"{path}: is a file; --out names a folder to write.")
-    lock_folder(path)
-    if is_begun(path):
-        resumed = _existing(path, command, settings, overwrite=overwrite)
-    remove_leftovers(path)
-    record = {
-        "command": command,
-        "status": "running",
-        "settings": settings,
-        "files": list(files),
-        "provenance": provenance(command_line()),
-    }
-    write_json(path / MARKER, record)
-    return Output(path, record, resumed)
-
-
-def keep_apart(source: Path, out: Path) -> None:
-    """Refuse to read from what is written: `--overwrite` would remove the input.
-
-    Raises:
-        BadInputError: the input is the output folder or lies in it.
-    """
-    source, target = source.resolve(), out.resolve()
-    if target == source or target in source.parents:
-        raise BadInputError(f"{out}: holds the input {source}; choose another place to write.")
-
-
-def is_begun(path: Path) -> bool:
-    """Whether a folder holds anything but what a process left that was killed while writing."""
-    leftovers = set(path.glob(_LEFTOVER)) if path.is_dir() else set()
-    return path.is_dir() and any(entry not in leftovers for entry in path.iterdir())
-
-
-def remove_leftovers(path: Path) -> None:
-    """Remove what a process left that was killed while writing; no other may be at work."""
-    for leftover in path.rglob(_LEFTOVER):
-        if leftover.is_file():
-            leftover.unlink()
-
-
-def unfinished(path: Path, command: str) -> bool:
-    """Whether an interrupted run of a command left its output here."""
-    if not (path / MARKER).is_file():
-        return False
-    record = _read(path)
-    return record.get("command") == command and record.get("status") == "running"
+    """`io.output.begin`, and say so where an interrupted run is gone on with."""
+    begun = output.begin(path, command, settings, files, command_line(), overwrite=overwrite)
+    if begun.resumed:
+        say(f"going on with the unfinished output in {path}")
+    return begun
 
 
 def command_line() -> str:
@@ -135,49 +63,3 @@ def refuse_file(path: Path, *, overwrite: bool) -> None:
         raise BadInputError(f"{path}: is a folder; --out names a file to write.")
     if path.exists() and not overwrite:
         raise BadInputError(f"{path}: exists; pass --overwrite to replace it.")
-
-
-def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: bool) -> bool:
-    """Whether the output there is to be gone on with; with `overwrite` it is removed."""
-    record = _read(path)
-    if overwrite:
-        _remove(path, record.get("files", []))
-        return False
-    same = record.get("command") == command and record.get("settings") == settings
-    if record.get("status") == "finished":
-        raise BadInputError(
-            f"{path}: holds the output of an earlier `{record.get('command')}`; pass --overwrite"
-            " to replace it, or choose another --out."
-        )
-    if not same:
-        raise BadInputError(
-            f"{path}: holds the unfinished output of `{record.get('command')}` with other"
-            " settings; repeat it as it was, pass --overwrite, or choose another --out."
-        )
-    say(f"going on with the unfinished output in {path}")
-    return True
-
-
-def _read(path: Path) -> dict[str, Any]:
-    marker = path / MARKER
-    if not marker.is_file():
-        raise BadInputError(
-            f"{path}: is not empty and was not written by this command; choose another --out."
-        )
-    try:
-        record = json.loads(marker.read_text("utf-8"))
-    except ValueError as error:
-        raise BadInputError(f"{marker}: damaged; choose another --out.") from error
-    return record if isinstance(record, dict) else {}
-
-
-def _remove(path: Path, patterns: Sequence[str]) -> None:
-    """Remove our files and the folders that are empty then."""
-    (path / MARKER).unlink()
-    for file in [file for pattern in patterns for file in path.glob(pattern)]:
-        if file.is_file():
-            file.unlink()
-    folders = sorted((f for f in path.rglob("*") if f.is_dir()), reverse=True)
-    for folder in folders:
-        if not any(folder.iterdir()):
-            folder.rmdir()

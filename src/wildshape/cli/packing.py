@@ -12,9 +12,9 @@ from typing import Any
 
 from wildshape.cli.options import Layout
 from wildshape.cli.output import begin, command_line
-from wildshape.cli.results.write import file_name
 from wildshape.cli.terminal import say
 from wildshape.errors import BadInputError
+from wildshape.inference.completed_files import file_name
 from wildshape.io.atomic import lock_folder
 from wildshape.io.provenance import provenance
 from wildshape.io.store.layout import INDEX_JSON, WRITING_JSON

@@ -11,10 +11,10 @@ from typing import Any, Protocol, runtime_checkable
 
 from wildshape.cli.output import MARKER, Output, begin, command_line, unfinished
 from wildshape.cli.packing import FILES
-from wildshape.cli.results.write import file_name
 from wildshape.cli.terminal import say
 from wildshape.datasets.tracks.conversion import STORE, TRACKS, PartResult
 from wildshape.errors import BadInputError
+from wildshape.inference.completed_files import file_name
 from wildshape.io.atomic import lock_folder, write_json
 from wildshape.io.provenance import provenance
 from wildshape.io.store.join import finish_join, is_joining, join_stores

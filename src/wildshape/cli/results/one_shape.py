@@ -10,9 +10,9 @@ from wildshape.cli.input.tracks import Reading
 from wildshape.cli.models import load_model
 from wildshape.cli.options import Device
 from wildshape.cli.results.tally import doubt
-from wildshape.cli.results.write import describe
 from wildshape.cli.terminal import answer, say
 from wildshape.errors import BadInputError
+from wildshape.inference.completed_files import describe
 from wildshape.io.scans.points import Coordinates
 from wildshape.io.scans.writers import MeshOrder, mesh_bytes, ply_bytes
 from wildshape.records import Completion, Points, Track

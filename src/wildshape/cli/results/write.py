@@ -21,6 +21,7 @@ from wildshape.cli.results.tally import Tally
 from wildshape.cli.terminal import answer, counted, duration, progress, say, say_skipped
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import stack
+from wildshape.inference.completed_files import COMPLETED, OBJECTS, POSES, file_name, objects_of
 from wildshape.inference.predictor import Predictor
 from wildshape.inference.registration import to_middle
 from wildshape.io.atomic import write_json
@@ -31,8 +32,8 @@ from wildshape.io.scans.writers import MESH_FORMATS, MeshOrder, write_mesh
 from wildshape.io.tracks import write_poses
 from wildshape.records import Completion, Track
 
-OBJECTS, POSES, COMPLETED, MIDDLE = "objects.json", "poses.txt", "completed", "T_middle_scan.txt"
-MESH, TUM, TRAJECTORY = "mesh", "trajectory.tum", "trajectory.json"
+MIDDLE, MESH = "T_middle_scan.txt", "mesh"
+TUM, TRAJECTORY = "trajectory.tum", "trajectory.json"
 FILES = (
     f"*/{COMPLETED}/*.ply",
     *(f"*/{MESH}/*.{kind}" for kind in MESH_FORMATS),
@@ -183,7 +184,14 @@ def write_results(
                 together=together,
                 mesh=mesh,
             )
-            described = _objects(track, scans, reading, predictor, together=together)
+            described = objects_of(
+                track,
+                scans,
+                predictor,
+                reading.source.path,
+                together=together,
+                skipped=reading.skipped_in(track.name),
+            )
             write_json(folder / OBJECTS, described)
             tally.add(track, scans)
             bar.at(index + 1, track.name)
@@ -220,54 +228,3 @@ def complete_track(
         write_tum(folder / TUM, poses, times_of(track.scan_names))
         write_trajectory(folder / TRAJECTORY, poses, track.scan_names)
     return found
-
-
-def file_name(name: str) -> str:
-    """The name itself.
-
-    Raises:
-        BadInputError: it is no plain file name.
-    """
-    if not name or Path(name).name != name or name.startswith("."):
-        raise BadInputError(f"'{name}': a track or scan of this name cannot become a file; rename.")
-    return name
-
-
-def _objects(
-    track: Track, scans: list[Completion], reading: Reading, predictor: Predictor, *, together: bool
-) -> dict[str, Any]:
-    return {
-        "format": 1,
-        "track": track.name,
-        "input": str(reading.source.path.resolve()),
-        "uses": "track" if together else "scan",
-        "together": together,
-        "category": track.category,
-        "sensor": track.sensor.kind,
-        "model": _model(predictor),
-        "inference": asdict(predictor.config),
-        "scans": [describe(name, done) for name, done in zip(track.scan_names, scans)],
-        "skipped": [
-            {"scan": scan, "reason": reason} for scan, reason in reading.skipped_in(track.name)
-        ],
-    }
-
-
-def _model(predictor: Predictor) -> dict[str, Any]:
-    made = predictor.settings.provenance
-    return {key: made.get(key) for key in ("command", "code", "time_utc", "steps", "seed")}
-
-
-def describe(name: str, done: Completion) -> dict[str, Any]:
-    """A completed scan without its points; metres, the scan's sensor frame."""
-    return {
-        "scan": name,
-        "box": asdict(done.box),
-        "confidence": done.confidence,
-        "refined": done.refined,
-        "seconds": done.seconds,
-        "branch": done.branch,
-        "cost_m": done.cost,
-        "warning": done.warning,
-        "reasons": done.reasons,
-    }

@@ -82,11 +82,16 @@ def read_detections(out: Path) -> list[Detection]:
             said = json.loads(path.read_text("utf-8"))
             if said["track"] != path.parent.name:  # it becomes a file's name
                 raise ValueError(f"track {said['track']!r} in the folder {path.parent.name!r}")
-            found += _detections_of(said, number)
+            found += detections_of(said, number)
     return found
 
 
-def _detections_of(said: dict[str, Any], number: int) -> Iterator[Detection]:
+def detections_of(said: dict[str, Any], number: int) -> Iterator[Detection]:
+    """The boxes of one track's `objects.json`; `number`: of the track.
+
+    Raises:
+        ValueError: a value makes no sense (KeyError, TypeError: is missing, is of another type).
+    """
     kind = said.get("sensor", "lidar")
     if kind not in get_args(SensorKind):
         raise ValueError(f"sensor {kind!r}")

@@ -1,0 +1,119 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The box of a vehicle in every frame from the first to the last in which it was seen.
+
+A vehicle that stands has one box in the world: the middle of those of its completed scans. One
+that moves goes a smooth way through them: in each frame a straight line is fitted to the places
+around it, the nearer the heavier (local linear regression, Cleveland 1979).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from wildshape.drives.config import BoxConfig
+from wildshape.drives.vehicles import Completed
+
+
+@dataclass(frozen=True)
+class Way:
+    """A vehicle's boxes in the drive's level world frame.
+
+    Attributes:
+        frames: every one from the first to the last in which it was seen.
+        boxes: `(f, 4)` centre x, y, z and yaw in each, metres and radians.
+        moving: or standing.
+    """
+
+    frames: tuple[int, ...]
+    boxes: Float[np.ndarray, "f 4"]
+    moving: bool
+
+
+def smooth(one: Completed, ticks: tuple[int, ...], config: BoxConfig) -> Way:
+    """The way of one vehicle.
+
+    Args:
+        one: completed.
+        ticks: when each frame of the drive was taken.
+        config: see there.
+    """
+    frames = tuple(range(one.seen.frames[0], one.seen.frames[-1] + 1))
+    at = np.array([ticks[frame] for frame in one.frames], np.float64)
+    wanted = np.array([ticks[frame] for frame in frames], np.float64)
+    if not moves(at, one.boxes, config):
+        return Way(frames, np.tile(_middle(one.boxes), (len(frames), 1)), moving=False)
+    places, velocities = _lines(at, one.boxes[:, :3], wanted, config.smooth_ticks)
+    yaws = _yaws(at, one.boxes, wanted, velocities, config)
+    return Way(frames, np.column_stack((places, yaws)), moving=True)
+
+
+def moves(
+    ticks: Float[np.ndarray, "k"], boxes: Float[np.ndarray, "k 4"], config: BoxConfig
+) -> bool:
+    """Whether a vehicle gets far enough, and fast enough, to be moving and not only uncertain."""
+    if len(ticks) < 2:
+        return False
+    third = -(-len(ticks) // 3)
+    early, late = (
+        np.median(boxes[part, :2], axis=0) for part in (slice(third), slice(-third, None))
+    )
+    time = np.median(ticks[-third:]) - np.median(ticks[:third])
+    way = float(np.linalg.norm(late - early))
+    return way > config.moving_m and way > config.moving_m_per_tick * time
+
+
+def _middle(boxes: Float[np.ndarray, "k 4"]) -> Float[np.ndarray, "4"]:
+    """The middle place, and the mean direction without those that look another way than most."""
+    yaw = boxes[:, 3]
+    towards = np.cos(yaw[:, None] - yaw)
+    leader = int(np.median(towards, axis=1).argmax())
+    agree = towards[leader] > 0.5
+    mean = np.arctan2(np.sin(yaw[agree]).mean(), np.cos(yaw[agree]).mean())
+    return np.append(np.median(boxes[:, :3], axis=0), mean)
+
+
+def _weights(
+    at: Float[np.ndarray, "k"], wanted: Float[np.ndarray, "f"], smooth_ticks: float
+) -> Float[np.ndarray, "f k"]:
+    """How much each completed scan says of each frame; the kernel is wide enough to reach two."""
+    apart = np.abs(wanted[:, None] - at)
+    second = np.sort(apart, axis=1)[:, min(1, len(at) - 1)]
+    width = np.maximum(smooth_ticks, second)[:, None]
+    return np.exp(-0.5 * (apart / width) ** 2)
+
+
+def _lines(
+    at: Float[np.ndarray, "k"],
+    places: Float[np.ndarray, "k 3"],
+    wanted: Float[np.ndarray, "f"],
+    smooth_ticks: float,
+) -> tuple[Float[np.ndarray, "f 3"], Float[np.ndarray, "f 3"]]:
+    """Place and velocity a tick in each frame, of the line of weighted least squares around it."""
+    weights = _weights(at, wanted, smooth_ticks)
+    weights /= weights.sum(1, keepdims=True)
+    time = at - wanted[:, None]
+    mean_time = (weights * time).sum(1, keepdims=True)
+    mean_place = weights @ places
+    spread = (weights * (time - mean_time) ** 2).sum(1, keepdims=True)
+    velocities = (weights * (time - mean_time)) @ places / spread
+    return mean_place - mean_time * velocities, velocities
+
+
+def _yaws(
+    at: Float[np.ndarray, "k"],
+    boxes: Float[np.ndarray, "k 4"],
+    wanted: Float[np.ndarray, "f"],
+    velocities: Float[np.ndarray, "f 3"],
+    config: BoxConfig,
+) -> Float[np.ndarray, "f"]:
+    """Headings between those of the completed scans, front where a vehicle drives to."""
+    nearest = np.abs(wanted[:, None] - at).argmin(0)
+    speed = np.linalg.norm(velocities[:, :2], axis=1)
+    course = np.arctan2(velocities[:, 1], velocities[:, 0])
+    fast = speed[nearest] > config.heading_m_per_tick
+    backwards = fast & (np.cos(boxes[:, 3] - course[nearest]) < 0)
+    yaw = boxes[:, 3] + np.pi * backwards
+    weights = _weights(at, wanted, config.smooth_ticks)
+    return np.arctan2(weights @ np.sin(yaw), weights @ np.cos(yaw))

@@ -1,0 +1,119 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What stands on the ground of one scan and hangs together: where vehicles may be.
+
+Points nearer to each other than a reach hang together. The reach grows with range as beams spread:
+`e = a + b r`. Coordinates in which it is 1 everywhere are `ln(e / a) / b` along r (the integral of
+`dr / e`), `azimuth r / e` and `z / e`.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from wildshape.drives.config import ClusterConfig
+from wildshape.records import Points
+
+_SIZED_BY = 1000  # points of a cluster that tell its size
+
+Rows = Int[np.ndarray, "k"]
+
+
+@dataclass(frozen=True)
+class _Above:
+    """The points of a scan that stand above its ground.
+
+    Attributes:
+        points: level frame.
+        heights: above the ground.
+        scaled: coordinates in which the reach is 1.
+    """
+
+    points: Points
+    heights: Float[np.ndarray, "n"]
+    scaled: Float[np.ndarray, "n 3"]
+
+
+def find_clusters(
+    points: Points, heights: Float[np.ndarray, "n"], config: ClusterConfig
+) -> list[Rows]:
+    """The rows of each cluster that may be a vehicle, the nearest to the sensor first.
+
+    Args:
+        points: of a whole scan, level frame.
+        heights: of each above the ground, metres (`ground.py`).
+        config: see there.
+    """
+    away = np.hypot(points[:, 0], points[:, 1])
+    with np.errstate(invalid="ignore"):
+        above = (heights > config.lowest_m) & (heights < config.highest_m)
+    rows = np.flatnonzero(above & (away < config.range_m))
+    if len(rows) < config.fewest_points:
+        return []
+    scan = _Above(points[rows], heights[rows], _scaled(points[rows], config))
+    everything = np.arange(len(rows))
+    found = [rows[part] for part in _vehicle_sized(scan, everything, (1.0, *config.finer), config)]
+    return sorted(found, key=lambda part: float(away[part].min()))
+
+
+def _scaled(points: Points, config: ClusterConfig) -> Float[np.ndarray, "n 3"]:
+    away = np.hypot(points[:, 0], points[:, 1])
+    reach = config.reach_m + config.reach_per_m * away
+    outwards = np.log(reach / config.reach_m) / config.reach_per_m
+    sideways = np.arctan2(points[:, 1], points[:, 0]) * away / reach
+    return np.stack((outwards, sideways, config.upright * points[:, 2] / reach), axis=1)
+
+
+def _vehicle_sized(
+    scan: _Above, rows: Rows, reaches: tuple[float, ...], config: ClusterConfig
+) -> Iterator[Rows]:
+    """Clusters of the size of vehicles; those too large are cut apart with the finer reaches."""
+    for part in connected(scan.scaled[rows], reaches[0], config.thin):
+        members = rows[part]
+        if len(members) < config.fewest_points or not _stands(scan.heights[members], config):
+            continue
+        length, width = extents(scan.points[members])
+        if length <= config.longest_m and width <= config.widest_m:
+            if length >= config.shortest_m:
+                yield members
+        elif len(reaches) > 1:
+            yield from _vehicle_sized(scan, members, reaches[1:], config)
+
+
+def connected(points: Float[np.ndarray, "n 3"], reach: float, thin: float = 0.25) -> list[Rows]:
+    """Rows of the points that hang together over steps of at most `reach`, the larger first.
+
+    Points are thinned first, to one a cell of `thin` times the reach: a step may be longer or
+    shorter by as much.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import KDTree
+
+    cells = np.floor(points / (thin * reach)).astype(np.int64)
+    number = np.ravel_multi_index(tuple((cells - cells.min(0)).T), np.ptp(cells, axis=0) + 1)
+    _, first, cell = np.unique(number, return_index=True, return_inverse=True)
+    pairs = KDTree(points[first]).query_pairs(reach, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs), bool), tuple(pairs.T)), shape=(len(first), len(first)))
+    label = connected_components(links, directed=False)[1][cell]
+    order = np.argsort(label, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+    return sorted(parts, key=len, reverse=True)
+
+
+def _stands(heights: Float[np.ndarray, "k"], config: ClusterConfig) -> bool:
+    """Whether something reaches down to the ground and up to where a bonnet is."""
+    return bool(heights.min() < config.highest_bottom_m and heights.max() > config.lowest_top_m)
+
+
+def extents(points: Points) -> tuple[float, float]:
+    """Length and width of the upright rectangle of least area, of 2 degrees' steps, metres."""
+    angles = np.deg2rad(np.arange(0.0, 90.0, 2.0))
+    flat = points[:: 1 + len(points) // _SIZED_BY, :2].astype(np.float64)
+    along = flat @ np.stack((np.cos(angles), np.sin(angles)))
+    across = flat @ np.stack((-np.sin(angles), np.cos(angles)))
+    sides = np.stack((np.ptp(along, axis=0), np.ptp(across, axis=0)))
+    width, length = np.sort(sides[:, sides.prod(0).argmin()])
+    return float(length), float(width)

@@ -1,0 +1,199 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The numbers that decide what `drive` finds, in frozen records, a record a stage.
+
+They are written into `wildshape.json` of every result and can be set from Python:
+`wildshape.drive("recording", "found", DriveConfig(clusters=ClusterConfig(range_m=40.0)))`.
+"""
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class MountingConfig:
+    """How the sensor's height and tilt are found from the ground (`mounting.py`).
+
+    Attributes:
+        scans: of the drive, evenly spread, that are looked at.
+        reach_m: the ground is flat enough only so near.
+        trials: planes that are tried in each scan.
+        thick_m: points this near to a plane lie on it.
+        steepest_deg: no sensor is mounted with more tilt.
+        below: share of the points that may lie below the ground: reflections, ditches.
+        level_deg: less tilt than this is the road's, not the sensor's, and is left alone.
+    """
+
+    scans: int = 9
+    reach_m: float = 15.0
+    trials: int = 300
+    thick_m: float = 0.1
+    steepest_deg: float = 35.0
+    below: float = 0.03
+    level_deg: float = 2.0
+
+
+@dataclass(frozen=True)
+class TrajectoryConfig:
+    """How the sensor's way is found (`trajectory.py`), by KISS-ICP with its own other settings.
+
+    Attributes:
+        range_m: farthest points that are used.
+        nearest_m: nearer ones are the vehicle that carries the sensor.
+        voxel_m: size of the local map's cells, KISS-ICP's hundredth of its default range.
+        jump_m: steps of neighbouring scans that differ by more are counted as a jump. At 10 Hz no
+            vehicle changes its speed by 20 m/s in between.
+    """
+
+    range_m: float = 100.0
+    nearest_m: float = 2.0
+    voxel_m: float = 1.0
+    jump_m: float = 2.0
+
+
+@dataclass(frozen=True)
+class GroundConfig:
+    """What is ground (`ground.py`), by Patchwork++ with its own other settings.
+
+    Attributes:
+        range_m: farther points are neither ground nor object.
+        nearest_m: nearer points are the vehicle that carries the sensor.
+        cell_m: the ground's height is kept in cells of this size: over more of it roads slope.
+    """
+
+    range_m: float = 80.0
+    nearest_m: float = 2.0
+    cell_m: float = 2.0
+
+
+@dataclass(frozen=True)
+class ClusterConfig:
+    """What hangs together in one scan (`clusters.py`).
+
+    Attributes:
+        range_m: horizontally; beyond it a car has hardly 100 points.
+        lowest_m: above the ground; lower points join neighbours through kerbs and grass.
+        highest_m: above the ground; higher points join vehicles through trees.
+        reach_m: points nearer than this at the sensor hang together.
+        reach_per_m: it grows by so much a metre of range, as beams spread.
+        upright: heights count by this factor: beams are farther apart upwards than sideways.
+        finer: clusters too large for a vehicle are cut apart with the reach times each of these.
+        thin: points are thinned to this share of the reach before it is measured.
+        fewest_points: of a cluster; 16 are the least that can be completed.
+        lowest_top_m: above the ground; lower things are no vehicles.
+        highest_bottom_m: above the ground; higher things do not stand on it.
+        shortest_m: a car's width, half hidden.
+        longest_m: a lorry.
+        widest_m: a lorry with its mirrors.
+    """
+
+    range_m: float = 60.0
+    lowest_m: float = 0.1
+    highest_m: float = 3.5
+    reach_m: float = 0.35
+    reach_per_m: float = 0.012
+    upright: float = 0.5
+    finer: tuple[float, ...] = (0.6, 0.4)
+    thin: float = 0.25
+    fewest_points: int = 30
+    lowest_top_m: float = 0.6
+    highest_bottom_m: float = 1.0
+    shortest_m: float = 1.0
+    longest_m: float = 12.0
+    widest_m: float = 3.5
+
+
+@dataclass(frozen=True)
+class LinkConfig:
+    """Which clusters of successive scans are one object (`tracks.py`). A tick is a scan's time.
+
+    Attributes:
+        gate_m: an object is looked for so far around where it is expected.
+        gate_per_tick_m: and so much farther for each tick that it was not seen.
+        longest_gap: ticks after which an object that was not seen is given up.
+        size_weight: metres of distance that a metre of change in size counts.
+        velocity_gain: share of a new velocity that is believed.
+        fewest_scans: shorter tracks are left out.
+    """
+
+    gate_m: float = 2.0
+    gate_per_tick_m: float = 0.5
+    longest_gap: int = 4
+    size_weight: float = 0.3
+    velocity_gain: float = 0.3
+    fewest_scans: int = 4
+
+
+@dataclass(frozen=True)
+class CompletionConfig:
+    """Which scans of a track are completed (`completion.py`).
+
+    Attributes:
+        looks: scans of a track that the network sees first, the fullest of equal parts of it.
+        worst_cost_m: tracks whose best first look costs more are no vehicles (METHOD 13.4: the
+            vehicles of a labelled street cost less than 0.2 m).
+        shortest_m: tracks whose first looks are all shorter are none either.
+        scans: of a track that are completed together.
+        ticks: between them; neighbours at 10 Hz are nearly the same scan.
+        fewest_points: scans of fewer are not completed where others are fuller.
+    """
+
+    looks: int = 3
+    worst_cost_m: float = 0.2
+    shortest_m: float = 2.2
+    scans: int = 16
+    ticks: int = 4
+    fewest_points: int = 60
+
+
+@dataclass(frozen=True)
+class VehicleConfig:
+    """Which completed tracks are vehicles (`vehicles.py`).
+
+    Attributes:
+        worst_cost_m: mean label-free cost of the whole track.
+        length_m: from and to.
+        width_m: from and to.
+        height_m: from and to.
+        fewest_points: that the fullest scan must have.
+        overlap: of two objects that share more of the smaller footprint one is left out.
+        same_time_frames: completed scans so near in time are compared.
+    """
+
+    worst_cost_m: float = 0.2
+    length_m: tuple[float, float] = (2.5, 9.0)
+    width_m: tuple[float, float] = (1.2, 2.8)
+    height_m: tuple[float, float] = (1.0, 3.6)
+    fewest_points: int = 60
+    overlap: float = 0.3
+    same_time_frames: int = 8
+
+
+@dataclass(frozen=True)
+class BoxConfig:
+    """How boxes are smoothed in time (`boxes.py`).
+
+    Attributes:
+        moving_m: an object that gets farther than this through its track may be moving.
+        moving_m_per_tick: and it must be as fast as this: 0.5 m/s at 10 Hz.
+        heading_m_per_tick: an object as fast as this looks where it goes: 1 m/s at 10 Hz.
+        smooth_ticks: over which the way of a moving object is smoothed, standard deviation.
+    """
+
+    moving_m: float = 1.0
+    moving_m_per_tick: float = 0.05
+    heading_m_per_tick: float = 0.1
+    smooth_ticks: float = 3.0
+
+
+@dataclass(frozen=True)
+class DriveConfig:
+    """Everything that decides what a drive gives besides the checkpoint."""
+
+    mounting: MountingConfig = field(default_factory=MountingConfig)
+    trajectory: TrajectoryConfig = field(default_factory=TrajectoryConfig)
+    ground: GroundConfig = field(default_factory=GroundConfig)
+    clusters: ClusterConfig = field(default_factory=ClusterConfig)
+    tracks: LinkConfig = field(default_factory=LinkConfig)
+    completion: CompletionConfig = field(default_factory=CompletionConfig)
+    vehicles: VehicleConfig = field(default_factory=VehicleConfig)
+    boxes: BoxConfig = field(default_factory=BoxConfig)

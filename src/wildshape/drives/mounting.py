@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""How a sensor is mounted: its height and tilt, from the ground around it.
+
+Planes through three points are tried (RANSAC: Fischler and Bolles 1981). The ground is the one with
+the most points on it and hardly any below; of many scans the middle one is believed, for roads
+slope.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from wildshape.drives.config import MountingConfig
+from wildshape.drives.source import Drive
+from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.records import Points
+
+_MOST_POINTS, _FEWEST_POINTS = 4000, 100
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """Where the sensor sits.
+
+    Attributes:
+        height_m: above the ground.
+        tilt_deg: between its z axis and the vertical.
+        up: `(3,)` the vertical in the sensor frame, unit length; (0, 0, 1) for one held level.
+    """
+
+    height_m: float
+    tilt_deg: float
+    up: tuple[float, float, float]
+
+    @property
+    def is_tilted(self) -> bool:
+        """Whether the sensor's z is not taken for vertical."""
+        return self.up != (0.0, 0.0, 1.0)
+
+    def levelling(self) -> SE3:
+        """`T_level_sensor`: the smallest turn after which z is vertical; the origin stays."""
+        up = torch.tensor(self.up, dtype=torch.float64)
+        x, y, z = self.up
+        axis = torch.tensor(((0.0, 0.0, -x), (0.0, 0.0, -y), (x, y, 0.0)), dtype=torch.float64)
+        # Rodrigues' formula; `axis` is the cross product's matrix times the sine.
+        turn = torch.eye(3, dtype=torch.float64) + axis + axis @ axis / (1.0 + z)
+        return SE3(turn, torch.zeros_like(up))
+
+
+def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
+    """Height and tilt of a drive's sensor.
+
+    Raises:
+        BadInputError: no scan shows ground around the sensor.
+    """
+    chosen = np.unique(np.linspace(0, len(drive) - 1, config.scans).round().astype(int))
+    planes = [ground_plane(drive.scan(int(frame)), config) for frame in chosen]
+    found = np.array([plane for plane in planes if plane is not None])
+    if not len(found):
+        drive.read(int(chosen[0]))  # says why if it cannot be read
+        raise BadInputError(
+            f"{drive.name}: no ground is seen below the sensor; the scans must be full ones in the"
+            " sensor's frame, metres, z up."
+        )
+    height = float(np.median(found[:, 3]))
+    up = np.median(found[:, :3], axis=0)
+    up /= np.linalg.norm(up)
+    tilt = math.degrees(math.acos(min(1.0, float(up[2]))))
+    if tilt < config.level_deg:
+        up = np.array((0.0, 0.0, 1.0))
+    x, y, z = up.tolist()
+    return Mounting(height, tilt, (x, y, z))
+
+
+def ground_plane(points: Points, config: MountingConfig) -> Float[np.ndarray, "4"] | None:
+    """Unit normal (upwards) of the ground around the sensor, and how far below it lies, metres.
+
+    None where a scan shows no ground: hardly any points, or no plane that is level enough.
+    """
+    rng = np.random.default_rng(0)
+    near = points[(points[:, :2] ** 2).sum(1) < config.reach_m**2].astype(np.float64)
+    near = near[rng.permutation(len(near))[:_MOST_POINTS]]
+    if len(near) < _FEWEST_POINTS:
+        return None
+    corners = near[rng.integers(len(near), size=(config.trials, 3))]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    normals = normals / np.where(lengths > 0, lengths, 1.0)[:, None]
+    normals *= np.where(normals[:, 2:] < 0, -1.0, 1.0)
+    depths = -(normals * corners[:, 0]).sum(1)
+    heights = near @ normals.T + depths  # of each point above each plane
+    on = (np.abs(heights) < config.thick_m).sum(0)
+    below = (heights < -config.thick_m).mean(0)
+    upright = normals[:, 2] > math.cos(math.radians(config.steepest_deg))
+    possible = upright & (depths > 0) & (below < config.below)
+    if not possible.any():
+        return None
+    best = int(np.where(possible, on, -1).argmax())
+    return _fitted(near[np.abs(heights[:, best]) < config.thick_m])
+
+
+def _fitted(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "4"]:
+    """The plane of least squared distances."""
+    middle = points.mean(0)
+    normal = np.linalg.svd(points - middle, full_matrices=False)[2][2]
+    normal = normal if normal[2] > 0 else -normal
+    return np.append(normal, -normal @ middle)

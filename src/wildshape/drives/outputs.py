@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a drive leaves in its folder for others: boxes, trajectory, tracks, completed shapes."""
+
+import csv
+import io
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from wildshape.drives.boxes import Way
+from wildshape.drives.completion import CATEGORY
+from wildshape.drives.placing import box_in_scan
+from wildshape.drives.sightings import Sightings
+from wildshape.drives.source import Drive
+from wildshape.drives.vehicles import Completed
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.completed_files import OBJECTS
+from wildshape.io.atomic import write_text
+from wildshape.io.boxes.detections import Detection, number_of
+from wildshape.io.boxes.table import BoxRow
+from wildshape.io.poses import write_poses, write_tum
+from wildshape.io.tracks import write_track
+from wildshape.records import Box
+
+TRAJECTORY, TUM, FRAMES, BOXES = "trajectory.txt", "trajectory.tum", "frames.csv", "boxes.csv"
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """A vehicle of a drive.
+
+    Attributes:
+        completed: its shape's place and size.
+        way: its boxes in the level world.
+        confidence: 0 to 1.
+    """
+
+    completed: Completed
+    way: Way
+    confidence: float
+
+    @property
+    def name(self) -> str:
+        """That of its folders."""
+        return self.completed.seen.name
+
+
+def write_trajectories(out: Path, drive: Drive, T_world_sensor: SE3) -> None:
+    """`trajectory.txt` and `trajectory.tum`; without times, time is counted in scans."""
+    write_tum(out / TUM, T_world_sensor, drive.times or drive.ticks)
+    write_poses(out / TRAJECTORY, T_world_sensor)
+
+
+def write_frames(path: Path, drive: Drive, points: Sequence[int]) -> None:
+    """Which scan each frame is; `points`: of each."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(("frame", "scan", "time", "points"))
+    times = drive.times or [""] * len(drive)
+    table.writerows(zip(range(len(drive)), drive.scan_names, times, points, strict=True))
+    write_text(path, text.getvalue())
+
+
+def write_vehicle_track(out: Path, seen: Sightings, cuts: Path, drive: Drive) -> None:
+    """All scans of a vehicle as a track folder, if it is not there yet."""
+    if not (out / seen.name / "scans").is_dir():
+        write_track(out / seen.name, seen.track(cuts, drive, CATEGORY))
+
+
+def copy_object(folder: Path, target: Path) -> None:
+    """A completed object from among the candidates to the results; `objects.json` comes last."""
+    if (target / OBJECTS).is_file():
+        return
+    shutil.copytree(
+        folder, target, ignore=shutil.ignore_patterns(OBJECTS, ".*"), dirs_exist_ok=True
+    )
+    write_text(target / OBJECTS, (folder / OBJECTS).read_text("utf-8"))
+
+
+def boxes_of(vehicle: Vehicle, T_level_sensor: SE3) -> list[tuple[int, Box]]:
+    """Frame and box in that frame's sensor frame, of all frames of a vehicle."""
+    size, way = vehicle.completed.size, vehicle.way
+    return [
+        (frame, box_in_scan(box, size, T_level_sensor[frame]))
+        for frame, box in zip(way.frames, way.boxes)
+    ]
+
+
+def rows_of(vehicle: Vehicle, boxes: list[tuple[int, Box]], drive: Drive) -> list[BoxRow]:
+    """A vehicle's lines of `boxes.csv`."""
+    seen = vehicle.completed.seen
+    points = dict(zip(seen.frames, seen.points))
+    return [
+        BoxRow(
+            frame,
+            None if drive.times is None else drive.times[frame],
+            vehicle.name,
+            *box.centre,
+            *box.size,
+            yaw=box.yaw,
+            confidence=vehicle.confidence,
+            points=points.get(frame, 0),
+            moving=vehicle.way.moving,
+        )
+        for frame, box in boxes
+    ]
+
+
+def detections_in(
+    vehicle: Vehicle, number: int, boxes: list[tuple[int, Box]], drive: Drive
+) -> list[Detection]:
+    """A vehicle's boxes for the formats of data sets; `number`: of it among all."""
+    return [
+        Detection(
+            track=vehicle.name,
+            track_number=number,
+            scan=drive.scan_names[frame],
+            scan_number=number_of(drive.scan_names[frame], frame),
+            category=CATEGORY,
+            sensor="lidar",
+            score=vehicle.confidence,
+            box=box,
+        )
+        for frame, box in boxes
+    ]

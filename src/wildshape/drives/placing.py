@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Between the frames of a drive: a scan's sensor frame, and the level world in which boxes stand.
+
+The world is the sensor frame of the first frame; the level world is it with z vertical.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from wildshape.drives.mounting import Mounting
+from wildshape.drives.sightings import Sightings
+from wildshape.drives.source import Drive
+from wildshape.drives.vehicles import Completed
+from wildshape.geometry.transforms.rotation import quaternion_from_rotation, rotation_z
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.completed_files import OBJECTS
+from wildshape.io.boxes.detections import Detection, detections_of, pose_of
+from wildshape.io.guard import read_json
+from wildshape.records import Box
+
+
+def level_poses(T_world_sensor: SE3, mounting: Mounting) -> SE3:
+    """`T_level_sensor` of every frame: from its sensor frame to the level world."""
+    return mounting.levelling() @ T_world_sensor
+
+
+def read_completed(seen: Sightings, folder: Path, drive: Drive, T_level_sensor: SE3) -> Completed:
+    """A completed object in the level world.
+
+    Args:
+        seen: the object.
+        folder: where `completion.py` wrote it.
+        drive: whose.
+        T_level_sensor: of every frame.
+
+    Raises:
+        BadInputError: the files are damaged.
+    """
+    said = read_json(folder / OBJECTS, "what complete writes")
+    found = list(detections_of(said, 0))
+    place = {name: frame for frame, name in enumerate(drive.scan_names)}
+    frames = tuple(place[one.scan] for one in found)
+    costs = [float(scan["cost_m"]) for scan in said["scans"]]
+    return Completed(
+        seen=seen,
+        frames=frames,
+        boxes=np.stack([_placed(one, T_level_sensor[frame]) for one, frame in zip(found, frames)]),
+        size=found[0].box.size,
+        cost_m=float(np.mean(costs)),
+        confidence=float(np.mean([one.score for one in found])),
+    )
+
+
+def _placed(one: Detection, T_level_sensor: SE3) -> Float[np.ndarray, "4"]:
+    """Centre and yaw in the level world."""
+    T = T_level_sensor @ pose_of(one.box)
+    yaw = torch.atan2(T.rotation[1, 0], T.rotation[0, 0])
+    return torch.cat((T.translation, yaw[None])).numpy()
+
+
+def box_in_scan(
+    box: Float[np.ndarray, "4"], size: tuple[float, float, float], T_level_sensor: SE3
+) -> Box:
+    """An upright box of the level world in the sensor frame of a frame.
+
+    Args:
+        box: centre x, y, z and yaw.
+        size: length, width, height.
+        T_level_sensor: of that frame.
+    """
+    upright = SE3(rotation_z(torch.tensor(box[3])), torch.from_numpy(box[:3]))
+    T_sensor_box = T_level_sensor.inverse() @ upright
+    x, y, z = T_sensor_box.translation.tolist()
+    qw, qx, qy, qz = quaternion_from_rotation(T_sensor_box.rotation).tolist()
+    return Box((x, y, z), size, (qw, qx, qy, qz))

@@ -1,0 +1,306 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A raw drive in, every vehicle out: the stages one after the other.
+
+Each stage leaves its files in the output folder and is not run again where they are: a killed run
+goes on.
+"""
+
+import shlex
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from wildshape.drives.boxes import smooth
+from wildshape.drives.completion import RULED_OUT, Completer
+from wildshape.drives.config import DriveConfig
+from wildshape.drives.mounting import Mounting, find_mounting
+from wildshape.drives.outputs import (
+    BOXES,
+    FRAMES,
+    TRAJECTORY,
+    TUM,
+    Vehicle,
+    boxes_of,
+    copy_object,
+    rows_of,
+    write_frames,
+    write_trajectories,
+    write_vehicle_track,
+)
+from wildshape.drives.placing import level_poses, read_completed
+from wildshape.drives.segmentation import cut_scans, read_cuts
+from wildshape.drives.sightings import Sightings, read_sightings, write_sightings
+from wildshape.drives.source import Drive, open_drive
+from wildshape.drives.tracks import Seen, link
+from wildshape.drives.trajectory import find_trajectory, jumps
+from wildshape.drives.vehicles import Judged, judge
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.completed_files import OBJECTS
+from wildshape.inference.predictor import Predictor, load
+from wildshape.io.atomic import write_json
+from wildshape.io.boxes.table import write_box_table
+from wildshape.io.guard import read_json
+from wildshape.io.output import begin, keep_apart
+from wildshape.io.poses import read_poses
+from wildshape.io.typed_records import record_of
+
+FILES = (
+    BOXES,
+    FRAMES,
+    TRAJECTORY,
+    TUM,
+    "tracks/*/track.json",
+    "tracks/*/scans/*.ply",
+    "objects/*/objects.json",
+    "objects/*/poses.txt",
+    "objects/*/completed/*.ply",
+    "stages/**/*",
+)
+_DEFAULT = DriveConfig()
+Watch = Callable[[str, int, int], None]
+"""Told the stage, how much of it is done, and how much there is."""
+
+
+def _silent(stage: str, done: int, total: int) -> None:
+    """Nobody is told."""
+    del stage, done, total
+
+
+@dataclass(frozen=True)
+class DriveResult:
+    """What was found in a drive.
+
+    Attributes:
+        out: the folder written.
+        frames: of the drive.
+        candidates: objects tracked, vehicles or not.
+        vehicles: their names.
+        boxes: lines of `boxes.csv`.
+        moving: vehicles that move.
+        warnings: what is odd about the drive, a sentence each.
+        seconds: by stage, of this run.
+    """
+
+    out: Path
+    frames: int
+    candidates: int
+    vehicles: tuple[str, ...]
+    boxes: int
+    moving: int
+    warnings: tuple[str, ...]
+    seconds: dict[str, float]
+
+
+@dataclass
+class _Clock:
+    """Seconds by stage, and who is told of progress."""
+
+    watch: Watch
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str, total: int) -> Iterator[Callable[[int], None]]:
+        began = time.perf_counter()
+        yield lambda done: self.watch(name, done, total)
+        self.seconds[name] = round(time.perf_counter() - began, 3)
+
+
+def drive(
+    source: Path | str,
+    out: Path | str,
+    config: DriveConfig = _DEFAULT,
+    *,
+    predictor: Predictor | None = None,
+    overwrite: bool = False,
+    watch: Watch = _silent,
+) -> DriveResult:
+    """Find every vehicle of a raw recording: its track, boxes and complete shape, without labels.
+
+    Args:
+        source: a folder of full scans, or a drive of KITTI (`source.py`).
+        out: folder to write (docs/drive.md); an interrupted run there is gone on with.
+        config: the numbers of every stage.
+        predictor: by default the shipped weights.
+        overwrite: remove an earlier output first.
+        watch: told of progress.
+
+    Raises:
+        BadInputError: source or output cannot be used.
+        MissingExtraError: a library is not installed.
+    """
+    source, out = Path(source), Path(out)
+    recording = open_drive(source)
+    predictor = load() if predictor is None else predictor
+    keep_apart(source, out)
+    settings = {
+        "source": str(source.resolve()),
+        "scans": len(recording),
+        "drive": asdict(config),
+        "model": predictor.settings.provenance,
+        "inference": asdict(predictor.config),
+    }
+    line = shlex.join(("wildshape", "drive", str(source), "--out", str(out)))
+    output = begin(out, "drive", settings, FILES, line, overwrite=overwrite)
+    found = _Run(recording, out, config, predictor, _Clock(watch)).perform()
+    output.finish(result={**asdict(found), "out": str(out)})
+    return found
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One drive on its way through the stages."""
+
+    drive: Drive
+    out: Path
+    config: DriveConfig
+    predictor: Predictor
+    clock: _Clock
+
+    @property
+    def stages(self) -> Path:
+        return self.out / "stages"
+
+    @property
+    def cuts(self) -> Path:
+        return self.stages / "clusters"
+
+    def perform(self) -> DriveResult:
+        mounting = self.mounting()
+        T_world_sensor = self.trajectory()
+        self.cut(mounting)
+        T_level_sensor = level_poses(T_world_sensor, mounting)
+        objects = self.tracks(T_level_sensor)
+        self.complete(objects, mounting)
+        vehicles = self.vehicles(objects, T_level_sensor)
+        boxes = self.write(vehicles, T_level_sensor)
+        return DriveResult(
+            out=self.out,
+            frames=len(self.drive),
+            candidates=len(objects),
+            vehicles=tuple(one.name for one in vehicles),
+            boxes=boxes,
+            moving=sum(one.way.moving for one in vehicles),
+            warnings=self.warnings(T_world_sensor),
+            seconds=self.clock.seconds,
+        )
+
+    def mounting(self) -> Mounting:
+        path = self.stages / "mounting.json"
+        with self.clock.stage("mounting", 1) as at:
+            if not path.is_file():
+                write_json(path, asdict(find_mounting(self.drive, self.config.mounting)))
+            at(1)
+            return record_of(Mounting, read_json(path, "the sensor's mounting"), {})
+
+    def trajectory(self) -> SE3:
+        path = self.out / TRAJECTORY
+        with self.clock.stage("trajectory", len(self.drive)) as at:
+            if not path.is_file():
+                found = find_trajectory(self.drive, self.config.trajectory, at)
+                write_trajectories(self.out, self.drive, found)
+            return read_poses(path, len(self.drive))
+
+    def cut(self, mounting: Mounting) -> None:
+        with self.clock.stage("clusters", len(self.drive)) as at:
+            cut_scans(self.drive, mounting, self.cuts, self.config, at)
+
+    def tracks(self, T_level_sensor: SE3) -> list[Sightings]:
+        path = self.stages / "tracks.json"
+        with self.clock.stage("tracks", 1) as at:
+            if not path.is_file():
+                write_sightings(path, self.linked(T_level_sensor))
+            at(1)
+            return read_sightings(path)
+
+    def linked(self, T_level_sensor: SE3) -> list[Sightings]:
+        counts = []
+
+        def seen() -> Iterator[Seen]:
+            for frame, cut in enumerate(read_cuts(self.cuts, len(self.drive))):
+                counts.append(cut.counts)
+                moved = [T_level_sensor[frame].apply_numpy(part) for part in cut.clusters()]
+                yield Seen.of(self.drive.ticks[frame], moved)
+
+        found = link(seen(), self.config.tracks, len(self.drive))
+        return [
+            Sightings(
+                f"{number:04d}",
+                tuple(one.frames),
+                tuple(one.rows),
+                tuple(int(counts[frame][row]) for frame, row in zip(one.frames, one.rows)),
+            )
+            for number, one in enumerate(found)
+        ]
+
+    def folder(self, seen: Sightings) -> Path:
+        return self.stages / "objects" / seen.name
+
+    def complete(self, objects: list[Sightings], mounting: Mounting) -> None:
+        level = mounting.levelling() if mounting.is_tilted else None
+        config = self.config.completion
+        completer = Completer(self.predictor, self.drive, self.cuts, level, config)
+        with self.clock.stage("completion", len(objects)) as at:
+            for number, seen in enumerate(objects, 1):
+                folder = self.folder(seen)
+                if not any((folder / name).is_file() for name in (OBJECTS, RULED_OUT)):
+                    completer.complete(seen, folder)
+                at(number)
+
+    def vehicles(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Vehicle]:
+        with self.clock.stage("vehicles", 1) as at:
+            completed = [
+                read_completed(seen, self.folder(seen), self.drive, T_level_sensor)
+                for seen in objects
+                if (self.folder(seen) / OBJECTS).is_file()
+            ]
+            said = judge(completed, self.config.vehicles)
+            self.write_judged(objects, said)
+            found = [
+                Vehicle(one, smooth(one, self.drive.ticks, self.config.boxes), one.confidence)
+                for one, judged in zip(completed, said)
+                if not judged.reasons
+            ]
+            at(1)
+            return found
+
+    def write_judged(self, objects: list[Sightings], said: list[Judged]) -> None:
+        """Why each object is a vehicle or not."""
+        by_name: dict[str, Any] = {one.name: list(one.reasons) for one in said}
+        for seen in objects:
+            by_name.setdefault(seen.name, ["first_looks"])
+        rows = [
+            {"track": name, "vehicle": not why, "reasons": why}
+            for name, why in sorted(by_name.items())
+        ]
+        write_json(self.stages / "vehicles.json", rows)
+
+    def write(self, vehicles: list[Vehicle], T_level_sensor: SE3) -> int:
+        with self.clock.stage("outputs", len(vehicles)) as at:
+            rows = []
+            for number, one in enumerate(vehicles, 1):
+                seen = one.completed.seen
+                write_vehicle_track(self.out / "tracks", seen, self.cuts, self.drive)
+                copy_object(self.folder(seen), self.out / "objects" / one.name)
+                rows += rows_of(one, boxes_of(one, T_level_sensor), self.drive)
+                at(number)
+            write_box_table(self.out / BOXES, rows)
+            return len(rows)
+
+    def warnings(self, T_world_sensor: SE3) -> tuple[str, ...]:
+        """What is odd about the drive; writes `frames.csv` on the way."""
+        points = [cut.scanned for cut in read_cuts(self.cuts, len(self.drive))]
+        write_frames(self.out / FRAMES, self.drive, points)
+        found = list(self.drive.warnings)
+        empty = points.count(0)
+        if empty:
+            found.append(f"{empty} of {len(points)} scans are empty or cannot be read")
+        leaps = list(jumps(T_world_sensor, self.drive.ticks, self.config.trajectory))
+        if leaps:
+            found.append(f"the sensor jumps {len(leaps)} times, first at frame {leaps[0]}")
+        if len(self.drive) < self.config.tracks.fewest_scans:
+            found.append(f"only {len(points)} scans: any object seen in all of them is tracked")
+        return tuple(found)

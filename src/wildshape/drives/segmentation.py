@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Each scan of a drive cut: its ground taken away, what stands on it kept in a file a scan."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Int
+
+from wildshape.drives.clusters import find_clusters
+from wildshape.drives.config import DriveConfig
+from wildshape.drives.ground import height_above_ground
+from wildshape.drives.mounting import Mounting
+from wildshape.drives.source import Drive
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.atomic import atomic_write
+from wildshape.io.guard import reading
+from wildshape.records import Points
+
+
+@dataclass(frozen=True)
+class CutScan:
+    """The clusters of one scan.
+
+    Attributes:
+        points: of all clusters, one after the other, sensor frame, metres.
+        counts: points of each cluster.
+        scanned: points of the whole scan.
+    """
+
+    points: Points
+    counts: Int[np.ndarray, "k"]
+    scanned: int
+
+    def clusters(self) -> list[Points]:
+        """The points of each cluster."""
+        return np.split(self.points, np.cumsum(self.counts)[:-1]) if len(self.counts) else []
+
+
+def cut(scan: Points, mounting: Mounting, T_level_sensor: SE3, config: DriveConfig) -> CutScan:
+    """The clusters of one scan that may be vehicles.
+
+    Args:
+        scan: whole, sensor frame, metres; it may be empty.
+        mounting: of the sensor.
+        T_level_sensor: of the sensor.
+        config: see there.
+    """
+    level = T_level_sensor.apply_numpy(scan) if mounting.is_tilted else scan
+    heights = height_above_ground(level, mounting.height_m, config.ground)
+    parts = find_clusters(level, heights, config.clusters)
+    rows = np.concatenate(parts) if parts else np.empty(0, np.int64)
+    return CutScan(scan[rows], np.array([len(part) for part in parts], np.int64), len(scan))
+
+
+def cut_scans(
+    drive: Drive,
+    mounting: Mounting,
+    folder: Path,
+    config: DriveConfig,
+    at: Callable[[int], None] = lambda _: None,
+) -> None:
+    """Cut every scan of a drive that has no file in the folder yet.
+
+    Args:
+        drive: its scans are read one by one.
+        mounting: of its sensor.
+        folder: `000000.npz` of each frame is written there.
+        config: see there.
+        at: told how many scans are done.
+    """
+    T_level_sensor = mounting.levelling()
+    for frame in range(len(drive)):
+        path = cut_file(folder, frame)
+        if not path.is_file():
+            found = cut(drive.scan(frame), mounting, T_level_sensor, config)
+            with atomic_write(path) as file:
+                np.savez(
+                    file, points=found.points, counts=found.counts, scanned=np.array(found.scanned)
+                )
+        at(frame + 1)
+
+
+def cut_file(folder: Path, frame: int) -> Path:
+    """Where the clusters of a frame are."""
+    return folder / f"{frame:06d}.npz"
+
+
+def read_cut(folder: Path, frame: int) -> CutScan:
+    """The clusters of one frame.
+
+    Raises:
+        BadInputError: the file is missing or damaged.
+    """
+    path = cut_file(folder, frame)
+    with reading(path, "the clusters of a scan"), np.load(path, allow_pickle=False) as found:
+        return CutScan(found["points"], found["counts"], int(found["scanned"]))
+
+
+def read_cuts(folder: Path, count: int) -> Iterator[CutScan]:
+    """The clusters of all frames, one after the other."""
+    return (read_cut(folder, frame) for frame in range(count))

@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""An object of a drive: in which frames it was seen, as which cluster, with how many points."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from wildshape.drives.segmentation import read_cut
+from wildshape.drives.source import Drive
+from wildshape.io.atomic import write_json
+from wildshape.io.guard import read_json
+from wildshape.io.typed_records import record_of
+from wildshape.records import Points, Track
+
+
+@dataclass(frozen=True)
+class Sightings:
+    """Where one object is among the clusters of a drive.
+
+    Attributes:
+        name: of the object.
+        frames: in which it was seen, rising.
+        rows: of its cluster in each of them.
+        points: of its cluster in each of them.
+    """
+
+    name: str
+    frames: tuple[int, ...]
+    rows: tuple[int, ...]
+    points: tuple[int, ...]
+
+    def part(self, kept: list[int]) -> "Sightings":
+        """The same object in some of its frames, by place."""
+        return Sightings(
+            self.name,
+            tuple(self.frames[i] for i in kept),
+            tuple(self.rows[i] for i in kept),
+            tuple(self.points[i] for i in kept),
+        )
+
+    def clouds(self, cuts: Path) -> list[Points]:
+        """Its points in each frame, sensor frame, metres."""
+        pairs = zip(self.frames, self.rows)
+        return [read_cut(cuts, frame).clusters()[row] for frame, row in pairs]
+
+    def track(self, cuts: Path, drive: Drive, category: str) -> Track:
+        """Its scans."""
+        names = tuple(drive.scan_names[frame] for frame in self.frames)
+        source = f"{drive.name}: cut out by `wildshape drive`, without labels"
+        return Track(self.name, tuple(self.clouds(cuts)), names, category=category, source=source)
+
+
+def write_sightings(path: Path, objects: list[Sightings]) -> None:
+    """Write all objects as one JSON file, atomically."""
+    write_json(path, [asdict(one) for one in objects])
+
+
+def read_sightings(path: Path) -> list[Sightings]:
+    """What `write_sightings` wrote.
+
+    Raises:
+        BadInputError: missing or damaged.
+    """
+    return [record_of(Sightings, one, {}) for one in read_json(path, "the objects of a drive")]

@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which clusters of successive scans are one object: assignment in the world frame.
+
+Each object is expected where it went (a constant velocity, drawn to what was seen). Of all ways to
+give clusters to objects the one of least total distance is taken (Kuhn 1955).
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from wildshape.drives.config import LinkConfig
+from wildshape.records import Points
+
+_FORBIDDEN = 1e6
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The clusters of one scan, as far as linking needs them.
+
+    Attributes:
+        tick: when.
+        centres: `(k, 3)` world frame, metres.
+        sizes: `(k, 3)` along the world's axes, metres.
+    """
+
+    tick: int
+    centres: Float[np.ndarray, "k 3"]
+    sizes: Float[np.ndarray, "k 3"]
+
+    @classmethod
+    def of(cls, tick: int, clusters: Sequence[Points]) -> "Seen":
+        """What is seen of clusters, world frame: the middle and the size of each one's extent."""
+        low = np.array([part.min(0) for part in clusters], np.float64).reshape(-1, 3)
+        high = np.array([part.max(0) for part in clusters], np.float64).reshape(-1, 3)
+        return cls(tick, (low + high) / 2, high - low)
+
+
+@dataclass
+class Linked:
+    """One object: its cluster's row in each frame in which it was seen."""
+
+    centre: Float[np.ndarray, "3"]
+    size: Float[np.ndarray, "3"]
+    tick: int
+    velocity: Float[np.ndarray, "3"] = field(default_factory=lambda: np.zeros(3))
+    frames: list[int] = field(default_factory=list)
+    rows: list[int] = field(default_factory=list)
+
+
+def link(scans: Iterable[Seen], config: LinkConfig, most_scans: int) -> list[Linked]:
+    """The objects seen in enough scans, in the order in which they were first seen.
+
+    Args:
+        scans: in time order.
+        config: see there.
+        most_scans: of the drive; of a very short one an object is to be in all.
+    """
+    every: list[Linked] = []
+    live: list[Linked] = []
+    for frame, seen in enumerate(scans):
+        live = [one for one in live if seen.tick - one.tick <= config.longest_gap]
+        pairs = _assigned(live, seen, config)
+        for row in range(len(seen.centres)):
+            if row in pairs:
+                _go_on(live[pairs[row]], seen, row, config)
+            else:
+                one = Linked(seen.centres[row], seen.sizes[row], seen.tick)
+                every.append(one)
+                live.append(one)
+                pairs[row] = len(live) - 1
+            live[pairs[row]].frames.append(frame)
+            live[pairs[row]].rows.append(row)
+    return [one for one in every if len(one.frames) >= min(config.fewest_scans, most_scans)]
+
+
+def _assigned(live: list[Linked], seen: Seen, config: LinkConfig) -> dict[int, int]:
+    """For each cluster that goes on with a live object, the object's place in `live`."""
+    from scipy.optimize import linear_sum_assignment
+
+    if not live or not len(seen.centres):
+        return {}
+    gaps = np.array([seen.tick - one.tick for one in live])
+    expected = np.stack([one.centre + one.velocity * gap for one, gap in zip(live, gaps)])
+    sizes = np.stack([one.size for one in live])
+    apart = np.linalg.norm((expected[:, None] - seen.centres)[..., :2], axis=-1)
+    unlike = np.abs(sizes[:, None] - seen.sizes).max(-1)
+    gate = config.gate_m + config.gate_per_tick_m * (gaps - 1)
+    cost = apart + config.size_weight * unlike
+    cost = np.where(cost < gate[:, None], cost, _FORBIDDEN)
+    chosen = zip(*linear_sum_assignment(cost))
+    return {int(row): int(one) for one, row in chosen if cost[one, row] < _FORBIDDEN}
+
+
+def _go_on(one: Linked, seen: Seen, row: int, config: LinkConfig) -> None:
+    """An object seen again."""
+    velocity = (seen.centres[row] - one.centre) / (seen.tick - one.tick)
+    gain = config.velocity_gain if len(one.frames) > 1 else 0.5
+    one.velocity = (1 - gain) * one.velocity + gain * velocity
+    one.centre, one.size, one.tick = seen.centres[row], seen.sizes[row], seen.tick
