@@ -87,7 +87,8 @@ def _floor(
     floor = np.zeros(side * side)
     floor[filled] = ground[order[middles], 2]
     empty = (counts == 0).reshape(side, side)
-    x, y = distance_transform_edt(empty, return_distances=False, return_indices=True)
+    nearest = distance_transform_edt(empty, return_distances=False, return_indices=True)
+    x, y = np.asarray(nearest)
     return floor.reshape(side, side)[x, y].ravel()[_cell(points, side, config.cell_m)]
 
 
