@@ -5,6 +5,7 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from wildshape.drives.run import drive
     from wildshape.errors import BadInputError, MissingExtraError
     from wildshape.inference.predictor import Predictor, load
     from wildshape.io.scans.writers import save
@@ -20,6 +21,7 @@ __all__ = [
     "Registration",
     "Sensor",
     "Track",
+    "drive",
     "load",
     "save",
 ]
@@ -28,6 +30,7 @@ _HOME = {
     "BadInputError": "wildshape.errors",
     "MissingExtraError": "wildshape.errors",
     "Predictor": "wildshape.inference.predictor",
+    "drive": "wildshape.drives.run",
     "load": "wildshape.inference.predictor",
     "save": "wildshape.io.scans.writers",
 }

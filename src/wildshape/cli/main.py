@@ -15,6 +15,7 @@ from wildshape.io.atomic import release_folders
 
 COMMANDS = {
     "demo": "the whole way on simulated scans, or on yours, in five minutes on a CPU",
+    "drive": "find every vehicle of a raw recording: tracks, boxes, shapes, without labels",
     "simulate": "make tracks of scans, with their truth, by ray casting",
     "convert": "turn a published data set, or your own folders, into tracks",
     "info": "say and draw what tracks hold: points, ranges, viewing angles, lengths",

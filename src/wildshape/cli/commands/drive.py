@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`wildshape drive`: every vehicle of a raw recording, without labels."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from tyro.conf import Positional, arg
+
+from wildshape.cli.options import AsJson, Device, Model, OutFolder, Overwrite
+from wildshape.errors import BadInputError
+
+if TYPE_CHECKING:
+    from wildshape.drives.run import DriveResult, Watch
+
+EXAMPLES = (
+    "wildshape drive recording --out found",
+    "wildshape drive 2011_09_26_drive_0048_sync --out found",
+    "wildshape drive monday tuesday --out found",
+)
+
+Sources = Annotated[
+    tuple[Path, ...],
+    Positional,
+    arg(
+        metavar="SOURCE",
+        help="folder of full scans, sorted by name (with times.txt or poses.txt if there are),"
+        " drive of KITTI raw, or sequence of KITTI odometry",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Find every vehicle of a raw recording: its track, boxes and complete shape, without labels.
+
+    Writes DIR/boxes.csv (a line a vehicle and frame, in that frame's sensor frame), trajectory.txt
+    (T_world_sensor), tracks/ (input for every other command) and objects/ (completed shapes); of
+    several drives each into a folder of its name. An interrupted run goes on where it stopped when
+    repeated.
+    """
+
+    source: Sources
+    out: OutFolder
+    model: Model = None
+    device: Device = "auto"
+    overwrite: Overwrite = False
+    json: AsJson = False
+
+
+def run(settings: Settings) -> None:
+    """Find the vehicles of every drive.
+
+    Raises:
+        BadInputError: a source, the model or the output cannot be used.
+        MissingExtraError: a library is not installed.
+    """
+    from wildshape.cli.models import load_model
+    from wildshape.cli.terminal import answer
+    from wildshape.drives.run import drive
+
+    folders = _folders(settings)
+    predictor = load_model(settings.model, settings.device)
+    found: list[DriveResult] = []
+    for source, out in folders.items():
+        with _bars() as watch:
+            overwrite = settings.overwrite
+            found.append(drive(source, out, predictor=predictor, overwrite=overwrite, watch=watch))
+    text = "\n".join(map(_sentence, found))
+    answer(text, {"drives": [_data(one) for one in found]}, as_json=settings.json)
+
+
+def _folders(settings: Settings) -> dict[Path, Path]:
+    """Where each drive goes."""
+    if not settings.source:
+        raise BadInputError("drive needs a SOURCE: a folder of full scans.")
+    if len(settings.source) == 1:
+        return {settings.source[0]: settings.out}
+    names = [source.resolve().name for source in settings.source]
+    for name in names:
+        if names.count(name) > 1:
+            raise BadInputError(f"{name}: two drives of one name; rename one.")
+    return {source: settings.out / name for source, name in zip(settings.source, names)}
+
+
+@contextmanager
+def _bars() -> "Iterator[Watch]":
+    """A bar of progress a stage."""
+    from contextlib import ExitStack
+
+    from wildshape.cli.terminal import Bar, progress
+
+    with ExitStack() as stack:
+        bars: dict[str, Bar] = {}
+
+        def watch(stage: str, done: int, total: int) -> None:
+            if stage not in bars:
+                stack.pop_all().close()
+                bars[stage] = stack.enter_context(progress(stage, total))
+            bars[stage].at(done)
+
+        yield watch
+
+
+def _sentence(found: "DriveResult") -> str:
+    from wildshape.cli.terminal import counted, duration, say
+
+    for warning in found.warnings:
+        say(f"{found.out.name}: {warning}")
+    vehicles = counted(len(found.vehicles), "vehicle")
+    return (
+        f"found {vehicles}, {found.moving} of them moving, in {counted(found.frames, 'scan')}"
+        f" in {duration(sum(found.seconds.values()))}; see {found.out}"
+    )
+
+
+def _data(found: "DriveResult") -> dict[str, Any]:
+    return {**asdict(found), "out": str(found.out)}
