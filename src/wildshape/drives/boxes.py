@@ -52,16 +52,17 @@ def smooth(one: Completed, ticks: tuple[int, ...], config: BoxConfig) -> Way:
 def moves(
     ticks: Float[np.ndarray, "k"], boxes: Float[np.ndarray, "k 4"], config: BoxConfig
 ) -> bool:
-    """Whether a vehicle gets far enough, and fast enough, to be moving and not only uncertain."""
-    if len(ticks) < 2:
+    """Whether a vehicle gets far enough, and fast enough, to be moving and not only uncertain.
+
+    Its velocity is the middle one of those between any two of its scans (Theil 1950, Sen 1968): a
+    few wrong poses do not move it.
+    """
+    early, late = np.triu_indices(len(ticks), 1)
+    if not len(early):
         return False
-    third = -(-len(ticks) // 3)
-    early, late = (
-        np.median(boxes[part, :2], axis=0) for part in (slice(third), slice(-third, None))
-    )
-    time = np.median(ticks[-third:]) - np.median(ticks[:third])
-    way = float(np.linalg.norm(late - early))
-    return way > config.moving_m and way > config.moving_m_per_tick * time
+    steps = (boxes[late, :2] - boxes[early, :2]) / (ticks[late] - ticks[early])[:, None]
+    speed = float(np.linalg.norm(np.median(steps, axis=0)))
+    return speed > config.moving_m_per_tick and speed * float(np.ptp(ticks)) > config.moving_m
 
 
 def _middle(boxes: Float[np.ndarray, "k 4"]) -> Float[np.ndarray, "4"]:

@@ -39,14 +39,18 @@ class TrajectoryConfig:
     Attributes:
         range_m: farthest points that are used.
         nearest_m: nearer ones are the vehicle that carries the sensor.
-        voxel_m: size of the local map's cells, KISS-ICP's hundredth of its default range.
+        ground_m: ground farther away is not used.
+        standing_m: what is higher above the ground is.
+        voxel_m: size of the local map's cells.
         jump_m: steps of neighbouring scans that differ by more are counted as a jump. At 10 Hz no
             vehicle changes its speed by 20 m/s in between.
     """
 
     range_m: float = 100.0
     nearest_m: float = 2.0
-    voxel_m: float = 1.0
+    ground_m: float = 10.0
+    standing_m: float = 0.2
+    voxel_m: float = 0.5
     jump_m: float = 2.0
 
 

@@ -51,6 +51,10 @@ class Mounting:
         turn = torch.eye(3, dtype=torch.float64) + axis + axis @ axis / (1.0 + z)
         return SE3(turn, torch.zeros_like(up))
 
+    def level(self, scan: Points) -> Points:
+        """A scan with z vertical."""
+        return self.levelling().apply_numpy(scan) if self.is_tilted else scan
+
 
 def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
     """Height and tilt of a drive's sensor.

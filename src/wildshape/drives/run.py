@@ -170,7 +170,7 @@ class _Run:
 
     def perform(self) -> DriveResult:
         mounting = self.mounting()
-        T_world_sensor = self.trajectory()
+        T_world_sensor = self.trajectory(mounting)
         self.cut(mounting)
         T_level_sensor = level_poses(T_world_sensor, mounting)
         objects = self.tracks(T_level_sensor)
@@ -196,11 +196,11 @@ class _Run:
             at(1)
             return record_of(Mounting, read_json(path, "the sensor's mounting"), {})
 
-    def trajectory(self) -> SE3:
+    def trajectory(self, mounting: Mounting) -> SE3:
         path = self.out / TRAJECTORY
         with self.clock.stage("trajectory", len(self.drive)) as at:
             if not path.is_file():
-                found = find_trajectory(self.drive, self.config.trajectory, at)
+                found = find_trajectory(self.drive, mounting, self.config, at)
                 write_trajectories(self.out, self.drive, found)
             return read_poses(path, len(self.drive))
 
@@ -218,14 +218,18 @@ class _Run:
 
     def linked(self, T_level_sensor: SE3) -> list[Sightings]:
         counts = []
+        usable = 0
 
         def seen() -> Iterator[Seen]:
+            nonlocal usable
             for frame, cut in enumerate(read_cuts(self.cuts, len(self.drive))):
                 counts.append(cut.counts)
+                usable += cut.scanned > 0
                 moved = [T_level_sensor[frame].apply_numpy(part) for part in cut.clusters()]
                 yield Seen.of(self.drive.ticks[frame], moved)
 
-        found = link(seen(), self.config.tracks, len(self.drive))
+        found = link(seen(), self.config.tracks)
+        fewest = min(self.config.tracks.fewest_scans, usable)
         return [
             Sightings(
                 f"{number:04d}",
@@ -233,7 +237,7 @@ class _Run:
                 tuple(one.rows),
                 tuple(int(counts[frame][row]) for frame, row in zip(one.frames, one.rows)),
             )
-            for number, one in enumerate(found)
+            for number, one in enumerate(one for one in found if len(one.frames) >= fewest)
         ]
 
     def folder(self, seen: Sightings) -> Path:
@@ -301,6 +305,4 @@ class _Run:
         leaps = list(jumps(T_world_sensor, self.drive.ticks, self.config.trajectory))
         if leaps:
             found.append(f"the sensor jumps {len(leaps)} times, first at frame {leaps[0]}")
-        if len(self.drive) < self.config.tracks.fewest_scans:
-            found.append(f"only {len(points)} scans: any object seen in all of them is tracked")
         return tuple(found)

@@ -14,7 +14,6 @@ from wildshape.drives.config import DriveConfig
 from wildshape.drives.ground import height_above_ground
 from wildshape.drives.mounting import Mounting
 from wildshape.drives.source import Drive
-from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import atomic_write
 from wildshape.io.guard import reading
 from wildshape.records import Points
@@ -39,16 +38,15 @@ class CutScan:
         return np.split(self.points, np.cumsum(self.counts)[:-1]) if len(self.counts) else []
 
 
-def cut(scan: Points, mounting: Mounting, T_level_sensor: SE3, config: DriveConfig) -> CutScan:
+def cut(scan: Points, mounting: Mounting, config: DriveConfig) -> CutScan:
     """The clusters of one scan that may be vehicles.
 
     Args:
         scan: whole, sensor frame, metres; it may be empty.
         mounting: of the sensor.
-        T_level_sensor: of the sensor.
         config: see there.
     """
-    level = T_level_sensor.apply_numpy(scan) if mounting.is_tilted else scan
+    level = mounting.level(scan)
     heights = height_above_ground(level, mounting.height_m, config.ground)
     parts = find_clusters(level, heights, config.clusters)
     rows = np.concatenate(parts) if parts else np.empty(0, np.int64)
@@ -71,11 +69,10 @@ def cut_scans(
         config: see there.
         at: told how many scans are done.
     """
-    T_level_sensor = mounting.levelling()
     for frame in range(len(drive)):
         path = cut_file(folder, frame)
         if not path.is_file():
-            found = cut(drive.scan(frame), mounting, T_level_sensor, config)
+            found = cut(drive.scan(frame), mounting, config)
             with atomic_write(path) as file:
                 np.savez(
                     file, points=found.points, counts=found.counts, scanned=np.array(found.scanned)

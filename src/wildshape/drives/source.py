@@ -54,6 +54,16 @@ class Drive:
             return np.empty((0, 3), np.float32)
 
 
+@dataclass(frozen=True)
+class _Files:
+    """Reads a frame's file."""
+
+    files: tuple[Path, ...]
+
+    def __call__(self, frame: int) -> Points:
+        return read_points(self.files[frame])
+
+
 def open_drive(path: Path | str) -> Drive:
     """A folder of full scans, a drive of KITTI raw or a sequence of KITTI odometry.
 
@@ -85,7 +95,7 @@ def _drive(path: Path, files: list[Path], times: list[float] | None, poses: Path
         name=path.name or path.resolve().name,
         scan_names=names,
         ticks=ticks,
-        read=lambda frame: read_points(files[frame]),
+        read=_Files(tuple(files)),
         times=None if times is None else tuple(times),
         T_world_sensor=None if poses is None else read_poses(poses, len(files)),
         warnings=missing,

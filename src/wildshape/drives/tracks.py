@@ -52,14 +52,8 @@ class Linked:
     rows: list[int] = field(default_factory=list)
 
 
-def link(scans: Iterable[Seen], config: LinkConfig, most_scans: int) -> list[Linked]:
-    """The objects seen in enough scans, in the order in which they were first seen.
-
-    Args:
-        scans: in time order.
-        config: see there.
-        most_scans: of the drive; of a very short one an object is to be in all.
-    """
+def link(scans: Iterable[Seen], config: LinkConfig) -> list[Linked]:
+    """The objects seen in scans in time order, in the order in which they were first seen."""
     every: list[Linked] = []
     live: list[Linked] = []
     for frame, seen in enumerate(scans):
@@ -75,7 +69,7 @@ def link(scans: Iterable[Seen], config: LinkConfig, most_scans: int) -> list[Lin
                 pairs[row] = len(live) - 1
             live[pairs[row]].frames.append(frame)
             live[pairs[row]].rows.append(row)
-    return [one for one in every if len(one.frames) >= min(config.fewest_scans, most_scans)]
+    return every
 
 
 def _assigned(live: list[Linked], seen: Seen, config: LinkConfig) -> dict[int, int]:

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The way of the sensor through a drive, by LiDAR odometry.
 
-KISS-ICP: Vizzo et al., RA-L 2023.
+KISS-ICP: Vizzo et al., RA-L 2023. Rings of a level sensor on a flat road look the same wherever it
+stands and hold the odometry back, so ground is used near the sensor alone, for height and tilt.
 """
 
 from collections.abc import Callable, Iterator
@@ -10,10 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wildshape.drives.config import TrajectoryConfig
+from wildshape.drives.config import DriveConfig, TrajectoryConfig
+from wildshape.drives.ground import height_above_ground
+from wildshape.drives.mounting import Mounting
 from wildshape.drives.source import Drive
 from wildshape.errors import MissingExtraError
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.records import Points
 
 if TYPE_CHECKING:
     from kiss_icp.kiss_icp import KissICP
@@ -22,7 +26,10 @@ _FEWEST_POINTS = 100
 
 
 def find_trajectory(
-    drive: Drive, config: TrajectoryConfig, at: Callable[[int], None] = lambda _: None
+    drive: Drive,
+    mounting: Mounting,
+    config: DriveConfig,
+    at: Callable[[int], None] = lambda _: None,
 ) -> SE3:
     """`T_world_sensor` of every frame; the world is the sensor frame of the first.
 
@@ -31,6 +38,7 @@ def find_trajectory(
 
     Args:
         drive: its scans are read one by one.
+        mounting: of its sensor.
         config: see there.
         at: told how many scans are done.
 
@@ -39,10 +47,10 @@ def find_trajectory(
     """
     if drive.T_world_sensor is not None:
         return drive.T_world_sensor[0].inverse() @ drive.T_world_sensor
-    odometry = _odometry(config)
+    odometry = _odometry(config.trajectory)
     poses = []
     for frame in range(len(drive)):
-        scan = drive.scan(frame)
+        scan = _landmarks(drive.scan(frame), mounting, config)
         if len(scan) < _FEWEST_POINTS:
             odometry.last_pose = odometry.last_pose @ odometry.last_delta
         else:
@@ -50,6 +58,14 @@ def find_trajectory(
         poses.append(odometry.last_pose.copy())
         at(frame + 1)
     return SE3.from_matrix(np.linalg.inv(poses[0]) @ np.stack(poses))
+
+
+def _landmarks(scan: Points, mounting: Mounting, config: DriveConfig) -> Points:
+    """What stands on the ground, and the ground near the sensor."""
+    level = mounting.level(scan)
+    heights = height_above_ground(level, mounting.height_m, config.ground)
+    near = np.hypot(level[:, 0], level[:, 1]) < config.trajectory.ground_m
+    return scan[near | (heights > config.trajectory.standing_m)]
 
 
 def jumps(T_world_sensor: SE3, ticks: tuple[int, ...], config: TrajectoryConfig) -> Iterator[int]:
@@ -69,6 +85,7 @@ def _odometry(config: TrajectoryConfig) -> "KissICP":
             " or give a poses.txt beside the scans."
         ) from error
     settings = load_config(None)
+    settings.registration.max_num_threads = 1  # the same scans give the same way to the last bit
     settings.data.deskew = False  # the files hold no time of each point
     settings.data.min_range, settings.data.max_range = config.nearest_m, config.range_m
     settings.mapping.voxel_size = config.voxel_m

@@ -8,8 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+Place = Float[np.ndarray, "4"]
+"""Centre x, y, z and yaw, metres and radians."""
 
-def footprint(box: Sequence[float], size: Sequence[float]) -> Float[np.ndarray, "4 2"]:
+
+def footprint(box: Place, size: Sequence[float]) -> Float[np.ndarray, "4 2"]:
     """Corners of a box seen from above, counter-clockwise.
 
     Args:
@@ -22,7 +25,7 @@ def footprint(box: Sequence[float], size: Sequence[float]) -> Float[np.ndarray, 
 
 
 def footprint_overlap(
-    box: Sequence[float], size: Sequence[float], other: Sequence[float], other_size: Sequence[float]
+    box: Place, size: Sequence[float], other: Place, other_size: Sequence[float]
 ) -> float:
     """The ground that two boxes share, as a part of the smaller one's; see `footprint`."""
     shared = _clipped(footprint(box, size), footprint(other, other_size))
@@ -31,7 +34,7 @@ def footprint_overlap(
 
 
 def footprint_iou(
-    box: Sequence[float], size: Sequence[float], other: Sequence[float], other_size: Sequence[float]
+    box: Place, size: Sequence[float], other: Place, other_size: Sequence[float]
 ) -> float:
     """Intersection over union in bird's eye view, 0 to 1; see `footprint`."""
     shared = _area(_clipped(footprint(box, size), footprint(other, other_size)))

@@ -1,0 +1,211 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A whole drive, from its scans to boxes.csv, against its truth."""
+
+import json
+import math
+import shutil
+import weakref
+
+import numpy as np
+import pytest
+from tests.drives.street import street
+from tests.refusal import refused
+
+import wildshape
+from wildshape.drives import run
+from wildshape.drives.config import DriveConfig
+from wildshape.drives.mounting import Mounting
+from wildshape.drives.segmentation import cut_scans
+from wildshape.drives.source import open_drive
+from wildshape.drives.trajectory import find_trajectory
+from wildshape.geometry.footprint import footprint_iou
+from wildshape.io.boxes.detections import read_detections
+from wildshape.io.boxes.table import HEADER, read_box_table
+from wildshape.io.poses import read_poses, read_tum
+from wildshape.io.tracks import read_track
+
+pytest.importorskip("kiss_icp")
+pytest.importorskip("pypatchworkpp")
+
+
+LEVEL = Mounting(1.7, 0.0, (0.0, 0.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return street()
+
+
+@pytest.fixture(scope="module")
+def recording(truth, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("street") / "recording"
+    folder.mkdir()
+    for frame, scan in enumerate(truth.scans):
+        np.save(folder / f"{frame:06d}.npy", scan)
+    times = "".join(f"{0.1 * frame:.1f}\n" for frame in range(len(truth.scans)))
+    (folder / "times.txt").write_text(times)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(recording, tmp_path_factory):
+    return wildshape.drive(recording, tmp_path_factory.mktemp("found") / "out")
+
+
+def test_the_trajectory_is_the_sensor_s_way(found, truth):
+    places = read_poses(found.out / "trajectory.txt", len(truth.scans)).translation.numpy()
+    assert np.abs(places[:, :2] - truth.places).max() < 0.1
+    times, poses = read_tum(found.out / "trajectory.tum")
+    assert times == pytest.approx([0.1 * frame for frame in range(len(truth.scans))])
+    assert np.allclose(poses.translation.numpy(), places)
+
+
+def test_every_car_is_one_track_and_nothing_else_is(found, truth):
+    rows = read_box_table(found.out / "boxes.csv")
+    owners = {}
+    for row in rows:
+        shares = {
+            name: footprint_iou(
+                np.array((row.x, row.y, row.z, row.yaw)),
+                (row.length, row.width),
+                np.array((*way[row.frame][:2] - truth.places[row.frame], 0.0, way[row.frame][2])),
+                tuple(map(float, truth.sizes[name][:2])),
+            )
+            for name, way in truth.cars.items()
+        }
+        best = max(shares, key=lambda name: shares[name])
+        assert shares[best] > 0.5, (row, shares)
+        owners.setdefault(best, set()).add((row.track, row.moving))
+        assert row.time == pytest.approx(0.1 * row.frame)
+    assert set(owners) == set(truth.cars)
+    assert all(len(tracks) == 1 for tracks in owners.values()), owners
+    assert {
+        name: moving for name, ((_, moving),) in ((n, tuple(t)) for n, t in owners.items())
+    } == {
+        "near": False,
+        "left": False,
+        "far": False,
+        "moving": True,
+    }
+
+
+def test_a_moving_car_looks_where_it_drives(found, truth):
+    rows = [row for row in read_box_table(found.out / "boxes.csv") if row.moving]
+    assert rows
+    for row in rows:
+        assert math.cos(row.yaw - truth.cars["moving"][row.frame][2]) > 0.9
+
+
+def test_what_is_written_is_what_the_documents_say(found, truth):
+    out = found.out
+    assert (out / "boxes.csv").read_text("utf-8").splitlines()[0] == (
+        "frame,time,track,x,y,z,length,width,height,yaw,confidence,points,moving"
+    )
+    assert ",".join(HEADER) == (out / "boxes.csv").read_text("utf-8").splitlines()[0]
+    rows = read_box_table(out / "boxes.csv")
+    assert len(rows) == found.boxes
+    assert set(found.vehicles) == {row.track for row in rows}
+    assert set(found.vehicles) == {folder.name for folder in (out / "tracks").iterdir()}
+    assert set(found.vehicles) == {folder.name for folder in (out / "objects").iterdir()}
+    frames = (out / "frames.csv").read_text("utf-8").splitlines()
+    assert frames[0] == "frame,scan,time,points"
+    assert frames[2].startswith(f"1,000001,0.1,{len(truth.scans[1])}")
+    said = json.loads((out / "wildshape.json").read_text("utf-8"))
+    assert said["status"] == "finished"
+    assert said["settings"]["drive"]["clusters"]["range_m"] == 60.0
+
+
+def test_tracks_and_objects_are_those_of_the_other_commands(found):
+    names = {row.track for row in read_box_table(found.out / "boxes.csv")}
+    boxes = read_detections(found.out / "objects")
+    assert {one.track for one in boxes} == names
+    for name in names:
+        track = read_track(found.out / "tracks" / name)
+        rows = [row for row in read_box_table(found.out / "boxes.csv") if row.track == name]
+        seen = {f"{row.frame:06d}": row.points for row in rows if row.points}
+        assert {n: len(s) for n, s in zip(track.scan_names, track.scans)} == seen
+        completed = {path.stem for path in (found.out / "objects" / name / "completed").iterdir()}
+        assert completed == {one.scan for one in boxes if one.track == name} <= set(seen)
+
+
+def test_a_run_killed_at_any_stage_goes_on_to_the_same_boxes(
+    found, recording, tmp_path, monkeypatch
+):
+    """The stages are stopped one after the other; each next run begins where the last stopped."""
+
+    class Killed(BaseException):
+        pass
+
+    def killed(*_, **__):
+        raise Killed
+
+    for stage in ("find_trajectory", "cut_scans", "link", "write_sightings", "judge", "rows_of"):
+        with monkeypatch.context() as patched:
+            patched.setattr(run, stage, killed)
+            with pytest.raises(Killed):
+                wildshape.drive(recording, tmp_path / "out")
+    again = wildshape.drive(recording, tmp_path / "out")
+    assert again.seconds["trajectory"] < 1.0
+    for name in ("boxes.csv", "trajectory.txt", "frames.csv", "stages/tracks.json"):
+        assert (tmp_path / "out" / name).read_bytes() == (found.out / name).read_bytes(), name
+
+
+def test_other_settings_do_not_go_on_with_an_output(found, recording):
+    refused(wildshape.drive, recording, found.out, match="--overwrite")
+
+
+def test_poses_beside_the_scans_skip_the_odometry(recording, truth, tmp_path):
+    folder = shutil.copytree(recording, tmp_path / "with_poses")
+    lines = [f"1 0 0 {x} 0 1 0 {y} 0 0 1 0\n" for x, y in truth.places + 7.0]
+    (folder / "poses.txt").write_text("".join(lines))
+    drive = open_drive(folder)
+    poses = find_trajectory(drive, LEVEL, DriveConfig())
+    assert poses.translation.numpy()[:, :2] == pytest.approx(truth.places)
+
+
+def test_scans_are_in_memory_one_by_one(recording, tmp_path):
+    drive = open_drive(recording)
+    alive = weakref.WeakSet()
+    most = 0
+
+    class Held(np.ndarray):
+        __hash__ = object.__hash__
+
+    def read(frame):
+        nonlocal most
+        scan = np.load(recording / f"{frame:06d}.npy").view(Held)
+        alive.add(scan)
+        most = max(most, len(alive))
+        return scan
+
+    object.__setattr__(drive, "read", read)
+    find_trajectory(drive, LEVEL, DriveConfig())
+    cut_scans(drive, LEVEL, tmp_path / "cuts", DriveConfig())
+    assert most <= 2
+
+
+def test_three_scans_an_empty_and_a_damaged_one_are_warnings(recording, tmp_path):
+    folder = tmp_path / "few"
+    folder.mkdir()
+    for name in ("000000.npy", "000001.npy", "000002.npy"):
+        shutil.copy(recording / name, folder)
+    np.save(folder / "000003.npy", np.empty((0, 3), np.float32))
+    (folder / "000005.npy").write_bytes(b"damaged")
+    few = wildshape.drive(folder, tmp_path / "out")
+    assert few.frames == 5
+    assert few.warnings == (
+        "1 scans are missing between the others",
+        "2 of 5 scans are empty or cannot be read",
+    )
+    assert few.vehicles
+
+
+def test_what_is_no_drive_is_refused(tmp_path):
+    folder = tmp_path / "object"
+    folder.mkdir()
+    rng = np.random.default_rng(0)
+    np.save(folder / "0.npy", rng.uniform((8, -1, 0), (12, 1, 1.5), (500, 3)))
+    refused(wildshape.drive, folder, tmp_path / "out", match="no ground is seen")
+    (folder / "0.npy").write_bytes(b"damaged")
+    refused(wildshape.drive, folder, tmp_path / "other", match="expected a numpy array")

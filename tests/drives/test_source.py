@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where drives come from: folders, KITTI's layouts, times and poses beside the scans."""
+
+import numpy as np
+import pytest
+from tests.refusal import refused
+
+from wildshape.drives.source import open_drive
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.poses import write_poses
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_scans(tmp_path / "drive", range(4))
+    return tmp_path / "drive"
+
+
+def write_scans(folder, numbers):
+    folder.mkdir(parents=True, exist_ok=True)
+    for number in numbers:
+        rows = np.full((50, 4), number, np.float32)
+        rows.tofile(folder / f"{number:06d}.bin")
+
+
+def test_names_sorted_are_the_order_in_time(folder):
+    drive = open_drive(folder)
+    assert (len(drive), drive.name, drive.times) == (4, "drive", None)
+    assert drive.scan_names == ("000000", "000001", "000002", "000003")
+    assert [float(drive.scan(frame)[0, 0]) for frame in range(4)] == [0, 1, 2, 3]
+    assert (drive.ticks, drive.warnings) == ((0, 1, 2, 3), ())
+
+
+def test_a_missing_scan_is_counted_and_leaves_its_time_out(tmp_path):
+    write_scans(tmp_path, (7, 8, 11))
+    drive = open_drive(tmp_path)
+    assert drive.ticks == (0, 1, 4)
+    assert drive.warnings == ("2 scans are missing between the others",)
+
+
+def test_times_beside_the_scans_are_seconds(folder):
+    (folder / "times.txt").write_text("5.0\n5.1\n5.2\n5.5\n")
+    drive = open_drive(folder)
+    assert drive.times == (5.0, 5.1, 5.2, 5.5)
+    assert drive.ticks == (0, 1, 2, 5)
+
+
+def test_poses_beside_the_scans_are_used(folder):
+    poses = SE3.identity(4)
+    write_poses(folder / "poses.txt", poses)
+    found = open_drive(folder).T_world_sensor
+    assert found is not None
+    assert len(found) == 4
+
+
+def test_kitti_raw_and_odometry(tmp_path):
+    raw = tmp_path / "2011_09_26_drive_0048_sync"
+    write_scans(raw / "velodyne_points" / "data", range(3))
+    stamps = [f"2011-09-26 13:02:25.{n}67208721\n" for n in (1, 2, 3)]
+    (raw / "velodyne_points" / "timestamps.txt").write_text("".join(stamps))
+    drive = open_drive(raw)
+    assert (drive.name, len(drive)) == (raw.name, 3)
+    assert drive.times is not None
+    assert np.diff(drive.times) == pytest.approx([0.1, 0.1], abs=1e-5)
+    odometry = tmp_path / "00"
+    write_scans(odometry / "velodyne", range(3))
+    (odometry / "times.txt").write_text("0.0\n1.036e-01\n2.073e-01\n")
+    (odometry / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 3)  # a camera's: not used
+    found = open_drive(odometry)
+    assert (found.ticks, found.T_world_sensor) == ((0, 1, 2), None)
+
+
+def test_what_cannot_be_a_drive_is_refused_in_a_sentence(folder, tmp_path):
+    refused(open_drive, tmp_path / "none", match="no such folder")
+    (tmp_path / "empty").mkdir()
+    refused(open_drive, tmp_path / "empty", match="holds no scan")
+    (folder / "times.txt").write_text("1\n2\n3\n")
+    refused(open_drive, folder, match="3 times for 4 scans")
+    (folder / "times.txt").write_text("1\n2\n1.5\n3\n")
+    refused(open_drive, folder, match=r"time 3 \(1.5\) is not after")
+    (folder / "times.txt").write_text("1\n2\nnan\n3\n")
+    refused(open_drive, folder, match="not finite")
+    (folder / "times.txt").unlink()
+    (folder / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
+    refused(open_drive, folder, match="1 lines of poses for 4 scans")
+    (folder / "poses.txt").unlink()
+    np.save(folder / "000001.npy", np.zeros((3, 3)))
+    refused(open_drive, folder, match="are one frame")
