@@ -170,7 +170,7 @@ def test_scans_are_in_memory_one_by_one(recording, tmp_path):
     most = 0
 
     class Held(np.ndarray):
-        __hash__ = object.__hash__
+        __hash__ = object.__hash__  # pyright: ignore[reportAssignmentType]
 
     def read(frame):
         nonlocal most
