@@ -245,8 +245,7 @@ def test_a_jump_is_counted_and_a_missing_scan_is_none():
 
 @given(st.floats(-math.pi, math.pi), st.floats(-2, 2), st.floats(-2, 2))
 def test_the_footprint_of_upright_boxes_overlaps_as_the_boxes_do(yaw, x, y):
-    from wildshape.geometry.box import FittedBox
-    from wildshape.geometry.box_overlap import box_iou
+    from wildshape.geometry.box import FittedBox, box_iou
     from wildshape.geometry.footprint import footprint_iou
     from wildshape.geometry.transforms.rotation import rotation_z
 

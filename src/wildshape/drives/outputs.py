@@ -49,7 +49,7 @@ class Vehicle:
 
 def write_trajectories(out: Path, drive: Drive, T_world_sensor: SE3) -> None:
     """`trajectory.txt` and `trajectory.tum`; without times, time is counted in scans."""
-    write_tum(out / TUM, T_world_sensor, drive.times or [float(tick) for tick in drive.ticks])
+    write_tum(out / TUM, T_world_sensor, drive.times or drive.ticks)
     write_poses(out / TRAJECTORY, T_world_sensor)
 
 

@@ -90,7 +90,7 @@ def times_of(scan_names: Sequence[str]) -> list[int]:
     return list(range(len(scan_names)))
 
 
-def write_tum(path: Path, poses: SE3, times: Sequence[float]) -> None:
+def write_tum(path: Path, poses: SE3, times: Sequence[float] | Sequence[int]) -> None:
     """Write `(n,)` poses, a line each, at full precision, atomically."""
     wxyz = quaternion_from_rotation(poses.rotation.double())
     rows = torch.cat((poses.translation.double(), wxyz[:, 1:], wxyz[:, :1]), dim=-1).tolist()

@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from tyro.conf import Positional, arg
+from tyro.conf import Positional
 
-from wildshape.cli.options import AsJson, Device, Model, OutFolder, Overwrite
+from wildshape.cli.options import AsJson, Device, Model, OutFolder, Overwrite, option
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ EXAMPLES = (
 Sources = Annotated[
     tuple[Path, ...],
     Positional,
-    arg(
+    option(
         metavar="SOURCE",
         help="folder of full scans, sorted by name (with times.txt or poses.txt if there are),"
         " drive of KITTI raw, or sequence of KITTI odometry",
