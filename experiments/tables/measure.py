@@ -19,12 +19,11 @@ from wildshape.cli.models import choose_device, fingerprint, load_model
 from wildshape.cli.terminal import say
 from wildshape.errors import MissingExtraError
 from wildshape.evaluation.method import Method
-from wildshape.evaluation.metrics import BoxScore, CompletionError
+from wildshape.evaluation.metrics import BoxScore, CompletionError, RegistrationScore
 from wildshape.evaluation.results import (
     CompletionScore,
     Limits,
     MethodScores,
-    RegistrationScore,
     Results,
     Rotate,
     Skipped,

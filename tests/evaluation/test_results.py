@@ -10,14 +10,13 @@ from wildshape.baselines.icp import LocalIcp
 from wildshape.baselines.identity import OneScan
 from wildshape.baselines.pairs import Chained
 from wildshape.evaluation.examples import gather, pick
-from wildshape.evaluation.metrics import CompletionError
+from wildshape.evaluation.metrics import CompletionError, RegistrationScore
 from wildshape.evaluation.paper import ABLATION_ROWS, LIDAR_ROWS, VIEW_ROWS
 from wildshape.evaluation.pictures import draw_errors, draw_examples, project, write_figures
 from wildshape.evaluation.protocol import run
 from wildshape.evaluation.results import (
     CompletionScore,
     MethodScores,
-    RegistrationScore,
     Results,
     Skipped,
 )

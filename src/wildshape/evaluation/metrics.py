@@ -66,6 +66,17 @@ class RegistrationError:
     translation_m: Float[Tensor, "V"]
 
 
+@dataclass(frozen=True)
+class RegistrationScore:
+    """One scan registered to its track's middle scan: its names, then `RegistrationError`."""
+
+    track: str
+    scan: str
+    rotation_deg: float
+    rotation_sym_deg: float
+    translation_m: float
+
+
 def registration_error(
     T_middle_scan: SE3, T_sensor_object: SE3, T_middle_object: SE3
 ) -> RegistrationError:

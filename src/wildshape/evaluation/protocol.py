@@ -4,7 +4,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ from wildshape.evaluation.method import (
     TrackCompleter,
 )
 from wildshape.evaluation.metrics import (
+    RegistrationScore,
     box_score,
     completion_error,
     distance_floor,
@@ -31,7 +32,6 @@ from wildshape.evaluation.results import (
     CompletionScore,
     Limits,
     MethodScores,
-    RegistrationScore,
     Results,
     Rotate,
     Skipped,
@@ -217,7 +217,7 @@ def _score_registration(method: Registrar, case: Case, ledger: _Ledger) -> None:
         case.T_sensor_object[index],
         case.T_sensor_object[case.middle],
     )
-    columns = (error.rotation_deg, error.rotation_sym_deg, error.translation_m)
+    columns = tuple(getattr(error, part.name) for part in fields(error))
     for i, values in zip(others, torch.stack(columns, dim=1).tolist(), strict=True):
         if not np.isfinite(values).all():
             ledger.skip(case, i, f"registration: {NOT_FINITE}")

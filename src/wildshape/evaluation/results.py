@@ -5,7 +5,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from wildshape.evaluation.metrics import BoxScore, CompletionError
+from wildshape.evaluation.metrics import BoxScore, CompletionError, RegistrationScore
 
 Rotate = Literal["none", "yaw", "so3"]
 
@@ -70,17 +70,6 @@ class CompletionScore:
     partial_points: int | None = None
     confidence: float | None = None
     box: BoxScore | None = None
-
-
-@dataclass(frozen=True)
-class RegistrationScore:
-    """One scan registered to its track's middle scan; see `RegistrationError`."""
-
-    track: str
-    scan: str
-    rotation_deg: float
-    rotation_sym_deg: float
-    translation_m: float
 
 
 @dataclass(frozen=True)
