@@ -111,30 +111,18 @@ def default() -> Recipe:
 
 
 def tiny() -> Recipe:
-    """For tests: learns little, in seconds."""
-    return Recipe(
+    """For tests: `small` with half its widths and points; learns little, in seconds."""
+    base = small()
+    network = replace(
+        base.network, encoder=(32, 64, 128, 256), decoder=(256, 256), pose=(128, 64), points=512
+    )
+    optim = replace(base.optim, steps=500, lr=2e-3, warmup=20, average=0.99)
+    return replace(
+        base,
         name="tiny",
-        network=NetworkConfig(
-            encoder=(32, 64, 128, 256),
-            decoder=(256, 256),
-            pose=(128, 64),
-            points=512,
-            selector=True,
-            mirror=True,
-            start=(1.0, 0.45, 0.35),
-            scale=2.0,
-        ),
-        loss=LossConfig(
-            beta=0.25,
-            projection=FacingBins(0.4),
-            template=1.0,
-            template_end=0.02,
-            belief=0.05,
-            time_ordered=True,
-            agree_at=(0.15, 0.4),
-        ),
-        views=ViewConfig(points=256, window=40, turn="facing"),
-        optim=OptimConfig(steps=500, lr=2e-3, decay_every=0, warmup=20, average=0.99, clip=5.0),
+        network=network,
+        views=replace(base.views, points=256),
+        optim=optim,
         validate_every=100,
     )
 

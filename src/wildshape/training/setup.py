@@ -130,8 +130,21 @@ def setup(
     described = {"recipe": asdict(recipe), "identity": identity, **(provenance or {})}
     if processes.leads:
         write_text(folder / "run.json", json.dumps(described, indent=1, default=str))
-    parts = (state, sampler, held_out, held_tracks, views, targets, identity, described, say)
-    return Run(recipe, seed, folder, processes, *parts)
+    return Run(
+        recipe=recipe,
+        seed=seed,
+        folder=folder,
+        processes=processes,
+        state=state,
+        sampler=sampler,
+        held_out=held_out,
+        held_tracks=held_tracks,
+        views=views,
+        targets=targets,
+        identity=identity,
+        provenance=described,
+        say=say,
+    )
 
 
 def _use_exact_products(device: torch.device) -> None:

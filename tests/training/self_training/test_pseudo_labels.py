@@ -27,11 +27,11 @@ from wildshape.training.self_training.headings import PosedTrack
 from wildshape.training.self_training.pseudo_labels import (
     SelfTrainingConfig,
     Teacher,
+    agreed_tracks,
     chained,
     fused_targets,
     heading_votes,
     levelled,
-    looking_one_way,
     refined,
     shape_of,
     true_targets,
@@ -262,7 +262,7 @@ def test_poses_by_which_a_scan_would_jump_are_not_taken(cars, monkeypatch):
 def test_tracks_turned_as_wholes_look_one_way_again(who, cars):
     turned = torch.tensor((1.0, -1.0, 1.0, -1.0, 1.0, 1.0))
     tracks = [true_track(cars, i, sign.expand(12)) for i, sign in enumerate(turned)]
-    found = looking_one_way(who, tracks, [sign.expand(12) for sign in turned])
+    found = agreed_tracks(who, tracks, [sign.expand(12) for sign in turned])
     assert max(float(off(track, cars, i).max()) for i, track in enumerate(found)) < 1e-4
 
 

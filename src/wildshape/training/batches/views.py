@@ -136,10 +136,8 @@ class ViewSampler:
         """As `turned`, of scans `(B, n, 3)` that are not the store's; sensor frames."""
         config = self.config
         if config.turn == "facing":
-            frames = [face(scan, sensor_kind=config.sensor) for scan in points]
-            turn = _rolls(len(points), config, rng)
-            turn = turn @ torch.stack([frame.turn for frame in frames])
-            centres = torch.stack([frame.centre for frame in frames])
+            frames = _frames_of(points, config)
+            turn, centres = _rolls(len(points), config, rng) @ frames.turn, frames.centre
         else:
             turn = _turns(len(points), config.turn, int(rng.integers(2**62)))
             turned = points @ turn.mT
@@ -150,13 +148,7 @@ class ViewSampler:
         self, points: Float[Tensor, "B n 3"]
     ) -> tuple[Float[Tensor, "B n 3"], Float[Tensor, "B 3"], Float[Tensor, "B 3 3"]]:
         """Scans that are not the store's, centred and turned as `gather_as_posed` does."""
-        if self.config.turn == "facing":
-            frames = [face(scan, sensor_kind=self.config.sensor) for scan in points]
-            turn = torch.stack([frame.turn for frame in frames])
-            centres = torch.stack([frame.centre for frame in frames])
-        else:
-            turn = torch.eye(3, device=points.device).repeat(len(points), 1, 1)
-            centres = torch.stack([scan_centre(scan, self.config.sensor) for scan in points])
+        turn, centres = _frames_of(points, self.config)
         return points @ turn.mT - centres[:, None], centres, turn
 
     def gather_as_posed(
@@ -225,6 +217,16 @@ class ViewSampler:
 
     def _points(self, scan: int) -> Float[Tensor, "n 3"]:
         return torch.from_numpy(np.ascontiguousarray(self.store.scan_points(scan)))
+
+
+def _frames_of(points: Float[Tensor, "B n 3"], config: ViewConfig) -> Facing:
+    """Turn and centre of scans that are to be posed: towards their objects, or as they are."""
+    if config.turn == "facing":
+        found = [face(scan, sensor_kind=config.sensor) for scan in points]
+        return Facing(*(torch.stack(parts) for parts in zip(*found)))
+    as_recorded = torch.eye(3, device=points.device).repeat(len(points), 1, 1)
+    centres = [scan_centre(scan, config.sensor) for scan in points]
+    return Facing(as_recorded, torch.stack(centres))
 
 
 def centre_turns_along(config: ViewConfig) -> bool:

@@ -197,7 +197,7 @@ def fused_targets(
         tracks.append(refined(who, posed.turned(votes[-1])))
         progress(done + 1, len(sampler.scans_of))
     if who.headings is None:
-        tracks = looking_one_way(who, tracks, votes)
+        tracks = agreed_tracks(who, tracks, votes)
     if who.is_lidar:
         tracks = [levelled(track) for track in tracks]
     shapes = [shape_of(who, track) for track in tracks]
@@ -225,8 +225,9 @@ def heading_votes(teacher: Teacher, track: PosedTrack) -> Float[Tensor, "V"]:
 def refined(teacher: Teacher, track: PosedTrack) -> PosedTrack:
     """The scans of a track moved onto each other, and those in time order onto their neighbours."""
     config, clouds = teacher.config, teacher.clouds(track)
-    ordered, given = teacher.time_ordered, track.T_sensor_can
-    start = without_outliers(given, config.track) if ordered else given
+    ordered, start = teacher.time_ordered, track.T_sensor_can
+    if ordered:
+        start = without_outliers(start, config.track)
     start = _scaled(start, 1 / teacher.unit)
     found = refine_jointly(clouds, start, mirror=teacher.mirror, config=config.track.coarse)
     if ordered:
@@ -240,7 +241,7 @@ def chained(scans: list[Points], T_sensor_can: SE3, config: SelfTrainingConfig =
     return found if stayed_near(T_sensor_can, found, config.track) else T_sensor_can
 
 
-def looking_one_way(
+def agreed_tracks(
     teacher: Teacher, tracks: Sequence[PosedTrack], votes: Sequence[Float[Tensor, "_"]]
 ) -> list[PosedTrack]:
     """The tracks turned so that all look one way, as profiles and the teacher itself say."""
@@ -254,9 +255,9 @@ def looking_one_way(
 
 def levelled(track: PosedTrack) -> PosedTrack:
     """A track in a frame that does not pitch against its sensors (`geometry/gravity.py`)."""
-    given = track.T_sensor_can
-    rotation = given.rotation @ level_turn(given.rotation)
-    return track._replace(T_sensor_can=SE3(rotation, given.translation))
+    posed = track.T_sensor_can
+    rotation = posed.rotation @ level_turn(posed.rotation)
+    return track._replace(T_sensor_can=SE3(rotation, posed.translation))
 
 
 def shape_of(teacher: Teacher, track: PosedTrack) -> Float32[np.ndarray, "G 3"]:
