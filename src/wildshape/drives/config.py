@@ -133,8 +133,8 @@ class CompletionConfig:
 
     Attributes:
         looks: scans of a track that the network sees first, the fullest of equal parts of it.
-        worst_cost_m: tracks whose best first look costs more are no vehicles (METHOD 13.4: the
-            vehicles of a labelled street cost less than 0.2 m).
+        worst_cost_m: tracks whose best first look costs more are no vehicles; those of a labelled
+            street cost less than 0.2 m.
         shortest_m: tracks whose first looks are all shorter are none either.
         scans: of a track that are completed together.
         ticks: between them; neighbours at 10 Hz are nearly the same scan.
