@@ -105,15 +105,20 @@ def test_what_is_taught_does_not_depend_on_the_size_of_the_objects():
     generator = torch.Generator().manual_seed(0)
     scans, shapes, sensors = (torch.randn(4, n, 3, generator=generator) for n in (64, 80, 2))
     rotation = random_rotation(4, generator)
-    losses = []
+    found = []
     for unit in (1.0, 0.2):
         torch.manual_seed(1)
         network = ShapePoseNet(replace(SMALLEST.network, scale=2 * unit))
         places = (unit * part for part in (torch.ones(4, 3), shapes, 5 * sensors))
         ends = torch.full((4,), 0.1)
         batch = FusedBatch(unit * scans, rotation, *places, view_top=ends)
-        losses.append(SelfTaught(network, SMALLEST.loss, False, unit=unit)(batch, 0.0).loss)
-    torch.testing.assert_close(losses[0], losses[1], atol=1e-3, rtol=1e-3)
+        found.append(SelfTaught(network, SMALLEST.loss, False, unit=unit)(batch, 0.0))
+    large, small = found
+    torch.testing.assert_close(large.loss, small.loss, atol=1e-3, rtol=1e-3)
+    # What is logged is in metres: a fifth for an object a fifth as large.
+    assert list(small.terms) == ["pose", "coverage", "precision", "template"]
+    for name, metres in small.terms.items():
+        torch.testing.assert_close(large.terms[name], 5 * metres, atol=1e-3, rtol=1e-3)
 
 
 def branches(degrees):

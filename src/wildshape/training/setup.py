@@ -35,7 +35,7 @@ from wildshape.training.self_training.saved_targets import load_targets, save_ta
 from wildshape.training.state import STATE, TrainState, load_state
 from wildshape.training.step import Step, Views
 
-_RESIDENT_SHARE = 0.5
+_RESIDENT_SHARE = 0.5  # of a GPU's memory; the rest is the step's
 Say = Callable[[str], None]
 Taught = Callable[[int, int], None]
 

@@ -20,8 +20,8 @@ from wildshape.geometry.transforms.rotation import rotation_from_uniform, rotati
 from wildshape.ops.counter_random import integers, random_bits, uniform
 from wildshape.training.batches.views import Batch, ViewConfig, ViewSampler, centre_turns_along
 
-_MOST_CENTRE_POINTS = 4096
-_POINTS_AT_ONCE = 1 << 22
+_MOST_CENTRE_POINTS = 4096  # of a scan whose centre is found anew; steps need fixed shapes
+_POINTS_AT_ONCE = 1 << 22  # decides memory alone
 _LAST = 1 << 32  # above all random bits
 
 
