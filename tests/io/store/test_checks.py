@@ -80,9 +80,11 @@ def test_a_flipped_point_is_named_and_the_rest_can_be_read(track: Track, tmp_pat
 
 def test_a_cloud_is_compared_once(path: Path, monkeypatch) -> None:
     counted = []
-    monkeypatch.setattr(
-        "wildshape.io.store.store.is_finite", lambda points: counted.append(1) or True
-    )
+    for check in (store_checks.cloud_crc, store_checks.is_finite):
+        monkeypatch.setattr(
+            f"wildshape.io.store.store.{check.__name__}",
+            lambda points, check=check: counted.append(1) or check(points),
+        )
     store = open_store(path)
     for _ in range(3):
         assert len(list(content(store))) == 1 + 3 * 3 + sum(len(t.scans) for t in store)
@@ -112,17 +114,34 @@ def test_a_changed_file_is_compared_again(path: Path) -> None:
         open_store(path)
 
 
-def test_points_that_are_no_numbers_are_refused_though_all_checksums_fit(track, tmp_path) -> None:
+def test_points_that_are_no_numbers_are_not_written(track, tmp_path) -> None:
     scan = track.scans[0].copy()
     scan[3, 1] = np.nan
-    for name, points in (("nan", scan), ("inf", track.scans[0] * np.float32(np.inf))):
-        with StoreWriter(tmp_path / name, {}) as writer:
-            writer.add(Track("a", (points,), ("a",)))
-        with pytest.raises(BadInputError, match="the points of scan 0"):
-            open_store(tmp_path / name).track(0)
-    with StoreWriter(tmp_path / "large", {}) as writer:
-        writer.add(Track("a", (np.full((2, 3), 1e30, np.float32),), ("a",)))
-    assert open_store(tmp_path / "large").scan_points(0)[0, 0] == np.float32(1e30)
+    infinite = track.scans[0] * np.float32(np.inf)
+    with StoreWriter(tmp_path / "store", {}) as writer:
+        for bad in (
+            Track("a", (scan,), ("a",)),
+            Track("b", track.scans[:1], ("a",), shape=infinite),
+        ):
+            with pytest.raises(BadInputError, match=f"track {bad.name}: .* not finite"):
+                writer.add(bad)
+        writer.add(Track("c", (np.full((2, 3), 1e30, np.float32),), ("a",)))
+    assert open_store(tmp_path / "store").scan_points(0)[0, 0] == np.float32(1e30)
+
+
+def test_points_that_are_no_numbers_are_refused_where_there_are_no_crcs(track, tmp_path) -> None:
+    with StoreWriter(tmp_path / "store", {}) as writer:
+        writer.add(track)
+    (shard,) = (tmp_path / "store").glob("points-*")
+    data = bytearray(shard.read_bytes())
+    data[256:260] = np.float32(np.nan).tobytes()
+    shard.write_bytes(data)
+    said = json.loads((tmp_path / "store" / INDEX_JSON).read_text())
+    said["shards"] = [vars(file_record(shard))]
+    (tmp_path / "store" / INDEX_JSON).write_text(json.dumps(said))
+    make_older(tmp_path / "store")
+    with pytest.raises(BadInputError, match="the points of scan 0"):
+        open_store(tmp_path / "store").track(0)
 
 
 CRAFTED = {

@@ -14,7 +14,7 @@ from jaxtyping import Float32
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import write_json
-from wildshape.io.store.checks import cloud_crc
+from wildshape.io.store.checks import cloud_crc, is_finite
 from wildshape.io.store.index import IndexWriter, file_record
 from wildshape.io.store.layout import (
     FORMAT,
@@ -93,8 +93,8 @@ class StoreWriter:
         """Append a track.
 
         Raises:
-            BadInputError: a name that was added before, no scans, or poses and names of another
-                length than the scans.
+            BadInputError: a name that was added before, no scans, poses and names of another
+                length than the scans, or points that are not finite.
             OSError: the disk is full.
         """
         self._check(track)
@@ -146,6 +146,9 @@ class StoreWriter:
             )
         if track.name in self._names:
             raise BadInputError(f"two tracks are named '{track.name}'; rename one of them.")
+        clouds = track.scans if track.shape is None else (*track.scans, track.shape)
+        if not all(is_finite(cloud) for cloud in clouds):  # a reader goes by the CRC alone
+            raise BadInputError(f"track {track.name}: has points that are not finite; drop these.")
         self._names.add(track.name)
 
     def _add_truth(self, poses: SE3 | None, shape: Float32[np.ndarray, "n 3"] | None) -> None:
