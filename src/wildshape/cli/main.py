@@ -24,6 +24,7 @@ COMMANDS = {
     "register": "align two scans of an object, or all scans of its track",
     "fuse": "join all scans of a track into one cloud",
     "evaluate": "measure models and baselines against known shapes and poses",
+    "evaluate-drive": "measure boxes, tracks and trajectory of drives against labels",
     "view": "look at results or scans on an interactive page of this machine",
     "report": "draw what other commands wrote as one HTML page",
     "export": "write a model as one ONNX file, for runtimes without this library",
@@ -105,7 +106,7 @@ def _guarded(command: str, arguments: list[str]) -> None:
     reserved: list[bytearray] = []
     try:
         reserved.append(bytearray(_RESERVED_BYTES))
-        module = import_module(f"wildshape.cli.commands.{command}")
+        module = import_module(f"wildshape.cli.commands.{command.replace('-', '_')}")
         module.run(_parse(module, command, arguments))
     except (BadInputError, MissingExtraError) as error:
         _leave(str(error), _BAD_INPUT)

@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`wildshape evaluate-drive`: boxes, tracks and trajectory of drives against labels."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from tyro.conf import Positional, arg
+
+from wildshape.cli.options import AsJson, Overwrite, listed, option
+
+EXAMPLES = (
+    "wildshape evaluate-drive found --labels street",
+    "wildshape evaluate-drive found --labels training/label_02/0001.txt --out evaluation",
+    "wildshape evaluate-drive found1 found2 --labels street1,street2",
+)
+
+Folders = Annotated[
+    tuple[Path, ...],
+    Positional,
+    arg(metavar="DIR [DIR ...]", help="folders that `wildshape drive` wrote"),
+]
+Labels = Annotated[
+    tuple[Path, ...],
+    listed("L,L", Path, words=1),
+    arg(help="of each drive: a file of KITTI tracking's label_02, or the folder above it"),
+]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Measure what was found in drives against KITTI tracking's labels or a simulated drive's.
+
+    Prints average precision, recall, HOTA, tracks a vehicle, errors of size and trajectory, beside
+    plain boxes around the same clusters. Several drives are measured as one.
+
+    Attributes:
+        out: write metrics.json, vehicles.json and table.md there.
+        points: a labelled vehicle with fewer points in a scan is not asked for.
+        range: farthest box, metres, where labels are a camera's.
+    """
+
+    folders: Folders
+    labels: Labels
+    out: Annotated[Path | None, option(metavar="DIR")] = None
+    points: Annotated[int, arg(metavar="N")] = 100
+    range: Annotated[float, arg(metavar="M")] = 60.0
+    overwrite: Overwrite = False
+    json: AsJson = False
+
+
+def run(settings: Settings) -> None:
+    """Evaluate, write and print.
+
+    Raises:
+        BadInputError: drives or labels that cannot be used, or that do not belong together.
+    """
+    from wildshape.cli.output import command_line
+    from wildshape.cli.terminal import answer, progress
+    from wildshape.evaluation.drives.found import read_found
+    from wildshape.evaluation.drives.labels import Counting, read_labels
+    from wildshape.evaluation.drives.protocol import evaluate_drives
+    from wildshape.evaluation.drives.results import as_json, markdown
+    from wildshape.io.provenance import provenance
+
+    _check(settings)
+    counting = Counting(points=settings.points, range_m=settings.range)
+    with progress("evaluating", len(settings.labels) + 3) as bar:
+        labelled, found = [], []
+        for path, folder in zip(settings.labels, settings.folders, strict=True):
+            labelled.append(read_labels(path, counting))
+            found.append(read_found(folder, len(labelled[-1].frames)))
+            bar.at(len(found))
+        scores = evaluate_drives(found, labelled, lambda rows: bar.at(len(found) + rows))
+    made = {**provenance(command_line()), "settings": _identity(settings)}
+    if settings.out is not None:
+        _write(settings, scores, counting, made)
+    answer(markdown(scores, counting), as_json(scores, counting, made), as_json=settings.json)
+
+
+def _check(settings: Settings) -> None:
+    from wildshape.errors import BadInputError
+
+    if not settings.folders:
+        raise BadInputError("evaluate-drive: expected a folder that `wildshape drive` wrote.")
+    if len(settings.labels) != len(settings.folders):
+        raise BadInputError(
+            f"--labels: {len(settings.labels)} for {len(settings.folders)} drives; give one each,"
+            " with commas between."
+        )
+    if settings.points < 0:
+        raise BadInputError(f"--points {settings.points}: expected 0 or more.")
+    if not settings.range > 0:
+        raise BadInputError(f"--range {settings.range}: expected more than 0 metres.")
+
+
+def _write(settings: Settings, scores: Any, counting: Any, made: dict[str, Any]) -> None:
+    from wildshape.cli.output import begin, keep_apart
+    from wildshape.evaluation.drives.results import FILES, write_results
+
+    assert settings.out is not None
+    for folder in settings.folders:
+        keep_apart(folder, settings.out)
+    output = begin(
+        settings.out, "evaluate-drive", _identity(settings), FILES, overwrite=settings.overwrite
+    )
+    write_results(settings.out, scores, counting, made)
+    output.finish()
+
+
+def _identity(settings: Settings) -> dict[str, Any]:
+    return {
+        "folders": [str(folder.resolve()) for folder in settings.folders],
+        "labels": [str(path.resolve()) for path in settings.labels],
+        "points": settings.points,
+        "range": settings.range,
+    }

@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What `wildshape drive` left in its folder: boxes, trajectory, and the points of each track."""
+
+import csv
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+from wildshape.errors import BadInputError
+from wildshape.evaluation.drives.overlap import UprightBox
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.boxes.table import BoxRow, read_box_table
+from wildshape.io.guard import reading
+from wildshape.io.inputs import open_tracks
+from wildshape.io.poses import read_poses
+from wildshape.records import Points
+
+BOXES, TRAJECTORY, FRAMES, TRACKS = "boxes.csv", "trajectory.txt", "frames.csv", "tracks"
+
+
+@dataclass(frozen=True)
+class Found:
+    """One vehicle found in one frame; a box in the sensor frame."""
+
+    track: str
+    confidence: float
+    box: UprightBox
+
+
+@dataclass(frozen=True)
+class FoundDrive:
+    """What was found in a drive.
+
+    Attributes:
+        path: of the folder.
+        frames: the vehicles of each scan.
+        T_world_sensor: the trajectory, if there is one.
+    """
+
+    path: Path
+    frames: tuple[tuple[Found, ...], ...]
+    T_world_sensor: SE3 | None
+
+
+def read_found(path: Path, scans: int) -> FoundDrive:
+    """The boxes and the trajectory of a drive of so many scans.
+
+    Raises:
+        BadInputError: boxes are missing or damaged, or are of another number of scans.
+    """
+    if not (path / BOXES).is_file():
+        raise BadInputError(
+            f"{path}: no {BOXES} in it; give a folder that `wildshape drive` wrote."
+        )
+    frames: dict[int, list[Found]] = defaultdict(list)
+    seen: set[tuple[int, str]] = set()
+    for row in read_box_table(path / BOXES):
+        _check(row, path / BOXES, scans)
+        if (row.frame, row.track) in seen:
+            raise BadInputError(
+                f"{path / BOXES}: track {row.track} is in frame {row.frame} twice; write it anew."
+            )
+        seen.add((row.frame, row.track))
+        frames[row.frame].append(Found(row.track, row.confidence, _upright(row)))
+    trajectory = path / TRAJECTORY
+    poses = read_poses(trajectory, scans) if trajectory.is_file() else None
+    return FoundDrive(path, tuple(tuple(frames[i]) for i in range(scans)), poses)
+
+
+def _check(row: BoxRow, path: Path, scans: int) -> None:
+    where = f"{path}: frame {row.frame}, track {row.track}"
+    if not 0 <= row.frame < scans:
+        raise BadInputError(
+            f"{where}: the labels know {scans} scans, 0 to {scans - 1}; give the labels of this"
+            " very drive."
+        )
+    if min(row.length, row.width, row.height) <= 0 or not 0 <= row.confidence <= 1:
+        raise BadInputError(
+            f"{where}: a box of {row.length:g} x {row.width:g} x {row.height:g} m with confidence"
+            f" {row.confidence:g}; sizes are over 0, confidences 0 to 1."
+        )
+
+
+def _upright(row: BoxRow) -> UprightBox:
+    return UprightBox(row.x, row.y, row.z, row.length, row.width, row.height, row.yaw)
+
+
+def read_clusters(path: Path) -> dict[tuple[int, str], Points]:
+    """The points of each track in each frame, sensor frame, metres; empty where none were kept.
+
+    Raises:
+        BadInputError: the tracks or the list of frames are damaged.
+    """
+    if not (path / TRACKS).exists() or not (path / FRAMES).is_file():
+        return {}
+    frames = path / FRAMES
+    with reading(frames, "a list of frames"), frames.open(encoding="utf-8", newline="") as file:
+        frame_of = {row["scan"]: int(row["frame"]) for row in csv.DictReader(file)}
+    source = open_tracks(path / TRACKS)
+    clusters: dict[tuple[int, str], Points] = {}
+    for number in range(len(source)):
+        track = source[number]
+        for name, points in zip(track.scan_names, track.scans, strict=True):
+            if name in frame_of:
+                clusters[frame_of[name], track.name] = points
+    return clusters

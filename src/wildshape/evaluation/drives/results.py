@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""An evaluation of drives as `metrics.json`, `vehicles.json` and the table that people read."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wildshape.evaluation.drives.labels import Counting
+from wildshape.evaluation.drives.protocol import DriveScores, RowScores
+from wildshape.evaluation.tables import pipe_table
+from wildshape.io.atomic import write_json, write_text
+
+FORMAT = 1
+FILES = ("metrics.json", "vehicles.json", "table.md")
+UNITS = {
+    "average_precision": "0 to 1, area under the envelope of precision over recall",
+    "recall_at_90": "0 to 1, largest recall at a precision of 0.9 or more",
+    "hota": "0 to 1, mean over overlaps 0.05 to 0.95, bird's eye view",
+    "size_bias_m": "metres, found minus labelled length, width, height",
+    "drift_percent": "of the way travelled, last place seen from the first pose",
+    "ate_m": "metres, root mean square after rigid alignment",
+    "rpe_m": "metres from scan to scan, root mean square",
+    "rpe_deg": "degrees from scan to scan, root mean square",
+}
+_DASH = "–"  # noqa: RUF001
+
+
+def as_json(scores: DriveScores, counting: Counting, made: Mapping[str, object]) -> dict[str, Any]:
+    """The content of `metrics.json`."""
+    rows = {}
+    for row in scores.rows:
+        figures = asdict(row)
+        figures.pop("name")
+        figures.pop("vehicles")
+        rows[row.name] = figures
+    return {
+        "format": FORMAT,
+        "units": UNITS,
+        "counting": asdict(counting),
+        "methods": rows,
+        "trajectories": [None if one is None else asdict(one) for one in scores.trajectories],
+        "provenance": dict(made),
+    }
+
+
+def write_results(
+    folder: Path, scores: DriveScores, counting: Counting, made: Mapping[str, object]
+) -> str:
+    """Write all files, atomically; returns the table."""
+    table = markdown(scores, counting)
+    vehicles = {row.name: [asdict(one) for one in row.vehicles] for row in scores.rows}
+    write_json(folder / "vehicles.json", {"format": FORMAT, "methods": vehicles})
+    write_text(folder / "table.md", table)
+    write_json(folder / "metrics.json", as_json(scores, counting, made))
+    return table
+
+
+def markdown(scores: DriveScores, counting: Counting) -> str:
+    """Detection, tracking, and what counted."""
+    heading = ["boxes", *(f"AP {name}" for name in ("BEV 0.5", "BEV 0.7", "3D 0.5", "3D 0.7"))]
+    detection = pipe_table([*heading, "recall at 90 %"], [_detection(row) for row in scores.rows])
+    heading = [
+        "boxes",
+        "HOTA",
+        "switches",
+        "tracks a vehicle",
+        "impure",
+        "length, width, height, m",
+    ]
+    tracking = pipe_table(heading, [_tracking(row) for row in scores.rows])
+    return f"{detection}\n\n{tracking}\n\n{_notes(scores, counting)}\n"
+
+
+def _detection(row: RowScores) -> list[str]:
+    precisions = [_percent(one.average_precision) for one in row.detections]
+    return [row.name, *precisions, _percent(row.detections[0].recall_at_90)]
+
+
+def _tracking(row: RowScores) -> list[str]:
+    tracks = row.purity.tracks_per_vehicle
+    bias = row.size_bias_m
+    return [
+        row.name,
+        _percent(None if row.hota is None else row.hota.hota),
+        str(row.identity_switches),
+        _DASH if tracks is None else f"{tracks:.2f}",
+        str(row.purity.impure_tracks),
+        _DASH if bias is None else " ".join(f"{side:+.2f}" for side in bias),
+    ]
+
+
+def _percent(value: float | None) -> str:
+    return _DASH if value is None else f"{100 * value:.1f}"
+
+
+def _notes(scores: DriveScores, counting: Counting) -> str:
+    ours = scores.rows[0]
+    lines = [
+        f"Counted: {ours.labels} labels of {ours.purity.vehicles} vehicles with"
+        f" {counting.points} points or more; {ours.purity.vehicles_found} vehicles found.",
+        "AP in percent; recall in percent at IoU 0.5 in bird's eye view (BEV), as HOTA's overlap.",
+        "Length, width, height: mean of found minus labelled.",
+    ]
+    if len(scores.rows) == 1:
+        lines.append("No points of tracks were kept: no other boxes could be put around them.")
+    known = [one for one in scores.trajectories if one is not None]
+    drifts = [one.drift_percent for one in known if one.drift_percent is not None]
+    if known:
+        drift = f"{np.mean(drifts):.2f} %, at most {max(drifts):.2f} %" if drifts else _DASH
+        lines.append(
+            f"Trajectory: drift {drift} of {sum(one.way_m for one in known):.0f} m; ATE"
+            f" {np.mean([one.ate_m for one in known]):.3f} m; RPE"
+            f" {np.mean([one.rpe_m for one in known]):.4f} m,"
+            f" {np.mean([one.rpe_deg for one in known]):.3f} degrees."
+        )
+    return "\n".join(f"- {line}" for line in lines)

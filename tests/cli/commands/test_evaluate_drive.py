@@ -1,0 +1,130 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`wildshape evaluate-drive` on a simulated drive."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from wildshape.cli.main import main
+from wildshape.io.scans.points import write_ply
+
+SCANS = 3
+
+
+@pytest.fixture(scope="module")
+def street(tmp_path_factory):
+    """A simulated drive."""
+    path = tmp_path_factory.mktemp("street") / "street"
+    main(["simulate", str(path), "--drive", "--scans", str(SCANS), "--seed", "5"])
+    return path
+
+
+@pytest.fixture
+def found(street, tmp_path):
+    """What a drive that knows the truth would have written."""
+    folder = tmp_path / "found"
+    folder.mkdir()
+    shutil.copy(street / "truth" / "0000.csv", folder / "boxes.csv")
+    shutil.copy(street / "poses" / "0000.txt", folder / "trajectory.txt")
+    return folder
+
+
+def test_the_truth_is_right(wildshape, street, found, tmp_path):
+    out = tmp_path / "evaluation"
+    said = wildshape("evaluate-drive", found, "--labels", street, "--out", out, "--json")
+    assert said.code == 0, said
+    metrics = json.loads(said.out)
+    ours = metrics["methods"]["wildshape"]
+    # Labels hold six digits after the point.
+    assert [one["average_precision"] for one in ours["detections"]] == [1, 1, 1, 1]
+    assert ours["hota"]["hota"] == pytest.approx(1)
+    assert ours["size_bias_m"] == pytest.approx([0, 0, 0], abs=1e-5)
+    assert metrics["trajectories"][0]["ate_m"] == pytest.approx(0, abs=1e-6)
+    assert json.loads((out / "metrics.json").read_text())["methods"] == metrics["methods"]
+    assert metrics["provenance"]["settings"]["points"] == 100
+    vehicles = json.loads((out / "vehicles.json").read_text())["methods"]["wildshape"]
+    assert all(one["found"] == one["scans"] for one in vehicles)
+    assert "AP BEV 0.5" in (out / "table.md").read_text()
+
+
+def test_plain_boxes_around_the_same_clusters(wildshape, street, found):
+    """Of the points that lie in the true boxes."""
+    rows = [line.split(",") for line in (found / "boxes.csv").read_text().splitlines()[1:]]
+    for frame in range(SCANS):
+        scan = street / "velodyne" / "0000" / f"{frame:06d}.bin"
+        points = np.fromfile(scan, "<f4").reshape(-1, 4)[:, :3]
+        for row in rows:
+            x, y, z, length, width, height, yaw = map(float, row[3:10])
+            c, s = np.cos(yaw), np.sin(yaw)
+            own = (points - (x, y, z)) @ np.array(((c, -s, 0), (s, c, 0), (0, 0, 1)))
+            inside = (np.abs(own) < np.array((length, width, height)) / 2 - (0, 0, 0.15)).all(1)
+            if int(row[0]) == frame and inside.sum() >= 16:
+                scans = found / "tracks" / row[2] / "scans"
+                write_ply(scans / f"{frame:06d}.ply", points[inside])
+    names = "".join(f"{i},{i:06d},{i / 10},1000\n" for i in range(SCANS))
+    (found / "frames.csv").write_text(f"frame,scan,time,points\n{names}")
+    said = wildshape("evaluate-drive", found, "--labels", street, "--json")
+    assert said.code == 0, said
+    methods = json.loads(said.out)["methods"]
+    assert len(methods) == 3
+    for name in ("clusters, smallest rectangles", "clusters, L-shape fits"):
+        bev = methods[name]["detections"][0]["average_precision"]
+        assert 0 < bev < methods["wildshape"]["detections"][0]["average_precision"]
+        assert max(methods[name]["size_bias_m"]) < 0
+
+
+def test_two_drives(wildshape, street, found):
+    said = wildshape("evaluate-drive", found, found, "--labels", f"{street},{street}")
+    assert said.code == 0, said
+    assert "| wildshape | 100.0 | 100.0 | 100.0 | 100.0 | 100.0 |" in said.out
+
+
+HEADER = "frame,time,track,x,y,z,length,width,height,yaw,confidence,points,moving"
+ROW = "0,0.0,7,10,2,-1,4,1.8,1.5,0.1,0.9,200,0"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", "expected the header"),
+        ("frame,x\n", "expected the header"),
+        (f"{HEADER}\n{ROW},1\n", "boxes.csv"),
+        (f"{HEADER}\n0,0.0,7,10\n", "boxes.csv"),
+        (f"{HEADER}\n{ROW.replace('10', 'ten')}\n", "boxes.csv"),
+        (f"{HEADER}\n{ROW.replace('10', 'nan')}\n", "boxes.csv"),
+        (f"{HEADER}\n{ROW.replace('4,', '-4,')}\n", "sizes are over 0"),
+        (f"{HEADER}\n{ROW.replace('0.9', '90')}\n", "confidences 0 to 1"),
+        (f"{HEADER}\n3{ROW[1:]}\n", "the labels know 3 scans"),
+        (f"{HEADER}\n-1{ROW[1:]}\n", "the labels know 3 scans"),
+        (f"{HEADER}\n{ROW}\n{ROW}\n", "twice"),
+        (f"{HEADER}\n{ROW[:-1]}2\n", "boxes.csv"),
+        ("\0\xff\n", "boxes.csv"),
+    ],
+)
+def test_bad_boxes(refused, street, found, text, expected):
+    (found / "boxes.csv").write_bytes(text.encode("latin-1"))
+    said = refused("evaluate-drive", found, "--labels", street)
+    assert expected in said
+    assert str(found) in said
+
+
+def test_other_bad_input(refused, street, found, tmp_path):
+    assert "no boxes.csv" in refused("evaluate-drive", tmp_path, "--labels", street)
+    assert "no label_02" in refused("evaluate-drive", found, "--labels", tmp_path)
+    assert "2 for 1 drives" in refused("evaluate-drive", found, "--labels", f"{street},{street}")
+    assert "--points -1" in refused("evaluate-drive", found, "--labels", street, "--points", "-1")
+    assert "--range" in refused("evaluate-drive", found, "--labels", street, "--range", "nan")
+    (found / "trajectory.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
+    assert "trajectory.txt" in refused("evaluate-drive", found, "--labels", street)
+
+
+def test_nothing_found(wildshape, street, found):
+    (found / "boxes.csv").write_text(f"{HEADER}\n")
+    (found / "trajectory.txt").unlink()
+    said = wildshape("evaluate-drive", found, "--labels", street)
+    assert said.code == 0, said
+    assert "| wildshape | 0.0 | 0.0 | 0.0 | 0.0 | 0.0 |" in said.out
+    assert "Trajectory" not in said.out

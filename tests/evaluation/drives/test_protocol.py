@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What counts and what does not, on drives of a few boxes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wildshape.errors import BadInputError
+from wildshape.evaluation.drives.found import Found, FoundDrive
+from wildshape.evaluation.drives.labels import (
+    Counting,
+    Label,
+    LabelledDrive,
+    LabelledFrame,
+    View,
+)
+from wildshape.evaluation.drives.overlap import UprightBox
+from wildshape.evaluation.drives.protocol import DriveScores, evaluate_drives
+
+CAR = UprightBox(15.0, 2.0, -0.9, 4.0, 1.8, 1.5, 0.1)
+FAR = CAR._replace(x=30.0)
+NOWHERE = np.empty((0, 4))
+# A camera at the LiDAR that looks along x: u = 600 - 700 y / x, v = 180 - 700 z / x.
+AHEAD = np.array(((600, -700, 0, 0), (180, 0, -700, 0), (1, 0, 0, 0.0)))
+
+
+def _label(box: UprightBox, track: int = 0, *, vehicle: bool = True, counted: bool = True) -> Label:
+    return Label(track, vehicle, box, counted)
+
+
+def _evaluated(
+    found: list[list[UprightBox]],
+    labels: list[list[Label]],
+    *,
+    view: View | None = None,
+    regions: np.ndarray = NOWHERE,
+) -> DriveScores:
+    """Of boxes as sure as their track is early; track i is the i-th box of each frame."""
+    frames = tuple(
+        tuple(Found(f"{i}", 0.9 - 0.1 * i, box) for i, box in enumerate(boxes)) for boxes in found
+    )
+    labelled = tuple(LabelledFrame(tuple(row), regions) for row in labels)
+    truth = LabelledDrive(Path("labels"), labelled, (), view, None, Counting())
+    return evaluate_drives([FoundDrive(Path("none"), frames, None)], [truth])
+
+
+def _precisions(scores: DriveScores) -> list[float | None]:
+    return [one.average_precision for one in scores.rows[0].detections]
+
+
+def test_what_is_right_is_right_everywhere() -> None:
+    scores = _evaluated([[CAR, FAR]] * 3, [[_label(CAR, 4), _label(FAR, 9)]] * 3)
+    row = scores.rows[0]
+    assert _precisions(scores) == [1, 1, 1, 1]
+    assert (row.labels, row.boxes, row.identity_switches) == (6, 6, 0)
+    assert row.size_bias_m == (0, 0, 0)
+    assert row.hota is not None
+    assert row.hota.hota == pytest.approx(1)
+    assert [(v.track, v.scans, v.found, v.tracks) for v in row.vehicles] == [
+        (4, 3, 3, ("0",)),
+        (9, 3, 3, ("1",)),
+    ]
+
+
+def test_boxes_that_are_off() -> None:
+    """Shifted along by 1 m of 4: IoU 3/5 in bird's eye view; half as high, too: 3/8 of space."""
+    off = CAR._replace(x=CAR.x + np.cos(0.1), y=CAR.y + np.sin(0.1))
+    assert _precisions(_evaluated([[off]], [[_label(CAR)]])) == [1, 0, 1, 0]
+    low = off._replace(height=0.75, z=CAR.z - 0.375)
+    scores = _evaluated([[low]], [[_label(CAR)]])
+    assert _precisions(scores) == [1, 0, 0, 0]
+    assert scores.rows[0].size_bias_m == pytest.approx((0, 0, -0.75))
+
+
+def test_what_nobody_labelled_is_a_mistake() -> None:
+    scores = _evaluated([[CAR, FAR]], [[_label(FAR)]])
+    assert _precisions(scores)[0] == pytest.approx(1 / 2)
+    assert scores.rows[0].boxes == 2
+
+
+@pytest.mark.parametrize("vehicle", [True, False])
+def test_labels_that_do_not_count_are_neither_found_nor_missed(vehicle: bool) -> None:
+    few = _label(CAR, 1, vehicle=vehicle, counted=False)
+    scores = _evaluated([[CAR, FAR]], [[few, _label(FAR)]])
+    assert _precisions(scores) == [1, 1, 1, 1]
+    assert (scores.rows[0].labels, scores.rows[0].boxes) == (1, 1)
+    assert _precisions(_evaluated([[FAR]], [[few, _label(FAR)]]))[0] == 1
+
+
+def test_a_poor_box_on_what_does_not_count_is_no_mistake() -> None:
+    few = _label(CAR, 1, counted=False)
+    part = CAR._replace(length=1.0, width=1.0)
+    assert _precisions(_evaluated([[part, FAR]], [[few, _label(FAR)]]))[0] == 1
+    beside = CAR._replace(y=CAR.y + 1.2)
+    assert _precisions(_evaluated([[beside, FAR]], [[few, _label(FAR)]]))[0] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    "unseen",
+    [
+        CAR._replace(x=-15.0),
+        CAR._replace(x=15.0, y=20.0),
+        CAR._replace(x=70.0),
+    ],
+    ids=["behind", "beside", "far"],
+)
+def test_boxes_that_the_labelled_camera_does_not_see(unseen: UprightBox) -> None:
+    view = View(AHEAD, Counting())
+    assert not view.sees(unseen)
+    scores = _evaluated([[unseen, FAR]], [[_label(FAR)]], view=view)
+    assert _precisions(scores)[0] == 1
+    assert _precisions(_evaluated([[unseen, FAR]], [[_label(FAR)]]))[0] == pytest.approx(0.5)
+
+
+def test_boxes_in_regions_that_nobody_cared_to_label() -> None:
+    view = View(AHEAD, Counting())
+    left, top, right, bottom = view.picture(CAR) or (0, 0, 0, 0)
+    whole = np.array([[left, top, right, bottom]])
+    third = np.array([[left, top, left + (right - left) / 3, bottom]])
+    for regions, expected in ((whole, 1), (third, 0.5), (NOWHERE, 0.5)):
+        scores = _evaluated([[CAR, FAR]], [[_label(FAR)]], view=view, regions=regions)
+        assert _precisions(scores)[0] == pytest.approx(expected)
+
+
+def test_drives_are_measured_as_one_and_their_tracks_apart() -> None:
+    frames = tuple((Found("0", 0.9, CAR),) for _ in range(2))
+    labelled = tuple(LabelledFrame((_label(CAR, 0),), NOWHERE) for _ in range(2))
+    truth = LabelledDrive(Path("labels"), labelled, (), None, None, Counting())
+    found = FoundDrive(Path("none"), frames, None)
+    missed = FoundDrive(Path("none"), ((), ()), None)
+    row = evaluate_drives([found, missed], [truth, truth]).rows[0]
+    assert row.detections[0].average_precision == pytest.approx(0.5)
+    assert (row.purity.vehicles, row.purity.vehicles_found) == (2, 1)
+    assert [v.drive for v in row.vehicles] == [0, 1]
+
+
+def test_nothing_counts() -> None:
+    with pytest.raises(BadInputError, match="no label counts"):
+        _evaluated([[CAR]], [[_label(CAR, counted=False)]])
