@@ -13,7 +13,6 @@ import sys
 import tomllib
 from contextlib import redirect_stdout
 from functools import cache
-from importlib import import_module
 from io import StringIO
 from pathlib import Path
 from pkgutil import resolve_name
@@ -24,6 +23,7 @@ import tyro
 import yaml
 
 import wildshape
+from wildshape.cli.commands import module_of
 from wildshape.cli.main import COMMANDS, main
 
 ROOT = Path(__file__).parent.parent
@@ -125,7 +125,7 @@ def check(words: list[str], *, run: bool) -> None:
 def parse(arguments: list[str]) -> None:
     """Have the command line's own parser read the arguments."""
     command, *rest = arguments
-    settings = import_module(f"wildshape.cli.commands.{command}").Settings
+    settings = module_of(command).Settings
     tyro.cli(settings, args=rest, config=(tyro.conf.FlagCreatePairsOff,))
 
 
@@ -160,7 +160,7 @@ def project() -> dict[str, Any]:
 @cache
 def options(command: str) -> frozenset[str]:
     """Every option of a command."""
-    settings = import_module(f"wildshape.cli.commands.{command}").Settings
+    settings = module_of(command).Settings
     with pytest.raises(SystemExit), redirect_stdout(StringIO()) as said:
         tyro.cli(settings, args=["--help"], config=(tyro.conf.FlagCreatePairsOff,))
     return frozenset(re.findall(r"--[a-z0-9-]+", said.getvalue()))

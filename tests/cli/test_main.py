@@ -4,7 +4,6 @@ import errno
 import shlex
 import subprocess
 import sys
-from importlib import import_module
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -12,7 +11,7 @@ import pytest
 import tyro
 
 from wildshape.baselines.dpc import objective as dpc
-from wildshape.cli.commands import train
+from wildshape.cli.commands import module_of, train
 from wildshape.cli.main import COMMANDS
 from wildshape.training import recipes
 
@@ -37,7 +36,7 @@ ONE_WORD = {"categories", "baselines"}
 
 def settings_of(command, *arguments) -> Any:
     """What the command line's parser makes of the arguments."""
-    settings = import_module(f"wildshape.cli.commands.{command}").Settings
+    settings = module_of(command).Settings
     return tyro.cli(settings, args=arguments, config=(tyro.conf.FlagCreatePairsOff,))
 
 
@@ -102,7 +101,7 @@ def test_help_shows_no_default_where_there_is_none(wildshape, command):
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_values_of_every_list_may_stand_with_commas_or_spaces(wildshape, command):
-    hints = get_type_hints(import_module(f"wildshape.cli.commands.{command}").Settings)
+    hints = get_type_hints(module_of(command).Settings)
     lists = {name for name, hint in hints.items() if "tuple" in str(hint)}
     lists -= {"origin", "source"}  # always X,Y,Z; positional, several words
     assert lists == LISTS.get(command, set())

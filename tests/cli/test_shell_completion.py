@@ -4,10 +4,10 @@
 
 import shutil
 import subprocess
-from importlib import import_module
 
 import pytest
 
+from wildshape.cli.commands import module_of
 from wildshape.cli.main import COMMANDS
 from wildshape.cli.shell_completion import SHELLS, options_of
 
@@ -50,9 +50,7 @@ def test_bash_completes_commands_options_and_words(complete):
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_option_offered_is_taken(command, wildshape):
     help_text = wildshape(command, "--help").out
-    for option, words in options_of(
-        import_module(f"wildshape.cli.commands.{command}").Settings
-    ).items():
+    for option, words in options_of(module_of(command).Settings).items():
         assert option in help_text
         assert all(word in help_text for word in words)
 

@@ -4,11 +4,11 @@
 
 import json
 from dataclasses import fields
-from importlib import import_module
 
 import numpy as np
 import pytest
 
+from wildshape.cli.commands import module_of
 from wildshape.cli.main import COMMANDS
 from wildshape.cli.terminal import answer
 
@@ -19,9 +19,7 @@ def refuse(constant):
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_json(command):
-    assert "json" in {
-        f.name for f in fields(import_module(f"wildshape.cli.commands.{command}").Settings)
-    }
+    assert "json" in {f.name for f in fields(module_of(command).Settings)}
 
 
 def test_commands_say_one_object(wildshape, dataset, store, trained, tmp_path):

@@ -6,9 +6,9 @@ import errno
 import os
 import sys
 from collections.abc import Sequence
-from importlib import import_module
 from types import ModuleType
 
+from wildshape.cli.commands import module_of
 from wildshape.cli.interrupt import Terminated, terminable
 from wildshape.errors import BadInputError, MissingExtraError, lacks_memory
 from wildshape.io.atomic import release_folders
@@ -106,7 +106,7 @@ def _guarded(command: str, arguments: list[str]) -> None:
     reserved: list[bytearray] = []
     try:
         reserved.append(bytearray(_RESERVED_BYTES))
-        module = import_module(f"wildshape.cli.commands.{command.replace('-', '_')}")
+        module = module_of(command)
         module.run(_parse(module, command, arguments))
     except (BadInputError, MissingExtraError) as error:
         _leave(str(error), _BAD_INPUT)

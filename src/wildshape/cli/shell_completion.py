@@ -4,11 +4,12 @@
 
 from collections.abc import Mapping
 from dataclasses import fields
-from importlib import import_module
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from tyro.conf import Positional
+
+from wildshape.cli.commands import module_of
 
 SHELLS = ("bash", "zsh")
 _ZSH = "autoload -U +X compinit && compinit\nautoload -U +X bashcompinit && bashcompinit\n"
@@ -39,7 +40,7 @@ def script(shell: str, commands: Mapping[str, object]) -> str:
     """What a shell is to source; file names are completed wherever nothing else fits."""
     choices, options = [], []
     for command in commands:
-        found = options_of(import_module(f"wildshape.cli.commands.{command}").Settings)
+        found = options_of(module_of(command).Settings)
         options.append(f'        "{command} -"*) words="{" ".join(found)} --help" ;;')
         choices += [
             f'    "{command} {name}") words="{" ".join(words)}" ;;'

@@ -76,8 +76,24 @@ def test_plain_boxes_around_the_same_clusters(wildshape, street, found):
         assert max(methods[name]["size_bias_m"]) < 0
 
 
-def test_two_drives(wildshape, street, found):
-    said = wildshape("evaluate-drive", found, found, "--labels", f"{street},{street}")
+def test_two_drives(wildshape, refused, street, found, tmp_path):
+    """A folder each, and their labels under the same names."""
+    drives, streets = tmp_path / "drives", tmp_path / "streets"
+    streets.mkdir()
+    for name in ("first", "second"):
+        shutil.copytree(found, drives / name)
+        (streets / name).symlink_to(street)
+    said = wildshape("evaluate-drive", drives, "--labels", streets, "--json")
+    assert said.code == 0, said
+    assert len(json.loads(said.out)["trajectories"]) == 2
+    (streets / "second").unlink()
+    assert "no labels of the drive second" in refused("evaluate-drive", drives, "--labels", streets)
+
+
+def test_sequences_of_one_folder(wildshape, street, found, tmp_path):
+    """As KITTI tracking keeps them."""
+    shutil.copytree(found, tmp_path / "drives" / "0000")
+    said = wildshape("evaluate-drive", tmp_path / "drives", "--labels", street)
     assert said.code == 0, said
     assert "| wildshape | 100.0 | 100.0 | 100.0 | 100.0 | 100.0 |" in said.out
 
@@ -112,9 +128,8 @@ def test_bad_boxes(refused, street, found, text, expected):
 
 
 def test_other_bad_input(refused, street, found, tmp_path):
-    assert "no boxes.csv" in refused("evaluate-drive", tmp_path, "--labels", street)
+    assert "no boxes.csv" in refused("evaluate-drive", found / "none", "--labels", street)
     assert "no label_02" in refused("evaluate-drive", found, "--labels", tmp_path)
-    assert "2 for 1 drives" in refused("evaluate-drive", found, "--labels", f"{street},{street}")
     assert "--points -1" in refused("evaluate-drive", found, "--labels", street, "--points", "-1")
     assert "--range" in refused("evaluate-drive", found, "--labels", street, "--range", "nan")
     (found / "trajectory.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")

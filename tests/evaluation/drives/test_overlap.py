@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from wildshape.evaluation.drives.overlap import UprightBox, overlaps
 from wildshape.evaluation.drives.rectangles import l_shape, smallest_rectangle
-from wildshape.geometry.box import FittedBox
-from wildshape.geometry.box_overlap import box_iou
+from wildshape.geometry.box import FittedBox, box_iou
 from wildshape.geometry.transforms.rotation import rotation_z
 
 CAR = UprightBox(10.0, 5.0, 0.0, 4.0, 2.0, 1.5, 0.0)

@@ -8,23 +8,26 @@ from typing import Annotated, Any
 
 from tyro.conf import Positional, arg
 
-from wildshape.cli.options import AsJson, Overwrite, listed, option
+from wildshape.cli.options import AsJson, Overwrite, option
 
 EXAMPLES = (
     "wildshape evaluate-drive found --labels street",
     "wildshape evaluate-drive found --labels training/label_02/0001.txt --out evaluation",
-    "wildshape evaluate-drive found1 found2 --labels street1,street2",
+    "wildshape evaluate-drive drives --labels streets",
 )
 
-Folders = Annotated[
-    tuple[Path, ...],
+Folder = Annotated[
+    Path,
     Positional,
-    arg(metavar="DIR [DIR ...]", help="folders that `wildshape drive` wrote"),
+    arg(metavar="DIR", help="a folder that `wildshape drive` wrote, or one of several such"),
 ]
 Labels = Annotated[
-    tuple[Path, ...],
-    listed("L,L", Path, words=1),
-    arg(help="of each drive: a file of KITTI tracking's label_02, or the folder above it"),
+    Path,
+    arg(
+        metavar="L",
+        help="a file of KITTI tracking's label_02, or a folder above it; of several drives, the"
+        " folder of what bears their names",
+    ),
 ]
 
 
@@ -41,7 +44,7 @@ class Settings:
         range: farthest box, metres, where labels are a camera's.
     """
 
-    folders: Folders
+    folder: Folder
     labels: Labels
     out: Annotated[Path | None, option(metavar="DIR")] = None
     points: Annotated[int, arg(metavar="N")] = 100
@@ -58,17 +61,18 @@ def run(settings: Settings) -> None:
     """
     from wildshape.cli.output import command_line
     from wildshape.cli.terminal import answer, progress
-    from wildshape.evaluation.drives.found import read_found
+    from wildshape.evaluation.drives.found import drives_of, read_found
     from wildshape.evaluation.drives.labels import Counting, read_labels
     from wildshape.evaluation.drives.protocol import evaluate_drives
     from wildshape.evaluation.drives.results import as_json, markdown
     from wildshape.io.provenance import provenance
 
     _check(settings)
+    drives = drives_of(settings.folder, settings.labels)
     counting = Counting(points=settings.points, range_m=settings.range)
-    with progress("evaluating", len(settings.labels) + 3) as bar:
+    with progress("evaluating", len(drives) + 3) as bar:
         labelled, found = [], []
-        for path, folder in zip(settings.labels, settings.folders, strict=True):
+        for folder, path in drives:
             labelled.append(read_labels(path, counting))
             found.append(read_found(folder, len(labelled[-1].frames)))
             bar.at(len(found))
@@ -82,13 +86,6 @@ def run(settings: Settings) -> None:
 def _check(settings: Settings) -> None:
     from wildshape.errors import BadInputError
 
-    if not settings.folders:
-        raise BadInputError("evaluate-drive: expected a folder that `wildshape drive` wrote.")
-    if len(settings.labels) != len(settings.folders):
-        raise BadInputError(
-            f"--labels: {len(settings.labels)} for {len(settings.folders)} drives; give one each,"
-            " with commas between."
-        )
     if settings.points < 0:
         raise BadInputError(f"--points {settings.points}: expected 0 or more.")
     if not settings.range > 0:
@@ -100,8 +97,8 @@ def _write(settings: Settings, scores: Any, counting: Any, made: dict[str, Any])
     from wildshape.evaluation.drives.results import FILES, write_results
 
     assert settings.out is not None
-    for folder in settings.folders:
-        keep_apart(folder, settings.out)
+    keep_apart(settings.folder, settings.out)
+    keep_apart(settings.labels, settings.out)
     output = begin(
         settings.out, "evaluate-drive", _identity(settings), FILES, overwrite=settings.overwrite
     )
@@ -111,8 +108,8 @@ def _write(settings: Settings, scores: Any, counting: Any, made: dict[str, Any])
 
 def _identity(settings: Settings) -> dict[str, Any]:
     return {
-        "folders": [str(folder.resolve()) for folder in settings.folders],
-        "labels": [str(path.resolve()) for path in settings.labels],
+        "folder": str(settings.folder.resolve()),
+        "labels": str(settings.labels.resolve()),
         "points": settings.points,
         "range": settings.range,
     }

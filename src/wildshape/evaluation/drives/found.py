@@ -43,6 +43,35 @@ class FoundDrive:
     T_world_sensor: SE3 | None
 
 
+def drives_of(path: Path, labels: Path) -> list[tuple[Path, Path]]:
+    """Folders with boxes, each with its labels.
+
+    Args:
+        path: a folder with boxes, or a folder of such.
+        labels: of the one drive; or else the folder of what bears the drives' names: folders with
+            labels, or files of label_02.
+
+    Raises:
+        BadInputError: there are no boxes, or a drive has no labels.
+    """
+    if (path / BOXES).is_file():
+        return [(path, labels)]
+    found = sorted(folder.parent for folder in path.glob(f"*/{BOXES}"))
+    if not found:
+        raise BadInputError(
+            f"{path}: no {BOXES} in it; give a folder that `wildshape drive` wrote."
+        )
+    return [(folder, _labels_of(folder.name, labels)) for folder in found]
+
+
+def _labels_of(name: str, labels: Path) -> Path:
+    files = (labels / f"{name}.txt", labels / "label_02" / f"{name}.txt")
+    for place in (labels / name, *files, labels / "training" / "label_02" / f"{name}.txt"):
+        if place.exists():
+            return place
+    raise BadInputError(f"{labels}: no labels of the drive {name}; name them as it is named.")
+
+
 def read_found(path: Path, scans: int) -> FoundDrive:
     """The boxes and the trajectory of a drive of so many scans.
 

@@ -10,8 +10,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from wildshape.geometry.box import FittedBox
-from wildshape.geometry.box_overlap import shared_volume
+from wildshape.geometry.box import FittedBox, shared_volume
 from wildshape.geometry.transforms.rotation import rotation_z
 
 
