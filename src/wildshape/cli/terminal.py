@@ -10,6 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
+from wildshape.report.words import counted as counted
+
 _EVERY_SECONDS = 10.0
 _LISTED = 20
 
@@ -48,11 +50,6 @@ def say_skipped(skipped: Sequence[tuple[str, str]]) -> None:
         say(f"  {what}: {reason}")
     if len(skipped) > _LISTED:
         say(f"  and {len(skipped) - _LISTED} more, all of them in wildshape.json")
-
-
-def counted(count: int, what: str) -> str:
-    """For example `1 scan`, `2 scans`."""
-    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def duration(seconds: float) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.registration import fuse_scans
 from wildshape.records import Box, Points, SensorKind, Track
+from wildshape.report.words import counted
 
 # Okabe & Ito 2008: told apart by colour-blind readers, on white and on black.
 ORANGE, BLUE, GREEN, PINK, SKY, GREY = (
@@ -174,7 +175,7 @@ def track_object(
     if completed is not None:
         clouds.append(Cloud("completed", completed))
     number = f"scan {track.scan_names[middle]} of {len(track.scans)}"
-    about = (track.category, number, f"{len(scan)} points", track.source)
+    about = (track.category, number, counted(len(scan), "point"), track.source)
     return ReportObject(
         name=track.name,
         subtitle=", ".join(part for part in about if part),

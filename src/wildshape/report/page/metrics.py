@@ -11,6 +11,7 @@ from wildshape.baselines.named import NAMES
 from wildshape.evaluation.summary import FIGURES
 from wildshape.evaluation.tables import ROTATE, cell
 from wildshape.report.content import Table
+from wildshape.report.words import counted
 
 _TRAINED_RIVALS = ("dpc", "oracle")  # and what their names begin, such as dpc-lidar
 _SURE = 0.5
@@ -44,7 +45,7 @@ def _caption(methods: Mapping[str, Mapping[str, Any]], seeds: int) -> str:
         "CD = precision + coverage, Euclidean, metres; rotation and translation are medians against"
         " the middle scan; sym counts a half turn as right; CD floor is what so few points allow.",
         f"Mean ± standard deviation of {seeds} seeds." if seeds > 1 else "",
-        f"{skipped} scans skipped, all methods together." if skipped else "",
+        f"{counted(skipped, 'scan')} skipped, all methods together." if skipped else "",
     )
     return " ".join(part for part in parts if part)
 
@@ -111,7 +112,7 @@ def of_confidences(confidences: Sequence[float], flagged: int) -> list[str]:
         return []
     unsure = sum(value < _SURE for value in confidences)
     lines = [
-        f"{len(confidences):,} scans were completed with a median confidence of "
+        f"{counted(len(confidences), 'scan')} completed: a median confidence of "
         f"{float(np.median(confidences)):.2f}; {unsure:,} of them "
         f"({_percent(unsure / len(confidences))}) are below {_SURE}, as one in ten of the scans "
         "held out in training were: look at these first."
@@ -129,13 +130,13 @@ def of_errors(cds: Sequence[float], rotations: Sequence[float]) -> list[str]:
     lines = []
     if cds:
         lines.append(
-            f"Against the true shape of {len(cds):,} objects: a median Chamfer distance of "
-            f"{float(np.median(cds)):.3f} m, {max(cds):.3f} m at worst."
+            f"Against the true shape of {counted(len(cds), 'object')}: a median Chamfer distance"
+            f" of {float(np.median(cds)):.3f} m, {max(cds):.3f} m at worst."
         )
     if rotations:
         share = sum(value <= 30 for value in rotations) / len(rotations)
         lines.append(
-            f"Against the true poses of {len(rotations):,} objects: "
+            f"Against the true poses of {counted(len(rotations), 'object')}: "
             f"{_percent(share)} have a median error of 30° or less to their middle scan."
         )
     return lines

@@ -25,6 +25,7 @@ from wildshape.report.statistics.drawing import (
 )
 from wildshape.report.statistics.statistics import Quantity, Statistics
 from wildshape.report.statistics.thumbnails import PANELS, draw_track
+from wildshape.report.words import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
@@ -50,9 +51,9 @@ def write_statistics_page(
 
 def summary_line(found: Statistics) -> str:
     """How much there is, in one line."""
-    parts = [f"{found.tracks:,} tracks"]
+    parts = [counted(found.tracks, "track")]
     if found.scans is not None and found.points is not None:
-        parts += [f"{found.scans:,} scans", f"{found.points:,} points"]
+        parts += [counted(found.scans, "scan"), counted(found.points, "point")]
     if found.with_poses is not None:
         parts += [f"{found.with_poses:,} with true poses, {found.with_shape:,} with true shapes"]
     single = [next(iter(c)) for c in (found.categories, found.sensors) if len(c) == 1]
@@ -71,7 +72,9 @@ def read_line(found: Statistics) -> str:
     """What was read to find that out."""
     if found.read == found.tracks:
         return "The points of all tracks were read."
-    return f"Points were read of a sample of {found.read:,} tracks, drawn by chance, seed 0."
+    return (
+        f"Points were read of a sample of {counted(found.read, 'track')}, drawn by chance, seed 0."
+    )
 
 
 def _draw_sheet(title: str, found: Statistics, tracks: Sequence[Track]) -> "Drawing":
@@ -104,7 +107,7 @@ def _draw_thumbnails(figure: Any, tracks: Sequence[Track]) -> None:
     for half, track in zip(figure.subfigures(rows, 2, squeeze=False, wspace=0.02).flat, tracks):
         axes = half.subplots(1, PANELS, gridspec_kw={"wspace": 0.03})
         draw_track(list(axes), track)
-        words = (track.name, track.category, f"{len(track.scans)} scans", track.source)
+        words = (track.name, track.category, counted(len(track.scans), "scan"), track.source)
         name = literal(", ".join(word for word in words if word)[:90])
         half.suptitle(name, fontsize=8, color=INK, x=0.01, ha="left")
 

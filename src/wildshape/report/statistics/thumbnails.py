@@ -15,6 +15,7 @@ from wildshape.records import Points, Track
 from wildshape.report.content import GREEN, GREY, ORANGE
 from wildshape.report.scene import thin, upright
 from wildshape.report.statistics.drawing import literal
+from wildshape.report.words import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,14 +43,14 @@ def draw_track(row: Sequence["Axes"], track: Track) -> None:
         if whole is not None:
             _dots(axes, whole, GREY, 0.25)
         _dots(axes, cloud, ORANGE, 1.0)
-        points = f"{len(track.scans[number]):,} points"
+        points = counted(len(track.scans[number]), "point")
         _frame(axes, bounds, literal(f"{_tail(track.scan_names[number])}: {points}"))
     for axes in row[len(clouds) :]:
         axes.set_axis_off()
     if whole is not None:
         row[-1].set_axis_on()
         _dots(row[-1], whole, GREEN, 1.0)
-        _frame(row[-1], bounds, f"{len(track.scans)} scans by truth")
+        _frame(row[-1], bounds, f"{counted(len(track.scans), 'scan')} by truth")
 
 
 def spread(count: int, wanted: int) -> list[int]:

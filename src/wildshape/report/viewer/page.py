@@ -18,6 +18,7 @@ from wildshape.report.viewer.details import details
 from wildshape.report.viewer.panel import Panel
 from wildshape.report.viewer.stage import Stage
 from wildshape.report.viewer.visitors import answering_only, checked_hosts, prove
+from wildshape.report.words import counted
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -117,7 +118,7 @@ class Page:
                 if turn != self.turn:
                     return
                 stage.add(scan, made)
-                self.status = f"completed {len(stage.made)} of {total} scans ..."
+                self.status = f"completed {len(stage.made)} of {counted(total, 'scan')} ..."
                 due = time.monotonic() - spoke > _SPEAK_SECONDS
                 if due or scan == self.panel.wish().scan:
                     spoke = time.monotonic()

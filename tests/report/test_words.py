@@ -1,0 +1,20 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""One scan is never `1 scans`."""
+
+from wildshape.report.page.metrics import of_confidences, of_errors
+from wildshape.report.words import counted
+
+
+def test_one_and_many() -> None:
+    assert [counted(n, "scan") for n in (0, 1, 2)] == ["0 scans", "1 scan", "2 scans"]
+    assert counted(20_000, "point") == "20,000 points"
+
+
+def test_readings_of_one_scan() -> None:
+    said = [*of_confidences([0.5], 0), *of_errors([0.1], [3.0])]
+    assert len(said) == 3
+    for line, begins in zip(said, ("1 scan completed", "Against the true shape of 1 object:", "")):
+        assert line.startswith(begins)
+        assert "1 scans" not in line
+        assert "1 objects" not in line
