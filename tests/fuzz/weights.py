@@ -20,7 +20,7 @@ from wildshape.method.confidence import Calibration, Facts
 from wildshape.method.network import NetworkConfig, ShapePoseNet
 from wildshape.training.batches.fused import FusedTargets
 from wildshape.training.runtime.log import RunLog
-from wildshape.training.self_training.saved_targets import load_targets, save_targets
+from wildshape.training.self_training.targets import load_targets, save_targets
 from wildshape.training.state import TrainState, load_state, save_state
 
 _NETWORK = NetworkConfig((8, 8, 8, 16), (8, 8), (8, 8), points=32, branches=2, selector=True)

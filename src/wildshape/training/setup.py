@@ -30,8 +30,8 @@ from wildshape.training.runtime.cuda_graph import Captured
 from wildshape.training.runtime.processes import Processes, join
 from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.self_training.objective import SelfTaught
-from wildshape.training.self_training.pseudo_labels import fused_targets, true_targets
-from wildshape.training.self_training.saved_targets import load_targets, save_targets
+from wildshape.training.self_training.pseudo_labels import fused_targets
+from wildshape.training.self_training.targets import load_targets, save_targets, true_targets
 from wildshape.training.state import STATE, TrainState, load_state
 from wildshape.training.step import Step, Views
 
@@ -199,7 +199,7 @@ def _targets(
     if teacher is None:
         return None
     if teacher == "truth":
-        return true_targets(sampler, config)
+        return true_targets(sampler, config.fusion)
     time_ordered = recipe.loss.time_ordered or recipe.views.sensor == "lidar"
     kept = {key: identity[key] for key in ("data", "teacher", "headings") if key in identity}
     kept["rules"] = _short_hash(repr((config, time_ordered)).encode())

@@ -34,11 +34,15 @@ from wildshape.training.self_training.pseudo_labels import (
     levelled,
     refined,
     shape_of,
-    true_targets,
     view_tops,
     with_roof,
 )
-from wildshape.training.self_training.saved_targets import TARGETS, load_targets, save_targets
+from wildshape.training.self_training.targets import (
+    TARGETS,
+    load_targets,
+    save_targets,
+    true_targets,
+)
 from wildshape.training.state import STATE, save_state
 
 IDENTITY = {"data": "abc", "teacher": "def"}

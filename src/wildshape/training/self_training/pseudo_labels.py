@@ -21,7 +21,6 @@ import torch
 from jaxtyping import Float, Float32
 from torch import Tensor
 
-from wildshape.errors import BadInputError
 from wildshape.geometry.gravity import level_turn
 from wildshape.geometry.projection.field_of_view import slope, view_top
 from wildshape.geometry.transforms.se3 import SE3
@@ -37,7 +36,6 @@ from wildshape.training.batches.fused import DrawConfig, FusedTargets
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.self_training.fused_shape import (
     FusionConfig,
-    exactly,
     fused_shape,
     sensors_of,
     with_unseen_roof,
@@ -51,7 +49,6 @@ from wildshape.training.self_training.heading_transfer import (
 from wildshape.training.self_training.headings import (
     HeadingConfig,
     PosedTrack,
-    by_scan,
     pose_track,
     settled_signs,
     signs_across,
@@ -60,6 +57,7 @@ from wildshape.training.self_training.headings import (
 )
 from wildshape.training.self_training.objective import TaughtLossConfig
 from wildshape.training.self_training.pose_graph import PoseGraphConfig, refine_by_graph
+from wildshape.training.self_training.targets import targets_of
 from wildshape.training.self_training.unseen_roof import RoofConfig
 
 Progress = Callable[[int, int], None]
@@ -204,7 +202,7 @@ def fused_targets(
     tops = view_tops(sampler)
     if who.is_lidar:
         shapes = [with_roof(who, *known) for known in zip(shapes, tracks, tops)]
-    return _targets(sampler, tracks, shapes, tops, config, complete=False)
+    return targets_of(sampler, tracks, shapes, tops, config.fusion, complete=False)
 
 
 def heading_votes(teacher: Teacher, track: PosedTrack) -> Float[Tensor, "V"]:
@@ -285,45 +283,6 @@ def view_tops(sampler: ViewSampler) -> list[float]:
         return float(slope(torch.from_numpy(sampler.store.scan_points(scan))).max())
 
     return [view_top([highest(int(scan)) for scan in scans]) for scans in sampler.scans_of]
-
-
-def true_targets(sampler: ViewSampler, config: SelfTrainingConfig = _DEFAULT) -> FusedTargets:
-    """The truth as targets: the oracle, the upper bound of METHOD 9.
-
-    Raises:
-        BadInputError: a track has no true poses or no true shape.
-    """
-    store = sampler.store
-    starts = np.asarray(store.track_starts)
-    tracks, shapes = [], []
-    for scans in sampler.scans_of:
-        number = int(np.searchsorted(starts, scans[0], side="right")) - 1
-        known, shape = store.poses_of(number), store.shape_of(number)
-        if known is None or shape is None:
-            raise BadInputError(
-                f"{store.path}: track {store.names[number]} has no true poses or shape; the oracle"
-                " needs both."
-            )
-        own = known[torch.from_numpy(scans - starts[number])].to(torch.float32)
-        tracks.append(PosedTrack(scans, own, 0.0))
-        shapes.append(exactly(np.asarray(shape), config.fusion.points))
-    return _targets(sampler, tracks, shapes, [math.inf] * len(shapes), config, complete=True)
-
-
-def _targets(
-    sampler: ViewSampler,
-    tracks: Sequence[PosedTrack],
-    shapes: Sequence[np.ndarray],
-    tops: Sequence[float],
-    config: SelfTrainingConfig,
-    *,
-    complete: bool,
-) -> FusedTargets:
-    poses = by_scan(tracks, len(sampler.store.scan_sizes))
-    sensors = torch.stack([sensors_of(track, config.fusion.sensors) for track in tracks])
-    found = torch.from_numpy(np.stack(shapes))
-    ends = torch.tensor(list(tops))
-    return FusedTargets(poses.rotation, poses.translation, found, sensors, ends, complete=complete)
 
 
 def _scaled(T_a_b: SE3, factor: float) -> SE3:
