@@ -27,8 +27,7 @@ from wildshape.io.tracks import write_track
 from wildshape.report.content import Report
 from wildshape.report.page.folder import report_from_folder
 from wildshape.report.statistics.statistics import statistics_of_store
-from wildshape.report.viewer.content import Source
-from wildshape.report.viewer.sources import from_results, worst_first
+from wildshape.report.viewer.sources import Source, from_results, worst_first
 from wildshape.simulate.shapes.meshes import mesh_files, read_mesh
 
 _SCAN = "000000"

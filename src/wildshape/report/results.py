@@ -3,7 +3,7 @@
 """What `complete` and `register` left of a track, read back: objects.json and what is beside."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -26,18 +26,23 @@ class TrackResult:
 
     Attributes:
         folder: where it lies.
-        said: the content of its objects.json.
+        record: the content of its objects.json.
         track: the scans it is about; None where they have moved, changed or were lost.
     """
 
     folder: Path
-    said: dict[str, Any]
+    record: dict[str, Any]
     track: Track | None
+
+    @property
+    def entries(self) -> Sequence[dict[str, Any]]:
+        """What objects.json says of each scan, in their order in time."""
+        return self.record.get("scans") or ()
 
     @property
     def scans(self) -> tuple[str, ...]:
         """Names of the scans that have a result, in their order in time."""
-        return tuple(str(scan["scan"]) for scan in self.said.get("scans") or ())
+        return tuple(str(entry["scan"]) for entry in self.entries)
 
     def entry(self, scan: str) -> dict[str, Any]:
         """What objects.json says of a scan."""
@@ -45,7 +50,7 @@ class TrackResult:
 
     @cached_property
     def _entries(self) -> dict[str, dict[str, Any]]:
-        return {str(entry["scan"]): entry for entry in reversed(self.said.get("scans") or ())}
+        return {str(entry["scan"]): entry for entry in reversed(self.entries)}
 
     def completed(self, scan: str) -> Points | None:
         """The completed shape, in that scan's sensor frame, metres."""
@@ -73,14 +78,14 @@ class Inputs:
     place: Path | None = None
     opened: dict[tuple[Path, Coordinates], TrackSource] = field(default_factory=dict)
 
-    def track(self, folder: Path, said: dict[str, Any]) -> Track | None:
+    def track(self, folder: Path, record: dict[str, Any]) -> Track | None:
         """The track that `folder` is about; None if the scans have moved, changed or lost it."""
-        named = self.place or (Path(said["input"]) if said.get("input") else None)
+        named = self.place or (Path(record["input"]) if record.get("input") else None)
         if named is None:
             return None
         try:
             source = self._open(named, coordinates_of(_settings(folder.parent / MARKER)))
-            return source[source.numbers[str(said.get("track") or folder.name)]]
+            return source[source.numbers[str(record.get("track") or folder.name)]]
         except (BadInputError, KeyError, ValueError):
             return None
 
@@ -121,8 +126,8 @@ def read_result(folder: Path, inputs: Inputs) -> TrackResult:
         BadInputError: objects.json is damaged.
     """
     with reading(folder / OBJECTS, "what complete or register writes"):
-        said = read_object(folder / OBJECTS)
-        found = TrackResult(folder, said, inputs.track(folder, said))
+        record = read_object(folder / OBJECTS)
+        found = TrackResult(folder, record, inputs.track(folder, record))
         for scan in found.scans:
             box_of(found.entry(scan))
             doubt_of(found.entry(scan))

@@ -62,7 +62,7 @@ def test_page_is_served_here_until_it_is_interrupted(wildshape, completed, monke
         while served.status or served.stage is None:
             time.sleep(0.01)
         with urlopen(served.url, timeout=60) as answer:
-            seen.append((served.url, len(served.stage.made), len(answer.read())))
+            seen.append((served.url, len(served.stage.completions), len(answer.read())))
         raise KeyboardInterrupt
 
     monkeypatch.setattr(page, "run_until_interrupted", once)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import torch
-from tests.report.viewer.made import perfect, track
+from tests.report.viewer.shown import perfect, track
 
 from wildshape.inference.registration import to_middle
 from wildshape.report.scene import upright as upright_points

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.report.viewer.made import perfect, track
+from tests.report.viewer.shown import perfect, track
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import stack

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
-from tests.report.viewer.made import perfect, track
+from tests.report.viewer.shown import perfect, track
 
 from wildshape.report.viewer.colours import COLOURINGS, GUESSED, by_distance, by_height
 from wildshape.report.viewer.details import details

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.report.chromium import CHROMIUM, Page, browser, eventually
-from tests.report.viewer.made import source
+from tests.report.viewer.shown import source
 
 pytest.importorskip("viser", reason="did not run: viser is not installed (extra view)")
 from wildshape.report.viewer.page import serving

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from tests.report.viewer.made import source
+from tests.report.viewer.shown import source
 
 from wildshape.errors import BadInputError, MissingExtraError
 from wildshape.report.viewer import page

@@ -28,7 +28,7 @@ from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.records import Points, Sensor
 
-_SEEN = 0.5  # of a scan's points must be in the image
+_IN_IMAGE = 0.5  # of a scan's points must be in the image
 
 
 def load(model: Path, device: str = "cpu") -> "Dpc":
@@ -59,12 +59,12 @@ class Dpc:
         volume = self.settings.network.volume
         lost = "silhouettes and depths" if self.settings.depth else "silhouettes"
         lost += ", half turns tried" if self.settings.half_turn else ""
-        made = f"our port of DPC ({self.settings.name}), trained on {lost}"
+        method = f"our port of DPC ({self.settings.name}), trained on {lost}"
         if not isinstance(volume, PinholeVolume):
-            return f"{made}; range images, cube of {volume.scale:g} m, radial offset of the scan"
+            return f"{method}; range images, cube of {volume.scale:g} m, radial offset of the scan"
         moved = "rotation and translation" if self.settings.network.reach else "rotation only"
         told = f"IS GIVEN the camera's distance ({volume.distance:g}) and that it looks at the"
-        return f"{made}; depth images, {moved}; {told} object's true centre"
+        return f"{method}; depth images, {moved}; {told} object's true centre"
 
     def complete(self, points: Points, sensor: Sensor) -> Points:
         """The complete shape `(m, 3)` in the frame of `points` `(n, 3)`, metres.
@@ -72,7 +72,7 @@ class Dpc:
         Raises:
             BadInputError: another sensor than trained on, or an object out of the image.
         """
-        cloud, T_sensor_can = self._look(points, sensor)
+        cloud, T_sensor_can = self._posed_cloud(points, sensor)
         return T_sensor_can.apply(cloud).float().numpy()
 
     def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:
@@ -90,10 +90,10 @@ class Dpc:
         Raises:
             BadInputError: as `complete`.
         """
-        return stack([self._look(scan, sensor)[1] for scan in scans])
+        return stack([self._posed_cloud(scan, sensor)[1] for scan in scans])
 
     @torch.inference_mode()
-    def _look(self, points: Points, sensor: Sensor) -> tuple[Float[Tensor, "n 3"], SE3]:
+    def _posed_cloud(self, points: Points, sensor: Sensor) -> tuple[Float[Tensor, "n 3"], SE3]:
         """Canonical points in metres, and `T_sensor_canonical`; float64."""
         volume = self.settings.network.volume
         _refuse_other(sensor, volume)
@@ -101,7 +101,7 @@ class Dpc:
         scan = torch.from_numpy(np.ascontiguousarray(points)).to(device)[None]
         turned, turn, offset = _before(scan, volume)
         cube = to_volume(turned, offset, volume)
-        _refuse_unseen(cube)
+        _refuse_outside(cube)
         code = self.network.encode(scan_image(cube, self.settings.network.image))
         cloud, _ = self.network.cloud(code)
         poses = self.network.poses(code)
@@ -129,8 +129,8 @@ def _refuse_other(sensor: Sensor, volume: Volume) -> None:
         )
 
 
-def _refuse_unseen(cube: Float[Tensor, "1 n 3"]) -> None:
-    if float(inside(cube).float().mean()) < _SEEN:
+def _refuse_outside(cube: Float[Tensor, "1 n 3"]) -> None:
+    if float(inside(cube).float().mean()) < _IN_IMAGE:
         raise BadInputError(
             "the object lies outside of DPC's image: it needs a camera that looks at the object"
             " from the distance trained with."

@@ -154,11 +154,11 @@ class DpcObjective(nn.Module):
         rendering = Rendering(volume, size, self._sigma(share, size), self.config.depth)
         strength = strength.repeat_interleave(views, dim=0)
         each = cloud.repeat_interleave(views, dim=0)[:, None]
-        seen = coarser(image, size)
+        observed = coarser(image, size)
 
         def judged(tried: Float[Tensor, "B M 4"], judge: Callable[..., Judged]) -> Judged:
             posed = place(each, rotation_from_quaternion(tried), middle[:, None], volume)
-            return judge(posed, offset, seen, rendering, strength)
+            return judge(posed, offset, observed, rendering, strength)
 
         tried, best = poses.candidates, None
         if self.config.half_turn:

@@ -49,10 +49,10 @@ class Hindsight(NamedTuple):
 
 
 def image_costs(
-    made: RangeImage, seen: RangeImage, depth: float
+    rendered: RangeImage, observed: RangeImage, depth: float
 ) -> tuple[Float[Tensor, "B"], Float[Tensor, "B"]]:
     """Half the squared differences of silhouettes and, weighted, depths; as of 64 x 64 pixels."""
-    squared = [(a - b).square().flatten(1).mean(1) for a, b in zip(made, seen, strict=True)]
+    squared = [(a - b).square().flatten(1).mean(1) for a, b in zip(rendered, observed, strict=True)]
     silhouette, away = (0.5 * _PIXELS * mean for mean in squared)
     return silhouette, depth * away
 
@@ -60,7 +60,7 @@ def image_costs(
 def hindsight(
     posed: Float[Tensor, "B K n 3"],
     offset: Float[Tensor, "B"],
-    seen: RangeImage,
+    observed: RangeImage,
     rendering: Rendering,
     strength: Float[Tensor, "B"],
 ) -> Hindsight:
@@ -69,12 +69,12 @@ def hindsight(
     Args:
         posed: the shape under each candidate pose, sensor's frame, metres.
         offset: distance of the cube's middle, metres.
-        seen: image of each view, `rendering.size` pixels wide.
+        observed: image of each view, `rendering.size` pixels wide.
         rendering: how images are made.
         strength: of each view's occupancy.
     """
-    winner = cheapest(posed, offset, seen, rendering, strength)
-    silhouette, depth = _costs(chosen(posed, winner), offset, seen, rendering, strength)
+    winner = cheapest(posed, offset, observed, rendering, strength)
+    silhouette, depth = _costs(chosen(posed, winner), offset, observed, rendering, strength)
     silhouette, depth = silhouette.mean(), depth.mean()
     return Hindsight(silhouette + depth, silhouette.detach(), depth.detach(), winner)
 
@@ -83,15 +83,16 @@ def hindsight(
 def cheapest(
     posed: Float[Tensor, "B K n 3"],
     offset: Float[Tensor, "B"],
-    seen: RangeImage,
+    observed: RangeImage,
     rendering: Rendering,
     strength: Float[Tensor, "B"],
 ) -> Int[Tensor, "B"]:
     """Row of the candidate whose image is nearest; arguments as of `hindsight`."""
     costs = [
-        sum(_costs(posed[:, k], offset, seen, rendering, strength)) for k in range(posed.shape[1])
+        sum(_costs(posed[:, k], offset, observed, rendering, strength))
+        for k in range(posed.shape[1])
     ]
-    return torch.stack([torch.as_tensor(cost) for cost in costs], dim=1).argmin(1)
+    return torch.stack(costs, dim=1).argmin(1)
 
 
 def chosen(candidates: Float[Tensor, "B K *rest"], row: Int[Tensor, "B"]) -> Tensor:
@@ -100,11 +101,11 @@ def chosen(candidates: Float[Tensor, "B K *rest"], row: Int[Tensor, "B"]) -> Ten
 
 
 def _costs(
-    posed: Tensor, offset: Tensor, seen: RangeImage, rendering: Rendering, strength: Tensor
+    posed: Tensor, offset: Tensor, observed: RangeImage, rendering: Rendering, strength: Tensor
 ) -> tuple[Tensor, Tensor]:
     points = to_volume(posed, offset, rendering.volume)
-    made = project(points, rendering.size, rendering.sigma, strength)
-    return image_costs(made, seen, rendering.depth)
+    rendered = project(points, rendering.size, rendering.sigma, strength)
+    return image_costs(rendered, observed, rendering.depth)
 
 
 def student_loss(student: Float[Tensor, "B 4"], teacher: Float[Tensor, "B 4"]) -> Float[Tensor, ""]:

@@ -12,7 +12,7 @@ from wildshape.cli.options import AT_ORIGIN, AsJson, Device, Model, Origin, Unit
 
 if TYPE_CHECKING:
     from wildshape.inference.predictor import Predictor
-    from wildshape.report.viewer.content import Source
+    from wildshape.report.viewer.sources import Source
 
 EXAMPLES = (
     "wildshape view completed",

@@ -130,7 +130,7 @@ def _findings(metrics: Metrics, ranked: Sequence[Judged]) -> Iterator[str]:
         [one.cd for one in ranked if one.cd is not None],
         [one.rotation_deg for one in ranked if one.rotation_deg is not None],
     )
-    entries = [entry for one in ranked for entry in one.result.said.get("scans") or ()]
+    entries = [entry for one in ranked for entry in one.result.entries]
     known = [float(e["confidence"]) for e in entries if e.get("confidence") is not None]
     yield from of_confidences(known, sum(bool(doubt_of(entry)) for entry in entries))
 

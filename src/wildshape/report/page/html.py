@@ -248,8 +248,8 @@ def _html_table(table: Table) -> str:
     )
     rows = "".join(_table_row(table, i, right) for i in range(len(table.rows)))
     caption = f"<p class=caption>{escape(table.caption)}</p>" if table.caption else ""
-    kinds = ["sortable"] * table.sortable + ["wide"] * (len(table.columns) > _WIDE)
-    kind = f' class="{" ".join(kinds)}"' if kinds else ""
+    classes = ["sortable"] * table.sortable + ["wide"] * (len(table.columns) > _WIDE)
+    kind = f' class="{" ".join(classes)}"' if classes else ""
     grid = f"<table{kind}><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
     return f"<div class=scroll>{grid}</div>{caption}"
 

@@ -41,13 +41,13 @@ class Judged:
     @property
     def warning(self) -> str:
         """Why the first of its scans that is in doubt is not to be trusted, or nothing."""
-        doubts = map(doubt_of, self.result.said.get("scans") or ())
+        doubts = map(doubt_of, self.result.entries)
         return next(filter(None, doubts), "")
 
 
 def judge(result: TrackResult) -> Judged:
     """Compare with truth where the scans bring it."""
-    entries = result.said.get("scans") or ()
+    entries = result.entries
     known = [float(e["confidence"]) for e in entries if e.get("confidence") is not None]
     least = min(known, default=None)
     track, bare = result.track, replace(result, track=None)
@@ -87,7 +87,7 @@ def index_of(ranked: Sequence[Judged], drawn: int) -> Table:
 
 def scans_of(result: TrackResult) -> Table | None:
     """What is known of each scan of a track."""
-    entries = result.said.get("scans") or ()
+    entries = result.entries
     if not entries:
         return None
     points = _counts(result.track)

@@ -9,7 +9,7 @@ import numpy as np
 from wildshape.evaluation.metrics import completion_error
 from wildshape.report.scene import thin
 from wildshape.report.viewer.colours import LEGENDS, css
-from wildshape.report.viewer.content import CompletedScan
+from wildshape.report.viewer.sources import CompletedScan
 from wildshape.report.viewer.stage import POINTS_A_CLOUD, Stage, Wish
 
 _ROW = "<div style='display:flex;gap:.8em;justify-content:space-between'><span style='opacity:.65'>"
@@ -24,7 +24,7 @@ def details(stage: Stage, wish: Wish, status: str = "") -> str:
         f"<div style='opacity:.65;overflow-wrap:anywhere'>{escape(about)}</div>" if about else "",
         *(_row(label, value) for label, value in _rows(stage, wish)),
         _small(f"Completed shape: {LEGENDS[wish.colouring]}."),
-        _small(_warning(stage.made.get(wish.scan)), "color:#d55e00"),
+        _small(_warning(stage.completions.get(wish.scan)), "color:#d55e00"),
         _small(status),
     ]
     inside = "".join(part for part in parts if part)
@@ -38,30 +38,30 @@ def _rows(stage: Stage, wish: Wish) -> list[tuple[str, str]]:
         ("measured points", f"{len(scan):,}"),
         ("distance to the sensor", f"{np.linalg.norm(stage.centre(wish.scan)):.1f} m"),
     ]
-    return rows + _completed_rows(stage.made.get(wish.scan)) + _true_rows(stage, wish)
+    return rows + _completed_rows(stage.completions.get(wish.scan)) + _true_rows(stage, wish)
 
 
-def _completed_rows(made: CompletedScan | None) -> list[tuple[str, str]]:
-    if made is None:
+def _completed_rows(done: CompletedScan | None) -> list[tuple[str, str]]:
+    if done is None:
         return [("completed shape", "not yet")]
     rows = []
-    if made.confidence is not None:
-        dot = f"<span style='color:{css(made.confidence)}'>\N{BLACK CIRCLE}</span>"
-        rows.append(("confidence", f"{dot} {made.confidence:.2f}"))
-    if made.box is not None:
-        size = " \N{MULTIPLICATION SIGN} ".join(f"{side:.2f}" for side in made.box.size)
+    if done.confidence is not None:
+        dot = f"<span style='color:{css(done.confidence)}'>\N{BLACK CIRCLE}</span>"
+        rows.append(("confidence", f"{dot} {done.confidence:.2f}"))
+    if done.box is not None:
+        size = " \N{MULTIPLICATION SIGN} ".join(f"{side:.2f}" for side in done.box.size)
         rows.append(("box", f"{size} m"))
-    if made.seconds:
-        rows.append(("time", f"{1000 * made.seconds:.0f} ms"))
+    if done.seconds:
+        rows.append(("time", f"{1000 * done.seconds:.0f} ms"))
     return rows
 
 
 def _true_rows(stage: Stage, wish: Wish) -> list[tuple[str, str]]:
     """Errors of this scan, and of the whole track by the way of fusing that is chosen."""
-    rows, made = [], stage.made.get(wish.scan)
+    rows, done = [], stage.completions.get(wish.scan)
     truth = stage.truth_in(wish.scan) if stage.track.shape is not None else None
-    if truth is not None and made is not None and made.points is not None:
-        error = completion_error(made.points, thin(truth, 2 * POINTS_A_CLOUD))
+    if truth is not None and done is not None and done.points is not None:
+        error = completion_error(done.points, thin(truth, 2 * POINTS_A_CLOUD))
         rows.append(("Chamfer distance to truth", f"{error.cd:.3f} m"))
     way = stage.moves(wish.way)
     if way is not None and way.error is not None and len(stage.track.scans) > 1:
@@ -79,5 +79,5 @@ def _small(text: str, style: str = "opacity:.65") -> str:
     return f"<div style='{style};margin-top:.4em'>{escape(text)}</div>" if text else ""
 
 
-def _warning(made: CompletedScan | None) -> str:
-    return made.warning if made is not None else ""
+def _warning(done: CompletedScan | None) -> str:
+    return done.warning if done is not None else ""

@@ -12,7 +12,7 @@ from wildshape.evaluation.metrics import ACCURATE_DEG, RegistrationError, regist
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.registration import to_middle
 from wildshape.records import Track
-from wildshape.report.viewer.content import CompletedScan
+from wildshape.report.viewer.sources import CompletedScan
 
 BEFORE, AFTER, ICP, TRUTH = "before: only centred", "after: Wildshape", "local ICP", "true poses"
 WAYS = (AFTER, BEFORE, ICP, TRUTH)
@@ -41,11 +41,11 @@ class Moves:
         return f"{median:.1f}°, {metres:.2f} m median; {100 * right:.0f} % within 30°"
 
 
-def moves(way: str, track: Track, made: Mapping[int, CompletedScan]) -> Moves | None:
+def moves(way: str, track: Track, completed: Mapping[int, CompletedScan]) -> Moves | None:
     """A track's scans taken to its middle scan's frame; None where that cannot be done (yet)."""
     if not all(len(scan) for scan in track.scans):
         return None
-    T_middle_scan = _moves(way, track, made)
+    T_middle_scan = _moves(way, track, completed)
     if T_middle_scan is None:
         return None
     truth = track.T_sensor_object
@@ -54,13 +54,13 @@ def moves(way: str, track: Track, made: Mapping[int, CompletedScan]) -> Moves | 
     return Moves(T_middle_scan, registration_error(T_middle_scan, truth, truth[track.middle]))
 
 
-def _moves(way: str, track: Track, made: Mapping[int, CompletedScan]) -> SE3 | None:
+def _moves(way: str, track: Track, completed: Mapping[int, CompletedScan]) -> SE3 | None:
     if way == BEFORE:
         return Identity().register_track(track.scans, track.sensor)
     if way == ICP:
         return Chained(LocalIcp()).register_track(track.scans, track.sensor)
     if way == TRUTH:
         return None if track.T_sensor_object is None else to_middle(track.T_sensor_object)
-    poses = [made[i].pose for i in range(len(track.scans)) if i in made]
+    poses = [completed[i].pose for i in range(len(track.scans)) if i in completed]
     known = [pose for pose in poses if pose is not None]
     return to_middle(stack(known)) if len(known) == len(track.scans) else None

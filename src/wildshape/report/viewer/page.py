@@ -13,9 +13,9 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from wildshape.errors import BadInputError, MissingExtraError
-from wildshape.report.viewer.content import Source
 from wildshape.report.viewer.details import details
 from wildshape.report.viewer.panel import Panel
+from wildshape.report.viewer.sources import Source
 from wildshape.report.viewer.stage import Stage
 from wildshape.report.viewer.visitors import answering_only, checked_hosts, prove
 from wildshape.report.words import counted
@@ -65,7 +65,7 @@ class Page:
             if self.stage is not None:
                 wish = self.panel.wish()
                 self.stage.show(wish)
-                self.panel.said.content = details(self.stage, wish, self.status or self.source.note)
+                self.panel.text.content = details(self.stage, wish, self.status or self.source.note)
 
     def play(self) -> None:
         """Go on by a scan, where that is asked for."""
@@ -92,10 +92,10 @@ class Page:
         self.stage = stage
         self.status = "completing ..."
         self.panel.fit(stage.track)
-        self._look()
+        self._aim_camera()
         self.refresh()
 
-    def _look(self) -> None:
+    def _aim_camera(self) -> None:
         """The camera at a distance that fits the object, for new pages and those open."""
         if self.stage is None:
             return
@@ -113,12 +113,13 @@ class Page:
             return
         spoke = 0.0
         total, shown = len(stage.track.scans), self.panel.wish().scan
-        for scan, made in self.source.make(number, stage.track, shown):
+        for scan, done in self.source.make(number, stage.track, shown):
             with self.lock:
                 if turn != self.turn:
                     return
-                stage.add(scan, made)
-                self.status = f"completed {len(stage.made)} of {counted(total, 'scan')} ..."
+                stage.add(scan, done)
+                of = counted(total, "scan")
+                self.status = f"completed {len(stage.completions)} of {of} ..."
                 due = time.monotonic() - spoke > _SPEAK_SECONDS
                 if due or scan == self.panel.wish().scan:
                     spoke = time.monotonic()
@@ -132,7 +133,7 @@ class Page:
             self.status = text
             self.refresh()
             if self.stage is None:
-                self.panel.said.content = f"<div style='padding:.8em'>{escape(text)}</div>"
+                self.panel.text.content = f"<div style='padding:.8em'>{escape(text)}</div>"
 
 
 @contextmanager

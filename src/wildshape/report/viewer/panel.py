@@ -55,7 +55,7 @@ class Panel:
             self.way = self._choice("fused by", WAYS)
             self.hold = self._choice("held still", tuple(_HOLDS))
             self.colouring = self._choice("colours", COLOURINGS)
-        self.said = self.gui.add_html("", order=6)
+        self.text = self.gui.add_html("", order=6)
 
     @property
     def track(self) -> int:

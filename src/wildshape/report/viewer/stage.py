@@ -16,7 +16,6 @@ from wildshape.records import Box, Points, Track
 from wildshape.report.content import BLUE, GREEN, GREY, ORANGE
 from wildshape.report.scene import box_segments, thin
 from wildshape.report.viewer.colours import PLAIN, WRONG, Rgb, by_height, completed_colours, rgb
-from wildshape.report.viewer.content import CompletedScan, true_shape
 from wildshape.report.viewer.fusing import AFTER, BEFORE, Moves, moves
 from wildshape.report.viewer.placing import (
     Hold,
@@ -26,6 +25,7 @@ from wildshape.report.viewer.placing import (
     moved_by,
     upright,
 )
+from wildshape.report.viewer.sources import CompletedScan, true_shape
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -80,7 +80,7 @@ class Stage:
 
     server: "ViserServer"
     track: Track
-    made: dict[int, CompletedScan] = field(default_factory=dict)
+    completions: dict[int, CompletedScan] = field(default_factory=dict)
     nodes: dict[tuple[str, int | str], Node] = field(default_factory=dict)
     ways: dict[str, Moves] = field(default_factory=dict)
     seen: int | None = None
@@ -98,16 +98,16 @@ class Stage:
         for handle in self.lines.values():
             handle.remove()
 
-    def add(self, scan: int, made: CompletedScan) -> None:
+    def add(self, scan: int, done: CompletedScan) -> None:
         """Take in what was made of a scan, hidden until it is asked for."""
-        self.made[scan] = made
+        self.completions[scan] = done
         self._scan(scan)
         self._completed(scan)
 
     def moves(self, way: str) -> Moves | None:
         """One way to fuse, worked out once."""
         if way not in self.ways:
-            found = moves(way, self.track, self.made)
+            found = moves(way, self.track, self.completions)
             if found is None:
                 return None
             self.ways[way] = found
@@ -131,19 +131,19 @@ class Stage:
 
     def centre(self, scan: int) -> np.ndarray:
         """`(3,)` the object's middle in a sensor frame, metres: of its box, if known."""
-        made, points = self.made.get(scan), self.track.scans[scan]
-        if made is not None and made.box is not None:
-            return np.asarray(made.box.centre, np.float64)
-        if made is not None and made.points is not None and not len(points):
-            return made.points.mean(0, dtype=np.float64)
+        done, points = self.completions.get(scan), self.track.scans[scan]
+        if done is not None and done.box is not None:
+            return np.asarray(done.box.centre, np.float64)
+        if done is not None and done.points is not None and not len(points):
+            return done.points.mean(0, dtype=np.float64)
         return points.mean(0, dtype=np.float64) if len(points) else np.zeros(3)
 
     def extent(self) -> float:
         """The object's longest side, metres, roughly."""
         middle = self.track.middle
-        made = self.made.get(middle)
-        if made is not None and made.box is not None:
-            return max(made.box.size)
+        done = self.completions.get(middle)
+        if done is not None and done.box is not None:
+            return max(done.box.size)
         scan = self.track.scans[middle]
         return float(np.ptp(scan, axis=0).max()) if len(scan) else _SIZE_M
 
@@ -158,7 +158,7 @@ class Stage:
                 self.nodes[kind, self.seen].show(visible=False)
 
     def _show_scan(self, wish: Wish, T_draw_sensor: SE3) -> None:
-        completed = self._completed(wish.scan) if wish.scan in self.made else None
+        completed = self._completed(wish.scan) if wish.scan in self.completions else None
         if completed is not None and completed.painted != wish.colouring:
             completed.handle.colors = self._paint(wish)
             completed.painted = wish.colouring
@@ -168,15 +168,15 @@ class Stage:
                 node.show(visible=kind in wish.shown)
 
     def _paint(self, wish: Wish) -> Rgb:
-        points, made = self._completed_points(wish.scan), self.made[wish.scan]
+        points, done = self._completed_points(wish.scan), self.completions[wish.scan]
         truth = self.truth_in(wish.scan) if wish.colouring == WRONG else None
         scan = self.track.scans[wish.scan]
-        colours = completed_colours(wish.colouring, points, made.confidence, scan, truth)
+        colours = completed_colours(wish.colouring, points, done.confidence, scan, truth)
         return self._shaded(points, BLUE) if colours is None else colours
 
     def _show_lines(self, wish: Wish, T_draw_sensor: SE3) -> None:
-        made = self.made.get(wish.scan, CompletedScan())
-        for kind, T_sensor_own in (("box", _box_pose(made.box)), ("axes", made.pose)):
+        done = self.completions.get(wish.scan, CompletedScan())
+        for kind, T_sensor_own in (("box", _box_pose(done.box)), ("axes", done.pose)):
             visible = kind in wish.shown and T_sensor_own is not None
             if T_sensor_own is None or (not visible and kind not in self.lines):
                 _hide(self.lines.get(kind))
@@ -184,8 +184,8 @@ class Stage:
             handle = self._line(kind)
             handle.wxyz, handle.position = as_node(T_draw_sensor @ T_sensor_own)
             handle.visible = visible
-        if made.box is not None and "box" in self.lines:
-            self.lines["box"].scale = made.box.size
+        if done.box is not None and "box" in self.lines:
+            self.lines["box"].scale = done.box.size
 
     def _line(self, kind: str) -> Any:
         if kind not in self.lines:
@@ -227,12 +227,12 @@ class Stage:
         return self._cloud("scan", scan, thin(points, POINTS_A_CLOUD), ORANGE)
 
     def _completed(self, scan: int) -> Node | None:
-        if self.made[scan].points is None:
+        if self.completions[scan].points is None:
             return None
         return self._cloud("completed", scan, self._completed_points(scan), BLUE)
 
     def _completed_points(self, scan: int) -> Points:
-        points = self.made[scan].points
+        points = self.completions[scan].points
         return thin(points, POINTS_A_CLOUD) if points is not None else np.zeros((0, 3), np.float32)
 
     def _fused(self, way: str) -> Node:

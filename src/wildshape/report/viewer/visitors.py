@@ -17,7 +17,7 @@ from wildshape.errors import BadInputError, MissingExtraError
 
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 _PORTS = {"http": 80, "https": 443}
-_FOREIGN = "viewer-test.invalid"
+_OTHER_HOST = "viewer-test.invalid"
 _SECONDS = 10.0
 _CURE = "pip install 'viser==1.1.1'"
 
@@ -84,8 +84,8 @@ def answering_only(allowed: Sequence[str]) -> Iterator[None]:
     real = server.serve
 
     def serve(*arguments: Any, process_request: Any = None, **options: Any) -> Any:
-        asked_first = _before(process_request, allowed)
-        return real(*arguments, process_request=asked_first, **options)
+        checked = _before(process_request, allowed)
+        return real(*arguments, process_request=checked, **options)
 
     server.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
     try:
@@ -99,15 +99,15 @@ def _before(inner: Callable[[Any, Any], Any] | None, allowed: Sequence[str]) -> 
         port = connection.local_address[1]
         hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
         if not is_welcome(hosts, origins, port, allowed):
-            said = f"asked for under another name than 127.0.0.1:{port}; see --allow-host\n"
-            return connection.respond(403, said)
+            text = f"asked for under another name than 127.0.0.1:{port}; see --allow-host\n"
+            return connection.respond(403, text)
         return None if inner is None else inner(connection, request)
 
     return process_request
 
 
 def prove(port: int) -> None:
-    """Ask the viewer as a foreign page would.
+    """Ask the viewer as a page of another host would.
 
     Raises:
         MissingExtraError: it answers; this viser cannot be told whom to answer.
@@ -118,8 +118,8 @@ def prove(port: int) -> None:
         "Sec-WebSocket-Version": "13",
         "Sec-WebSocket-Key": "d2lsZHNoYXBlIHZpZXdlcg==",
     }
-    own, foreign = f"127.0.0.1:{port}", f"http://{_FOREIGN}"
-    for headers in ({"Host": _FOREIGN}, {**upgrade, "Host": own, "Origin": foreign}):
+    own, other = f"127.0.0.1:{port}", f"http://{_OTHER_HOST}"
+    for headers in ({"Host": _OTHER_HOST}, {**upgrade, "Host": own, "Origin": other}):
         if _status(port, headers) != http.client.FORBIDDEN:
             raise MissingExtraError(
                 f"this version of viser answers pages of other hosts, so it is not used: {_CURE}."

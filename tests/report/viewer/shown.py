@@ -7,7 +7,7 @@ from tests.cars import car_surface, drive_by
 
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.records import Box, Track
-from wildshape.report.viewer.content import CompletedScan, Source
+from wildshape.report.viewer.sources import CompletedScan, Source
 
 SIZE = (4.2, 1.7, 1.35)
 
