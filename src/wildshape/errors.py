@@ -3,6 +3,8 @@
 """The ways in which Wildshape refuses: one sentence that names the cause and the cure."""
 
 import errno
+from importlib import import_module
+from typing import Any
 
 _LONGEST = 1600
 
@@ -26,6 +28,23 @@ class SharedInputError(BadInputError):
 
 class MissingExtraError(ImportError):
     """An optional library is absent; the message names the extra that brings it."""
+
+
+def load_library(name: str, purpose: str, install: str) -> Any:
+    """A module of a library that is imported where it is needed and nowhere else.
+
+    Args:
+        name: of the module.
+        purpose: what needs it, the beginning of the message: `meshes need scikit-image`.
+        install: what brings it.
+
+    Raises:
+        MissingExtraError: it is not installed.
+    """
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise MissingExtraError(f"{purpose}, which is not installed: {install}.") from error
 
 
 def _visible(character: str) -> str:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The first hit is the nearest of all triangles, by the textbook formula."""
 
-import builtins
+import sys
 
 import numpy as np
 import pytest
@@ -54,13 +54,6 @@ def test_solids_are_told_apart_and_misses_are_infinite() -> None:
 
 
 def test_without_embreex_one_sentence_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = builtins.__import__
-
-    def refuse(name: str, *args: object, **kwargs: object) -> object:
-        if name.startswith("embreex"):
-            raise ImportError(name)
-        return real(name, *args, **kwargs)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(builtins, "__import__", refuse)
+    monkeypatch.setitem(sys.modules, "embreex", None)
     with pytest.raises(MissingExtraError, match="pip install embreex"):
         Scene([])

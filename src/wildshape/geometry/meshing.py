@@ -17,7 +17,7 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, UInt8
 
-from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.errors import BadInputError, load_library
 from wildshape.ops.nearest import nearest
 
 if TYPE_CHECKING:
@@ -77,7 +77,10 @@ def closed_mesh(
     """
     import trimesh
 
-    march = _marching_cubes()
+    measure = load_library(
+        "skimage.measure", "meshes need scikit-image", "pip install scikit-image"
+    )
+    march = measure.marching_cubes
     extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
     if not extent > 0:
         raise BadInputError("a shape whose points are all equal has no surface.")
@@ -89,16 +92,6 @@ def closed_mesh(
     depth = _large_bodies(depth, level, config.smallest_body)
     vertices, faces, *_ = march(depth, level, gradient_direction="ascent")
     return trimesh.Trimesh(vertices * grid.step + grid.start, faces, process=False)
-
-
-def _marching_cubes():
-    try:
-        from skimage.measure import marching_cubes
-    except ImportError as error:
-        raise MissingExtraError(
-            "meshes need scikit-image; install it with: pip install scikit-image"
-        ) from error
-    return marching_cubes
 
 
 def _grid_around(points: np.ndarray, step: float, reach: float) -> _Grid:

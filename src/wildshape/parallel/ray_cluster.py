@@ -4,11 +4,10 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator
-from importlib import import_module
 from itertools import islice
 from typing import Any, TypeVar
 
-from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.errors import BadInputError, load_library
 from wildshape.parallel.processes import guarded
 
 Item = TypeVar("Item")
@@ -38,7 +37,7 @@ def on_ray(
         BadInputError: no cluster there, or an item whose workers died again and again.
         Exception: what the task raised.
     """
-    ray = _ray()
+    ray = load_library("ray", "--ray needs Ray", "pip install 'wildshape[ray]'")
     ours = not ray.is_initialized()
     if ours:
         _connect(ray, address, workers)
@@ -86,13 +85,4 @@ def _connect(ray: Any, address: str, workers: int | None) -> None:
         raise BadInputError(
             f"--ray {address}: no Ray cluster answers there ({error}); start one by"
             " `ray start --head`, or pass --ray local."
-        ) from error
-
-
-def _ray() -> Any:
-    try:
-        return import_module("ray")
-    except ImportError as error:
-        raise MissingExtraError(
-            "Ray is not installed; `pip install wildshape[ray]` brings it."
         ) from error

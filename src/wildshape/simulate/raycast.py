@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wildshape.errors import MissingExtraError
+from wildshape.errors import load_library
 from wildshape.simulate.shapes.solid import Solid
 
 
@@ -36,14 +36,11 @@ class Scene:
         Raises:
             MissingExtraError: embreex is not installed.
         """
-        try:
-            from embreex.mesh_construction import TriangleMesh
-            from embreex.rtcore_scene import EmbreeScene
-        except ImportError as missing:
-            raise MissingExtraError(
-                "ray casting needs the package embreex, which has wheels for x86-64 and Apple "
-                "silicon only: pip install embreex"
-            ) from missing
+        install = "pip install embreex (it has wheels for x86-64 and Apple silicon only)"
+        load_library("embreex", "ray casting needs embreex", install)
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
         self._scene = EmbreeScene(robust=True)
         self._meshes = [
             TriangleMesh(self._scene, s.vertices.astype(np.float32), s.faces.astype(np.int32))

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from wildshape.datasets.argoverse2.unpacked import unpacked_bytes
-from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.errors import BadInputError, load_library
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import check_unpacked, reading
@@ -34,7 +34,7 @@ def read_feather(path: Path, names: tuple[str, ...], brings: str) -> Columns:
         BadInputError: the file is missing, damaged or lacks a column.
         MissingExtraError: pyarrow is not installed.
     """
-    _check_pyarrow()
+    load_library("pyarrow", "feather files need pyarrow", "pip install 'wildshape[arrow]'")
     if not path.is_file():
         raise BadInputError(f"{path}: no such file; {brings}.")
     with reading(path, "a feather table"):
@@ -109,13 +109,3 @@ def poses(columns: Columns, path: Path) -> SE3:
         row = int((~good).nonzero()[0])
         raise BadInputError(f"{path}: row {row} holds no pose; download the file again.")
     return SE3(rotation_from_quaternion(quaternion), translation)
-
-
-def _check_pyarrow() -> None:
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError as error:
-        raise MissingExtraError(
-            "feather files are read by pyarrow, which is not installed: "
-            "pip install 'wildshape[arrow]'."
-        ) from error

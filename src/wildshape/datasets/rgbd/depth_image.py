@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float, Shaped
 
-from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.errors import BadInputError, load_library
 from wildshape.io.guard import reading
 from wildshape.records import Intrinsics, Points
 
@@ -26,12 +26,7 @@ def read_png(path: Path, what: str) -> Shaped[np.ndarray, "h w"]:
         BadInputError: no such file, truncated, in colour, or far larger than its file.
         MissingExtraError: Pillow is not installed.
     """
-    try:
-        from PIL import Image
-    except ImportError as missing:
-        raise MissingExtraError(
-            "depth images need the package Pillow: pip install pillow"
-        ) from missing
+    Image = load_library("PIL.Image", "depth images need Pillow", "pip install pillow")
     with reading(path, what), Image.open(path, formats=("PNG",)) as image:
         if image.mode not in _BYTES:
             raise BadInputError(f"{path}: expected {what}, found colours ({image.mode}).")

@@ -14,7 +14,7 @@ import torch
 from wildshape.datasets.tracks.labelled_boxes import check_boxes
 from wildshape.datasets.waymo.footer import row_groups
 from wildshape.datasets.waymo.range_image import uniform_inclinations
-from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.errors import BadInputError, load_library
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import reading
@@ -183,7 +183,9 @@ def _read_rows(path: Path, names: tuple[str, ...]) -> list[tuple[Any, ...]]:
 
 def _batches(path: Path, names: tuple[str, ...], size: int) -> Iterator[Any]:
     """The named columns, a few rows at a time; never a whole row group of images."""
-    parquet = _pyarrow_parquet()
+    load_library("pyarrow", "parquet files need pyarrow", "pip install 'wildshape[arrow]'")
+    from pyarrow import parquet
+
     if not path.is_file():
         raise BadInputError(f"{path}: no such file; download this component of the segment.")
     how = {"buffer_size": _BUFFER, "pre_buffer": False}
@@ -240,14 +242,3 @@ def _pose(transform: list[float], path: Path) -> SE3:
         return SE3.from_matrix(matrix)
     except BadInputError as error:
         raise BadInputError(f"{path}: {error}") from error
-
-
-def _pyarrow_parquet() -> Any:
-    try:
-        from pyarrow import parquet
-    except ImportError as error:
-        raise MissingExtraError(
-            "parquet files are read by pyarrow, which is not installed: "
-            "pip install 'wildshape[arrow]'."
-        ) from error
-    return parquet

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from wildshape.errors import MissingExtraError
+from wildshape.errors import load_library
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import atomic_write
 from wildshape.io.boxes.detections import Detection, moved
@@ -66,11 +66,5 @@ def load_pyarrow() -> Any:
     Raises:
         MissingExtraError: it is not installed.
     """
-    try:
-        import pyarrow
-    except ImportError as error:
-        raise MissingExtraError(
-            "Argoverse 2's boxes are written by pyarrow, which is not installed: "
-            "pip install 'wildshape[arrow]'."
-        ) from error
-    return pyarrow
+    install = "pip install 'wildshape[arrow]'"
+    return load_library("pyarrow", "Argoverse 2's boxes need pyarrow", install)
