@@ -106,7 +106,7 @@ def _camera(key: str, value: str) -> str:
     ("text", "said"),
     [
         ("{", "track.json: expected JSON"),
-        ("[1]", "expected a JSON object, found list"),
+        ("[1]", "the keys of a track, found list"),
         ('{"unit": "inch"}', "unit 'inch' is unknown"),
         ('{"unit": [1]}', "unit"),
         ('{"sensor": "radar"}', "sensor 'radar' is unknown"),

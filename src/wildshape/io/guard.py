@@ -121,19 +121,25 @@ def check_promise(path: Path, what: str, promised: int, least: int, present: int
         )
 
 
-def read_json(path: Path, expected: str) -> Any:
+def read_json(path: Path, expected: str, kind: type = object) -> Any:
     """What a JSON file holds.
 
     Args:
         path: of the file, in UTF-8.
         expected: what it should hold, for the error.
+        kind: `dict` or `list`; anything by default.
 
     Raises:
-        BadInputError: missing, damaged, or hardly anything but brackets, which take far more
-            memory than they take room in a file.
+        BadInputError: missing, damaged, of another kind, or hardly anything but brackets, which
+            take far more memory than they take room in a file.
     """
     with reading(path, expected):
-        return parse_json(path.read_text("utf-8"), path, expected)
+        found = parse_json(path.read_text("utf-8"), path, expected)
+    if not isinstance(found, kind):
+        raise BadInputError(
+            f"{path}: expected {expected}, found {type(found).__name__}; write or copy it again."
+        )
+    return found
 
 
 def parse_json(text: str, path: Path, expected: str) -> Any:

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Track folders: scans/ and, if known, poses.txt, shape.ply, track.json (docs/formats.md)."""
 
-import json
 import math
 import shutil
 from dataclasses import asdict, dataclass
@@ -16,7 +15,7 @@ from numpy import ndarray
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import write_json
-from wildshape.io.guard import reading
+from wildshape.io.guard import read_json
 from wildshape.io.poses import read_poses, write_poses
 from wildshape.io.scans.points import (
     METRES,
@@ -181,17 +180,8 @@ def read_info(path: Path) -> dict[str, Any]:
     Raises:
         BadInputError: no JSON object, or a value that makes no sense.
     """
-    raw: Any = {}
-    if path.exists():
-        with reading(path, "JSON with the keys of a track"):
-            raw = json.loads(path.read_text("utf-8"))
-            if not isinstance(raw, dict):
-                raise BadInputError(f"{path}: expected a JSON object, found {type(raw).__name__}.")
-            return _parse_info(raw, path)
-    return _parse_info(raw, path)
-
-
-def _parse_info(raw: dict[str, Any], path: Path) -> dict[str, Any]:
+    expected = "JSON with the keys of a track"
+    raw = read_json(path, expected, dict) if path.exists() else {}
     unit = raw.get("unit", "m")
     if unit not in tuple(METRES):
         raise BadInputError(f"{path}: unit {unit!r} is unknown; use one of {', '.join(METRES)}.")

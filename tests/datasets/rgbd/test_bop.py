@@ -91,7 +91,7 @@ def test_missing_and_damaged_files_are_named(tmp_path):
     camera.write_text(json.dumps({"0": {}, "1": {}}))
     refused(tmp_path, "expected BOP's fields of image 0")
     camera.write_text("[]")
-    refused(tmp_path, r"scene_camera\.json: expected cam_K")
+    refused(tmp_path, r"scene_camera\.json: expected JSON with cam_K")
     camera.unlink()
     refused(tmp_path, r"scene_camera\.json: no such file")
     camera.write_text(good[0])

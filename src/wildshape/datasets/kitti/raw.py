@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wildshape.datasets.kitti.raw_world import world_poses
+from wildshape.datasets.kitti.oxts import drive_poses
 from wildshape.datasets.kitti.tracklets import Tracklet, read_tracklets
 from wildshape.datasets.tracks.gathering import Gathering
 from wildshape.datasets.tracks.labelled_boxes import (
@@ -79,7 +79,7 @@ class KittiRaw:
         tracklets = read_tracklets(drive / _TRACKLETS)
         gathering = Gathering(self.selection, HDL64E, self.rejected)
         files = scan_files(drive)
-        world = {} if self.selection.motion == "any" else world_poses(drive)
+        world = {} if self.selection.motion == "any" else drive_poses(drive)
         labelled: dict[int, dict[str, Tracklet]] = defaultdict(dict)
         for number, tracklet in enumerate(tracklets):
             if self._is_wanted(tracklet):

@@ -12,7 +12,6 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -146,7 +145,7 @@ def read_drive(scene: Path, frames: int) -> Drive:
     Raises:
         BadInputError: a file is missing or corrupt, or has another number of poses.
     """
-    poses, stamps = _list(scene / _POSES), _list(scene / _STAMPS)
+    poses, stamps = (read_json(scene / file, "a JSON list", list) for file in (_POSES, _STAMPS))
     if len(poses) != len(stamps) or len(poses) < frames:
         raise BadInputError(
             f"{scene}: {len(poses)} poses and {len(stamps)} timestamps in lidar/ for {frames} "
@@ -166,12 +165,3 @@ def read_drive(scene: Path, frames: int) -> Drive:
     if not rise or not all(map(math.isfinite, times)):
         raise BadInputError(f"{scene / _STAMPS}: the times do not rise; {_BRINGS}.")
     return Drive(times, T)
-
-
-def _list(path: Path) -> list[Any]:
-    data = read_json(path, "a JSON list")
-    if not isinstance(data, list):
-        raise BadInputError(
-            f"{path}: expected a JSON list, found {type(data).__name__}; {_BRINGS}."
-        )
-    return data

@@ -178,7 +178,7 @@ def _pose(rotation: Any, translation_mm: Any) -> SE3:
 
 
 def _json(path: Path, expected: str) -> dict[str, Any]:
-    raw = read_json(path, f"JSON with {expected}")
-    if not isinstance(raw, dict) or not all(_IMAGE.fullmatch(key) for key in raw):
+    raw = read_json(path, f"JSON with {expected}", dict)
+    if not all(_IMAGE.fullmatch(key) for key in raw):
         raise BadInputError(f"{path}: expected {expected}, under the image's number.")
     return raw

@@ -101,7 +101,8 @@ def open_sequence(folder: Path) -> Sequence:
         raise BadInputError(f"{folder / 'depth'}: no .png; a sequence keeps its depth images here.")
     if not (folder / "masks").is_dir():
         raise BadInputError(f"{folder / 'masks'}: no such folder; a sequence keeps its masks here.")
-    raw = _json(folder / "camera.json", f"JSON with {', '.join(_KEYS)} and depth_scale")
+    expected = f"JSON with {', '.join(_KEYS)} and depth_scale"
+    raw = read_json(folder / "camera.json", expected, dict)
     size = read_png(depth[0], "a 16-bit depth PNG").shape[::-1]
     poses = folder / "poses.txt"
     return Sequence(
@@ -162,7 +163,7 @@ def _number_of(value: object, key: str, path: Path) -> float:
 def _categories(path: Path) -> dict[int, str]:
     if not path.exists():
         return {}
-    raw = _json(path, 'JSON such as {"1": "mug"}')
+    raw = read_json(path, 'JSON such as {"1": "mug"}', dict)
     wrong = next((key for key in raw if not _INSTANCE.fullmatch(key)), None)
     if wrong is not None:
         raise BadInputError(f"{path}: '{wrong}' is no instance number; write such as 1.")
@@ -173,10 +174,3 @@ def _number(folder: Path) -> int:
     if not _INSTANCE.fullmatch(folder.name):
         raise BadInputError(f"{folder}: the folder of an instance's masks is a number, such as 3.")
     return int(folder.name)
-
-
-def _json(path: Path, expected: str) -> dict[str, Any]:
-    raw = read_json(path, expected)
-    if not isinstance(raw, dict):
-        raise BadInputError(f"{path}: expected {expected}, found {type(raw).__name__}.")
-    return raw
