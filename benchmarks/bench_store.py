@@ -25,7 +25,7 @@ from machine import header, median, peak_mib, verdict
 from many_scans import ManyScans
 from turns import begin, options, set_clock, take_turns
 
-from wildshape.cli.conversion.work import Order, convert
+from wildshape.datasets.convert import convert
 from wildshape.io.store.store import open_store
 
 _OPENING = """
@@ -42,7 +42,7 @@ _COMPARED = 256
 
 def write(path: Path, scans: int) -> None:
     began, cpu = time.perf_counter(), cpu_seconds()
-    convert(Order("copies", ManyScans(scans), path, "packed", None, {"scans": scans}))
+    convert(ManyScans(scans), path)
     wall, cpu = time.perf_counter() - began, cpu_seconds() - cpu
     size = sum(file.stat().st_size for file in path.iterdir())
     workers = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024

@@ -27,14 +27,14 @@ from wildshape.evaluation.cases import turn_track
 from wildshape.evaluation.confidence import RiskCoverage, rank_correlation, risk_coverage
 from wildshape.evaluation.metrics import completion_error
 from wildshape.geometry.transforms.se3 import stack
+from wildshape.inference.models import SHIPPED, weights_file
 from wildshape.inference.predictor import Predictor, load
-from wildshape.inference.shipped_weights import SHIPPED, weights_file
 from wildshape.io.atomic import write_json
 from wildshape.io.provenance import provenance
 from wildshape.io.store.store import Store, open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import load_checkpoint, save_checkpoint
-from wildshape.method.confidence import Calibration, Facts, fit_calibration
+from wildshape.method.confidence import Calibration, ConfidenceFeatures, fit_calibration
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
 _VEHICLES, _SCANS = ("car", "truck", "bus"), 12
@@ -86,14 +86,14 @@ class Measured(NamedTuple):
     """Completions of single scans; a LiDAR's each turned by its own yaw.
 
     Attributes:
-        facts: known without labels.
+        features: known without labels.
         plain: confidence that falls with the label-free cost alone.
         cd: true Chamfer distance, metres.
         rotation_deg: angle to the true pose, in the canonical frame that most scans agree on.
         track: number of each one's track.
     """
 
-    facts: list[Facts]
+    features: list[ConfidenceFeatures]
     plain: list[float]
     cd: list[float]
     rotation_deg: list[float]
@@ -140,7 +140,7 @@ def measure(predictor: Predictor, store: Store) -> Measured:
         done = list(predictor.complete_many(track.scans, track.sensor))
         for i, item in enumerate(done):
             local = truth[i].inverse().apply_numpy(item.points)
-            found.facts.append(Facts(*item.facts))
+            found.features.append(ConfidenceFeatures(*item.features))
             found.plain.append(1 / (1 + (item.cost / predictor.settings.cost_m[1]) ** 2))
             found.cd.append(completion_error(local, shape).cd)
             found.track.append(index)
@@ -165,9 +165,9 @@ def best_ridge(found: Measured) -> float:
         foretold = np.zeros(len(cd))
         for fold in range(_FOLDS):
             out = tracks % _FOLDS == fold
-            fitted = [facts for facts, left in zip(found.facts, out) if not left]
+            fitted = [features for features, left in zip(found.features, out) if not left]
             line = fit_calibration(fitted, cd[~out], ridge=ridge)
-            foretold[out] = [line.expected(found.facts[i]) for i in np.flatnonzero(out)]
+            foretold[out] = [line.expected(found.features[i]) for i in np.flatnonzero(out)]
         order[ridge] = rank_correlation(list(-foretold), found.cd) or 0.0
     return max(order, key=lambda ridge: order[ridge])
 
@@ -231,15 +231,15 @@ def main(settings: Settings) -> None:
     kind = f"{settings.category}s"
     fitted_on = _FITTED_ON.format(what="views" if views else "drives", kind=kind)
     ridge = best_ridge(seen)
-    calibration = fit_calibration(seen.facts, np.asarray(seen.cd), fitted_on, ridge)
+    calibration = fit_calibration(seen.features, np.asarray(seen.cd), fitted_on, ridge)
     test = measure(predictor, drives(settings, "test"))
-    after = [calibration.confidence(facts) for facts in test.facts]
+    after = [calibration.confidence(features) for features in test.features]
     report = {
         "before": figures(test.plain, test),
         "after": figures(after, test),
         "each_fact_alone": {
-            name: rank_correlation([-facts[i] for facts in test.facts], test.cd)
-            for i, name in enumerate(Facts._fields)
+            name: rank_correlation([-features[i] for features in test.features], test.cd)
+            for i, name in enumerate(ConfidenceFeatures._fields)
         },
         "reliability": reliability(after, test, calibration.within_m),
         "calibration": vars(calibration),

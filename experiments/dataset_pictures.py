@@ -25,7 +25,7 @@ from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from wildshape.cli.conversion.sources import open_source
+from wildshape.datasets.sources import open_source
 from wildshape.datasets.tracks.source import all_tracks
 from wildshape.datasets.tracks.truth import fuse_by_truth
 from wildshape.io.atomic import atomic_write

@@ -12,12 +12,12 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
-from wildshape.cli.conversion.sources import open_source
-from wildshape.cli.packing import write_tracks
-from wildshape.cli.terminal import progress, say
+from wildshape.cli.terminal import TERMINAL, say
+from wildshape.datasets.sources import open_source
 from wildshape.datasets.tracks.source import all_tracks
 from wildshape.errors import BadInputError
 from wildshape.io.store.store import is_store
+from wildshape.io.write_tracks import write_tracks
 from wildshape.records import Track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
@@ -70,9 +70,11 @@ def store_of(folder: Path, data: Data) -> Path:
     if is_store(path):
         return path
     tracks, count = _tracks(folder, data)
-    with progress(f"making {data.name}", count) as bar:
-        settings = cast("dict[str, Any]", as_values(data))
-        write_tracks(tracks, path, "packed", command="tables", settings=settings, at=bar.at)
+    settings = cast("dict[str, Any]", as_values(data))
+    bar = (f"making {data.name}", count)
+    write_tracks(
+        tracks, path, "packed", command="tables", settings=settings, progress=TERMINAL, bar=bar
+    )
     return path
 
 

@@ -15,7 +15,6 @@ from experiments.tables.size import sized
 from experiments.tables.table import Block, Table, Trained
 from experiments.tables.train import Workshop, model_of
 
-from wildshape.cli.input.tracks import Reading
 from wildshape.evaluation.cases import Case, prepare
 from wildshape.evaluation.examples import pick
 from wildshape.evaluation.method import Completer
@@ -23,6 +22,7 @@ from wildshape.evaluation.pictures import draw_panel
 from wildshape.evaluation.protocol import complete_scans
 from wildshape.evaluation.results import Limits
 from wildshape.io.atomic import atomic_write
+from wildshape.io.inputs import open_tracks
 from wildshape.records import Points
 from wildshape.training.recipes import small
 
@@ -91,7 +91,7 @@ def draw(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
     best = [selected(row.name, tuple(m for m in ms if m)) for row, ms in zip(rows, tried)]
     chosen = pick(best[0].results.methods[0])
     wanted = {track: label for label, (track, _) in chosen.items()}
-    tracks = [t for _, t in Reading(store_of(shop.folder, test)).tracks() if t.name in wanted]
+    tracks = [t for t in open_tracks(store_of(shop.folder, test)) if t.name in wanted]
     cases = {wanted[t.name]: prepare(t, "none", 0, Limits(max_scans=most)) for t in tracks}
     cases = {label: cases[label] for label in chosen}
     columns = []

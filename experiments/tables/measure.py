@@ -13,11 +13,9 @@ from experiments.tables.train import Model, Workshop, model_of
 from wildshape.baselines.dpc import completer as dpc
 from wildshape.baselines.dpc.checkpoint import is_dpc
 from wildshape.baselines.named import baseline
-from wildshape.cli.evaluation import evaluate_once
-from wildshape.cli.input.tracks import Reading
-from wildshape.cli.models import choose_device, fingerprint, load_model
-from wildshape.cli.terminal import say
+from wildshape.cli.terminal import TERMINAL, say
 from wildshape.errors import MissingExtraError
+from wildshape.evaluation.evaluate import evaluate_once
 from wildshape.evaluation.method import Method
 from wildshape.evaluation.metrics import BoxScore, CompletionError, RegistrationScore
 from wildshape.evaluation.results import (
@@ -28,8 +26,11 @@ from wildshape.evaluation.results import (
     Rotate,
     Skipped,
 )
-from wildshape.inference.evaluated import Learned, LearnedTrack
+from wildshape.inference.evaluated import Learned
+from wildshape.inference.models import choose_device, fingerprint
+from wildshape.inference.predictor import load
 from wildshape.io.atomic import write_json
+from wildshape.io.inputs import open_tracks
 from wildshape.io.provenance import provenance
 
 
@@ -60,8 +61,8 @@ def measure(
         method = method_of(shop, row, model)
         if method is None:
             return None
-        reading = Reading(store_of(shop.folder, block.test))
-        found = evaluate_once(reading, {row.name: method}, rotate, seed, max_scans)
+        source = open_tracks(store_of(shop.folder, block.test))
+        found = evaluate_once(source, {row.name: method}, rotate, seed, max_scans, TERMINAL)
         made = {**provenance(shop.command), "model": mark}
         write_json(path, {"results": asdict(found), "made": made})
     kept = json.loads(path.read_text("utf-8"))
@@ -89,8 +90,8 @@ def method_of(shop: Workshop, row: Row, model: Model | None) -> Method | None:
     if isinstance(row, Shipped) or model is not None:
         path = None if model is None else model.path
         answer = row.answer if isinstance(row, Trained) else "refined"
-        predictor = load_model(path, shop.device, raw=answer == "raw")
-        return LearnedTrack(predictor) if answer == "track" else Learned(predictor)
+        predictor = load(path, shop.device, raw=answer == "raw")
+        return Learned(predictor, track=answer == "track")
     try:
         return baseline(row.name)
     except MissingExtraError as error:

@@ -19,12 +19,12 @@ from experiments.tables.train import Workshop
 
 from wildshape.baselines.icp import LocalIcp
 from wildshape.baselines.pairs import Chained
-from wildshape.cli.input.tracks import Reading
-from wildshape.cli.models import load_model
 from wildshape.evaluation.examples import Example, gather
 from wildshape.evaluation.pictures import draw_examples
 from wildshape.inference.evaluated import Learned
+from wildshape.inference.predictor import load
 from wildshape.io.atomic import atomic_write
+from wildshape.io.inputs import open_tracks
 from wildshape.simulate.config import Category
 
 
@@ -87,9 +87,9 @@ def _selected(name: str, measured: tuple[Measured, ...]) -> Measured:
 def _examples(shop: Workshop, block: Block, best: Measured) -> list[Example]:
     model = None if best.model is None else best.model.path
     return gather(
-        (track for _, track in Reading(store_of(shop.folder, block.test)).tracks()),
+        open_tracks(store_of(shop.folder, block.test)),
         best.results,
         best.results.methods[0].name,
-        Learned(load_model(model, shop.device, raw=model is not None)),
+        Learned(load(model, shop.device, raw=model is not None)),
         rival=Chained(LocalIcp()),
     )

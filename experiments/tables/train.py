@@ -14,15 +14,16 @@ from experiments.tables.table import Trained
 
 from wildshape.baselines.dpc.objective import DpcRecipe
 from wildshape.baselines.dpc.training import fit_dpc, setup_dpc
-from wildshape.cli.interrupt import stop_flag
-from wildshape.cli.models import choose_device
-from wildshape.cli.terminal import progress, say
-from wildshape.cli.training.recipe import fit_with_progress
+from wildshape.cli.process import stop_flag, stoppable
+from wildshape.cli.terminal import TERMINAL, say
+from wildshape.inference.models import choose_device
 from wildshape.io.atomic import write_json
+from wildshape.io.progress import SILENT
 from wildshape.io.provenance import provenance
 from wildshape.io.store.store import Store, open_store
 from wildshape.training.config import Recipe
 from wildshape.training.loop import MODEL, setup
+from wildshape.training.train import fit_with_progress
 
 _TRAINED = "trained.json"
 Made = dict[str, Any]
@@ -91,7 +92,8 @@ def _train_ours(
     teacher = row.teacher
     taught_by = model_of(shop, teacher, seed).path if isinstance(teacher, Trained) else teacher
     start = model_of(shop, row.start, seed).path if row.start else None
-    with progress("fusing tracks", 0, silent=not isinstance(teacher, Trained)) as bar:
+    shown = TERMINAL if isinstance(teacher, Trained) else SILENT
+    with shown.bar("fusing tracks", 0) as bar:
         run = setup(
             recipe,
             open_store(shop.data(row)),
@@ -106,7 +108,7 @@ def _train_ours(
             say=say,
         )
     first = run.state.step
-    fit_with_progress(run, resume=shop.command)
+    fit_with_progress(run, TERMINAL, stoppable, resume=shop.command)
     return first, run.state.step
 
 
@@ -116,7 +118,7 @@ def _train_dpc(
     device = choose_device(shop.device)
     run = setup_dpc(recipe, store, folder, seed=seed, device=device, resume=True, provenance=made)
     first, steps = run.state.step, recipe.optim.steps
-    with stop_flag() as stopped, progress("training DPC", steps, start=first) as bar:
+    with stop_flag() as stopped, TERMINAL.bar("training DPC", steps, start=first) as bar:
         if not fit_dpc(run, lambda at, _: bar.at(at), stopped):
             raise stopped.error(f"stopped after step {run.state.step}; go on with `{shop.command}`")
     return first, run.state.step

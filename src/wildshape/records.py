@@ -186,9 +186,9 @@ class Completion:
         refined: whether the pose was refined against the scan.
         warning: empty, or one sentence (for example a size outside the training range).
         reasons: why it is not to be trusted, in short names; empty where nothing speaks against
-            it. `inference/reasons.py` and docs/formats.md say what each means.
+            it. `inference/confidence.py` and docs/formats.md say what each means.
         seconds: time spent on this scan.
-        facts: what the confidence is made from (`method/confidence.py`).
+        features: what the confidence is made from (`method/confidence.py`).
     """
 
     points: Points
@@ -201,7 +201,7 @@ class Completion:
     warning: str = ""
     reasons: tuple[str, ...] = ()
     seconds: float = 0.0
-    facts: tuple[float, ...] = ()
+    features: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
         said = ", refined" if self.refined else ""

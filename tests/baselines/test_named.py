@@ -7,8 +7,8 @@ from importlib.abc import MetaPathFinder
 
 import pytest
 
+from wildshape.baselines.compare import load_models
 from wildshape.baselines.named import NAMES, baseline
-from wildshape.cli.models import load_models
 from wildshape.errors import BadInputError, MissingExtraError
 
 

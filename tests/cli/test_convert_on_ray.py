@@ -13,7 +13,7 @@ from contextlib import contextmanager
 import pytest
 from tests.cli.interrupted_source import Waiting
 
-from wildshape.cli.conversion.work import Order, convert
+from wildshape.datasets.convert import ConversionOptions, convert
 from wildshape.io.store.store import open_store
 
 pytestmark = pytest.mark.skipif(
@@ -23,14 +23,10 @@ PROGRAM = """
 import sys
 from pathlib import Path
 from tests.cli.interrupted_source import Waiting
-from wildshape.cli.conversion.work import Order, convert
+from wildshape.datasets.convert import ConversionOptions, convert
 root, out = map(Path, sys.argv[1:])
-convert(Order("waiting", Waiting(root), out, "packed", None, {}, workers=2, ray="local"))
+convert(Waiting(root), out, ConversionOptions(workers=2, ray="local"))
 """
-
-
-def order(root, out, **how):
-    return Order("waiting", Waiting(root), out, "packed", None, {}, **how)
 
 
 def test_a_killed_worker_is_replaced_and_nothing_doubled(tmp_path):
@@ -45,7 +41,7 @@ def test_a_killed_worker_is_replaced_and_nothing_doubled(tmp_path):
     assert store.names == ("a0", "a1", "b0", "b1", "c0", "c1", "d0", "d1")
     attempts = sorted((root / "attempts").read_text().split())
     assert attempts == ["a", "b", "b", "c", "d"]
-    convert(order(root, tmp_path / "alone", workers=1))
+    convert(Waiting(root), tmp_path / "alone", ConversionOptions(workers=1))
     assert open_store(tmp_path / "alone").fingerprint == store.fingerprint
 
 

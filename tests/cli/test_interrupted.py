@@ -151,7 +151,7 @@ def test_a_conversion_to_folders_killed_at_its_end(
 
     command = ("convert", "folder", dataset, out, "--layout", "folders", "--workers", 1)
     with monkeypatch.context() as patched:
-        patched.setattr("wildshape.cli.conversion.output.shutil.rmtree", removed_in_part)
+        patched.setattr("wildshape.datasets.destinations.shutil.rmtree", removed_in_part)
         assert wildshape(*command).code == 130
     again = wildshape(*command)
     assert again.code == 0 or "--overwrite" in again.err

@@ -6,15 +6,14 @@ import json
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 from tests.datasets import write_argoverse2 as av2
 from tests.datasets import write_kitti_tracking as tracking
 from tests.fuzz.scans import track
 from tests.fuzz.target import Arrays, Target, numbers_of
 
-from wildshape.cli.results.boxes import BoxOrder
 from wildshape.datasets.tracks.whole_tracks import Packed
+from wildshape.inference.box_files import BoxFiles
 from wildshape.io.poses import write_poses
 from wildshape.io.scans.writers import write_ply
 from wildshape.io.store.index import file_record
@@ -155,8 +154,7 @@ def _read_viewer(folder: Path) -> Arrays:
 def _read_boxes(folder: Path) -> Arrays:
     """Results as `complete --boxes` turns them into other formats."""
     (folder / "out" / "boxes").mkdir(exist_ok=True)
-    with mock.patch("wildshape.cli.results.boxes.say"):
-        BoxOrder(("json", "nuscenes", "kitti", "argoverse2")).write(folder / "out")
+    BoxFiles(("json", "nuscenes", "kitti", "argoverse2")).write(folder / "out")
     yield None
 
 
@@ -170,7 +168,7 @@ def _build_calibration(folder: Path) -> None:
 def _read_calibration(folder: Path) -> Arrays:
     path = next(iter(sorted(folder.rglob("*.*"))), folder / "calib.txt")
     kinds = {".txt": "kitti", ".feather": "argoverse2"}
-    BoxOrder((kinds[path.suffix],), path).check()  # pyright: ignore[reportArgumentType]
+    BoxFiles((kinds[path.suffix],), path).check()  # pyright: ignore[reportArgumentType]
     yield None
 
 

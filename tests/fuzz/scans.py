@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from tests.fuzz.target import Arrays, Target, numbers_of, only_file
 
-from wildshape.cli.input.pipe import as_file
+from wildshape.cli.pipe import as_file
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.inputs import open_tracks
 from wildshape.io.poses import read_poses, read_tum, write_poses, write_tum

@@ -16,7 +16,7 @@ from wildshape.baselines.dpc.viewing_volume import PolarVolume
 from wildshape.geometry.projection.visibility import PolarBins
 from wildshape.inference.predictor import Predictor
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint, save_checkpoint
-from wildshape.method.confidence import Calibration, Facts
+from wildshape.method.confidence import Calibration, ConfidenceFeatures
 from wildshape.method.network import NetworkConfig, ShapePoseNet
 from wildshape.training.batches.fused import FusedTargets
 from wildshape.training.runtime.log import RunLog
@@ -31,7 +31,7 @@ _IDENTITY = {"settings": "a", "data": "b", "seed": "0"}
 
 def _build_checkpoint(folder: Path) -> None:
     torch.manual_seed(0)
-    calibration = Calibration((0.1,) * len(Facts._fields), 0.0, 0.5, 0.3, "a test")
+    calibration = Calibration((0.1,) * len(ConfidenceFeatures._fields), 0.0, 0.5, 0.3, "a test")
     common = ModelSettings(_NETWORK, "lidar", 32, PolarBins(), 0.5)
     whole = ModelSettings(
         **{**vars(common), "facing": True, "up": (0.0, 0.0, 1.0), "calibration": calibration}

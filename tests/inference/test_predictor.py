@@ -15,11 +15,12 @@ from tests.strategies import rotation_about
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.confidence import confidence_of
+from wildshape.inference.models import weights_file
 from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.registration import inlier_ratio
-from wildshape.inference.shipped_weights import weights_file
 from wildshape.method.checkpoint import save_checkpoint
-from wildshape.method.confidence import Facts
+from wildshape.method.confidence import ConfidenceFeatures
 from wildshape.method.network import ShapePoseNet
 from wildshape.records import Sensor
 
@@ -235,9 +236,12 @@ def test_another_kind_of_sensor_is_flagged(predictor):
 
 
 def test_confidence_falls_with_the_cost(predictor):
-    facts = Facts(*[0.0] * len(Facts._fields))
+    features = ConfidenceFeatures(*[0.0] * len(ConfidenceFeatures._fields))
     costs = (1e-4, 0.1, 0.3, 1.0, 100.0)
-    values = [predictor.confidence(facts._replace(log_cost=math.log(cost))) for cost in costs]
+    values = [
+        confidence_of(features._replace(log_cost=math.log(cost)), predictor.settings)
+        for cost in costs
+    ]
     assert values[0] == pytest.approx(1, abs=1e-6)
     assert values[2] == pytest.approx(0.5)
     assert values == sorted(values, reverse=True)

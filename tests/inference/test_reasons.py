@@ -9,7 +9,7 @@ import pytest
 
 from wildshape.geometry.projection.visibility import FacingBins
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.reasons import judged_again, reasons_of_result, reasons_of_scan
+from wildshape.inference.confidence import judged_again, reasons_of_result, reasons_of_scan
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.network import NetworkConfig
 from wildshape.records import Box, Completion, Sensor

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 import torch
 
-from wildshape.cli.input.tracks import Reading
 from wildshape.datasets.tracks.whole_tracks import Folder
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
@@ -74,8 +73,8 @@ def _results(folder: Path, scans: int) -> Path:
 
 
 def _of_reading(path: Path) -> object:
-    reading = Reading(path)
-    return [reading.skipped_in(track.name) for _, track in reading.tracks()]
+    source = open_tracks(path)
+    return [source.skipped_in(track.name) for track in source]
 
 
 @pytest.mark.parametrize(

@@ -18,8 +18,8 @@ from wildshape.baselines.dpc.checkpoint import DpcSettings, load_dpc, save_dpc
 from wildshape.baselines.dpc.network import DpcConfig, DpcNet
 from wildshape.baselines.dpc.viewing_volume import PolarVolume
 from wildshape.errors import BadInputError
+from wildshape.inference.models import SHIPPED
 from wildshape.inference.predictor import load
-from wildshape.inference.shipped_weights import SHIPPED
 from wildshape.method import checkpoint
 from wildshape.method.checkpoint import load_checkpoint, save_checkpoint
 from wildshape.method.network import NetworkConfig, ShapePoseNet
@@ -125,7 +125,7 @@ def test_every_setting_is_checked(small, monkeypatch):
         (("projection", "kind"), "HexBins", "projection.kind is 'HexBins', expected PolarBins or"),
         (("facing",), 1, "facing is 1, expected bool"),
         (("cost_m",), [0.2, 0.1], "cost_m is 0.2, 0.1, expected a smaller and a larger"),
-        (("calibration", "weights"), [0.0] * 9, "9 weights for 10 facts"),
+        (("calibration", "weights"), [0.0] * 9, "9 weights for 10 features"),
         (("colour",), 3, "the whole has an unknown colour"),
     ],
 )

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from wildshape.cli.commands import module_of
-from wildshape.cli.interrupt import Terminated, terminable
+from wildshape.cli.process import Terminated, terminable
 from wildshape.errors import BadInputError, MissingExtraError, lacks_memory
 from wildshape.io.atomic import release_folders
 

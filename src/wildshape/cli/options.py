@@ -3,13 +3,17 @@
 """Options that several commands share, as types; nothing heavy is imported here."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from math import isfinite, nan
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from tyro.conf import Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, arg
 from tyro.constructors import PrimitiveConstructorSpec
+
+if TYPE_CHECKING:
+    from wildshape.io.scans.coordinates import Coordinates
 
 
 def _hint(default: str) -> str:
@@ -36,8 +40,8 @@ def listed(
         words: `*`: they may stand apart, too, where no positional argument follows.
     """
 
-    def values(given: Sequence[str]) -> tuple[Any, ...]:
-        found = tuple(read(word) for word in _apart(given))
+    def values(typed: Sequence[str]) -> tuple[Any, ...]:
+        found = tuple(read(word) for word in _apart(typed))
         if count not in (None, len(found)):
             raise ValueError(f"expected {count} values, got {len(found)}")
         return found
@@ -118,3 +122,41 @@ Layout = Annotated[
 Together = Annotated[
     bool, arg(name="track", help="use all scans of a track together: one shape, posed in each")
 ]
+
+Format = Annotated[
+    Literal["auto", "ply", "pcd", "bin", "npy", "npz", "xyz", "csv", "las", "laz"],
+    arg(help="of a scan on stdin (`-`); auto tells all but bin, KITTI's bare numbers"),
+]
+
+
+def is_pipe(path: Path | None) -> bool:
+    """Whether `-` was written."""
+    return str(path) == "-"
+
+
+@dataclass(frozen=True)
+class NetworkOptions:
+    """Which weights, and where they run."""
+
+    model: Model = None
+    device: Device = "auto"
+
+
+@dataclass(frozen=True)
+class FileOptions:
+    """How the numbers in the files are to be understood."""
+
+    unit: Unit = "m"
+    origin: Origin = AT_ORIGIN
+
+    @property
+    def coordinates(self) -> "Coordinates":
+        """The same for the library."""
+        from wildshape.io.scans.coordinates import Coordinates
+
+        return Coordinates(self.unit, self.origin)
+
+
+Network = Annotated[NetworkOptions, OmitArgPrefixes]
+Files = Annotated[FileOptions, OmitArgPrefixes]
+DEFAULT_NETWORK, DEFAULT_FILES = NetworkOptions(), FileOptions()

@@ -7,7 +7,7 @@ from dataclasses import fields
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
-from tyro.conf import Positional
+from tyro.conf import OmitArgPrefixes, Positional
 
 from wildshape.cli.commands import module_of
 
@@ -47,13 +47,13 @@ def script(shell: str, commands: Mapping[str, object]) -> str:
             for name, words in found.items()
             if words
         ]
-    made = _SCRIPT.format(
+    text = _SCRIPT.format(
         commands=" ".join((*commands, "--help", "--version", "--print-completion")),
         choices="\n".join(choices),
         options="\n".join(options),
         shells=" ".join(SHELLS),
     )
-    return _ZSH + made if shell == "zsh" else made
+    return _ZSH + text if shell == "zsh" else text
 
 
 def options_of(settings: type) -> dict[str, tuple[str, ...]]:
@@ -62,7 +62,9 @@ def options_of(settings: type) -> dict[str, tuple[str, ...]]:
     found = {}
     for field in fields(settings):
         marks = _marks(hints[field.name])
-        if Positional not in marks:
+        if OmitArgPrefixes in marks:
+            found |= options_of(hints[field.name].__origin__)
+        elif Positional not in marks:
             names = (getattr(mark, "name", None) for mark in marks)
             name = next((name for name in names if isinstance(name, str)), field.name)
             found[f"--{name.replace('_', '-')}"] = _words(hints[field.name])

@@ -8,9 +8,14 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
-from wildshape.report.words import counted as counted
+from wildshape.io.progress import Bar, duration, printable
+
+if TYPE_CHECKING:
+    from wildshape.inference.folders import FolderSummary
+
+from wildshape.io.progress import counted as counted
 
 _EVERY_SECONDS = 10.0
 _LISTED = 20
@@ -19,11 +24,6 @@ _LISTED = 20
 def say(text: str) -> None:
     """A message for people."""
     print(printable(text), file=sys.stderr, flush=True)
-
-
-def printable(text: str) -> str:
-    """Text without control characters, which a damaged file could send to the terminal."""
-    return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
 def answer(text: str, data: Mapping[str, Any], *, as_json: bool) -> None:
@@ -52,46 +52,38 @@ def say_skipped(skipped: Sequence[tuple[str, str]]) -> None:
         say(f"  and {len(skipped) - _LISTED} more, all of them in wildshape.json")
 
 
-def duration(seconds: float) -> str:
-    """For example `42 s`, `3 min 05 s`, `2 h 10 min`."""
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02d} s"
-    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+def conclude(found: "FolderSummary", *, as_json: bool) -> None:
+    """What `complete` and `register` say of a folder."""
+    if found.dropped:
+        say(found.dropped)
+    say_skipped(found.skipped)
+    if found.reasons.flagged:
+        say(found.reasons.sentence)
+    answer(found.sentence, found.data, as_json=as_json)
 
 
-class Bar(Protocol):
-    """Progress of one long piece of work."""
+class Terminal:
+    """Progress on stderr."""
 
-    def at(self, done: int, text: str = "", *, total: int | None = None) -> None:
-        """So much is done; `text` says what else there is to say, `total` a new total."""
-        ...
+    def say(self, text: str) -> None:
+        """See `say`."""
+        say(text)
 
+    def skipped(self, skipped: Sequence[tuple[str, str]]) -> None:
+        """See `say_skipped`."""
+        say_skipped(skipped)
 
-@contextmanager
-def progress(label: str, total: int, *, silent: bool = False, start: int = 0) -> Iterator[Bar]:
-    """A bar with the time left on a terminal, else a line every ten seconds; on stderr.
-
-    Args:
-        label: what is done.
-        total: how much of it there is; 0 if nobody knows.
-        silent: show nothing at all (processes that do not lead).
-        start: how much had been done before.
-    """
-    if silent:
-        yield _Nothing()
-    elif sys.stderr.isatty():
-        with _rich_bar(label, total, start) as bar:
-            yield bar
-    else:
-        yield _Lines(label, total, start)
+    @contextmanager
+    def bar(self, label: str, total: int, *, start: int = 0) -> Iterator[Bar]:
+        """A bar with the time left on a terminal, else a line every ten seconds."""
+        if sys.stderr.isatty():
+            with _rich_bar(label, total, start) as drawn:
+                yield drawn
+        else:
+            yield _Lines(label, total, start)
 
 
-class _Nothing:
-    def at(self, done: int, text: str = "", *, total: int | None = None) -> None:
-        pass
+TERMINAL = Terminal()
 
 
 class _Lines:

@@ -144,7 +144,7 @@ def drive(
         "inference": asdict(predictor.config),
     }
     line = shlex.join(("wildshape", "drive", str(source), "--out", str(out)))
-    output = begin(out, "drive", settings, FILES, line, overwrite=overwrite)
+    output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
     found = _Run(recording, out, config, predictor, _Clock(watch)).perform()
     output.finish(result={**asdict(found), "out": str(out)})
     return found

@@ -7,7 +7,9 @@ roll about the line of sight, and upright is what a network knows best. A scan t
 tilted is rolled upright, as the first look says, and seen once more; the cheaper answer speaks.
 """
 
-from typing import NamedTuple, Protocol, runtime_checkable
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import torch
 from jaxtyping import Float, Int
@@ -15,11 +17,11 @@ from torch import Tensor
 
 from wildshape.geometry.projection.line_of_sight import roll_angle
 from wildshape.geometry.projection.visibility import Projection
+from wildshape.inference.confidence import look_features
 from wildshape.inference.config import HypothesisRule
-from wildshape.inference.evidence import seen_facts
 from wildshape.inference.prepare import NetworkInput
 from wildshape.method.checkpoint import ModelSettings
-from wildshape.method.hindsight import Scores, score_hypotheses
+from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.network import Poses, ShapePoseNet
 
 _RULE = HypothesisRule()
@@ -45,7 +47,22 @@ class CostRule(Protocol):
         ...
 
 
-class Chosen(NamedTuple):
+@runtime_checkable
+class HypothesisScores(Protocol):
+    """What a hypothesis scored: of `method/hindsight.py`, or of an exported graph."""
+
+    def cost(self, beta: float) -> Float[Tensor, "B K"]:
+        """The label-free cost of each hypothesis, metres."""
+        ...
+
+
+ScoresT = TypeVar("ScoresT", bound=HypothesisScores)
+Score = Callable[[Tensor, Tensor, Tensor, Projection], ScoresT]
+"""Scans, centres, posed shapes and the projection -> scores, as `score_hypotheses`."""
+
+
+@dataclass(frozen=True)
+class Chosen(Generic[ScoresT]):
     """The hypotheses of centred scans, and the one that speaks for each.
 
     Attributes:
@@ -60,7 +77,7 @@ class Chosen(NamedTuple):
     shapes: Float[Tensor, "B P 3"]
     poses: Poses
     posed: Float[Tensor, "B K P 3"]
-    scores: Scores
+    scores: ScoresT
     believed: Float[Tensor, "B K"]
     branch: Int[Tensor, "B"]
 
@@ -79,7 +96,8 @@ def choose_hypothesis(
     scans: Float[Tensor, "B N 3"],
     centres: Float[Tensor, "B 3"],
     rule: CostRule,
-) -> Chosen:
+    score: Score[ScoresT] = score_hypotheses,
+) -> Chosen[ScoresT]:
     """Ask a network, score its hypotheses against the scans, and take the cheapest.
 
     Args:
@@ -87,24 +105,25 @@ def choose_hypothesis(
         scans: centred, as it was trained on.
         centres: where each scan's centre lies in the frame it was turned into.
         rule: what a hypothesis costs.
+        score: gives both terms of the cost.
     """
-    code = network.encode(scans)
-    shapes, poses = network.canonical(code), network.poses(code)
+    shapes, *hypotheses = network(scans)
+    poses = Poses(*hypotheses)
     posed = poses.apply(shapes)
-    scores = score_hypotheses(scans, centres, posed, rule.projection)
+    scores = score(scans, centres, posed, rule.projection)
     believed = scores.cost(rule.beta) - rule.belief * poses.log_belief
     return Chosen(shapes, poses, posed, scores, believed, believed.argmin(-1))
 
 
 class Found(NamedTuple):
-    """What looks at scans give: shapes, `T_sensor_canonical`, cost, branch, and facts."""
+    """What looks at scans give: shapes, `T_sensor_canonical`, cost, branch, and features."""
 
     shapes: Float[Tensor, "B P 3"]
     rotation: Float[Tensor, "B 3 3"]
     translation: Float[Tensor, "B 3"]
     cost: Float[Tensor, "B"]
     branch: Int[Tensor, "B"]
-    facts: Float[Tensor, "B F"]
+    features: Float[Tensor, "B F"]
 
     def part(self, rows: Int[Tensor, "b"]) -> "Found":
         """Some of the scans."""
@@ -115,28 +134,38 @@ class Found(NamedTuple):
         return Found(*(old.index_copy(0, rows, part) for old, part in zip(self, new)))
 
 
-def look(network: ShapePoseNet, settings: ModelSettings, given: NetworkInput) -> Found:
+def look(network: ShapePoseNet, settings: ModelSettings, inputs: NetworkInput) -> Found:
     """Shapes, and the poses of the hypotheses that speak, from prepared scans."""
-    found = choose_hypothesis(network, given.scans, given.centres, settings)
-    facts = seen_facts(given.scans, found.posed, found.scores, found.poses, found.believed)
-    back, chosen = given.turn.mT, found.pose
-    translation = back @ (chosen.translation[:, 0] + given.centres)[..., None]
+    found = choose_hypothesis(network, inputs.scans, inputs.centres, settings)
+    features = look_features(inputs.scans, found.posed, found.scores, found.poses, found.believed)
+    return in_sensor_frame(found, inputs, settings, features)
+
+
+def in_sensor_frame(
+    found: Chosen[ScoresT],
+    inputs: NetworkInput,
+    settings: ModelSettings,
+    features: Float[Tensor, "B F"],
+) -> Found:
+    """The hypotheses that speak, in the frames of the sensors."""
+    back, chosen = inputs.turn.mT, found.pose
+    translation = back @ (chosen.translation[:, 0] + inputs.centres)[..., None]
     rotation, cost = back @ chosen.rotation[:, 0], found.cost(settings.beta)
-    return Found(found.shapes, rotation, translation[..., 0], cost, found.branch, facts)
+    return Found(found.shapes, rotation, translation[..., 0], cost, found.branch, features)
 
 
 def look_twice(
     network: ShapePoseNet,
     settings: ModelSettings,
-    given: NetworkInput,
+    inputs: NetworkInput,
     rule: HypothesisRule = _RULE,
 ) -> Found:
     """`look`, and a second one at the scans that turn out to be tilted, rolled upright."""
-    first = look(network, settings, given)
-    angle = roll_angle(given.turn @ first.rotation)
+    first = look(network, settings, inputs)
+    angle = roll_angle(inputs.turn @ first.rotation)
     rows = torch.nonzero(angle.abs() > rule.upright_rad)[:, 0]
     if len(rows) == 0:
         return first
-    second = look(network, settings, given.part(rows).rolled(angle[rows]))
+    second = look(network, settings, inputs.part(rows).rolled(angle[rows]))
     cheaper = torch.nonzero(second.cost < first.cost[rows])[:, 0]
     return first.replaced(rows[cheaper], second.part(cheaper))

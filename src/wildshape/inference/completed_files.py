@@ -7,15 +7,16 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import stack
 from wildshape.inference.predictor import Predictor
 from wildshape.io.atomic import write_json
+from wildshape.io.output import file_name
 from wildshape.io.poses import write_poses
 from wildshape.io.scans.points import write_ply
 from wildshape.records import Completion, Track
 
 OBJECTS, POSES, COMPLETED = "objects.json", "poses.txt", "completed"
+_MODEL = ("command", "code", "time_utc", "steps", "seed")  # said of a model
 
 
 def write_completed(
@@ -55,16 +56,11 @@ def objects_of(
         "together": together,
         "category": track.category,
         "sensor": track.sensor.kind,
-        "model": _model(predictor),
+        "model": {name: predictor.settings.provenance.get(name) for name in _MODEL},
         "inference": asdict(predictor.config),
         "scans": [describe(name, one) for name, one in zip(track.scan_names, done)],
         "skipped": [{"scan": scan, "reason": reason} for scan, reason in skipped],
     }
-
-
-def _model(predictor: Predictor) -> dict[str, Any]:
-    made = predictor.settings.provenance
-    return {key: made.get(key) for key in ("command", "code", "time_utc", "steps", "seed")}
 
 
 def describe(name: str, done: Completion) -> dict[str, Any]:
@@ -80,14 +76,3 @@ def describe(name: str, done: Completion) -> dict[str, Any]:
         "warning": done.warning,
         "reasons": done.reasons,
     }
-
-
-def file_name(name: str) -> str:
-    """The name itself.
-
-    Raises:
-        BadInputError: it is no plain file name.
-    """
-    if not name or Path(name).name != name or name.startswith("."):
-        raise BadInputError(f"'{name}': a track or scan of this name cannot become a file; rename.")
-    return name

@@ -93,6 +93,9 @@ class JointIcpConfig:
     step: float = 0.8
 
 
+_FINE = JointIcpConfig(rounds=15, points=512, most=4096, normal_m=0.3, holding=0.02)
+
+
 @dataclass(frozen=True)
 class HeadingVoteConfig:
     """How the scans of a track agree on which way is front (`tracks/heading_vote.py`).
@@ -154,11 +157,7 @@ class TrackConfig:
     vote: HeadingVoteConfig = field(default_factory=HeadingVoteConfig)
     outliers: PoseOutlierConfig = field(default_factory=PoseOutlierConfig)
     coarse: JointIcpConfig = field(default_factory=JointIcpConfig)
-    fine: JointIcpConfig = field(
-        default_factory=lambda: JointIcpConfig(
-            rounds=15, points=512, most=4096, normal_m=0.3, holding=0.02
-        )
-    )
+    fine: JointIcpConfig = _FINE
     within_m: float = 1.5
     within_rad: float = 0.6
     most_points: int = 4096
@@ -189,10 +188,42 @@ class BoxConfig:
 
 
 @dataclass(frozen=True)
+class ReasonRule:
+    """When a result is flagged as not to be trusted (`confidence.py`).
+
+    Attributes:
+        few_points: a scan of fewer points says little: twice what is accepted at least.
+        smallest: share of the smallest extent trained on, below which a scan is too small.
+        largest: times the largest extent trained on, above which a warning is given.
+        poor_fit: times the 90th percentile of the held-out label-free cost.
+        low_confidence: one chance in ten that the completion is as good as the median of those
+            calibrated on.
+    """
+
+    few_points: int = 32
+    smallest: float = 0.5
+    largest: float = 1.5
+    poor_fit: float = 1.5
+    low_confidence: float = 0.1
+
+
+@dataclass(frozen=True)
 class InferenceConfig:
-    """Everything that decides a result besides the checkpoint."""
+    """Everything that decides a result besides the checkpoint.
+
+    Attributes:
+        hypothesis: which pose hypothesis speaks.
+        refine: how one completion is fitted to its scan.
+        track: how the scans of a track make one object.
+        box: how a box is laid around a shape.
+        reasons: when a result is flagged.
+        ground_share: a scan of which more than this share is ground beside the object is given to
+            the network once more without it.
+    """
 
     hypothesis: HypothesisRule = field(default_factory=HypothesisRule)
     refine: RefineConfig = field(default_factory=RefineConfig)
     track: TrackConfig = field(default_factory=TrackConfig)
     box: BoxConfig = field(default_factory=BoxConfig)
+    reasons: ReasonRule = field(default_factory=ReasonRule)
+    ground_share: float = 0.05

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Complete, register and fuse with a trained network (METHOD 7)."""
 
-import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
@@ -17,27 +16,24 @@ from wildshape.geometry.ground import skirt
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import box_seen
 from wildshape.inference.choose_hypothesis import Found, look, look_twice
-from wildshape.inference.compiled import compiled
-from wildshape.inference.config import InferenceConfig, RefineConfig
-from wildshape.inference.evidence import facts_of
-from wildshape.inference.prepare import (
-    MIN_POINTS,
-    as_points,
-    in_order,
-    network_input,
+from wildshape.inference.confidence import (
+    confidence_of,
+    features_of,
+    reasons_of_result,
+    reasons_of_scan,
+    warning_of,
 )
-from wildshape.inference.reasons import reasons_of_result, reasons_of_scan, warning_of
+from wildshape.inference.config import InferenceConfig, RefineConfig
+from wildshape.inference.models import choose_device, compiled, weights_file
+from wildshape.inference.prepare import MIN_POINTS, as_points, in_order, network_input
 from wildshape.inference.refine import filled, refine
 from wildshape.inference.registration import fuse_scans, inlier_ratio, to_middle
-from wildshape.inference.shipped_weights import weights_file
 from wildshape.inference.tracks.complete_track import complete_together
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint
-from wildshape.method.confidence import Facts
 from wildshape.method.network import ShapePoseNet
 from wildshape.records import Completion, Points, Registration, Sensor
 
 _BATCH = 32
-_GROUND = 0.05
 _DEFAULT = InferenceConfig()
 
 
@@ -52,8 +48,8 @@ def load(
     """A predictor from a checkpoint; the weights shipped in the package by default.
 
     Args:
-        model: checkpoint, or the name of other weights shipped (docs/models.md).
-        device: cpu or cuda.
+        model: checkpoint, folder of a run, or the name of other weights shipped (docs/models.md).
+        device: cpu, cuda, or auto, which takes the GPU where there is one.
         raw: give the network's own answers, not refined against the scan (`refine.py`).
             Networks trained with a `paper-*` preset are never refined.
         level: LiDARs are held level to about a degree, as on a vehicle. Where a scan comes out
@@ -63,10 +59,11 @@ def load(
         config: the numbers that decide a result besides the checkpoint.
 
     Raises:
-        BadInputError: the checkpoint cannot be used; the sentence says why.
+        BadInputError: the checkpoint cannot be used, or there is no GPU; the sentence says why.
     """
+    place = choose_device(device)
     network, settings = load_checkpoint(weights_file(model))
-    return Predictor(network.to(device), settings, raw=raw, level=level, config=config)
+    return Predictor(network.to(place), settings, raw=raw, level=level, config=config)
 
 
 class Predictor:
@@ -107,9 +104,9 @@ class Predictor:
         alone (docs/performance.md). Where torch finds no compiler, a RuntimeWarning says so and
         the network runs as it did.
         """
-        made = copy(self)
-        made.network = compiled(self.network, self.settings.input_points)
-        return made
+        other = copy(self)
+        other.network = compiled(self.network, self.settings.input_points)
+        return other
 
     def complete(self, points: object, sensor: Sensor | None = None) -> Completion:
         """The complete shape of the object of one scan.
@@ -128,14 +125,7 @@ class Predictor:
     ) -> Iterator[Completion]:
         """`complete` for many scans, in batches; each is completed on its own."""
         for start in range(0, len(scans), _BATCH):
-            began = time.perf_counter()
-            names = range(start, len(scans))
-            batch = [
-                as_points(s, f"scan {i}") for i, s in zip(names, scans[start : start + _BATCH])
-            ]
-            done = self._complete_batch(batch, sensor)
-            seconds = (time.perf_counter() - began) / len(batch)
-            yield from (replace(item, seconds=seconds) for item in done)
+            yield from self._each(_checked(scans[start : start + _BATCH], start), sensor)
 
     def complete_track(
         self, scans: Sequence[object], sensor: Sensor | None = None
@@ -148,12 +138,31 @@ class Predictor:
         Raises:
             BadInputError: a scan is not `(n, 3)`, or has fewer than 16 finite points.
         """
-        clouds = [as_points(scan, f"scan {i}") for i, scan in enumerate(scans)]
+        return self._together(_checked(scans), sensor)
+
+    def complete_checked(
+        self, scans: Sequence[Points], sensor: Sensor | None = None, *, track: bool = False
+    ) -> Iterable[Completion]:
+        """`complete_many`, or with `track` `complete_track`, of scans that are known to be such.
+
+        What `io` reads has passed `check_scan`; it is not checked again.
+        """
+        return self._together(scans, sensor) if track else self._each(scans, sensor)
+
+    def _each(self, scans: Sequence[Points], sensor: Sensor | None) -> Iterator[Completion]:
+        for start in range(0, len(scans), _BATCH):
+            began = time.perf_counter()
+            batch = list(scans[start : start + _BATCH])
+            done = self._complete_batch(batch, sensor)
+            seconds = (time.perf_counter() - began) / len(batch)
+            yield from (replace(item, seconds=seconds) for item in done)
+
+    def _together(self, scans: Sequence[Points], sensor: Sensor | None) -> list[Completion]:
         began = time.perf_counter()
-        alone = list(self.complete_many(clouds, sensor))
+        alone = list(self._each(scans, sensor))
         clouds = [
             self._off_ground(cloud, done.pose.inverse().apply_numpy(done.points), done.pose)
-            for cloud, done in zip(clouds, alone)
+            for cloud, done in zip(scans, alone)
         ]
         done = complete_together(alone, clouds, self.settings, self.config)
         seconds = (time.perf_counter() - began) / max(len(done), 1)
@@ -164,7 +173,7 @@ class Predictor:
     ) -> Registration:
         """`T_target_source = T_target_can inv(T_source_can)` (METHOD 7)."""
         pair = (as_points(source, "source"), as_points(target, "target"))
-        done_source, done_target = self.complete_many(pair, sensor)
+        done_source, done_target = self._each(pair, sensor)
         T_target_source = done_target.pose @ done_source.pose.inverse()
         ratio = inlier_ratio(T_target_source, *pair)
         confidence = min(done_source.confidence, done_target.confidence)
@@ -188,8 +197,8 @@ class Predictor:
         self, scans: Sequence[object], sensor: Sensor | None = None, *, track: bool = False
     ) -> SE3:
         """`T_sensor_canonical` of each scan; `track` as in `register_track`."""
-        complete = self.complete_track if track else self.complete_many
-        return stack([done.pose for done in complete(scans, sensor)])
+        done = self.complete_checked(_checked(scans), sensor, track=track)
+        return stack([item.pose for item in done])
 
     def fuse(
         self, scans: Sequence[object], sensor: Sensor | None = None, *, track: bool = False
@@ -198,14 +207,16 @@ class Predictor:
 
         `track` as in `register_track`.
         """
-        clouds = [as_points(scan, f"scan {i}") for i, scan in enumerate(scans)]
-        return fuse_scans(clouds, self.register_track(clouds, sensor, track=track))
+        clouds = _checked(scans)
+        done = self.complete_checked(clouds, sensor, track=track)
+        return fuse_scans(clouds, to_middle(stack([item.pose for item in done])))
 
     @torch.inference_mode()
     def _complete_batch(self, scans: list[Points], sensor: Sensor | None) -> list[Completion]:
         found = self._found(scans)
         seen = self._off_their_ground(scans, found)
-        much = [len(kept) < (1 - _GROUND) * len(scan) for kept, scan in zip(seen, scans)]
+        least = 1 - self.config.ground_share
+        much = [len(kept) < least * len(scan) for kept, scan in zip(seen, scans)]
         if any(much):  # the network has seen the ground, too: once more without it
             rows = torch.tensor(much).nonzero()[:, 0]
             again = self._found([seen[int(row)] for row in rows])
@@ -217,11 +228,11 @@ class Predictor:
     def _found(self, scans: list[Points]) -> Found:
         """What the network says of scans, on the host."""
         of = self.settings
-        given = network_input(scans, of.input_points, of.sensor, of.facing).to(self.device)
+        inputs = network_input(scans, of.input_points, of.sensor, of.facing).to(self.device)
         if of.facing:
-            found = look_twice(self.network, of, given, self.config.hypothesis)
+            found = look_twice(self.network, of, inputs, self.config.hypothesis)
         else:
-            found = look(self.network, of, given)
+            found = look(self.network, of, inputs)
         return Found(*(part.cpu() for part in found))
 
     def _off_their_ground(self, scans: list[Points], found: Found) -> list[Points]:
@@ -237,10 +248,12 @@ class Predictor:
         """Scan `i` of those found; `seen`: without ground."""
         shape, T_sensor_can = found.shapes[i], SE3(found.rotation[i], found.translation[i])
         mirror, cost = self.settings.network.mirror, float(found.cost[i])
-        facts = facts_of(scan, cost, found.facts[i])
-        warning = warning_of(scan, sensor, self.settings)
-        confidence = 0.0 if warning else self.confidence(facts)
-        of_result = reasons_of_result(cost, confidence, self.settings)
+        rule = self.config.reasons
+        features = features_of(scan, cost, found.features[i])
+        warning = warning_of(scan, sensor, self.settings, rule)
+        confidence = 0.0 if warning else confidence_of(features, self.settings)
+        reasons = reasons_of_scan(scan, sensor, self.settings, rule)
+        reasons += reasons_of_result(cost, confidence, self.settings, rule)
         if self.refines:
             shape, T_sensor_can = _refined(
                 seen, shape, T_sensor_can, self.config.refine, mirror=mirror, up=self.up
@@ -256,8 +269,8 @@ class Predictor:
             cost=cost,
             refined=self.refines,
             warning=warning,
-            reasons=(*reasons_of_scan(scan, sensor, self.settings), *of_result),
-            facts=facts,
+            reasons=reasons,
+            features=features,
         )
 
     def _off_ground(self, scan: Points, shape: Points, T_sensor_canonical: SE3) -> Points:
@@ -268,15 +281,10 @@ class Predictor:
         kept = scan[~skirt(T_canonical_sensor.apply_numpy(scan), shape)]
         return kept if len(kept) >= MIN_POINTS else scan
 
-    def confidence(self, facts: Facts) -> float:
-        """0 to 1: as the weights are calibrated (`method/confidence.py`).
 
-        Without a calibration it falls with the label-free cost, and is 1/2 at the held-out 90th
-        percentile.
-        """
-        if self.settings.calibration is not None:
-            return self.settings.calibration.confidence(facts)
-        return 1.0 / (1.0 + (math.exp(facts.log_cost) / self.settings.cost_m[1]) ** 2)
+def _checked(scans: Sequence[object], first: int = 0) -> list[Points]:
+    """Scans handed in from Python; errors count them from `first`."""
+    return [as_points(scan, f"scan {i}") for i, scan in enumerate(scans, first)]
 
 
 def _refined(

@@ -7,7 +7,15 @@ from functools import cached_property, partial
 from pathlib import Path
 
 from wildshape.errors import BadInputError
-from wildshape.io.scans.points import SENSOR_METRES, SUFFIXES, Coordinates, is_scan_file, read_scan
+from wildshape.io.progress import counted
+from wildshape.io.scans.points import (
+    SENSOR_METRES,
+    SUFFIXES,
+    Coordinates,
+    check_scan,
+    is_scan_file,
+    read_scan,
+)
 from wildshape.io.store.store import is_store, open_store
 from wildshape.io.tracks import (
     NoUsableScanError,
@@ -28,11 +36,12 @@ _CURE = (
 
 
 class TrackSource:
-    """Tracks that are read when asked for.
+    """Tracks that are read when asked for; what cannot be used is kept with its reason.
 
     Attributes:
         path: what was opened.
         names: the tracks' names, known without reading them.
+        refused: tracks passed over as a whole, with the reason.
     """
 
     def __init__(
@@ -41,16 +50,16 @@ class TrackSource:
         """Tracks `names`, of which `read(i)` reads number i."""
         self.path = path
         self.names = names
+        self.refused: dict[str, str] = {}
         self._read = read
         self._skipped: dict[str, tuple[tuple[str, str], ...]] = {}  # by track
         self._dropped: dict[str, int] = {}
 
     @property
     def skipped(self) -> tuple[tuple[str, str], ...]:
-        """`track/scan file` and reason of each scan skipped in the tracks read until now."""
-        return tuple(
-            (f"{name}/{s}", why) for name in self._skipped for s, why in self.skipped_in(name)
-        )
+        """`track/scan` or `track`, and the reason, of what could not be used until now."""
+        scans = [(f"{name}/{s}", why) for name in self._skipped for s, why in self.skipped_in(name)]
+        return (*scans, *self.refused.items())
 
     def skipped_in(self, name: str) -> tuple[tuple[str, str], ...]:
         """Scan file and reason of each scan skipped in a track that has been read."""
@@ -60,6 +69,14 @@ class TrackSource:
     def numbers(self) -> dict[str, int]:
         """The number of each track, by its name; the first, where two have one name."""
         return {name: number for number, name in reversed(list(enumerate(self.names)))}
+
+    @property
+    def dropped(self) -> str:
+        """A sentence on points that were not finite, or nothing."""
+        if not self._dropped:
+            return ""
+        points = counted(sum(self._dropped.values()), "point")
+        return f"dropped {points} with NaN or infinity in {counted(len(self._dropped), 'scan')}"
 
     @property
     def dropped_nonfinite(self) -> tuple[tuple[str, int], ...]:
@@ -91,22 +108,50 @@ class TrackSource:
         return found.track
 
     def __iter__(self) -> Iterator[Track]:
-        """The tracks in order; those without a usable scan are passed over (see `skipped`).
+        """The usable tracks in order; see `tracks`."""
+        return (track for _, track in self.tracks())
+
+    def tracks(self, done: Callable[[str], bool] = lambda _: False) -> Iterator[tuple[int, Track]]:
+        """The usable tracks with their numbers, without those that are done already.
+
+        Args:
+            done: says so of a track's name.
 
         Raises:
-            BadInputError: no track has a usable scan, or truth is damaged.
+            BadInputError: not a single track can be used.
         """
         last, count = None, 0
-        for index in range(len(self)):
+        for index, name in enumerate(self.names):
+            if done(name):
+                count += 1
+                continue
             try:
                 track = self[index]
-            except NoUsableScanError as error:
+            except BadInputError as error:
                 last = error
+                self.refused[name] = str(error)
                 continue
             count += 1
-            yield track
+            yield index, track
         if last is not None and not count:
             raise last
+
+    def single(self, why: str) -> Track:
+        """The only track.
+
+        Args:
+            why: what takes one track, for the error.
+
+        Raises:
+            BadInputError: there are several, or it cannot be used.
+        """
+        if len(self) != 1:
+            raise BadInputError(
+                f"{self.path}: holds {len(self)} tracks, but {why} takes one; name the"
+                f" folder of one, such as {self.names[0]} (`wildshape convert packed STORE OUT"
+                " --layout folders` makes folders of a packed store)."
+            )
+        return self[0]
 
 
 def open_tracks(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> TrackSource:
@@ -133,11 +178,30 @@ def open_tracks(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> T
                 " and --origin away, and give them to `convert`."
             )
         store = open_store(path)
-        return TrackSource(path, store.names, lambda index: TrackFile(store.track(index)))
+        return TrackSource(path, store.names, lambda index: _checked(store.track(index)))
     if (path / "scans").is_dir():
         scan_files(path / "scans")
         return TrackSource(path, (_name(path),), lambda _: read_track_file(path, coordinates))
     return _folder(path, coordinates)
+
+
+def _checked(track: Track) -> TrackFile:
+    """A track that was not read from scan files, without the scans that cannot be used.
+
+    Raises:
+        NoUsableScanError: all of them.
+    """
+    kept, skipped = [], []
+    for number, (name, scan) in enumerate(zip(track.scan_names, track.scans)):
+        try:
+            check_scan(scan, f"{track.name}/{name}")
+        except BadInputError as error:
+            skipped.append((name, str(error)))
+            continue
+        kept.append(number)
+    if not kept:
+        raise NoUsableScanError(Path(track.name), tuple(skipped))
+    return TrackFile(track if not skipped else track.part(kept), tuple(skipped))
 
 
 def _single_scan(path: Path, coordinates: Coordinates) -> TrackSource:

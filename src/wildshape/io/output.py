@@ -7,6 +7,8 @@ with; two are never mixed; `--overwrite` removes what the earlier command wrote 
 """
 
 import json
+import shlex
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +16,7 @@ from typing import Any
 
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import lock_folder, write_json
+from wildshape.io.progress import SILENT, Progress
 from wildshape.io.provenance import provenance
 
 MARKER = "wildshape.json"
@@ -50,9 +53,10 @@ def begin(
     command: str,
     settings: dict[str, Any],
     files: Sequence[str],
-    command_line: str,
     *,
     overwrite: bool = False,
+    progress: Progress = SILENT,
+    line: str | None = None,
 ) -> Output:
     """Start, or go on with, the output of a command.
 
@@ -61,8 +65,10 @@ def begin(
         command: for example `complete`.
         settings: JSON values; whatever changes the content of the output.
         files: patterns of the files that the command may write below `path`.
-        command_line: how the output came about, as a user would type it again.
         overwrite: remove an earlier output first.
+        progress: is told that an earlier run is gone on with.
+        line: how the output comes about, as a user would type it again; by default the command
+            line of this process.
 
     Raises:
         BadInputError: something else is there, or a finished output without `overwrite`, or
@@ -75,13 +81,15 @@ def begin(
     lock_folder(path)
     if is_begun(path):
         resumed = _existing(path, command, settings, overwrite=overwrite)
+    if resumed:
+        progress.say(f"going on with the unfinished output in {path}")
     remove_leftovers(path)
     record = {
         "command": command,
         "status": "running",
         "settings": settings,
         "files": list(files),
-        "provenance": provenance(command_line),
+        "provenance": provenance(line or command_line()),
     }
     write_json(path / MARKER, record)
     return Output(path, record, resumed)
@@ -117,6 +125,34 @@ def unfinished(path: Path, command: str) -> bool:
         return False
     record = _read(path)
     return record.get("command") == command and record.get("status") == "running"
+
+
+def command_line() -> str:
+    """As a user would type it again."""
+    return shlex.join(["wildshape", *sys.argv[1:]])
+
+
+def file_name(name: str) -> str:
+    """The name itself.
+
+    Raises:
+        BadInputError: it is no plain file name.
+    """
+    if not name or Path(name).name != name or name.startswith("."):
+        raise BadInputError(f"'{name}': a track or scan of this name cannot become a file; rename.")
+    return name
+
+
+def refuse_file(path: Path, *, overwrite: bool) -> None:
+    """Refuse to write over a file.
+
+    Raises:
+        BadInputError: it exists, and `overwrite` was not given; or it is a folder.
+    """
+    if path.is_dir():
+        raise BadInputError(f"{path}: is a folder; --out names a file to write.")
+    if path.exists() and not overwrite:
+        raise BadInputError(f"{path}: exists; pass --overwrite to replace it.")
 
 
 def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: bool) -> bool:

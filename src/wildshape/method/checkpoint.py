@@ -14,7 +14,7 @@ from safetensors.torch import save
 from wildshape.geometry.projection.visibility import Projection
 from wildshape.io.atomic import atomic_write
 from wildshape.io.typed_records import record_of
-from wildshape.method.confidence import Calibration, Facts
+from wildshape.method.confidence import Calibration, ConfidenceFeatures
 from wildshape.method.network import NetworkConfig, ShapePoseNet
 from wildshape.method.saved_network import Format, load_network
 from wildshape.records import SensorKind
@@ -121,8 +121,10 @@ def settings_from_dict(values: object) -> ModelSettings:
     if settings.up is not None and abs(math.hypot(*settings.up) - 1) > _UNIT_WITHIN:
         raise ValueError(f"up is {settings.up}, expected a direction of length 1")
     known = settings.calibration
-    if known is not None and len(known.weights) != len(Facts._fields):
-        raise ValueError(f"{len(known.weights)} weights for {len(Facts._fields)} facts")
+    if known is not None and len(known.weights) != len(ConfidenceFeatures._fields):
+        raise ValueError(
+            f"{len(known.weights)} weights for {len(ConfidenceFeatures._fields)} features"
+        )
     return settings
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How far a completion can be trusted, from what is known without labels (beyond the paper).
 
-A line through a few such facts foretells the Chamfer distance. Its coefficients are fitted where
+A line through a few such features foretells the Chamfer distance. Its coefficients are fitted where
 truth is known, on simulated drives, and travel with the weights; without them the confidence falls
 with the label-free cost alone.
 """
@@ -15,10 +15,16 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+COVERED_M = 0.2
+"""How near to its scan a point of a shape counts as seen, metres: part of what `covered` means."""
+
+SMALLEST_M = 1e-4
+"""Lengths below this count as this where their logarithm is taken."""
+
 _MOST = 700.0  # the logarithm of the largest float, nearly
 
 
-class Facts(NamedTuple):
+class ConfidenceFeatures(NamedTuple):
     """What is known of a completion without labels; numbers that grow or fall with its error.
 
     Attributes:
@@ -48,10 +54,10 @@ class Facts(NamedTuple):
 
 @dataclass(frozen=True)
 class Calibration:
-    """From facts to the probability that the Chamfer distance is at most `within_m`.
+    """From features to the probability that the Chamfer distance is at most `within_m`.
 
     Attributes:
-        weights: of `Facts`, in their order, for the logarithm of the Chamfer distance.
+        weights: of `ConfidenceFeatures`, in their order, for the logarithm of the Chamfer distance.
         bias: added to it.
         sigma: standard deviation of what the line does not explain.
         within_m: a good completion's Chamfer distance, metres: the median where it was fitted.
@@ -64,21 +70,21 @@ class Calibration:
     within_m: float
     fitted_on: str = ""
 
-    def expected(self, facts: Facts) -> float:
-        """The Chamfer distance that the facts let expect, metres."""
-        return math.exp(min(self._line(facts), _MOST))
+    def expected(self, features: ConfidenceFeatures) -> float:
+        """The Chamfer distance that the features let expect, metres."""
+        return math.exp(min(self._line(features), _MOST))
 
-    def confidence(self, facts: Facts) -> float:
+    def confidence(self, features: ConfidenceFeatures) -> float:
         """0 to 1: the probability that the Chamfer distance is at most `within_m`."""
-        beyond = (self._line(facts) - math.log(self.within_m)) / self.sigma
+        beyond = (self._line(features) - math.log(self.within_m)) / self.sigma
         return 0.5 * math.erfc(beyond / math.sqrt(2))
 
-    def _line(self, facts: Facts) -> float:
-        return self.bias + sum(w * f for w, f in zip(self.weights, facts, strict=True))
+    def _line(self, features: ConfidenceFeatures) -> float:
+        return self.bias + sum(w * f for w, f in zip(self.weights, features, strict=True))
 
 
 def fit_calibration(
-    facts: Sequence[Facts],
+    features: Sequence[ConfidenceFeatures],
     cd: Float[np.ndarray, "n"],
     fitted_on: str = "",
     ridge: float = 1.0,
@@ -87,18 +93,18 @@ def fit_calibration(
     """Ridge regression of the logarithm of true Chamfer distances.
 
     Args:
-        facts: of completions.
+        features: of completions.
         cd: their true Chamfer distances, metres.
         fitted_on: what they are, in words.
-        ridge: what holds the weights of all facts but the cost near zero.
+        ridge: what holds the weights of all features but the cost near zero.
         ridge_of_cost: the same of the cost, which orders errors well by itself; at most `ridge`.
     """
-    known = np.asarray(facts, dtype=np.float64)
+    known = np.asarray(features, dtype=np.float64)
     target = np.log(np.maximum(cd, 1e-6))
     middle, width = known.mean(0), known.std(0) + 1e-6
     scaled = (known - middle) / width
     held = np.full(scaled.shape[1], ridge)
-    held[Facts._fields.index("log_cost")] = min(ridge, ridge_of_cost)
+    held[ConfidenceFeatures._fields.index("log_cost")] = min(ridge, ridge_of_cost)
     normal = scaled.T @ scaled + np.diag(held)
     slope = np.linalg.solve(normal, scaled.T @ (target - target.mean()))
     left = target - target.mean() - scaled @ slope

@@ -86,7 +86,7 @@ class Poses(NamedTuple):
 
     def choose(self, branch: Tensor) -> "Poses":
         """One hypothesis a scan, `(B,)` indices, K = 1."""
-        rows = torch.arange(len(branch), device=branch.device)
+        rows = torch.arange(branch.shape[0], device=branch.device)
         return Poses(*(part[rows, branch][:, None] for part in self))
 
 

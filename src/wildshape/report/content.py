@@ -13,8 +13,8 @@ import numpy as np
 
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.registration import fuse_scans
+from wildshape.io.progress import counted
 from wildshape.records import Box, Points, SensorKind, Track
-from wildshape.report.words import counted
 
 # Okabe & Ito 2008: told apart by colour-blind readers, on white and on black.
 ORANGE, BLUE, GREEN, PINK, SKY, GREY = (

@@ -9,6 +9,7 @@ from typing import Any
 
 from torch.profiler import record_function
 
+from wildshape.inference.models import MODEL
 from wildshape.method.checkpoint import ModelSettings, save_checkpoint
 from wildshape.training.runtime.log import RunLog
 from wildshape.training.runtime.profiler import steps_profiled
@@ -21,7 +22,6 @@ from wildshape.training.validate import Validation, truth_figures, usual_up, val
 
 __all__ = ["MODEL", "Progress", "Run", "StopRequested", "fit", "setup", "split_tracks"]
 
-MODEL = "model.safetensors"
 _LOG_EVERY, _LOG_EVERY_GPU = 25, 250  # reading the figures waits for a GPU to be done
 Progress = Callable[[int, dict[str, Any]], None]
 

@@ -18,7 +18,7 @@ from tests.datasets.write_argoverse2 import write_log
 from tests.datasets.write_kitti_raw import in_velo, write_drive
 
 from wildshape.cli.commands.convert import _OURS, _TRUTH, Settings, _options
-from wildshape.cli.conversion.sources import _NESTED, SOURCES, open_source
+from wildshape.datasets.sources import _NESTED, SOURCES, open_source
 from wildshape.datasets.tracks.source import Source
 from wildshape.io.store.store import open_store
 from wildshape.io.tracks import read_track

@@ -3,8 +3,8 @@
 import json
 import shutil
 
-from wildshape.cli.commands.demo import FILES
 from wildshape.io.store.store import open_store
+from wildshape.report.demo.run import FILES
 
 QUICK = ("--preset", "tiny", "--seconds", "0.5", "--tracks", "4", "--test-tracks", "2")
 

@@ -18,9 +18,9 @@ from wildshape.inference.config import HypothesisRule, InferenceConfig
 from wildshape.inference.export.onnx import describe, graph_of, trace, write_torch
 from wildshape.inference.export.plain_scores import nearest_both_plain, score_plain, visible_plain
 from wildshape.inference.export.verify import compare, open_exported, prepared, rehearsal_scans
+from wildshape.inference.models import SHIPPED
 from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.prepare import resample
-from wildshape.inference.shipped_weights import SHIPPED
 from wildshape.method.checkpoint import ModelSettings, save_checkpoint
 from wildshape.method.confidence import Calibration
 from wildshape.method.hindsight import score_hypotheses

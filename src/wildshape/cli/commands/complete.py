@@ -8,24 +8,26 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-from wildshape.cli.importing import uncollected
-from wildshape.cli.input.pipe import Format, is_pipe
 from wildshape.cli.options import (
-    AT_ORIGIN,
+    DEFAULT_FILES,
+    DEFAULT_NETWORK,
     AsJson,
-    Device,
-    Model,
-    Origin,
+    Files,
+    Format,
+    Network,
     Overwrite,
     Together,
-    Unit,
+    is_pipe,
     listed,
     option,
 )
+from wildshape.cli.process import uncollected
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
-    from wildshape.io.scans.writers import MeshOrder
+    from wildshape.inference.folders import FolderOptions
+    from wildshape.io.scans.writers import MeshFiles
+    from wildshape.records import Completion, Track
 
 EXAMPLES = (
     "wildshape complete scan.ply --out completed",
@@ -64,10 +66,8 @@ class Settings:
 
     input: Input
     out: Out = None
-    model: Model = None
-    unit: Unit = "m"
-    origin: Origin = AT_ORIGIN
-    device: Device = "auto"
+    network: Network = DEFAULT_NETWORK
+    files: Files = DEFAULT_FILES
     together: Together = False
     mesh: Annotated[bool, arg(help="also write a closed mesh of each shape")] = False
     mesh_format: Annotated[Literal["ply", "obj", "glb"], arg(help="of the meshes")] = "ply"
@@ -110,52 +110,96 @@ def run(settings: Settings) -> None:
 
 def _to_folder(settings: Settings, out: Path) -> None:
     with uncollected():
-        from wildshape.cli.results.boxes import BoxOrder
-        from wildshape.cli.results.write import Work, perform
-        from wildshape.io.scans.points import Coordinates
+        from wildshape.cli.terminal import TERMINAL, conclude
+        from wildshape.inference.folders import complete_folder
 
     if settings.format != "auto":
         raise BadInputError(f"--format {settings.format}: is for a scan on stdin; leave it away.")
-    boxes = BoxOrder(settings.boxes, settings.calibration)
-    boxes.check()
-    work = Work(
-        command="complete",
-        input=settings.input,
-        out=out,
-        model=settings.model,
-        coordinates=Coordinates(settings.unit, settings.origin),
-        device=settings.device,
+    conclude(
+        complete_folder(settings.input, out, _options(settings), TERMINAL), as_json=settings.json
+    )
+
+
+def _options(settings: Settings) -> "FolderOptions":
+    from wildshape.inference.box_files import BoxFiles
+    from wildshape.inference.folders import FolderOptions
+
+    wanted = bool(settings.boxes or settings.calibration)
+    boxes = BoxFiles(settings.boxes, settings.calibration) if wanted else None
+    return FolderOptions(
+        model=settings.network.model,
+        device=settings.network.device,
+        coordinates=settings.files.coordinates,
         track=settings.together,
         mesh=_mesh(settings),
         boxes=boxes,
-    )
-    perform(work, overwrite=settings.overwrite, as_json=settings.json)
-
-
-def _to_stdout(settings: Settings) -> None:
-    if settings.boxes or settings.calibration:
-        raise BadInputError("--boxes: stdout holds one shape; name a folder with --out DIR.")
-    with uncollected():
-        from wildshape.cli.results.one_shape import Order, complete_to_stdout
-        from wildshape.io.scans.points import Coordinates
-
-    complete_to_stdout(
-        Order(
-            input=settings.input,
-            format=settings.format,
-            model=settings.model,
-            coordinates=Coordinates(settings.unit, settings.origin),
-            device=settings.device,
-            mesh=_mesh(settings),
-            json=settings.json,
-        )
+        overwrite=settings.overwrite,
     )
 
 
-def _mesh(settings: Settings) -> "MeshOrder | None":
-    from wildshape.io.scans.writers import MeshOrder
+def _mesh(settings: Settings) -> "MeshFiles | None":
+    from wildshape.io.scans.writers import MeshFiles
 
     coloured = settings.mesh_colours == "confidence"
     if coloured and not settings.mesh:
         raise BadInputError("--mesh-colours: there is no mesh to colour; pass --mesh, too.")
-    return MeshOrder(settings.mesh_format, coloured) if settings.mesh else None
+    return MeshFiles(settings.mesh_format, coloured) if settings.mesh else None
+
+
+def _to_stdout(settings: Settings) -> None:
+    """One scan completed to stdout: a PLY, a mesh, or one JSON object with the points."""
+    if settings.boxes or settings.calibration:
+        raise BadInputError("--boxes: stdout holds one shape; name a folder with --out DIR.")
+    with uncollected():
+        from wildshape.cli.pipe import refuse_terminal, write_stdout
+        from wildshape.cli.terminal import answer, say
+        from wildshape.inference.confidence import reasons_sentence
+        from wildshape.inference.predictor import load
+
+    mesh = _mesh(settings)
+    if not settings.json:
+        refuse_terminal()
+    track = _one_scan(settings)
+    predictor = load(settings.network.model, settings.network.device)
+    (done,) = predictor.complete_checked(track.scans, track.sensor)
+    if done.reasons:
+        say(reasons_sentence(done))
+    if settings.json:
+        answer("", _as_json(track.scan_names[0], done), as_json=True)
+    else:
+        write_stdout(_as_file(done, track, mesh))
+
+
+def _one_scan(settings: Settings) -> "Track":
+    from wildshape.cli.pipe import as_file
+    from wildshape.cli.terminal import say
+    from wildshape.io.inputs import open_tracks
+
+    with as_file(settings.input, settings.format) as path:
+        source = open_tracks(path, settings.files.coordinates)
+        track = source.single("--out -")
+    if len(track.scans) != 1:
+        raise BadInputError(
+            f"{settings.input}: holds {len(track.scans)} scans, but --out - writes one shape; name"
+            " the file of one scan, or a folder for --out."
+        )
+    if source.dropped:
+        say(source.dropped)
+    return track
+
+
+def _as_json(name: str, done: "Completion") -> dict[str, object]:
+    """What `objects.json` says of a scan, its pose, and its points to a tenth of a millimetre."""
+    from wildshape.inference.completed_files import describe
+
+    pose = done.pose.matrix.tolist()
+    points = [[round(x, 4) for x in row] for row in done.points.tolist()]
+    return {**describe(name, done), "T_sensor_canonical": pose, "points": points}
+
+
+def _as_file(done: "Completion", track: "Track", mesh: "MeshFiles | None") -> bytes:
+    from wildshape.io.scans.writers import mesh_bytes, ply_bytes
+
+    if mesh is None:
+        return ply_bytes(done.points)
+    return mesh_bytes(done.mesh(track.scans[0] if mesh.coloured else None), mesh.kind)

@@ -4,19 +4,18 @@
 
 import math
 import time
-from dataclasses import asdict, dataclass, fields, is_dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
-from wildshape.cli.conversion.sources import SOURCES, open_source
 from wildshape.cli.options import AsJson, Layout, Origin, Overwrite, Unit, listed, option
+from wildshape.datasets.sources import SOURCES
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
     from wildshape.datasets.tracks.conversion import PartResult
-    from wildshape.datasets.tracks.source import Source
     from wildshape.datasets.tracks.truth import TruthBuilder
 
 EXAMPLES = (
@@ -126,8 +125,10 @@ def run(settings: Settings) -> None:
         BadInputError: an unknown source, files that are missing or damaged, an existing output.
         MissingExtraError: a library that the source or Ray needs is not installed.
     """
-    from wildshape.cli.conversion.work import Order, convert
-    from wildshape.cli.output import keep_apart
+    from wildshape.cli.terminal import TERMINAL
+    from wildshape.datasets.convert import ConversionOptions, convert
+    from wildshape.datasets.sources import open_source
+    from wildshape.io.output import keep_apart
 
     began = time.monotonic()
     _check(settings)
@@ -135,28 +136,21 @@ def run(settings: Settings) -> None:
     # Machines of a cluster have working folders of their own.
     root = settings.root if settings.ray is None else settings.root.absolute()
     source = open_source(settings.source, root, _options(settings))
-    order = Order(
-        name=settings.source,
-        source=source,
-        out=settings.out,
-        layout=settings.layout,
-        truth=_truth(settings),
-        settings=_identity(settings, source),
-        workers=settings.workers,
-        ray=settings.ray,
-        overwrite=settings.overwrite,
+    options = ConversionOptions(
+        settings.layout, _truth(settings), settings.workers, settings.ray, settings.overwrite
     )
-    _tell(convert(order), settings, time.monotonic() - began)
+    results = convert(source, settings.out, options, TERMINAL, name=settings.source)
+    _tell(results, settings, time.monotonic() - began)
 
 
 def _options(settings: Settings) -> dict[str, Any]:
     """What the user asked of the reader, by the names of its fields."""
     names = [f.name for f in fields(settings) if f.name not in (*_OURS, *_TRUTH)]
-    given = {name: getattr(settings, name) for name in names}
+    asked = {name: getattr(settings, name) for name in names}
     if settings.categories == ():
         raise BadInputError("--categories names no category; leave it out for the usual ones.")
     # By identity: 0 == False, and an explicit zero is a wish.
-    return {name: v for name, v in given.items() if v is not None and v is not False}
+    return {name: v for name, v in asked.items() if v is not None and v is not False}
 
 
 def _truth(settings: Settings) -> "TruthBuilder | None":
@@ -171,14 +165,6 @@ def _truth(settings: Settings) -> "TruthBuilder | None":
         neighbours=settings.outlier_neighbours,
         strip=settings.ground_strip,
     )
-
-
-def _identity(settings: Settings, source: "Source") -> dict[str, Any]:
-    """The reader with all its options, those included that the user did not give."""
-    names = [f.name for f in fields(cast("Any", source)) if f.init and f.name != "root"]
-    options = {name: getattr(source, name) for name in names}
-    values = {n: asdict(cast("Any", v)) if is_dataclass(v) else v for n, v in options.items()}
-    return {"source": settings.source, "root": str(settings.root.resolve()), **values}
 
 
 def _check(settings: Settings) -> None:
@@ -199,8 +185,9 @@ def _check(settings: Settings) -> None:
 
 def _tell(results: "list[PartResult]", settings: Settings, seconds: float) -> None:
     """The figures on stdout, and what was left out as a table on stderr."""
-    from wildshape.cli.conversion.output import left_out
-    from wildshape.cli.terminal import answer, counted, duration, say
+    from wildshape.cli.terminal import answer, say
+    from wildshape.datasets.destinations import left_out
+    from wildshape.io.progress import counted, duration
 
     counts = {key: sum(getattr(r, key) for r in results) for key in ("tracks", "scans", "points")}
     reasons = left_out(results)
@@ -209,8 +196,8 @@ def _tell(results: "list[PartResult]", settings: Settings, seconds: float) -> No
     damaged = [result.damage for result in results if result.damage]
     if damaged:
         say(f"{len(damaged)} of {len(results)} parts are damaged, for example {damaged[0]}")
-    made = ", ".join(counted(n, key.removesuffix("s")) for key, n in counts.items())
-    text = f"converted {made} in {duration(seconds)}; see {settings.out}"
+    written = ", ".join(counted(n, key.removesuffix("s")) for key, n in counts.items())
+    text = f"converted {written} in {duration(seconds)}; see {settings.out}"
     parts = [{key: value for key, value in asdict(r).items() if key != "names"} for r in results]
     data = {"out": str(settings.out), **counts, "left_out": reasons, "parts": parts}
     answer(text, {**data, "seconds": round(seconds, 3)}, as_json=settings.json)

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional
 
-from wildshape.cli.options import AsJson, Device, Model, OutFolder, Overwrite, option
+from wildshape.cli.options import (
+    DEFAULT_NETWORK,
+    AsJson,
+    Network,
+    OutFolder,
+    Overwrite,
+    option,
+)
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -45,8 +52,7 @@ class Settings:
 
     source: Sources
     out: OutFolder
-    model: Model = None
-    device: Device = "auto"
+    network: Network = DEFAULT_NETWORK
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -58,12 +64,12 @@ def run(settings: Settings) -> None:
         BadInputError: a source, the model or the output cannot be used.
         MissingExtraError: a library is not installed.
     """
-    from wildshape.cli.models import load_model
     from wildshape.cli.terminal import answer
     from wildshape.drives.run import drive
+    from wildshape.inference.predictor import load
 
     folders = _folders(settings)
-    predictor = load_model(settings.model, settings.device)
+    predictor = load(settings.network.model, settings.network.device)
     found: list[DriveResult] = []
     for source, out in folders.items():
         with _bars() as watch:
@@ -91,7 +97,8 @@ def _bars() -> "Iterator[Watch]":
     """A bar of progress a stage."""
     from contextlib import ExitStack
 
-    from wildshape.cli.terminal import Bar, progress
+    from wildshape.cli.terminal import TERMINAL
+    from wildshape.io.progress import Bar
 
     with ExitStack() as stack:
         bars: dict[str, Bar] = {}
@@ -99,14 +106,15 @@ def _bars() -> "Iterator[Watch]":
         def watch(stage: str, done: int, total: int) -> None:
             if stage not in bars:
                 stack.pop_all().close()
-                bars[stage] = stack.enter_context(progress(stage, total))
+                bars[stage] = stack.enter_context(TERMINAL.bar(stage, total))
             bars[stage].at(done)
 
         yield watch
 
 
 def _sentence(found: "DriveResult") -> str:
-    from wildshape.cli.terminal import counted, duration, say
+    from wildshape.cli.terminal import say
+    from wildshape.io.progress import counted, duration
 
     for warning in found.warnings:
         say(f"{found.out.name}: {warning}")

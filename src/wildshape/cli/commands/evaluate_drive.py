@@ -59,18 +59,18 @@ def run(settings: Settings) -> None:
     Raises:
         BadInputError: drives or labels that cannot be used, or that do not belong together.
     """
-    from wildshape.cli.output import command_line
-    from wildshape.cli.terminal import answer, progress
+    from wildshape.cli.terminal import TERMINAL, answer
     from wildshape.evaluation.drives.found import drives_of, read_found
     from wildshape.evaluation.drives.labels import Counting, read_labels
     from wildshape.evaluation.drives.protocol import evaluate_drives
     from wildshape.evaluation.drives.results import as_json, markdown
+    from wildshape.io.output import command_line
     from wildshape.io.provenance import provenance
 
     _check(settings)
     drives = drives_of(settings.folder, settings.labels)
     counting = Counting(points=settings.points, range_m=settings.range)
-    with progress("evaluating", len(drives) + 3) as bar:
+    with TERMINAL.bar("evaluating", len(drives) + 3) as bar:
         labelled, found = [], []
         for folder, path in drives:
             labelled.append(read_labels(path, counting))
@@ -93,8 +93,8 @@ def _check(settings: Settings) -> None:
 
 
 def _write(settings: Settings, scores: Any, counting: Any, made: dict[str, Any]) -> None:
-    from wildshape.cli.output import begin, keep_apart
     from wildshape.evaluation.drives.results import FILES, write_results
+    from wildshape.io.output import begin, keep_apart
 
     assert settings.out is not None
     keep_apart(settings.folder, settings.out)

@@ -51,7 +51,7 @@ def run(settings: Settings) -> None:
     Raises:
         BadInputError: model or output cannot be used, or the file does not do what torch does.
     """
-    from wildshape.cli.output import refuse_file
+    from wildshape.io.output import refuse_file
 
     suffix = settings.out.suffix.lower()
     if suffix not in _SUFFIXES:
@@ -63,13 +63,13 @@ def run(settings: Settings) -> None:
 
 
 def _export(settings: Settings, suffix: str) -> None:
-    from wildshape.cli.models import load_model
     from wildshape.cli.terminal import answer
     from wildshape.inference.export import onnx, verify
+    from wildshape.inference.predictor import load
 
     if suffix == ".onnx":
         onnx.require_onnx()
-    predictor = load_model(settings.model, "cpu", raw=True)
+    predictor = load(settings.model, raw=True)
     if predictor.settings.network.backbone != "pcn":
         raise BadInputError(
             f"{settings.model}: its encoder is {predictor.settings.network.backbone}, and only"

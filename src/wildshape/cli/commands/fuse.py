@@ -9,14 +9,13 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from wildshape.cli.options import (
-    AT_ORIGIN,
+    DEFAULT_FILES,
+    DEFAULT_NETWORK,
     AsJson,
-    Device,
-    Model,
-    Origin,
+    Files,
+    Network,
     Overwrite,
     Together,
-    Unit,
 )
 
 EXAMPLES = (
@@ -36,10 +35,8 @@ class Settings:
 
     track: TrackFolder
     out: OutFile
-    model: Model = None
-    unit: Unit = "m"
-    origin: Origin = AT_ORIGIN
-    device: Device = "auto"
+    network: Network = DEFAULT_NETWORK
+    files: Files = DEFAULT_FILES
     together: Together = False
     overwrite: Overwrite = False
     json: AsJson = False
@@ -51,36 +48,33 @@ def run(settings: Settings) -> None:
     Raises:
         BadInputError: input, model or output cannot be used.
     """
-    from wildshape.cli.input.tracks import Reading
-    from wildshape.cli.models import load_model
-    from wildshape.cli.output import refuse_file
-    from wildshape.cli.results.tally import Doubts
-    from wildshape.cli.terminal import answer, counted, say, say_skipped
+    from wildshape.cli.terminal import answer, say, say_skipped
     from wildshape.geometry.transforms.se3 import stack
+    from wildshape.inference.confidence import ReasonCounts
+    from wildshape.inference.predictor import load
     from wildshape.inference.registration import fuse_scans, to_middle
-    from wildshape.io.scans.points import Coordinates
+    from wildshape.io.inputs import open_tracks
+    from wildshape.io.output import refuse_file
+    from wildshape.io.progress import counted
     from wildshape.io.scans.writers import check_suffix, write_cloud
 
     check_suffix(settings.out)
     refuse_file(settings.out, overwrite=settings.overwrite)
-    reading = Reading(settings.track, Coordinates(settings.unit, settings.origin))
-    track = reading.single("fuse")
-    predictor = load_model(settings.model, settings.device)
-    if settings.together:
-        done = predictor.complete_track(track.scans, track.sensor)
-    else:
-        done = list(predictor.complete_many(track.scans, track.sensor))
+    source = open_tracks(settings.track, settings.files.coordinates)
+    track = source.single("fuse")
+    predictor = load(settings.network.model, settings.network.device)
+    done = list(predictor.complete_checked(track.scans, track.sensor, track=settings.together))
     fused = fuse_scans(track.scans, to_middle(stack([scan.pose for scan in done])))
     write_cloud(settings.out, fused)
-    say_skipped(reading.skipped)
-    doubts = Doubts().of(track.scan_names, done)
-    if doubts.flagged:
-        say(doubts.sentence)
+    say_skipped(source.skipped)
+    reasons = ReasonCounts().of(track.scan_names, done)
+    if reasons.flagged:
+        say(reasons.sentence)
     middle = track.scan_names[track.middle]
     text = (
         f"fused {counted(len(track.scans), 'scan')}, {len(fused)} points, in the frame of scan"
         f" {middle}; see {settings.out}"
     )
     data = {"out": str(settings.out), "points": len(fused), "scans": len(track.scans)}
-    data |= {**doubts.data, "uses": "track" if settings.together else "scan"}
+    data |= {**reasons.data, "uses": "track" if settings.together else "scan"}
     answer(text, {**data, "middle_scan": middle}, as_json=settings.json)

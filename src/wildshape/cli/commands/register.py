@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
-from wildshape.cli.importing import uncollected
-from wildshape.cli.input.pipe import Format, as_file, is_pipe
 from wildshape.cli.options import (
-    AT_ORIGIN,
+    DEFAULT_FILES,
+    DEFAULT_NETWORK,
     AsJson,
-    Device,
-    Model,
-    Origin,
+    Files,
+    Format,
+    Network,
     Overwrite,
     Together,
-    Unit,
+    is_pipe,
     option,
 )
+from wildshape.cli.process import uncollected
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -58,10 +58,8 @@ class Settings:
     source: Source
     target: Target = None
     out: Out = None
-    model: Model = None
-    unit: Unit = "m"
-    origin: Origin = AT_ORIGIN
-    device: Device = "auto"
+    network: Network = DEFAULT_NETWORK
+    files: Files = DEFAULT_FILES
     together: Together = False
     format: Format = "auto"
     overwrite: Overwrite = False
@@ -92,30 +90,29 @@ def run(settings: Settings) -> None:
 
 def _tracks(settings: Settings, out: Path) -> None:
     with uncollected():
-        from wildshape.cli.results.write import Work, perform
-        from wildshape.io.scans.points import Coordinates
+        from wildshape.cli.terminal import TERMINAL, conclude
+        from wildshape.inference.folders import FolderOptions, complete_folder
 
-    work = Work(
-        command="register",
-        input=settings.source,
-        out=out,
-        model=settings.model,
-        coordinates=Coordinates(settings.unit, settings.origin),
-        device=settings.device,
+    options = FolderOptions(
+        model=settings.network.model,
+        device=settings.network.device,
+        coordinates=settings.files.coordinates,
         track=settings.together,
+        overwrite=settings.overwrite,
     )
-    perform(work, overwrite=settings.overwrite, as_json=settings.json)
+    found = complete_folder(settings.source, out, options, TERMINAL, registers=True)
+    conclude(found, as_json=settings.json)
 
 
 def _pair(settings: Settings, target: Path) -> None:
-    from wildshape.cli.models import load_model
-    from wildshape.cli.results.tally import doubt
     from wildshape.cli.terminal import answer, say
+    from wildshape.inference.confidence import reasons_sentence
+    from wildshape.inference.predictor import load
 
     if is_pipe(settings.source) and is_pipe(target):
         raise BadInputError("register - -: stdin holds one scan; name a file for the other.")
     source, target_track = (_scan(path, settings) for path in (settings.source, target))
-    predictor = load_model(settings.model, settings.device)
+    predictor = load(settings.network.model, settings.network.device)
     found = predictor.register(source.scans[0], target_track.scans[0], source.sensor)
     matrix = found.T_target_source.matrix.tolist()
     lines = [" ".join(f"{value:12.6f}" for value in row) for row in matrix]
@@ -128,17 +125,17 @@ def _pair(settings: Settings, target: Path) -> None:
         "reasons": found.reasons,
     }
     if found.reasons:
-        say(doubt(found))
+        say(reasons_sentence(found))
     answer("\n".join(("T_target_source", *lines, shares)), data, as_json=settings.json)
 
 
 def _scan(path: Path, settings: Settings) -> "Track":
-    from wildshape.cli.input.tracks import Reading
-    from wildshape.io.scans.points import Coordinates
+    from wildshape.cli.pipe import as_file
+    from wildshape.io.inputs import open_tracks
 
     kind = settings.format if is_pipe(path) else "auto"
     with as_file(path, kind) as file:
-        track = Reading(file, Coordinates(settings.unit, settings.origin)).single("a pair")
+        track = open_tracks(file, settings.files.coordinates).single("a pair")
     if len(track.scans) != 1:
         raise BadInputError(
             f"{path}: holds {len(track.scans)} scans, but a pair takes two files of one scan each;"

@@ -43,8 +43,8 @@ def run(settings: Settings) -> None:
     Raises:
         BadInputError: nothing there to report, or the page exists.
     """
-    from wildshape.cli.output import refuse_file
     from wildshape.cli.terminal import answer
+    from wildshape.io.output import refuse_file
     from wildshape.report.page.folder import report_from_folder
     from wildshape.report.page.html import write_report
 

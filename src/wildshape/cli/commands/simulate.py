@@ -101,8 +101,9 @@ def _refuse(settings: Settings, foreign: tuple[str, ...]) -> None:
 
 
 def _drive(settings: Settings) -> None:
-    from wildshape.cli.output import begin
-    from wildshape.cli.terminal import answer, counted, duration, progress
+    from wildshape.cli.terminal import TERMINAL, answer
+    from wildshape.io.output import begin
+    from wildshape.io.progress import counted, duration
     from wildshape.simulate.street.drive_folder import FILES, write_drive
     from wildshape.simulate.street.whole_drive import DriveConfig, WholeDrive
 
@@ -116,8 +117,15 @@ def _drive(settings: Settings) -> None:
     )
     drive = WholeDrive(config, settings.seed)
     identity = {**asdict(config), "seed": settings.seed}
-    output = begin(settings.out, "simulate", identity, FILES, overwrite=settings.overwrite)
-    with progress("simulating", config.scans) as bar:
+    output = begin(
+        settings.out,
+        "simulate",
+        identity,
+        FILES,
+        overwrite=settings.overwrite,
+        progress=TERMINAL,
+    )
+    with TERMINAL.bar("simulating", config.scans) as bar:
         written = write_drive(drive, settings.out, bar.at)
     output.finish()
     seconds = time.monotonic() - began
@@ -130,9 +138,10 @@ def _drive(settings: Settings) -> None:
 
 
 def _tracks(settings: Settings) -> None:
-    from wildshape.cli.packing import write_tracks
-    from wildshape.cli.terminal import answer, counted, duration, progress
+    from wildshape.cli.terminal import TERMINAL, answer
     from wildshape.errors import BadInputError
+    from wildshape.io.progress import counted, duration
+    from wildshape.io.write_tracks import write_tracks
     from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
     began = time.monotonic()
@@ -148,16 +157,16 @@ def _tracks(settings: Settings) -> None:
         ground=settings.ground,
     )
     identity = {**asdict(config), "seed": settings.seed}
-    with progress("simulating", settings.tracks) as bar:
-        written = write_tracks(
-            simulate_tracks(config, settings.seed, settings.workers),
-            settings.out,
-            settings.layout,
-            command="simulate",
-            settings=identity,
-            overwrite=settings.overwrite,
-            at=bar.at,
-        )
+    written = write_tracks(
+        simulate_tracks(config, settings.seed, settings.workers),
+        settings.out,
+        settings.layout,
+        command="simulate",
+        settings=identity,
+        overwrite=settings.overwrite,
+        progress=TERMINAL,
+        bar=("simulating", settings.tracks),
+    )
     seconds = time.monotonic() - began
     text = (
         f"simulated {counted(written.tracks, 'track')}, {counted(written.scans, 'scan')},"

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import FlagCreatePairsOff, Positional, arg
 
-from wildshape.cli.options import AT_ORIGIN, AsJson, Device, Model, Origin, Unit, listed, option
+from wildshape.cli.options import (
+    DEFAULT_FILES,
+    DEFAULT_NETWORK,
+    AsJson,
+    Files,
+    Network,
+    listed,
+    option,
+)
 
 if TYPE_CHECKING:
     from wildshape.inference.predictor import Predictor
@@ -51,15 +59,13 @@ class Settings:
     """
 
     input: Shown
-    model: Model = None
+    network: Network = DEFAULT_NETWORK
     inputs: Inputs = None
     port: Port = 8080
     allow_host: AllowHost = ()
     open: FlagCreatePairsOff[bool] = False
     no_open: FlagCreatePairsOff[bool] = False
-    unit: Unit = "m"
-    origin: Origin = AT_ORIGIN
-    device: Device = "auto"
+    files: Files = DEFAULT_FILES
     json: AsJson = False
 
 
@@ -104,36 +110,35 @@ def source_of(settings: Settings) -> "Source":
 
 
 def _scans(settings: Settings, path: Path) -> "Source":
-    from wildshape.cli.input.tracks import Reading
-    from wildshape.io.scans.points import Coordinates
+    from wildshape.io.inputs import open_tracks
     from wildshape.records import as_text
     from wildshape.report.viewer.sources import from_model
 
-    reading = Reading(path, Coordinates(settings.unit, settings.origin))
-    names = reading.source.names
-    return from_model(as_text(path.resolve().name), names, reading.track, lambda: _model(settings))
+    source = open_tracks(path, settings.files.coordinates)
+    title = as_text(path.resolve().name)
+    return from_model(title, source.names, source.__getitem__, lambda: _model(settings))
 
 
 def _evaluated(settings: Settings) -> "Source":
     """The data of an evaluation, the worst object first, completed once more."""
-    from wildshape.cli.input.tracks import Reading
-    from wildshape.cli.models import OURS
+    from wildshape.baselines.compare import OURS
     from wildshape.errors import BadInputError
-    from wildshape.io.scans.points import SENSOR_METRES, Coordinates
+    from wildshape.io.inputs import open_tracks
+    from wildshape.io.scans.points import SENSOR_METRES
     from wildshape.records import as_text
     from wildshape.report.results import METRICS, SCORES, coordinates_of, read_object
     from wildshape.report.viewer.sources import from_model, worst_first
 
     said = read_object(settings.input / METRICS)
-    made = (said.get("provenance") or {}).get("settings") or {}
-    data = settings.inputs or (Path(made["data"]) if made.get("data") else None)
+    asked = (said.get("provenance") or {}).get("settings") or {}
+    data = settings.inputs or (Path(asked["data"]) if asked.get("data") else None)
     if data is None:
         raise BadInputError(f"{settings.input}: does not say which data it is of; add --inputs.")
-    here = Coordinates(settings.unit, settings.origin)
-    reading = Reading(data, coordinates_of(made) if here == SENSOR_METRES else here)
+    here = settings.files.coordinates
+    source = open_tracks(data, coordinates_of(asked) if here == SENSOR_METRES else here)
     methods = list(said.get("methods") or ())
     ours = OURS if OURS in methods else methods[-1]
-    numbers = {name: i for i, name in enumerate(reading.source.names)}
+    numbers = source.numbers
     ranked = [
         (numbers[name], f"{name}  (CD {cd:.3f} m)")
         for name, cd in worst_first(settings.input / SCORES, ours)
@@ -144,17 +149,17 @@ def _evaluated(settings: Settings) -> "Source":
     return from_model(
         as_text(settings.input.resolve().name),
         [label for _, label in ranked],
-        lambda i: reading.track(ranked[i][0]),
+        lambda i: source[ranked[i][0]],
         lambda: _model(settings),
         f"Worst object first, by {ours} in this evaluation; scans are shown as recorded, completed"
-        f" by {'--model' if settings.model else 'the shipped weights'}.",
+        f" by {'--model' if settings.network.model else 'the shipped weights'}.",
     )
 
 
 def _model(settings: Settings) -> "Predictor":
-    from wildshape.cli.models import load_model
+    from wildshape.inference.predictor import load
 
-    return load_model(settings.model, settings.device)
+    return load(settings.network.model, settings.network.device)
 
 
 def _display() -> bool:

@@ -10,9 +10,11 @@ from torch import Tensor, nn
 
 from wildshape.geometry.centring import scan_centre
 from wildshape.geometry.projection.line_of_sight import face, roll, roll_angle
+from wildshape.inference.choose_hypothesis import choose_hypothesis, in_sensor_frame
 from wildshape.inference.config import HypothesisRule
-from wildshape.inference.export.plain_confidence import confidence_plain, seen_plain
+from wildshape.inference.export.plain_confidence import confidence_plain, look_plain
 from wildshape.inference.export.plain_scores import score_plain
+from wildshape.inference.prepare import NetworkInput
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.network import ShapePoseNet
 
@@ -38,7 +40,7 @@ class Completed(NamedTuple):
 
 
 OUTPUTS = Completed._fields
-# Canonical shape, rotation and translation in the sensor frame, cost, branch, facts.
+# Canonical shape, rotation and translation in the sensor frame, cost, branch, features.
 _Look = tuple[Tensor, ...]
 _PARTS = 6
 _DEFAULT = HypothesisRule()
@@ -64,9 +66,9 @@ class CompletionGraph(nn.Module):
             scans: sensor frame, metres.
             drawn: which of its points the network sees; all count where a scan is centred.
         """
-        shape, rotation, translation, cost, branch, facts = self._complete(scans, drawn)
+        shape, rotation, translation, cost, branch, features = self._complete(scans, drawn)
         points = shape @ rotation.mT + translation[:, None]
-        confidence = confidence_plain(scans, cost, facts, self.settings)
+        confidence = confidence_plain(scans, cost, features, self.settings)
         found = (points, rotation, translation, confidence, cost, branch)
         return found if torch.compiler.is_exporting() else Completed(*found)
 
@@ -79,14 +81,14 @@ class CompletionGraph(nn.Module):
         first = self._look(sampled @ turn.mT, centre, turn)
         angle = roll_angle(turn @ first[1])
         tilted = angle.abs() > self.rule.upright_rad
-        given = (*first, sampled, turn, centre, angle, tilted)
+        state = (*first, sampled, turn, centre, angle, tilted)
         if torch.compiler.is_exporting():
-            return torch.cond(tilted.any(), self._look_again, _keep, given)
-        return self._look_again(*given) if bool(tilted.any()) else first
+            return torch.cond(tilted.any(), self._look_again, _keep, state)
+        return self._look_again(*state) if bool(tilted.any()) else first
 
-    def _look_again(self, *given: Tensor) -> _Look:
+    def _look_again(self, *state: Tensor) -> _Look:
         """Tilted scans rolled upright and seen again (`choose_hypothesis.py`)."""
-        first, (sampled, turn, centre, angle, tilted) = given[:_PARTS], given[_PARTS:]
+        first, (sampled, turn, centre, angle, tilted) = state[:_PARTS], state[_PARTS:]
         upright = roll(angle) @ turn
         second = self._look(sampled @ upright.mT, centre, upright)
         cheaper = tilted & (second[3] < first[3])
@@ -96,22 +98,13 @@ class CompletionGraph(nn.Module):
         )
 
     def _look(self, turned: Tensor, centre: Tensor, turn: Tensor) -> _Look:
-        """Shapes, and the poses of the branches that speak (`inference/choose_hypothesis.py`)."""
-        settings, centred = self.settings, turned - centre[:, None]
-        shape, rotation, translation, belief = self.network(centred)
-        posed = shape[:, None] @ rotation.mT + translation[:, :, None]
-        scores = score_plain(centred, centre, posed, settings.projection)
-        costs = scores.observation + settings.beta * scores.projection
-        back = turn.mT
-        believed = costs - settings.belief * belief
-        branch = believed.argmin(-1, keepdim=True)
-        chosen_rotation = rotation.gather(1, branch[..., None, None].expand(-1, 1, 3, 3))[:, 0]
-        chosen = translation.gather(1, branch[..., None].expand(-1, 1, 3))[:, 0] + centre
-        moved, cost = (back @ chosen[..., None])[..., 0], costs.gather(1, branch)[:, 0]
-        facts = seen_plain(posed, scores, belief, believed)
-        return shape, back @ chosen_rotation, moved, cost, branch[:, 0], facts
+        """Shapes, and the poses of the hypotheses that speak."""
+        inputs = NetworkInput(turned - centre[:, None], centre, turn)
+        found = choose_hypothesis(self.network, inputs.scans, centre, self.settings, score_plain)
+        features = look_plain(found.posed, found.scores, found.poses.log_belief, found.believed)
+        return tuple(in_sensor_frame(found, inputs, self.settings, features))
 
 
-def _keep(*given: Tensor) -> _Look:
+def _keep(*state: Tensor) -> _Look:
     """Nothing is tilted: the first look stands."""
-    return tuple(part.clone() for part in given[:_PARTS])
+    return tuple(part.clone() for part in state[:_PARTS])

@@ -54,7 +54,7 @@ def write_onnx(path: Path, program: ExportedProgram, metadata: dict[str, str]) -
     import onnx
 
     with _quiet():
-        made = torch.onnx.export(
+        exported = torch.onnx.export(
             program,
             input_names=list(INPUTS),
             output_names=list(OUTPUTS),
@@ -63,8 +63,8 @@ def write_onnx(path: Path, program: ExportedProgram, metadata: dict[str, str]) -
             external_data=False,
             verbose=False,
         )
-    assert made is not None
-    model = made.model_proto
+    assert exported is not None
+    model = exported.model_proto
     onnx.helper.set_model_props(model, metadata)
     with atomic_write(path) as file:
         file.write(model.SerializeToString())
@@ -81,11 +81,11 @@ def write_torch(path: Path, program: ExportedProgram, metadata: dict[str, str]) 
 def describe(predictor: Predictor) -> dict[str, str]:
     """What a user of the file must know: settings, origin, and the points a scan may have."""
     settings = _settings(predictor)
-    made = {**asdict(settings), "provenance": settings.provenance}
-    made["projection"]["kind"] = type(settings.projection).__name__
+    described = {**asdict(settings), "provenance": settings.provenance}
+    described["projection"]["kind"] = type(settings.projection).__name__
     return {
         "wildshape": json.dumps(provenance("wildshape export")),
-        "settings": json.dumps(made),
+        "settings": json.dumps(described),
         "sensor": settings.sensor,
         "input_points": str(settings.input_points),
         "refined": "no: the network's own answer, as wildshape.load(raw=True) gives it",

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Facts and confidence of completions in operations that every runtime has.
+"""Features and confidence of completions in operations that every runtime has.
 
-Same definitions as `inference/evidence.py` and `method/confidence.py`, which the tests hold against
-these.
+The same definitions as in `inference/confidence.py` and `method/confidence.py`; the tests hold them
+against these.
 """
 
 import math
@@ -12,25 +12,27 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from wildshape.inference.config import ReasonRule
 from wildshape.inference.export.plain_scores import PlainScores
 from wildshape.method.checkpoint import ModelSettings
+from wildshape.method.confidence import COVERED_M, SMALLEST_M
 
-_COVERED_M, _SMALLEST_M = 0.2, 1e-4
+_RULE = ReasonRule()
 
 
-def seen_plain(
+def look_plain(
     posed: Float[Tensor, "B H P 3"],
     scores: PlainScores,
     belief: Float[Tensor, "B H"],
     believed: Float[Tensor, "B H"],
 ) -> Float[Tensor, "B 6"]:
-    """What a look at scans tells, in the order of `seen_facts`."""
+    """What a look at scans tells, in the order of `look_features`."""
     two = min(2, believed.shape[1])
     least, order = believed.topk(two, dim=-1, largest=False, sorted=True)
     first, second = order[:, :1], order[:, two - 1 :]
     entropy = -(belief.exp() * belief).sum(-1)
     spread = (_of(posed, first) - _of(posed, second)).norm(dim=-1).mean(-1)
-    covered = (_of(scores.to_scan, first) < _COVERED_M).float().mean(-1)
+    covered = (_of(scores.to_scan, first) < COVERED_M).float().mean(-1)
     terms = [_log(part.gather(1, first)[:, 0]) for part in (scores.observation, scores.projection)]
     return torch.stack((*terms, entropy, least[:, -1] - least[:, 0], spread, covered), dim=-1)
 
@@ -44,7 +46,7 @@ def confidence_plain(
     """0 to 1, of scans in their sensor frames; 0 where `Completion.warning` would name the size."""
     low, high = settings.extent_m
     size = (scans.amax(1) - scans.amin(1)).norm(dim=-1)
-    usual = (size >= low / 2) & (size <= 1.5 * high)
+    usual = (size >= _RULE.smallest * low) & (size <= _RULE.largest * high)
     return torch.where(usual, _foretold(scans, size, cost, seen, settings), 0.0)
 
 
@@ -58,8 +60,8 @@ def _foretold(
     number = torch.ones_like(scans[..., 0]).sum(-1)
     distance = scans.mean(1).norm(dim=-1)
     own = torch.stack((number.log(), _log(distance), _log(size)), dim=-1)
-    facts = torch.cat((_log(cost)[:, None], seen[:, :5], own, seen[:, 5:]), dim=-1)
-    foretold = calibration.bias + facts @ facts.new_tensor(calibration.weights)
+    features = torch.cat((_log(cost)[:, None], seen[:, :5], own, seen[:, 5:]), dim=-1)
+    foretold = calibration.bias + features @ features.new_tensor(calibration.weights)
     beyond = (foretold - math.log(calibration.within_m)) / calibration.sigma
     return 0.5 * (1.0 - torch.erf(beyond / math.sqrt(2)))
 
@@ -71,4 +73,4 @@ def _of(values: Float[Tensor, "B H *rest"], chosen: Tensor) -> Tensor:
 
 
 def _log(values: Float[Tensor, "B"]) -> Float[Tensor, "B"]:
-    return values.clamp_min(_SMALLEST_M).log()
+    return values.clamp_min(SMALLEST_M).log()

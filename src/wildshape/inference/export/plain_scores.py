@@ -65,6 +65,10 @@ class PlainScores(NamedTuple):
     projection: Float[Tensor, "B H"]
     to_scan: Float[Tensor, "B H P"]
 
+    def cost(self, beta: float) -> Float[Tensor, "B H"]:
+        """The label-free cost of each hypothesis, metres (METHOD 6)."""
+        return self.observation + beta * self.projection
+
 
 def score_plain(
     scans: Float[Tensor, "B N 3"],

@@ -36,14 +36,14 @@ def open_exported(path: Path, threads: int = 0) -> Runner:
     """What runs a file: onnxruntime for `.onnx`, torch for `.pt2`; `threads` 0 takes all cores."""
     if path.suffix == ".pt2":
         module = torch.export.load(path).module()
-        return lambda *given: [part.numpy() for part in module(*map(torch.from_numpy, given))]
+        return lambda *inputs: [part.numpy() for part in module(*map(torch.from_numpy, inputs))]
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
-    return lambda *given: [
-        np.asarray(part) for part in session.run(None, dict(zip(INPUTS, given, strict=True)))
+    return lambda *inputs: [
+        np.asarray(part) for part in session.run(None, dict(zip(INPUTS, inputs, strict=True)))
     ]
 
 

@@ -18,9 +18,9 @@ from wildshape.geometry.box import FittedBox
 from wildshape.geometry.outliers import voxel_thin
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
+from wildshape.inference.confidence import judged_again
 from wildshape.inference.config import BoxConfig, InferenceConfig, TrackConfig
 from wildshape.inference.prepare import network_input, unit_of
-from wildshape.inference.reasons import judged_again
 from wildshape.inference.refine import denser
 from wildshape.inference.tracks.heading_vote import (
     half_turn,
@@ -74,10 +74,10 @@ def complete_together(
     poses = stack([item.pose for item in done])
     voted = _voted(poses, shape, weights, scans, settings, config.track)
     mirror, unit = settings.network.mirror, unit_of(settings.extent_m[1])
-    given, start = _in_units(scans, voted, unit)
-    fit = refine_checked(given, start, mirror=mirror, config=config.track)
+    clouds, start = _in_units(scans, voted, unit)
+    fit = refine_checked(clouds, start, mirror=mirror, config=config.track)
     shape = unit * drawn_to(
-        shape / unit, _seen(given, fit.T_sensor_object, mirror, config.track), config.track
+        shape / unit, _seen(clouds, fit.T_sensor_object, mirror, config.track), config.track
     )
     fit = fit._replace(T_sensor_object=_scaled(fit.T_sensor_object, unit))
     fitted = _box(shape, scans, fit.T_sensor_object, config.box, mirror=mirror)
@@ -92,7 +92,7 @@ def complete_together(
             pose=fit.T_sensor_object[i],
             box=carried(fitted, fit.T_sensor_object[i]),
             confidence=trust[i],
-            reasons=judged_again(item, float(cost[i]), trust[i], settings),
+            reasons=judged_again(item, float(cost[i]), trust[i], settings, config.reasons),
             cost=float(cost[i]),
             refined=fit.refined,
         )
@@ -176,10 +176,10 @@ def track_cost(
     found = []
     for start in range(0, len(scans), _BATCH):
         part = slice(start, start + _BATCH)
-        given = network_input(scans[part], settings.input_points, settings.sensor, settings.facing)
-        posed = T_sensor_object[part].apply(shape.expand(len(given.scans), -1, -1)).float()
-        posed = posed @ given.turn.mT - given.centres[:, None]
-        scores = score_hypotheses(given.scans, given.centres, posed[:, None], settings.projection)
+        inputs = network_input(scans[part], settings.input_points, settings.sensor, settings.facing)
+        posed = T_sensor_object[part].apply(shape.expand(len(inputs.scans), -1, -1)).float()
+        posed = posed @ inputs.turn.mT - inputs.centres[:, None]
+        scores = score_hypotheses(inputs.scans, inputs.centres, posed[:, None], settings.projection)
         found.append(scores.cost(settings.beta)[:, 0])
     return torch.cat(found).double()
 

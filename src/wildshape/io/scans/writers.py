@@ -136,7 +136,7 @@ def save(shape: object, path: str | Path) -> None:
 
 
 @dataclass(frozen=True)
-class MeshOrder:
+class MeshFiles:
     """How meshes are wanted.
 
     Attributes:

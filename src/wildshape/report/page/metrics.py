@@ -10,8 +10,8 @@ import numpy as np
 from wildshape.baselines.named import NAMES
 from wildshape.evaluation.summary import FIGURES
 from wildshape.evaluation.tables import ROTATE, cell
+from wildshape.io.progress import counted
 from wildshape.report.content import Table
-from wildshape.report.words import counted
 
 _TRAINED_RIVALS = ("dpc", "oracle")  # and what their names begin, such as dpc-lidar
 _SURE = 0.5

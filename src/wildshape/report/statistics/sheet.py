@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from wildshape.inference.registration import to_middle
 from wildshape.io.atomic import atomic_write
+from wildshape.io.progress import counted
 from wildshape.records import Track
 from wildshape.report.content import Cell, Figure, Report, ReportObject, Table, track_object
 from wildshape.report.page.html import write_report
@@ -25,7 +26,6 @@ from wildshape.report.statistics.drawing import (
 )
 from wildshape.report.statistics.statistics import Quantity, Statistics
 from wildshape.report.statistics.thumbnails import PANELS, draw_track
-from wildshape.report.words import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing

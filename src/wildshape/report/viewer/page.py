@@ -13,12 +13,12 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.io.progress import counted
 from wildshape.report.viewer.details import details
 from wildshape.report.viewer.panel import Panel
 from wildshape.report.viewer.sources import Source
 from wildshape.report.viewer.stage import Stage
 from wildshape.report.viewer.visitors import answering_only, checked_hosts, prove
-from wildshape.report.words import counted
 
 if TYPE_CHECKING:
     from viser import ViserServer

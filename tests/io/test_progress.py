@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """One scan is never `1 scans`."""
 
+from wildshape.io.progress import counted
 from wildshape.report.page.metrics import of_confidences, of_errors
-from wildshape.report.words import counted
 
 
 def test_one_and_many() -> None:

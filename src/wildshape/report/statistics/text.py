@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The numbers of `wildshape info` as tables for a terminal, each with a small histogram."""
+"""Statistics as tables for a terminal, each with a small histogram, and as JSON values."""
 
 import io
 import sys
 from typing import TYPE_CHECKING
 
-from wildshape.cli.terminal import printable
+from wildshape.io.progress import printable
 from wildshape.report.statistics.drawing import number
 from wildshape.report.statistics.sheet import read_line, summary_line
 from wildshape.report.statistics.statistics import Statistics
@@ -74,8 +74,8 @@ def _bases(found: Statistics) -> list[str]:
 
 
 def _counted(found: Statistics) -> list[tuple[str, dict[str, int]]]:
-    made = found.provenance
-    words = {str(made[k]): 0 for k in ("command", "time_utc") if made.get(k)}
+    origin = found.provenance
+    words = {str(origin[k]): 0 for k in ("command", "time_utc") if origin.get(k)}
     tables = [
         ("categories", found.categories),
         ("sensors", found.sensors),

@@ -7,21 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Literal
 
-from tyro.conf import arg
-
+from wildshape.cli.options import is_pipe
 from wildshape.errors import BadInputError
-
-Format = Annotated[
-    Literal["auto", "ply", "pcd", "bin", "npy", "npz", "xyz", "csv", "las", "laz"],
-    arg(help="of a scan on stdin (`-`); auto tells all but bin, KITTI's bare numbers"),
-]
-
-
-def is_pipe(path: Path | None) -> bool:
-    """Whether `-` was written."""
-    return str(path) == "-"
 
 
 @contextmanager

@@ -8,22 +8,23 @@ from pathlib import Path
 from typing import Any, Literal
 
 from wildshape.baselines.icp import LocalIcp
+from wildshape.baselines.named import baseline
 from wildshape.baselines.pairs import Chained
-from wildshape.cli.demo.tracks import TEST, DemoData
-from wildshape.cli.evaluation import choose_baselines, evaluate_once, write
-from wildshape.cli.input.tracks import Reading
-from wildshape.cli.output import Output, begin
-from wildshape.cli.results.write import FILES, write_results
-from wildshape.cli.terminal import duration
+from wildshape.evaluation.evaluate import evaluate_once, write_evaluation
 from wildshape.evaluation.examples import pick
 from wildshape.evaluation.results import Results
 from wildshape.evaluation.summary import as_json, figures_of
 from wildshape.inference.evaluated import Learned
+from wildshape.inference.folders import FILES, write_results
 from wildshape.inference.predictor import Predictor
 from wildshape.inference.registration import fuse_scans
+from wildshape.io.inputs import TrackSource, open_tracks
+from wildshape.io.output import Output, begin
+from wildshape.io.progress import Progress, duration
 from wildshape.io.scans.writers import write_cloud
 from wildshape.records import Completion, Track
 from wildshape.report.content import Cloud, Report, ReportObject, track_object
+from wildshape.report.demo.tracks import TEST, DemoData
 from wildshape.report.page.curves import training_curves
 from wildshape.report.page.html import write_report
 from wildshape.report.page.metrics import metrics_table
@@ -32,40 +33,43 @@ _PROTOCOLS: tuple[Literal["yaw", "none"], ...] = ("yaw", "none")
 _BASELINES, _MAX_SCANS, _SHOWN = ("identity", "local-icp", "one-scan"), 6, 3
 
 
-def evaluate(out: Path, models: Mapping[str, Predictor]) -> dict[str, Results]:
+def evaluate(out: Path, models: Mapping[str, Predictor], progress: Progress) -> dict[str, Results]:
     """Baselines and models on the test tracks, turned in yaw and as recorded; by protocol."""
-    reading = Reading(out / TEST)
+    source = open_tracks(out / TEST)
     ours = {name: Learned(predictor) for name, predictor in models.items()}
-    methods = {**choose_baselines(_BASELINES), **ours}
+    methods = {**{name: baseline(name) for name in _BASELINES}, **ours}
     drawn = next(iter(ours.items()))
     found = {}
     for rotate in _PROTOCOLS:
-        found[rotate] = evaluate_once(reading, methods, rotate, 0, _MAX_SCANS)
+        found[rotate] = evaluate_once(source, methods, rotate, 0, _MAX_SCANS, progress)
         folder = out / "evaluation" / rotate
-        write(folder, reading, [found[rotate]], drawn, {})
+        write_evaluation(folder, source, [found[rotate]], drawn, {})
     return found
 
 
 def process(
-    out: Path, models: Mapping[str, Predictor], results: Mapping[str, Results]
+    out: Path,
+    models: Mapping[str, Predictor],
+    results: Mapping[str, Results],
+    progress: Progress,
 ) -> list[ReportObject]:
     """Complete and register every test track with each model; fuse and draw some."""
-    reading = Reading(out / TEST)
+    source = open_tracks(out / TEST)
     for name, predictor in models.items():
         folder = out / "completed" / _slug(name)
         output = begin(folder, "complete", {}, FILES, overwrite=True)
-        write_results(reading, predictor, output)
+        write_results(source, predictor, output, progress=progress)
         output.finish()
-    chosen = _chosen(reading, results["yaw"], next(iter(models)))
-    tracks = {track.name: track for _, track in reading.tracks(lambda name: name not in chosen)}
+    chosen = _chosen(source, results["yaw"], next(iter(models)))
+    tracks = {track.name: track for _, track in source.tracks(lambda name: name not in chosen)}
     return [_object(out, tracks[name], label, models) for name, label in chosen.items()]
 
 
-def _chosen(reading: Reading, results: Results, ours: str) -> dict[str, str]:
+def _chosen(source: TrackSource, results: Results, ours: str) -> dict[str, str]:
     """Best, median and worst track by their error; the first ones where there is no truth."""
     picked = pick(results[ours])
     if not picked:
-        return dict.fromkeys(reading.source.names[:_SHOWN], "not chosen by any error")
+        return dict.fromkeys(source.names[:_SHOWN], "not chosen by any error")
     labels: dict[str, str] = {}
     for label, (name, cd) in picked.items():
         labels.setdefault(name, f"{label} of the test tracks, CD {cd:.3f} m")

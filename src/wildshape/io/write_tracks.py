@@ -1,26 +1,27 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Tracks written as a packed store or as track folders, by `simulate`, `convert` and `train`."""
+"""Tracks written as they come, as a packed store or as track folders."""
 
 import json
 import shutil
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
-from wildshape.cli.options import Layout
-from wildshape.cli.output import begin, command_line
-from wildshape.cli.terminal import say
 from wildshape.errors import BadInputError
-from wildshape.inference.completed_files import file_name
 from wildshape.io.atomic import lock_folder
+from wildshape.io.output import begin, command_line, file_name
+from wildshape.io.progress import SILENT, Progress
 from wildshape.io.provenance import provenance
 from wildshape.io.store.layout import INDEX_JSON, WRITING_JSON
 from wildshape.io.store.store import StoreWriter
 from wildshape.io.tracks import write_track
 from wildshape.records import Track
+
+Layout = Literal["packed", "folders"]
+"""One packed store, or track folders with a file a scan."""
 
 FILES = ("*/scans/*.ply", "*/poses.txt", "*/shape.ply", "*/track.json")
 _UNFINISHED = ".unfinished"
@@ -49,7 +50,8 @@ def write_tracks(
     command: str,
     settings: dict[str, Any],
     overwrite: bool = False,
-    at: Callable[[int], None] = lambda _: None,
+    progress: Progress = SILENT,
+    bar: tuple[str, int] = ("writing tracks", 0),
 ) -> Written:
     """Write tracks as they come.
 
@@ -60,7 +62,8 @@ def write_tracks(
         command: that writes.
         settings: JSON values; all that decides the tracks.
         overwrite: replace an earlier output.
-        at: called with the number of tracks written.
+        progress: is told what goes on.
+        bar: what is done, and how many tracks there are to come, 0 if nobody knows.
 
     Raises:
         BadInputError: something is at `out` already, or no track came.
@@ -68,28 +71,43 @@ def write_tracks(
     write = _packed if layout == "packed" else _folders
     settings = json.loads(json.dumps(settings, default=str))
     written = Written()
-    for track in write(tracks, out, command, settings, overwrite):
-        written.count(track)
-        at(written.tracks)
+    output = _Output(out, command, settings, overwrite, progress)
+    with progress.bar(*bar) as shown:
+        for track in write(tracks, output):
+            written.count(track)
+            shown.at(written.tracks)
     if not written.tracks:
         raise BadInputError(f"{out}: no track came out of the source; check it and its options.")
     return written
 
 
-def _packed(
-    tracks: Iterable[Track], out: Path, command: str, settings: dict[str, Any], overwrite: bool
-) -> Iterator[Track]:
+class _Output(NamedTuple):
+    """Where tracks go; the fields are those of `write_tracks`."""
+
+    out: Path
+    command: str
+    settings: dict[str, Any]
+    overwrite: bool
+    progress: Progress
+
+
+def _packed(tracks: Iterable[Track], wanted: _Output) -> Iterator[Track]:
     """Into a packed store, which cannot be gone on with: a half-written one is begun again."""
-    made = {**provenance(command_line()), "made_by": command, "settings": settings}
+    out = wanted.out
+    origin = {
+        **provenance(command_line()),
+        "made_by": wanted.command,
+        "settings": wanted.settings,
+    }
     first, tracks = _first(tracks)
     if not first:
         return  # nothing half-written stays behind
     if not out.is_file():
         lock_folder(out)
-    again = _half_written(out, made)
+    again = _half_written(out, origin)
     if again:
-        say(f"beginning the half-written store {out} again")
-    with StoreWriter(out, made, overwrite=overwrite or again) as writer:
+        wanted.progress.say(f"beginning the half-written store {out} again")
+    with StoreWriter(out, origin, overwrite=wanted.overwrite or again) as writer:
         for track in chain(first, tracks):
             writer.add(track)
             yield track
@@ -101,7 +119,7 @@ def _first(tracks: Iterable[Track]) -> tuple[list[Track], Iterator[Track]]:
     return list(islice(rest, 1)), rest
 
 
-def _half_written(out: Path, made: dict[str, Any]) -> bool:
+def _half_written(out: Path, origin: dict[str, Any]) -> bool:
     """Whether an interrupted run of the same command and settings left a store."""
     path = out / WRITING_JSON
     if not path.is_file() or (out / INDEX_JSON).exists():
@@ -110,14 +128,13 @@ def _half_written(out: Path, made: dict[str, Any]) -> bool:
         found = json.loads(path.read_text("utf-8")).get("provenance", {})
     except ValueError:
         return False
-    return all(found.get(key) == made[key] for key in ("made_by", "settings"))
+    return all(found.get(key) == origin[key] for key in ("made_by", "settings"))
 
 
-def _folders(
-    tracks: Iterable[Track], out: Path, command: str, settings: dict[str, Any], overwrite: bool
-) -> Iterator[Track]:
+def _folders(tracks: Iterable[Track], wanted: _Output) -> Iterator[Track]:
     """Into track folders; each appears under its name only when it is whole."""
-    output = begin(out, command, settings, FILES, overwrite=overwrite)
+    out, command, settings, overwrite, progress = wanted
+    output = begin(out, command, settings, FILES, overwrite=overwrite, progress=progress)
     unfinished = out / _UNFINISHED
     shutil.rmtree(unfinished, ignore_errors=True)
     try:

@@ -9,17 +9,23 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from wildshape.cli.output import MARKER, Output, begin, command_line, unfinished
-from wildshape.cli.packing import FILES
-from wildshape.cli.terminal import say
 from wildshape.datasets.tracks.conversion import STORE, TRACKS, PartResult
 from wildshape.errors import BadInputError
-from wildshape.inference.completed_files import file_name
 from wildshape.io.atomic import lock_folder, write_json
+from wildshape.io.output import (
+    MARKER,
+    Output,
+    begin,
+    command_line,
+    file_name,
+    unfinished,
+)
+from wildshape.io.progress import SILENT, Progress
 from wildshape.io.provenance import provenance
 from wildshape.io.store.join import finish_join, is_joining, join_stores
 from wildshape.io.store.layout import FORMAT, JOINING_JSON, PARTS, VERSION, WRITING_JSON
 from wildshape.io.store.writer import check_room
+from wildshape.io.write_tracks import FILES
 
 _COMMAND = "convert"
 Done = list[tuple[Path, PartResult]]
@@ -72,11 +78,13 @@ class PackedStore:
         path: its folder.
         settings: JSON values; all that decides the content.
         overwrite: replace what is there.
+        progress: is told that an earlier run is gone on with.
     """
 
     path: Path
     settings: dict[str, Any]
     overwrite: bool
+    progress: Progress = SILENT
 
     def begin(self) -> list[PartResult] | None:
         """See `Destination`."""
@@ -85,7 +93,7 @@ class PackedStore:
             raise BadInputError(f"{self.path}: is a file; OUT names a folder to write.")
         lock_folder(self.path)
         if self._is_ours():
-            say(f"going on with the unfinished store in {self.path}")
+            self.progress.say(f"going on with the unfinished store in {self.path}")
         else:
             self._make_room()
         if is_joining(self.path):
@@ -139,18 +147,25 @@ class TrackFolders:
         path: the folder.
         settings: JSON values; all that decides the content.
         overwrite: replace what is there.
+        progress: is told that an earlier run is gone on with.
     """
 
     path: Path
     settings: dict[str, Any]
     overwrite: bool
+    progress: Progress = SILENT
 
     def begin(self) -> list[PartResult] | None:
         """See `Destination`."""
         if (self.path / MARKER).is_file() and not unfinished(self.path, _COMMAND):
             shutil.rmtree(self.path / PARTS, ignore_errors=True)  # of a run killed at its very end
         self._output: Output = begin(
-            self.path, _COMMAND, self.settings, FILES, overwrite=self.overwrite
+            self.path,
+            _COMMAND,
+            self.settings,
+            FILES,
+            overwrite=self.overwrite,
+            progress=self.progress,
         )
         if not self._output.resumed:
             shutil.rmtree(self.path / PARTS, ignore_errors=True)

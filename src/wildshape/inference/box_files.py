@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wildshape.cli.terminal import say
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -33,21 +32,21 @@ _CALIBRATES = {".txt": "kitti", ".feather": "argoverse2"}
 
 
 @dataclass(frozen=True)
-class BoxOrder:
+class BoxFiles:
     """Which box files to write.
 
     Attributes:
-        formats: none writes nothing.
+        formats: of `BOX_FORMATS`.
         calibration: KITTI's `.txt`, or Argoverse 2's `egovehicle_SE3_sensor.feather`.
     """
 
-    formats: tuple[str, ...] = ()
+    formats: tuple[str, ...]
     calibration: Path | None = None
 
     def identity(self) -> dict[str, Any]:
         """What decides the content of the box files."""
         calibration = self.calibration and str(self.calibration.resolve())
-        return {"boxes": sorted(self.formats), "calibration": calibration} if self.formats else {}
+        return {"boxes": sorted(self.formats), "calibration": calibration}
 
     def check(self) -> None:
         """Refuse before any work is done what could not be written after it.
@@ -74,10 +73,12 @@ class BoxOrder:
             )
         _camera(self.calibration) if wants == "kitti" else _ego(self.calibration)
 
-    def write(self, out: Path) -> None:
-        """Write them from the `objects.json` of every track below `out`, and say what to know."""
-        if not self.formats:
-            return
+    def write(self, out: Path) -> list[str]:
+        """Write them from the `objects.json` of every track below `out`.
+
+        Returns:
+            Sentences on what to know of them.
+        """
         from wildshape.io.boxes.detections import read_detections, write_box_list
         from wildshape.io.boxes.nuscenes import write_nuscenes_boxes
 
@@ -90,9 +91,8 @@ class BoxOrder:
             self._kitti(folder / "kitti", detections)
         if "argoverse2" in self.formats:
             self._argoverse2(folder / _ARGOVERSE2, detections)
-        for kind in self.formats:
-            if kind in _UNCALIBRATED and not self._calibrates(kind):
-                say(_UNCALIBRATED[kind])
+        bare = [kind for kind in self.formats if not self._calibrates(kind)]
+        return [_UNCALIBRATED[kind] for kind in bare if kind in _UNCALIBRATED]
 
     def _calibrates(self, kind: str) -> bool:
         known = self.calibration

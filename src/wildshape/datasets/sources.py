@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Names of the data sets that `convert` reads, and what reads them.
+"""Names of the data sets that can be converted, and what reads them.
 
-To add a reader (see `datasets.source.Source`): one line in `SOURCES`, in the order in
-which the help is to list them. Its own options are fields of `convert.Settings` with the names of
-the reader's fields; whoever passes one to a reader that lacks it is told so.
+To add a reader (see `datasets.tracks.source.Source`): one line in `SOURCES`, in the order in
+which the help is to list them. Its own options are fields of the command's `Settings`, with the
+names of the reader's fields; whoever passes one to a reader that lacks it is told so.
 """
 
 from dataclasses import fields, replace

@@ -1,0 +1,192 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Models and baselines measured beside each other on one data set, and written (METHOD 8)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from wildshape.baselines.dpc import completer as dpc
+from wildshape.baselines.dpc.checkpoint import is_dpc
+from wildshape.baselines.dpc.completer import Dpc
+from wildshape.baselines.named import NAMES, baseline
+from wildshape.errors import BadInputError
+from wildshape.evaluation.evaluate import evaluate_once, write_evaluation
+from wildshape.evaluation.method import Method
+from wildshape.evaluation.results import Results, Rotate
+from wildshape.inference.evaluated import Learned
+from wildshape.inference.models import MODEL, choose_device, fingerprint, weights_file
+from wildshape.inference.predictor import Predictor, load
+from wildshape.io.inputs import TrackSource, open_tracks
+from wildshape.io.output import begin, keep_apart
+from wildshape.io.progress import SILENT, Progress
+from wildshape.io.scans.points import SENSOR_METRES, Coordinates
+
+OURS = "wildshape"
+"""The name of our row, where it has no other."""
+
+FILES = ("metrics.json", "scores.json", "table.md", "errors.png", "confidence.png", "examples.png")
+Model = Predictor | Dpc
+
+
+@dataclass(frozen=True)
+class ComparisonOptions:
+    """What is measured, and how.
+
+    Attributes:
+        models: checkpoints, run folders or names of shipped weights; the shipped ones if none.
+        baselines: of `named.NAMES`; `none` is none.
+        rotate: turn each scan about the sensor: not at all, in yaw, or freely.
+        seeds: how many seeds of these turns.
+        max_scans: take this many scans of a longer track, evenly.
+        as_seeds: the models are training seeds of one method: one row with mean and deviation, and
+            a second for the one whose label-free validation cost is lowest.
+        track: a second row for each model, which uses all scans of a track together.
+        raw: measure the networks' own answers, not refined against the scan.
+        coordinates: of the data's files.
+        device: `auto`, `cpu` or `cuda`.
+        overwrite: replace an earlier output.
+    """
+
+    models: tuple[Path, ...] = ()
+    baselines: tuple[str, ...] = ("identity", "local-icp")
+    rotate: Rotate = "none"
+    seeds: int = 1
+    max_scans: int | None = None
+    as_seeds: bool = False
+    track: bool = False
+    raw: bool = False
+    coordinates: Coordinates = SENSOR_METRES
+    device: str = "auto"
+    overwrite: bool = False
+
+    def __post_init__(self) -> None:
+        if self.seeds < 1:
+            raise BadInputError(f"--seeds {self.seeds}: expected 1 or more.")
+        if self.max_scans is not None and self.max_scans < 1:
+            raise BadInputError(f"--max-scans {self.max_scans}: expected 1 or more.")
+
+    def identity(self, data: Path) -> dict[str, Any]:
+        """What decides the figures, as JSON values."""
+        names = ("rotate", "seeds", "max_scans", "as_seeds", "track", "raw")
+        return {
+            **{name: getattr(self, name) for name in names},
+            **asdict(self.coordinates),
+            "baselines": ",".join(self.baselines),
+            "data": str(data.resolve()),
+            "models": [fingerprint(model) for model in self.models or (None,)],
+        }
+
+
+_DEFAULT = ComparisonOptions()
+
+
+def compare(
+    data: Path, out: Path, options: ComparisonOptions = _DEFAULT, progress: Progress = SILENT
+) -> tuple[str, tuple[tuple[str, str], ...]]:
+    """Measure shapes and registration against truth, and write metrics, scores, table, figures.
+
+    Returns:
+        The table, and what was skipped, each with its reason.
+
+    Raises:
+        BadInputError: data, models or options that cannot be used; nothing with truth.
+        MissingExtraError: a baseline needs a library that is not installed.
+    """
+    baselines = {name: baseline(name) for name in options.baselines if name != "none"}
+    source = open_tracks(data, options.coordinates)
+    _check_truth(source)
+    models = load_models(options.models, options.device, raw=options.raw)
+    keep_apart(data, out)
+    identity = options.identity(data)
+    output = begin(out, "evaluate", identity, FILES, overwrite=options.overwrite, progress=progress)
+    pooled = options.as_seeds and len(models) > 1
+    evaluated = (
+        _pooled(models, track=options.track)
+        if pooled
+        else [_rows(models, track=options.track)] * _useful_seeds(options, progress)
+    )
+    runs = [
+        evaluate_once(
+            source, {**baselines, **rows}, options.rotate, seed, options.max_scans, progress
+        )
+        for seed, rows in enumerate(evaluated)
+    ]
+    if pooled:
+        runs = _with_selected(runs, models)
+    provenance = {**output.record["provenance"], "settings": output.record["settings"]}
+    drawn = next(iter(evaluated[0].items()))
+    table = write_evaluation(out, source, runs, drawn, provenance)
+    output.finish(skipped=source.skipped)
+    return table, source.skipped
+
+
+def load_models(models: Sequence[Path], device: str, *, raw: bool = False) -> dict[str, Model]:
+    """Models by the name of their row, ours or DPC's; the shipped weights if none is named.
+
+    Raises:
+        BadInputError: a checkpoint that cannot be used, two of one name, or a baseline's name.
+    """
+    if not models:
+        return {OURS: load(None, device, raw=raw)}
+    found: dict[str, Model] = {}
+    for model in models:
+        file = weights_file(model)
+        name = file.resolve().parent.name if file.name == MODEL else file.stem
+        if name in found:
+            raise BadInputError(f"{model}: another --model is called {name} too; rename one.")
+        if name in NAMES:
+            raise BadInputError(f"{model}: {name} is the name of a baseline; rename the model.")
+        ours = not is_dpc(file)
+        found[name] = load(file, device, raw=raw) if ours else dpc.load(file, choose_device(device))
+    return found
+
+
+def _useful_seeds(options: ComparisonOptions, progress: Progress) -> int:
+    if options.rotate == "none" and options.seeds > 1:
+        progress.say("--rotate none leaves nothing to chance: one seed is enough")
+        return 1
+    return options.seeds
+
+
+def _rows(models: Mapping[str, Model], *, track: bool) -> dict[str, Method]:
+    """A row a model; where asked, one more for whole tracks used together."""
+    rows: dict[str, Method] = {}
+    for name, model in models.items():
+        rows[name] = model if isinstance(model, Dpc) else Learned(model)
+        if track and not isinstance(model, Dpc):
+            rows[f"{name}, track"] = Learned(model, track=True)
+    return rows
+
+
+def _pooled(models: Mapping[str, Model], *, track: bool) -> list[dict[str, Method]]:
+    """Each model under our one name, in a run of its own.
+
+    Raises:
+        BadInputError: one of them is not ours.
+    """
+    for name, model in models.items():
+        if isinstance(model, Dpc):
+            raise BadInputError(f"--as-seeds: {name} is a trained DPC; leave out --as-seeds.")
+    return [_rows({OURS: model}, track=track) for model in models.values()]
+
+
+def _with_selected(runs: list[Results], models: Mapping[str, Model]) -> list[Results]:
+    """The run of the model with the lowest label-free cost gets a second row for it."""
+    costs = [model.settings.cost_m[0] for model in models.values() if isinstance(model, Predictor)]
+    best = costs.index(min(costs))
+    name = f"{OURS}, seed selected without labels ({list(models)[best]})"
+    chosen = replace(runs[best][OURS], name=name)
+    return [
+        replace(run, methods=(*run.methods, chosen)) if i == best else run
+        for i, run in enumerate(runs)
+    ]
+
+
+def _check_truth(source: TrackSource) -> None:
+    if all(track.T_sensor_object is None for track in source):
+        raise BadInputError(
+            f"{source.path}: no track has true poses (poses.txt) to measure against;"
+            " complete it instead."
+        )

@@ -1,6 +1,0 @@
-# SPDX-FileCopyrightText: 2026 The Wildshape developers
-# SPDX-License-Identifier: Apache-2.0
-"""What `complete` and `register` write.
-
-Start with `write`.
-"""

@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Methods measured on the tracks of an input with progress shown, and the files of a result."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from wildshape.evaluation.examples import gather
+from wildshape.evaluation.method import Method
+from wildshape.evaluation.protocol import run as run_protocol
+from wildshape.evaluation.results import Limits, Results, Rotate
+from wildshape.evaluation.summary import write_metrics, write_scores
+from wildshape.evaluation.tables import markdown, write_table
+from wildshape.io.inputs import TrackSource
+from wildshape.io.progress import SILENT, Progress
+
+
+def evaluate_once(
+    source: TrackSource,
+    methods: Mapping[str, Method],
+    rotate: Rotate,
+    seed: int,
+    max_scans: int | None,
+    progress: Progress = SILENT,
+) -> Results:
+    """The protocol under one seed.
+
+    Args:
+        source: the tracks.
+        methods: by the name of their row.
+        rotate: how each scan is turned.
+        seed: of these turns.
+        max_scans: take this many scans of a longer track, evenly.
+        progress: is told how many tracks are done.
+    """
+    with progress.bar(f"evaluating, seed {seed}", len(source)) as bar:
+        return run_protocol(
+            methods, source, rotate, seed, bar.at, limits=Limits(max_scans=max_scans)
+        )
+
+
+def write_evaluation(
+    out: Path,
+    source: TrackSource,
+    runs: list[Results],
+    drawn: tuple[str, Method],
+    provenance: dict[str, Any],
+) -> str:
+    """Write metrics, scores, table and figures; returns the table.
+
+    Args:
+        out: folder.
+        source: the tracks of the runs.
+        runs: one a seed.
+        drawn: row and method whose best, median and worst object are drawn.
+        provenance: how the figures came about.
+    """
+    from wildshape.evaluation.pictures import write_figures
+
+    write_figures(out, runs[0], gather(source, runs[0], *drawn))
+    write_scores(out, runs)
+    write_table(out, runs, views=has_views(source))
+    write_metrics(out, runs, provenance)
+    return markdown(runs)
+
+
+def has_views(source: TrackSource) -> bool:
+    """Whether the tracks are depth views."""
+    first = next(iter(source), None)
+    return first is not None and first.sensor.kind == "camera"

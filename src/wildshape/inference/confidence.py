@@ -1,0 +1,231 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""How far a completion is to be trusted: its features, its confidence, and what speaks against it.
+
+The features are known without labels; `method/confidence.py` makes a confidence of them. Reasons
+are short names for machines (docs/formats.md). Asked of the scan: `other_sensor` (a camera's scan
+for weights of LiDARs, or the reverse), `too_large_for_model` (the bounding box's diagonal is above
+the largest trained on), `too_small_for_model` (below half of the smallest trained on: a scan may
+show a part of an object), `few_points`, `sensor_inside` (the points lie on all sides of the
+origin). Asked of the result: `poor_fit` (the label-free cost is far above that of scans held out in
+training), `low_confidence`. `ReasonRule` holds the bounds.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from wildshape.geometry.projection.line_of_sight import surrounded
+from wildshape.inference.config import ReasonRule
+from wildshape.inference.prepare import extent
+from wildshape.io.progress import counted
+from wildshape.method.checkpoint import ModelSettings
+from wildshape.method.confidence import COVERED_M, SMALLEST_M, ConfidenceFeatures
+from wildshape.method.hindsight import Scores
+from wildshape.method.network import Poses
+from wildshape.records import Completion, Points, Registration, Sensor
+
+_RULE = ReasonRule()
+
+
+def look_features(
+    scans: Float[Tensor, "B N 3"],
+    posed: Float[Tensor, "B H P 3"],
+    scores: Scores,
+    poses: Poses,
+    believed: Float[Tensor, "B H"],
+) -> Float[Tensor, "B 6"]:
+    """The features that a look at scans tells: all but those of the scan itself and the cost.
+
+    Args:
+        scans: centred scans.
+        posed: shapes under every hypothesis.
+        scores: of the hypotheses.
+        poses: the hypotheses.
+        believed: what decides between them, metres; the least speaks.
+    """
+    rows = torch.arange(len(scans), device=scans.device)
+    order = believed.argsort(-1)
+    first, second = order[:, 0], order[:, min(1, order.shape[1] - 1)]
+    entropy = -(poses.log_belief.exp() * poses.log_belief).nan_to_num().sum(-1)
+    shape = posed[rows, first]
+    spread = (shape - posed[rows, second]).norm(dim=-1).mean(-1)
+    found = scans.gather(1, scores.to_scan[rows, first][..., None].expand(-1, -1, 3))
+    covered = ((shape - found).norm(dim=-1) < COVERED_M).float().mean(-1)
+    terms = [_log(part[rows, first]) for part in (scores.observation, scores.projection)]
+    margin = believed[rows, second] - believed[rows, first]
+    return torch.stack((*terms, entropy, margin, spread, covered), dim=-1)
+
+
+def _log(values: Float[Tensor, "B"]) -> Float[Tensor, "B"]:
+    return values.clamp_min(SMALLEST_M).log()
+
+
+def features_of(scan: Points, cost: float, seen: Float[Tensor, "6"]) -> ConfidenceFeatures:
+    """All features of one completion."""
+    observation, projection, entropy, margin, spread, covered = seen.tolist()
+    return ConfidenceFeatures(
+        log_cost=math.log(max(cost, SMALLEST_M)),
+        log_observation=observation,
+        log_projection=projection,
+        entropy=entropy,
+        margin=margin,
+        spread=spread,
+        log_points=math.log(len(scan)),
+        log_range=math.log(max(float(np.linalg.norm(scan.mean(0))), SMALLEST_M)),
+        log_extent=math.log(max(extent(scan), SMALLEST_M)),
+        covered=covered,
+    )
+
+
+def confidence_of(features: ConfidenceFeatures, settings: ModelSettings) -> float:
+    """0 to 1: as the weights are calibrated (`method/confidence.py`).
+
+    Without a calibration it falls with the label-free cost, and is 1/2 at the held-out 90th
+    percentile.
+    """
+    if settings.calibration is not None:
+        return settings.calibration.confidence(features)
+    return 1.0 / (1.0 + (math.exp(features.log_cost) / settings.cost_m[1]) ** 2)
+
+
+def reasons_of_scan(
+    scan: Points, sensor: Sensor | None, settings: ModelSettings, rule: ReasonRule = _RULE
+) -> tuple[str, ...]:
+    """What speaks against the scan itself, a line a reason.
+
+    Args:
+        scan: sensor frame, metres.
+        sensor: how it was taken, if known.
+        settings: of the weights.
+        rule: the bounds.
+    """
+    low, high = settings.extent_m
+    size = extent(scan)
+    holds = {
+        "other_sensor": sensor is not None and sensor.kind != settings.sensor,
+        "too_large_for_model": size > high,
+        "too_small_for_model": size < rule.smallest * low,
+        "few_points": len(scan) < rule.few_points,
+        "sensor_inside": surrounded(scan),
+    }
+    return tuple(reason for reason, held in holds.items() if held)
+
+
+def reasons_of_result(
+    cost: float, confidence: float, settings: ModelSettings, rule: ReasonRule = _RULE
+) -> tuple[str, ...]:
+    """What speaks against what came out, a line a reason.
+
+    Args:
+        cost: label-free, metres.
+        confidence: 0 to 1.
+        settings: of the weights.
+        rule: the bounds.
+    """
+    holds = {
+        "poor_fit": cost > rule.poor_fit * settings.cost_m[1],
+        "low_confidence": confidence < rule.low_confidence,
+    }
+    return tuple(reason for reason, held in holds.items() if held)
+
+
+def judged_again(
+    done: Completion,
+    cost: float,
+    confidence: float,
+    settings: ModelSettings,
+    rule: ReasonRule = _RULE,
+) -> tuple[str, ...]:
+    """The reasons of a completion whose cost and confidence have changed."""
+    before = reasons_of_result(done.cost, done.confidence, settings, rule)
+    of_scan = (reason for reason in done.reasons if reason not in before)
+    return (*of_scan, *reasons_of_result(cost, confidence, settings, rule))
+
+
+def warning_of(
+    scan: Points, sensor: Sensor | None, settings: ModelSettings, rule: ReasonRule = _RULE
+) -> str:
+    """One sentence where the model was not made for such a scan, else nothing."""
+    if sensor is not None and sensor.kind != settings.sensor:
+        return f"a {sensor.kind} scan, but the model was trained on {settings.sensor} scans"
+    if surrounded(scan):
+        return (
+            "its points lie on all sides of the origin, where no sensor can have stood: moved to"
+            " its own centre? hand it in as the sensor saw it"
+        )
+    low, high = settings.extent_m
+    size = extent(scan)
+    if size < rule.smallest * low or size > rule.largest * high:
+        return (
+            f"extent {size:.3g} m lies outside the {low:.3g} to {high:.3g} m trained on;"
+            " check the unit, or train on such objects"
+        )
+    return ""
+
+
+def reasons_sentence(done: Completion | Registration) -> str:
+    """A sentence on one result that is not to be trusted, or nothing."""
+    if not done.reasons:
+        return ""
+    why = ", ".join(map(_words, done.reasons))
+    detail = f" ({done.warning})" if done.warning else ""
+    return f"this result is not to be trusted: {why}{detail}"
+
+
+@dataclass
+class ReasonCounts:
+    """Results that are not to be trusted, and why (`reasons_of_scan`, `reasons_of_result`).
+
+    Attributes:
+        seen: results looked at.
+        flagged: of them not to be trusted; `example` is the first, with its warning if any.
+        reasons: how often each speaks.
+    """
+
+    seen: int = 0
+    flagged: int = 0
+    example: str = ""
+    reasons: Counter[str] = field(default_factory=Counter)
+
+    def add(self, name: str, done: Completion) -> None:
+        """Look at a result."""
+        self.seen += 1
+        self.flagged += bool(done.reasons)
+        self.reasons.update(done.reasons)
+        if done.reasons and not self.example:
+            self.example = f"{name}: {done.warning}" if done.warning else name
+
+    def of(self, names: Iterable[str], done: Iterable[Completion]) -> "ReasonCounts":
+        """The same with more results looked at."""
+        for name, one in zip(names, done, strict=True):
+            self.add(name, one)
+        return self
+
+    @property
+    def sentence(self) -> str:
+        """How many are not to be trusted and the commonest reasons, or nothing."""
+        if not self.flagged:
+            return ""
+        why = ", ".join(f"{_words(reason)} {n}" for reason, n in self.reasons.most_common())
+        are = "is" if self.flagged == 1 else "are"
+        return (
+            f"{self.flagged} of {counted(self.seen, 'result')} {are} not to be trusted: {why};"
+            f" for example {self.example}"
+        )
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The same for machines, the commonest reason first."""
+        return {"flagged": self.flagged, "reasons": dict(self.reasons.most_common())}
+
+
+def _words(reason: str) -> str:
+    return reason.replace("_", " ")

@@ -1,0 +1,269 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whole folders completed or registered, and what is written of each track (docs/formats.md).
+
+`objects.json` is written last: a track folder that has it is finished.
+"""
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.se3 import stack
+from wildshape.inference.box_files import BOX_FILES, BoxFiles
+from wildshape.inference.completed_files import COMPLETED, OBJECTS, POSES, objects_of
+from wildshape.inference.confidence import ReasonCounts
+from wildshape.inference.models import fingerprint
+from wildshape.inference.predictor import Predictor, load
+from wildshape.inference.registration import to_middle
+from wildshape.io.atomic import write_json
+from wildshape.io.guard import reading
+from wildshape.io.inputs import TrackSource, open_tracks
+from wildshape.io.output import Output, begin, file_name, keep_apart
+from wildshape.io.poses import times_of, write_poses, write_trajectory, write_tum
+from wildshape.io.progress import SILENT, Progress, counted, duration
+from wildshape.io.scans.points import SENSOR_METRES, Coordinates, write_ply
+from wildshape.io.scans.writers import MESH_FORMATS, MeshFiles, write_mesh
+from wildshape.records import Completion, Track
+
+MIDDLE, MESH, TUM, TRAJECTORY = "T_middle_scan.txt", "mesh", "trajectory.tum", "trajectory.json"
+FILES = (
+    f"*/{COMPLETED}/*.ply",
+    *(f"*/{MESH}/*.{kind}" for kind in MESH_FORMATS),
+    f"*/{POSES}",
+    f"*/{MIDDLE}",
+    f"*/{TUM}",
+    f"*/{TRAJECTORY}",
+    f"*/{OBJECTS}",
+    *BOX_FILES,
+)
+
+
+@dataclass(frozen=True)
+class FolderOptions:
+    """How a folder is completed or registered.
+
+    Attributes:
+        model: checkpoint, None for the shipped one.
+        device: `auto`, `cpu` or `cuda`.
+        coordinates: of the files that are read.
+        track: use all scans of a track together.
+        mesh: also write a closed mesh of each shape, in this way.
+        boxes: also write all boxes, in these files.
+        overwrite: replace an earlier output.
+    """
+
+    model: Path | None = None
+    device: str = "auto"
+    coordinates: Coordinates = SENSOR_METRES
+    track: bool = False
+    mesh: MeshFiles | None = None
+    boxes: BoxFiles | None = None
+    overwrite: bool = False
+
+    def identity(self, source: Path) -> dict[str, Any]:
+        """What decides the output's content, as JSON values."""
+        found = {"input": str(source.resolve()), **asdict(self.coordinates)}
+        found["model"] = fingerprint(self.model)
+        uses = {"uses": "track"} if self.track else {}
+        mesh = {"mesh": self.mesh.kind} if self.mesh else {}
+        colours = {"mesh_colours": "confidence"} if self.mesh and self.mesh.coloured else {}
+        boxes = self.boxes.identity() if self.boxes else {}
+        return {**found, **uses, **mesh, **colours, **boxes}
+
+
+_DEFAULT = FolderOptions()
+
+
+@dataclass
+class FolderSummary:
+    """What was done.
+
+    Attributes:
+        out: the folder written.
+        done: the verb: `completed` or `registered`.
+        tracks: written now.
+        finished_before: tracks of an earlier, interrupted run.
+        scans: written now.
+        seconds: that it took.
+        skipped: what could not be used, with the reason.
+        dropped: a sentence on points that were not finite, or nothing.
+        reasons: which scans' results are not to be trusted.
+    """
+
+    out: Path
+    done: str
+    tracks: int = 0
+    finished_before: int = 0
+    scans: int = 0
+    seconds: float = 0.0
+    skipped: list[tuple[str, str]] = field(default_factory=list)
+    dropped: str = ""
+    reasons: ReasonCounts = field(default_factory=ReasonCounts)
+
+    def add(self, track: Track, scans: list[Completion]) -> None:
+        """Count a track."""
+        self.tracks += 1
+        self.scans += len(scans)
+        self.reasons.of((f"{track.name}/{name}" for name in track.scan_names), scans)
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        earlier = counted(self.finished_before, "track")
+        before = f", {earlier} had been finished before" if self.finished_before else ""
+        return (
+            f"{self.done} {counted(self.scans, 'scan')} of {counted(self.tracks, 'track')}"
+            f" in {duration(self.seconds)}{before}; see {self.out}"
+        )
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The same as JSON values."""
+        return {
+            "out": str(self.out),
+            "tracks": self.tracks,
+            "tracks_finished_before": self.finished_before,
+            "scans": self.scans,
+            "skipped": [{"what": what, "reason": reason} for what, reason in self.skipped],
+            **self.reasons.data,
+            "seconds": round(self.seconds, 3),
+        }
+
+
+def complete_folder(
+    source: Path,
+    out: Path,
+    options: FolderOptions = _DEFAULT,
+    progress: Progress = SILENT,
+    *,
+    registers: bool = False,
+) -> FolderSummary:
+    """Complete every scan of every track, and write it; an interrupted run is gone on with.
+
+    Args:
+        source: a scan, TRACK, DATASET or packed store.
+        out: folder to write.
+        options: how.
+        progress: is told what goes on.
+        registers: write the scans' poses to the middle scan instead of the completed shapes.
+
+    Raises:
+        BadInputError: input, model or output cannot be used.
+        MissingExtraError: a box file needs a library that is not installed.
+    """
+    began = time.monotonic()
+    if options.boxes is not None:
+        options.boxes.check()
+    tracks = open_tracks(source, options.coordinates)
+    predictor = load(options.model, options.device)
+    keep_apart(source, out)
+    command, identity = "register" if registers else "complete", options.identity(source)
+    output = begin(out, command, identity, FILES, overwrite=options.overwrite, progress=progress)
+    try:
+        found = write_results(
+            tracks, predictor, output, options, registers=registers, progress=progress
+        )
+    except BadInputError:
+        output.abandon()
+        raise
+    if options.boxes is not None:
+        for note in options.boxes.write(out):
+            progress.say(note)
+    output.finish(skipped=found.skipped)
+    found.seconds = time.monotonic() - began
+    return found
+
+
+def write_results(
+    source: TrackSource,
+    predictor: Predictor,
+    output: Output,
+    options: FolderOptions = _DEFAULT,
+    *,
+    registers: bool = False,
+    progress: Progress = SILENT,
+) -> FolderSummary:
+    """Complete every scan of every track and write the results, track after track.
+
+    Args:
+        source: the tracks.
+        predictor: does the work.
+        output: the folder, begun.
+        options: `track` and `mesh` count here.
+        registers: see `complete_folder`.
+        progress: is told what goes on.
+
+    Raises:
+        BadInputError: nothing can be used, or a name cannot be that of a file.
+    """
+    earlier: list[tuple[str, str]] = []
+    summary = FolderSummary(output.path, "registered" if registers else "completed")
+
+    def done(name: str) -> bool:
+        before = _written_before(output.path / file_name(name) / OBJECTS)
+        if before is None:
+            return False
+        earlier.extend((f"{name}/{scan['scan']}", scan["reason"]) for scan in before)
+        summary.finished_before += 1
+        return True
+
+    with progress.bar("completing", len(source)) as bar:
+        for index, track in source.tracks(done):
+            at = lambda text, index=index: bar.at(index, text)  # noqa: E731
+            folder = output.path / file_name(track.name)
+            scans = _write_track(track, predictor, folder, at, options, registers=registers)
+            described = objects_of(
+                track,
+                scans,
+                predictor,
+                source.path,
+                together=options.track,
+                skipped=source.skipped_in(track.name),
+            )
+            write_json(folder / OBJECTS, described)
+            summary.add(track, scans)
+            bar.at(index + 1, track.name)
+    summary.skipped, summary.dropped = [*earlier, *source.skipped], source.dropped
+    return summary
+
+
+def _written_before(path: Path) -> list[dict[str, str]] | None:
+    """What an earlier run skipped of a track that it finished; None if it did not."""
+    if not path.is_file():
+        return None
+    with reading(path, "what an earlier run wrote"):
+        return json.loads(path.read_text("utf-8"))["skipped"]
+
+
+def _write_track(
+    track: Track,
+    predictor: Predictor,
+    folder: Path,
+    at: Callable[[str], None],
+    options: FolderOptions,
+    *,
+    registers: bool,
+) -> list[Completion]:
+    """Complete the scans of a track, writing each into its folder; all but `objects.json`."""
+    found: list[Completion] = []
+    for done in predictor.complete_checked(track.scans, track.sensor, track=options.track):
+        name = file_name(track.scan_names[len(found)])
+        if not registers:
+            write_ply(folder / COMPLETED / f"{name}.ply", done.points)
+        if options.mesh is not None:
+            scan = track.scans[len(found)] if options.mesh.coloured else None
+            write_mesh(folder / MESH / f"{name}.{options.mesh.kind}", done.mesh(scan))
+        found.append(done)
+        at(f"{track.name}, scan {len(found)} of {len(track.scans)}")
+    poses = stack([done.pose for done in found])
+    write_poses(folder / POSES, poses)
+    if registers:
+        write_poses(folder / MIDDLE, to_middle(poses))
+        write_tum(folder / TUM, poses, times_of(track.scan_names))
+        write_trajectory(folder / TRAJECTORY, poses, track.scan_names)
+    return found

@@ -1,0 +1,363 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A whole training from an input to a checkpoint: what `wildshape train` does.
+
+`loop.fit` trains what `setup` has made; here are the folder of the run, the data and the preset.
+"""
+
+import json
+import os
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from wildshape.errors import BadInputError
+from wildshape.inference.models import MODEL, choose_device, weights_file
+from wildshape.io.atomic import lock_folder, write_json
+from wildshape.io.inputs import open_tracks
+from wildshape.io.output import (
+    MARKER,
+    Output,
+    begin,
+    command_line,
+    is_begun,
+    keep_apart,
+    remove_leftovers,
+)
+from wildshape.io.progress import SILENT, Progress, duration
+from wildshape.io.provenance import provenance
+from wildshape.io.scans.points import SENSOR_METRES, Coordinates
+from wildshape.io.store.store import Store, is_store, open_store
+from wildshape.io.write_tracks import write_tracks
+from wildshape.method.checkpoint import load_checkpoint
+from wildshape.method.network import Backbone
+from wildshape.training.config import Recipe
+from wildshape.training.loop import Run, StopRequested, fit, setup
+from wildshape.training.recipes import PRESETS, with_encoder
+from wildshape.training.runtime.profiler import PROFILE
+
+_PACKED = "data.store"
+_FILES = (
+    "*.safetensors",
+    "run.json",
+    "log.jsonl",
+    "profile.txt",
+    "tensorboard/*",
+    f"{_PACKED}/*",
+)
+
+
+Stopping = Callable[[], AbstractContextManager[Callable[[], bool]]]
+"""Gives a context in which a training asks between two steps whether to stop."""
+
+
+def never_stopped() -> AbstractContextManager[Callable[[], bool]]:
+    """Nobody asks to stop."""
+    return nullcontext(lambda: False)
+
+
+@dataclass(frozen=True)
+class TrainingOptions:
+    """How a model is trained.
+
+    Attributes:
+        preset: of `recipes.PRESETS`; DPC's have a training of their own (`baselines/dpc`).
+        encoder: point network that reads a scan; None: the preset's.
+        steps: gradient steps instead of the preset's; the schedule is stretched to them.
+        seed: of weights and batches.
+        resume: go on with the run; a finished one is left as it is.
+        start: fine-tune these weights, a checkpoint of the same preset or `shipped`.
+        teacher: a checkpoint or `shipped`, whose pseudo-labels are trained on; `truth` is the
+            oracle.
+        headings: checkpoint that is asked which way views look that come in no order.
+        device: `auto`, `cpu` or `cuda`.
+        coordinates: of the data's files.
+        overwrite: replace an earlier run.
+        profile: write where a step's time goes; the weights are the same.
+    """
+
+    preset: str = "default"
+    encoder: Backbone | None = None
+    steps: int | None = None
+    seed: int = 0
+    resume: bool = False
+    start: str | None = None
+    teacher: str | None = None
+    headings: str | None = None
+    device: str = "auto"
+    coordinates: Coordinates = SENSOR_METRES
+    overwrite: bool = False
+    profile: bool = False
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise BadInputError(f"--seed {self.seed}: expected 0 or more.")
+        if self.steps is not None and self.steps < 1:
+            raise BadInputError(f"--steps {self.steps}: expected 1 or more.")
+        if self.headings and self.teacher in (None, "truth"):
+            raise BadInputError(
+                "--headings: decides which way a teacher's tracks look; pass --teacher M, too."
+            )
+
+
+@dataclass(frozen=True)
+class Trained:
+    """What came of a training.
+
+    Attributes:
+        sentence: in words.
+        model: the checkpoint.
+        steps: gradient steps in all.
+        seconds: of this run.
+        metrics: of the validation.
+        recipe: as trained, JSON values.
+        leads: false in a process that does not lead others; it says nothing.
+    """
+
+    sentence: str
+    model: Path
+    steps: int
+    seconds: float
+    metrics: dict[str, Any]
+    recipe: dict[str, Any]
+    leads: bool = True
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The same as JSON values."""
+        return {
+            "model": str(self.model),
+            "steps": self.steps,
+            "seconds": round(self.seconds, 3),
+            "metrics": self.metrics,
+            "recipe": self.recipe,
+        }
+
+
+_DEFAULT = TrainingOptions()
+
+
+def train(
+    data: Path,
+    out: Path,
+    options: TrainingOptions = _DEFAULT,
+    progress: Progress = SILENT,
+    stopping: Stopping = never_stopped,
+) -> Trained:
+    """Train, or go on training.
+
+    Args:
+        data: a packed store, or a DATASET folder.
+        out: folder of the run.
+        options: how.
+        progress: is told what goes on.
+        stopping: a context of the training alone; what it gives is asked between two steps.
+
+    Raises:
+        BadInputError: data or options that cannot be used, an existing run without `resume`.
+        StopRequested: `stopping` said so, the state is saved; its text says how to go on.
+    """
+    device = choose_device(options.device)
+    output = begin_run(data, out, options)
+    try:
+        store = open_training_data(data, out, options, progress)
+        recipe = recipe_for(store, options.preset, options.steps)
+        recipe = with_encoder(recipe, options.encoder or recipe.network.backbone)
+    except BadInputError:
+        if output is not None:
+            output.abandon()
+        raise
+    run = _set_up(recipe, store, data, out, options, device, progress)
+    if options.profile and run.processes.leads:
+        run.profile = out / PROFILE
+    began, first = time.monotonic(), run.state.step
+    if first >= recipe.optim.steps:
+        return _finished(run, out, 0.0, f"{out} was finished already")
+    flag = "" if options.resume else " --resume"
+    fit_with_progress(run, progress, stopping, resume=f"{command_line()}{flag}")
+    seconds = time.monotonic() - began
+    text = f"trained {run.state.step - first} steps in {duration(seconds)}"
+    return _finished(run, out, seconds, text)
+
+
+def _set_up(
+    recipe: Recipe,
+    store: Store,
+    data: Path,
+    out: Path,
+    options: TrainingOptions,
+    device: str,
+    progress: Progress,
+) -> Run:
+    learns = options.teacher not in (None, "truth")
+    with (progress if learns else SILENT).bar("fusing tracks", 0) as bar:
+        return setup(
+            recipe,
+            store,
+            out,
+            seed=options.seed,
+            device=device,
+            resume=options.resume,
+            start=_checkpoint(options.start),
+            teacher=_teacher(options.teacher),
+            headings=_checkpoint(options.headings),
+            provenance={**provenance(command_line()), "data": str(data)},
+            taught=lambda done, total: bar.at(done, total=total),
+            say=progress.say,
+        )
+
+
+def _teacher(model: str | None) -> Path | Literal["truth"] | None:
+    return "truth" if model == "truth" else _checkpoint(model)
+
+
+def _checkpoint(model: str | None) -> Path | None:
+    """The checkpoint that a user names."""
+    if model is None:
+        return None
+    return weights_file(None if model == "shipped" else Path(model))
+
+
+def recipe_for(store: Store, preset: str, steps: int | None) -> Recipe:
+    """The preset, for the kind of sensor in the store, with another number of steps if asked.
+
+    Raises:
+        BadInputError: a preset of the paper that was made for the other kind of sensor.
+    """
+    recipe = PRESETS[preset]()
+    kind = store.sensor_of(0).kind
+    if kind != recipe.views.sensor:
+        if preset.startswith("paper-"):
+            raise BadInputError(
+                f"{store.path}: holds {kind} scans, but preset {preset} is for"
+                f" {recipe.views.sensor} scans; choose another preset."
+            )
+        recipe = replace(recipe, views=replace(recipe.views, sensor=kind))
+    if steps is None:
+        return recipe
+    return replace(recipe, optim=replace(recipe.optim, steps=steps))
+
+
+def fit_with_progress(
+    run: Run,
+    progress: Progress = SILENT,
+    stopping: Stopping = never_stopped,
+    *,
+    resume: str = "",
+    adjust: Callable[[Run], bool] | None = None,
+) -> Path:
+    """`fit` with a bar; `stopping` ends it between two steps and saves the state.
+
+    Args:
+        run: set up.
+        progress: is told what goes on, if this process leads.
+        stopping: a context of the training alone; what it gives is asked between two steps.
+        resume: the command that goes on after a stop, for the message.
+        adjust: called every 25 steps; may change the run's number of steps, and says whether.
+
+    Raises:
+        StopRequested: its text says how to go on.
+    """
+    planned = None if adjust else run.recipe.optim.steps
+    shown = progress if run.processes.leads else SILENT
+    with stopping() as stopped, shown.bar("training", planned or 0, start=run.state.step) as bar:
+
+        def report(step: int, values: dict[str, Any]) -> None:
+            nonlocal planned
+            if adjust is not None and adjust(run):
+                planned = run.recipe.optim.steps
+                progress.say(f"training for {planned} steps, which fit into the time")
+            bar.at(step, _line(values), total=planned)
+
+        try:
+            return fit(run, report, stopped)
+        except StopRequested:
+            raise StopRequested(
+                f"stopped after step {run.state.step} of {run.recipe.optim.steps}, the state is"
+                f" saved; go on with `{resume}`."
+            ) from None
+
+
+def _line(values: dict[str, Any]) -> str:
+    shares = "/".join(f"{100 * share:.0f}" for share in values["branch_shares"])
+    others = ("loss", "branch_shares", "steps_per_second")
+    terms = ", ".join(f"{k} {value:.4f}" for k, value in values.items() if k not in others)
+    return (
+        f"loss {values['loss']:.4f} ({terms}), branches {shares} %,"
+        f" {values['steps_per_second']:.1f} steps/s"
+    )
+
+
+def open_training_data(
+    data: Path, out: Path, options: TrainingOptions, progress: Progress = SILENT
+) -> Store:
+    """The packed store to train on; track folders are packed once into the run's folder.
+
+    Raises:
+        BadInputError: no tracks there; or track folders under torchrun.
+    """
+    if is_store(data):
+        return open_store(data)
+    if int(os.environ.get("WORLD_SIZE", "1")) > 1:
+        raise BadInputError(
+            f"{data}: several processes need a packed store; make one first by"
+            f" `wildshape convert folder {data} OUT`."
+        )
+    packed = out / _PACKED
+    if options.resume and is_store(packed):
+        return open_store(packed)
+    source = open_tracks(data, options.coordinates)
+    write_tracks(
+        source,
+        packed,
+        "packed",
+        command="train",
+        settings={"input": str(data.resolve()), **asdict(options.coordinates)},
+        overwrite=True,
+        progress=progress,
+        bar=("packing tracks", len(source)),
+    )
+    progress.skipped(source.skipped)
+    return open_store(packed)
+
+
+def begin_run(data: Path, out: Path, options: TrainingOptions) -> Output | None:
+    """The marker of a new run; processes that do not lead leave the folder alone.
+
+    Raises:
+        BadInputError: another run is there.
+    """
+    if int(os.environ.get("RANK", "0")) > 0:
+        return None
+    if options.resume and (out / MARKER).is_file():
+        lock_folder(out)
+        remove_leftovers(out)
+        return None
+    keep_apart(data, out)
+    if is_begun(out) and not options.overwrite:
+        raise BadInputError(
+            f"{out}: a run is there already; pass --resume to go on with it, --overwrite"
+            " to replace it, or choose another --out."
+        )
+    parts = ("preset", "encoder", "steps", "seed")
+    identity = {"data": str(data), **{name: str(getattr(options, name)) for name in parts}}
+    return begin(out, "train", identity, _FILES, overwrite=options.overwrite)
+
+
+def finish_run(out: Path) -> None:
+    """Say in the run's folder that it is finished."""
+    marker = out / MARKER
+    write_json(marker, {**json.loads(marker.read_text("utf-8")), "status": "finished"})
+
+
+def _finished(run: Run, out: Path, seconds: float, text: str) -> Trained:
+    model, recipe, leads = out / MODEL, asdict(run.recipe), run.processes.leads
+    metrics: dict[str, Any] = {}
+    if leads:
+        finish_run(out)
+        metrics = load_checkpoint(model)[1].metrics
+    sentence = f"{text}; the model is {model}"
+    return Trained(sentence, model, run.state.step, seconds, metrics, recipe, leads)
