@@ -15,7 +15,6 @@ from wildshape.io.progress import Bar, duration, printable
 if TYPE_CHECKING:
     from wildshape.inference.folders import FolderSummary
 
-from wildshape.io.progress import counted as counted
 
 _EVERY_SECONDS = 10.0
 _LISTED = 20
