@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Objects chosen by their error, and how they are drawn."""
+
+import numpy as np
+import pytest
+from tests.cars import drive_by
+from tests.evaluation.scores import completion
+
+from wildshape.baselines.icp import LocalIcp
+from wildshape.baselines.identity import OneScan
+from wildshape.baselines.pairs import Chained
+from wildshape.evaluation.examples import gather, pick
+from wildshape.evaluation.pictures import draw_errors, draw_examples, project, write_figures
+from wildshape.evaluation.protocol import run
+from wildshape.evaluation.results import (
+    MethodScores,
+    Results,
+)
+
+
+def test_examples_are_picked_by_error():
+    rows = tuple(completion(name, cd, 0.0) for name, cd in zip("abcde", (0.5, 0.1, 0.9, 0.2, 0.3)))
+    extra = completion("a", 0.1, 0.0)  # The mean of a is 0.3: a tie with e, settled by name.
+    chosen = pick(MethodScores("m", (*rows, extra), (), ()))
+    assert {label: name for label, (name, _) in chosen.items()} == {
+        "best": "b",
+        "median": "a",
+        "worst": "c",
+    }
+    assert pick(MethodScores("m", (), (), ())) == {}
+
+
+class Method(OneScan, Chained):
+    def __init__(self):
+        Chained.__init__(self, LocalIcp())
+
+
+def test_examples_and_figures(tmp_path):
+    tracks = [drive_by(f"t{i}", scans=3, points=100 + 50 * i, seed=i) for i in range(4)]
+    results = run({"m": Method()}, tracks, "so3", seed=3)
+    examples = gather(tracks, results, "m", Method())
+    assert [e.label for e in examples] == ["best", "median", "worst"]
+    assert examples[0].cd <= examples[1].cd <= examples[2].cd
+    for example in examples:
+        # Back in the object's frame although the input was turned.
+        assert np.abs(example.scan).max(axis=0) == pytest.approx([2.1, 0.85, 0.75], abs=0.15)
+        assert example.fused is not None
+    paths = write_figures(tmp_path, results, examples)
+    assert [p.name for p in paths] == ["errors.png", "examples.png"]
+    assert all(p.read_bytes()[:4] == b"\x89PNG" for p in paths)
+    assert len(draw_examples(examples).axes) == 3 * 4
+    beside = gather(tracks, results, "m", Method(), rival=Chained(LocalIcp()))
+    icp, ours = beside[0].rival, examples[0].fused
+    assert icp is not None
+    assert ours is not None
+    assert np.array_equal(icp, ours)  # the same ICP
+    assert len(draw_examples(beside).axes) == 3 * 5
+
+
+def test_drawing_keeps_aspect_and_survives_gaps():
+    tracks = [drive_by(scans=2, points=60)]
+    results = run({"scan": OneScan()}, tracks)
+    examples = gather(tracks, results, "scan", OneScan())
+    assert examples[0].fused is None
+    figure = draw_examples(examples)
+    assert all(ax.get_aspect() == 1.0 for ax in figure.axes)
+    assert len(draw_errors(Results("none", 0, ())).axes) == 2
+
+
+def test_projection_is_orthographic():
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(30, 3)).astype(np.float32)
+    lengths = np.linalg.norm(project(points), axis=1)
+    assert lengths == pytest.approx(np.linalg.norm(points, axis=1), rel=1e-5)
+    assert project(np.array([[0, 0, 1]], np.float32))[0, 1] > 0.9

@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+import json
+
+import pytest
+from tests.evaluation.scores import scores
+
+from wildshape.evaluation.results import (
+    MethodScores,
+    Results,
+)
+from wildshape.evaluation.summary import figures_of, summarise, write_metrics, write_scores
+
+FIXED = ["cd", "precision", "coverage", "acc30", "rot_median_deg"]
+FIXED += ["trans_median_m", "acc30_sym", "rot_sym_median_deg"]
+
+
+def test_figures_by_hand():
+    figures = figures_of(scores())
+    assert figures["cd"] == pytest.approx(0.4)
+    assert figures["precision"] == pytest.approx(0.15)
+    assert figures["coverage"] == pytest.approx(0.25)
+    assert figures["cd_partial"] == pytest.approx(0.2)
+    assert figures["acc30"] == pytest.approx(1 / 3)
+    assert figures["acc30_sym"] == pytest.approx(2 / 3)
+    assert figures["rot_median_deg"] == 40
+    assert figures["rot_sym_median_deg"] == 30
+    assert figures["trans_median_m"] == pytest.approx(0.2)
+
+
+def test_mean_and_std_over_seeds():
+    runs = [Results("yaw", seed, (scores(scale),)) for seed, scale in enumerate((1, 2, 3))]
+    summary = summarise(runs)[0]
+    assert summary.mean["cd"] == pytest.approx(0.8)
+    assert summary.std["cd"] == pytest.approx(0.4)
+    assert summary.std["acc30"] == pytest.approx(0)
+    assert summary.per_seed[2]["cd"] == pytest.approx(1.2)
+    assert (summary.completions, summary.registrations) == (6, 9)
+    assert summary.skipped == {"all points equal": 6}
+    assert summarise(runs[:1])[0].std["cd"] is None
+
+
+def test_metrics_json_has_the_fixed_names(tmp_path):
+    bare = MethodScores("pose only", (), scores().registrations, ())
+    runs = [Results("yaw", seed, (scores(), bare)) for seed in (0, 5)]
+    path = write_metrics(tmp_path / "new", runs, {"command": "wildshape evaluate"})
+    content = json.loads(path.read_text())
+    assert path.name == "metrics.json"
+    assert content["rotate"] == "yaw"
+    assert content["provenance"]["command"] == "wildshape evaluate"
+    ours = content["methods"]["ours"]
+    assert all(isinstance(ours[name], float) for name in FIXED)
+    assert set(FIXED) <= set(ours["std"])
+    assert set(ours["per_seed"]) == {"0", "5"}
+    assert ours["scans_counted"] == {"completion": 4, "registration": 6}
+    assert ours["scans_skipped"] == {"all points equal": 4}
+    # Named once, however many seeds, with the rows they are missing from.
+    assert content["skipped"] == [
+        {"track": "a", "scan": "7", "reason": "all points equal", "methods": ["ours"]},
+        {"track": "b", "scan": "3", "reason": "all points equal", "methods": ["ours"]},
+    ]
+    assert content["methods"]["pose only"]["cd"] is None
+    every = json.loads(write_scores(tmp_path / "new", runs).read_text())
+    assert len(every["runs"]) == 2

@@ -1,0 +1,37 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Tables for people, and the rows that the paper prints."""
+
+import pytest
+from tests.evaluation.scores import scores
+
+from wildshape.evaluation.paper import ABLATION_ROWS, LIDAR_ROWS, VIEW_ROWS
+from wildshape.evaluation.results import (
+    Results,
+)
+from wildshape.evaluation.tables import markdown, paper_markdown, write_table
+
+
+def test_table_shows_every_row_what_was_left_out_and_the_paper_apart(tmp_path):
+    runs = [Results("yaw", seed, (scores(scale),)) for seed, scale in enumerate((1, 2, 3))]
+    table = markdown(runs)
+    assert "| ours | 0.800 ± 0.400 |" in table
+    assert "33.3 ± 0.0" in table
+    assert "6 x all points equal" in table
+    assert "200 points" in table
+    text = write_table(tmp_path, runs).read_text()
+    assert "SemanticKITTI" not in table
+    assert "other data" in text
+    assert "| SemanticKITTI | paper, mean of 5 seeds | 0.200 |" in text
+    lines = [line for line in table.splitlines() if line.startswith("|")]
+    assert len({line.count("|") for line in lines}) == 1
+
+
+def test_paper_rows_add_up():
+    """CD = precision + coverage, up to the rounding (and one known slip) of the printed tables."""
+    rows = (*LIDAR_ROWS, *VIEW_ROWS, *ABLATION_ROWS)
+    whole = [row for row in rows if row.precision is not None and row.method != "DPC-LIDAR"]
+    assert len(whole) == 28
+    for row in whole:
+        assert row.cd == pytest.approx(row.precision + row.coverage, abs=0.011)
+    assert "97.7" in paper_markdown()
