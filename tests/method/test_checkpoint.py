@@ -35,7 +35,8 @@ def rewritten(path, *, metadata=None, drop=(), add=None):
         found = dict(file.metadata())
         weights = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
     weights = {k: v for k, v in weights.items() if k not in drop} | (add or {})
-    save_file(weights, path, {**found, **(metadata or {})})
+    texts = {**found, **(metadata or {})}
+    save_file(weights, path, {key: text for key, text in texts.items() if text is not None})
     return path
 
 
@@ -59,7 +60,7 @@ def test_a_checkpoint_from_before_a_number_was_a_field_means_its_default(saved):
         described = json.loads(file.metadata()["settings"])
     for name in ("neighbours", "centres"):
         del described["network"][name]
-    rewritten(saved, metadata={"settings": json.dumps(described)})
+    rewritten(saved, metadata={"settings": json.dumps(described), "sha256": None})
     assert load_checkpoint(saved)[1] == settings()
 
 
@@ -96,6 +97,26 @@ def test_truncated(saved, keep):
     saved.write_bytes(saved.read_bytes()[: int(keep * saved.stat().st_size)])
     with pytest.raises(BadInputError, match="not a readable safetensors"):
         load_checkpoint(saved)
+
+
+@pytest.mark.parametrize("place", [0.6, 0.8, 0.999])
+def test_a_bit_that_changes_a_weight_a_little_is_seen(saved, place):
+    data = bytearray(saved.read_bytes())
+    at = int(place * len(data)) & ~3
+    data[at] ^= 1  # the least of a float32's bits
+    saved.write_bytes(data)
+    with pytest.raises(BadInputError, match=r"model\.safetensors: the checksum is wrong"):
+        load_checkpoint(saved)
+
+
+def test_a_changed_setting_is_seen_and_files_without_a_checksum_are_read(saved):
+    with safe_open(saved, framework="pt") as file:
+        text = file.metadata()["settings"]
+    rewritten(saved, metadata={"settings": text + " "})
+    with pytest.raises(BadInputError, match="the checksum is wrong"):
+        load_checkpoint(saved)
+    rewritten(saved, metadata={"settings": text + " ", "sha256": None})
+    load_checkpoint(saved)
 
 
 def test_foreign_safetensors(tmp_path):
@@ -164,7 +185,7 @@ def test_an_interrupted_write_leaves_the_old_file(saved, network, monkeypatch):
     def disk_full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("wildshape.method.checkpoint.save", disk_full)
+    monkeypatch.setattr("wildshape.method.checkpoint.packed_network", disk_full)
     with pytest.raises(OSError, match="No space"):
         save_checkpoint(saved, network, settings())
     assert saved.read_bytes() == before

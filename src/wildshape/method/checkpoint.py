@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors.torch import save
 
 from wildshape.geometry.projection.visibility import Projection
 from wildshape.io.atomic import atomic_write
 from wildshape.io.typed_records import record_of
 from wildshape.method.confidence import Calibration, ConfidenceFeatures
 from wildshape.method.network import NetworkConfig, ShapePoseNet
-from wildshape.method.saved_network import Format, load_network
+from wildshape.method.saved_network import Format, load_network, packed_network
 from wildshape.records import SensorKind
 
 FORMAT, VERSION = "wildshape-checkpoint", 1
@@ -95,7 +94,7 @@ def save_checkpoint(
     described["projection"]["kind"] = type(settings.projection).__name__
     metadata = {"format": FORMAT, "version": str(VERSION), "settings": json.dumps(described)}
     with atomic_write(path) as file:
-        file.write(save(weights, metadata))
+        file.write(packed_network(weights, metadata))
 
 
 def load_checkpoint(path: Path) -> tuple[ShapePoseNet, ModelSettings]:

@@ -2,14 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """A network in a safetensors file: nothing is built of what does not fit, nor of no numbers."""
 
+import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import torch
 from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
 from torch import Tensor, nn
 
 from wildshape.errors import BadInputError
@@ -18,6 +20,7 @@ from wildshape.io.guard import first_line
 Net = TypeVar("Net", bound=nn.Module)
 Settings = TypeVar("Settings")
 _FLOATS = ("F16", "BF16", "F32", "F64")
+_CHECKSUM = "sha256"
 _MOST = 1e9
 _CURE = "take another copy of the file, or train it again"
 
@@ -46,7 +49,7 @@ def load_network(path: Path, form: Format[Net, Settings]) -> tuple[Net, Settings
 
     Raises:
         BadInputError: no such file, no safetensors, another format or version, damaged settings,
-            weights missing, of another shape or no numbers.
+            weights missing, of another shape, no numbers, or not those that were saved.
     """
     if not path.is_file():
         raise BadInputError(f"{path}: no such checkpoint; give --model a .safetensors file.")
@@ -56,16 +59,38 @@ def load_network(path: Path, form: Format[Net, Settings]) -> tuple[Net, Settings
             with torch.device("meta"):
                 expected = form.build(settings).state_dict()
             check_shapes(path, file, expected)
-            weights = {name: file.get_tensor(name).to(expected[name].dtype) for name in expected}
+            stored = {name: file.get_tensor(name) for name in expected}
+            metadata = file.metadata()
     except BadInputError:
         raise
     except (SafetensorError, OSError, ValueError) as error:
         said = first_line(error)
         raise BadInputError(f"{path}: not a readable safetensors file ({said}).") from error
+    weights = {name: values.to(expected[name].dtype) for name, values in stored.items()}
     check_numbers(path, weights)
+    _check_sum(path, stored, metadata)
     network = form.build(settings)
     network.load_state_dict(weights)
     return network.eval(), settings
+
+
+def packed_network(weights: Mapping[str, Tensor], metadata: dict[str, str]) -> bytes:
+    """A safetensors file of weights on the CPU and of its metadata, with their checksum."""
+    return save(dict(weights), metadata | {_CHECKSUM: _sum_of(weights, metadata)})
+
+
+def _sum_of(weights: Mapping[str, Tensor], metadata: Mapping[str, str]) -> str:
+    found = hashlib.sha256(metadata["settings"].encode())
+    for name in sorted(weights):
+        found.update(name.encode())
+        found.update(weights[name].contiguous().flatten().view(torch.uint8).numpy().data)
+    return found.hexdigest()
+
+
+def _check_sum(path: Path, weights: Mapping[str, Tensor], metadata: Mapping[str, str]) -> None:
+    """Files of older versions have no checksum."""
+    if metadata.get(_CHECKSUM) not in (None, _sum_of(weights, metadata)):
+        raise BadInputError(f"{path}: the checksum is wrong, the file is damaged; {_CURE}.")
 
 
 def _settings(path: Path, metadata: dict[str, str], form: Format[Any, Settings]) -> Settings:

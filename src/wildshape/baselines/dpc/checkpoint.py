@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
 
 from wildshape.baselines.dpc.network import DpcConfig, DpcNet
 from wildshape.io.atomic import atomic_write
 from wildshape.io.typed_records import record_of
-from wildshape.method.saved_network import Format, load_network
+from wildshape.method.saved_network import Format, load_network, packed_network
 
 FORMAT, VERSION = "wildshape-dpc", 1
 _LENGTH = (1e-3, 1e3)
@@ -67,7 +66,7 @@ def save_dpc(path: Path, network: DpcNet, settings: DpcSettings) -> None:
     described["network"]["volume"]["kind"] = type(settings.network.volume).__name__
     metadata = {"format": FORMAT, "version": str(VERSION), "settings": json.dumps(described)}
     with atomic_write(path) as file:
-        file.write(save(weights, metadata))
+        file.write(packed_network(weights, metadata))
 
 
 def load_dpc(path: Path) -> tuple[DpcNet, DpcSettings]:
