@@ -113,6 +113,8 @@ def _agree_if_due(run: Run) -> None:
     due = {int(share * run.recipe.optim.steps) for share in loss.agree_at}
     if state.step in due and run.targets is None:
         with record_function("wildshape: headings"):
+            weights = sum(float(p.detach().sum()) for p in state.mean.parameters())
+            refuse_not_finite(weights, state.step)
             rules = run.recipe.self_training.headings
             state.anchors = agreed_rotations(state.mean, run.sampler, loss, rules)
         run.views.hold(state.anchors)

@@ -20,7 +20,6 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.choose_hypothesis import CostRule, choose_hypothesis
 from wildshape.inference.tracks.heading_vote import continuous_signs, turned_where
@@ -43,10 +42,6 @@ from wildshape.training.self_training.heading_profiles import (
     together,
 )
 
-NOT_FINITE = (
-    "training stopped: the loss is not finite; resume from the last checkpoint with a smaller"
-    " learning rate, or check the data's units."
-)
 _BATCH = 64  # scans at once; decides memory alone
 
 
@@ -100,13 +95,10 @@ def agreed_rotations(
     Zero for scans that are not trained on.
 
     Args:
-        network: poses the scans.
+        network: poses the scans; its weights are finite.
         sampler: of the tracks trained on.
         loss: decides which branch speaks, and whether the scans of a track follow each other.
         config: how headings are agreed on.
-
-    Raises:
-        BadInputError: the network's weights are no longer finite.
     """
     posed = [pose_track(network, sampler, loss, scans) for scans in sampler.scans_of]
     ordered, mirror = loss.time_ordered, network.config.mirror
@@ -131,12 +123,7 @@ def pose_track(
         sampler: prepares scans as the network was trained on them.
         rule: what a hypothesis costs.
         scans: rows of the store.
-
-    Raises:
-        BadInputError: the network's weights are no longer finite.
     """
-    if not all(bool(torch.isfinite(p).all()) for p in network.parameters()):
-        raise BadInputError(NOT_FINITE)
     rng = np.random.default_rng(0)
     device = next(network.parameters()).device
     found, middles = [], []
