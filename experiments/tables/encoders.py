@@ -6,7 +6,7 @@ from experiments.tables.given import Given
 from experiments.tables.rows import default_form
 from experiments.tables.table import Block, Table, Trained
 
-from wildshape.method.network import Backbone
+from wildshape.method.encoders.named import Backbone
 from wildshape.training.recipes import with_encoder
 
 _NAMES: dict[Backbone, str] = {"pcn": "PCN", "pointnet2": "PointNet++", "dgcnn": "DGCNN"}

@@ -5,8 +5,9 @@
 from dataclasses import replace
 
 from wildshape.geometry.projection.visibility import FacingBins, PixelBins, PolarBins
+from wildshape.method.encoders.named import Backbone
 from wildshape.method.multiview import LossConfig
-from wildshape.method.network import Backbone, NetworkConfig
+from wildshape.method.network import NetworkConfig
 from wildshape.training.batches.views import ViewConfig
 from wildshape.training.config import OptimConfig, Recipe
 

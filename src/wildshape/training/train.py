@@ -33,7 +33,7 @@ from wildshape.io.scans.points import SENSOR_METRES, Coordinates
 from wildshape.io.store.store import Store, is_store, open_store
 from wildshape.io.write_tracks import write_tracks
 from wildshape.method.checkpoint import load_checkpoint
-from wildshape.method.network import Backbone
+from wildshape.method.encoders.named import Backbone
 from wildshape.training.config import Recipe
 from wildshape.training.loop import Run, StopRequested, fit, setup
 from wildshape.training.recipes import PRESETS, with_encoder

@@ -4,11 +4,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from tyro.conf import arg
 
 from wildshape.cli.options import DEFAULT_FILES, AsJson, Data, Device, Files, Overwrite, option
+from wildshape.method.encoders.named import Backbone
 
 EXAMPLES = (
     "wildshape train cars.store --out runs/cars --preset small",
@@ -44,7 +45,7 @@ Preset = Annotated[
         ),
     ),
 ]  # fmt: skip
-Encoder = Literal["pcn", "pointnet2", "dgcnn"]
+Encoder = Annotated[Backbone | None, option(metavar="{" + ",".join(get_args(Backbone)) + "}")]
 OutRun = Annotated[Path, arg(metavar="RUN", help="folder of the run")]
 
 
@@ -72,7 +73,7 @@ class Settings:
     data: Data
     out: OutRun
     preset: Preset = "default"
-    encoder: Annotated[Encoder | None, option(metavar="{pcn,pointnet2,dgcnn}")] = None
+    encoder: Encoder = None
     steps: Annotated[int | None, option(metavar="N")] = None
     seed: Annotated[int, arg(metavar="S")] = 0
     resume: bool = False
