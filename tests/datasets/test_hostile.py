@@ -217,6 +217,9 @@ def test_names_of_models_are_names_of_folders_and_the_list_is_read_once(tmp_path
     path.write_text("a" * 300)
     with pytest.raises(BadInputError, match="expected a model a line"):
         read_model_list(path)
+    path.write_text("1 " * 100_000)
+    with pytest.raises(BadInputError, match=r"03001627_train\.txt: lists a model twice"):
+        read_model_list(path)
 
 
 def test_a_feather_table_without_its_columns_is_not_unpacked(tmp_path):

@@ -87,6 +87,8 @@ def _models_of(path: Path, size: int, changed_ns: int) -> list[str]:  # noqa: AR
     wrong = next((model for model in models if not _MODEL.fullmatch(model)), None)
     if wrong is not None or not models:
         raise BadInputError(f"{path}: expected a model a line, found {wrong or 'nothing'!r}.")
+    if len(set(models)) < len(models):
+        raise BadInputError(f"{path}: lists a model twice; copy the folder data/splits again.")
     return models
 
 
