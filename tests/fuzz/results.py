@@ -4,16 +4,25 @@
 
 import json
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from tests.datasets import write_argoverse2 as av2
 from tests.datasets import write_kitti_tracking as tracking
+from tests.datasets.street import street
 from tests.fuzz.scans import track
 from tests.fuzz.target import Arrays, Target, numbers_of
 
 from wildshape.datasets.tracks.whole_tracks import Packed
+from wildshape.evaluation.drives.found import drives_of, read_found
+from wildshape.evaluation.drives.labels import Counting, read_labels
+from wildshape.evaluation.drives.protocol import evaluate_drives
+from wildshape.evaluation.drives.results import as_json
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.box_files import BoxFiles
+from wildshape.io.boxes.table import BoxRow, write_box_table
 from wildshape.io.poses import write_poses
 from wildshape.io.scans.writers import write_ply
 from wildshape.io.store.index import file_record
@@ -172,6 +181,41 @@ def _read_calibration(folder: Path) -> Arrays:
     yield None
 
 
+_ALL_COUNT = Counting(points=0, range_m=1e6)
+
+
+def _build_drives(folder: Path) -> None:
+    """What was found in two scans, and labels of them: of KITTI and simulated."""
+    scene = street(2, points=400, eye=tracking.EYE)
+    for kind in ("kitti", "simulated"):
+        labels, found = folder / kind / "labels", folder / kind / "found"
+        tracking.write_sequence(labels, scene, oxts=kind == "kitti")
+        rows = [
+            BoxRow(frame, 0.1 * frame, f"{one.track}", *one.box, 0.9, 50, moving=False)
+            for frame, labelled in enumerate(read_labels(labels, _ALL_COUNT).frames)
+            for one in labelled.labels
+        ]
+        write_box_table(found / "boxes.csv", rows)
+        (found / "frames.csv").write_text("frame,scan,time,points\n0,000000,0,9\n1,000001,,9\n")
+        write_poses(found / "trajectory.txt", SE3.identity(2))
+        for name in {row.track for row in rows}:
+            write_track(found / "tracks" / name, replace(track(), name=name))
+        if kind == "simulated":
+            write_box_table(labels / "truth" / "0001.csv", rows)
+            write_poses(labels / "poses" / "0001.txt", SE3.identity(2))
+
+
+def _read_drives(folder: Path) -> Arrays:
+    """As `evaluate-drive` does."""
+    (found, labels) = drives_of(folder / "found", folder / "labels")[0]
+    labelled = read_labels(labels, _ALL_COUNT)
+    scores = evaluate_drives([read_found(found, len(labelled.frames))], [labelled])
+    as_json(scores, _ALL_COUNT, {})
+    for row in scores.rows:
+        yield np.array([one.average_precision for one in row.detections], float)
+        yield None if row.size_bias_m is None else np.array(row.size_bias_m)
+
+
 def _build_meshes(folder: Path) -> None:
     import trimesh
 
@@ -204,5 +248,6 @@ TARGETS = (
     Target("viewer", _build_results, _read_viewer, 0.7, attacked=_is_result),
     Target("boxes", _build_results, _read_boxes, 0.5, attacked=_is_result, writes=True),
     Target("calibration", _build_calibration, _read_calibration, 0.7),
+    Target("evaluate-drive", _build_drives, _read_drives, 1),
     Target("meshes", _build_meshes, _read_meshes, 1.5),
 )
