@@ -62,7 +62,7 @@ def match(
     return outcome
 
 
-def pooled(frames: Iterable[tuple[Float[np.ndarray, "f"], np.ndarray, int]]) -> Ranked:
+def pooled(frames: Iterable[tuple[Float[np.ndarray, "_"], np.ndarray, int]]) -> Ranked:
     """Confidences, outcomes and counted labels of many frames as one."""
     parts = list(frames)
     return Ranked(

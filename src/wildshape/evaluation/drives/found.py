@@ -4,9 +4,13 @@
 
 import csv
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from wildshape.datasets.kitti.raw import read_velodyne
 from wildshape.errors import BadInputError
 from wildshape.evaluation.drives.overlap import UprightBox
 from wildshape.geometry.transforms.se3 import SE3
@@ -16,6 +20,8 @@ from wildshape.io.inputs import open_tracks
 from wildshape.io.poses import read_poses
 from wildshape.records import Points
 
+Clusters = dict[tuple[int, str], Points]
+_AROUND_M, _ABOVE_M, _FEWEST = 0.3, 0.2, 5
 BOXES, TRAJECTORY, FRAMES, TRACKS = "boxes.csv", "trajectory.txt", "frames.csv", "tracks"
 
 
@@ -115,7 +121,33 @@ def _upright(row: BoxRow) -> UprightBox:
     return UprightBox(row.x, row.y, row.z, row.length, row.width, row.height, row.yaw)
 
 
-def read_clusters(path: Path) -> dict[tuple[int, str], Points]:
+def points_inside(drive: FoundDrive, scans: Sequence[Path]) -> Clusters:
+    """The points in and close around each found box, without the ground under it.
+
+    For drives whose clusters were not kept.
+
+    Args:
+        drive: what was found.
+        scans: its files, of KITTI's format.
+
+    Raises:
+        BadInputError: a scan is damaged.
+    """
+    inside: Clusters = {}
+    for number, (scan, frame) in enumerate(zip(scans, drive.frames)):
+        points = read_velodyne(scan) if frame else np.empty((0, 3), np.float32)
+        for one in frame:
+            box = one.box
+            c, s = np.cos(box.yaw), np.sin(box.yaw)
+            own = (points - np.array(box[:3], np.float32)) @ np.array(((c, -s, 0), (s, c, 0), (0, 0, 1)))
+            near = (np.abs(own[:, :2]) < np.array(box[3:5]) / 2 + _AROUND_M).all(1)
+            upright = np.abs(own[:, 2] - _ABOVE_M / 2) < (box.height - _ABOVE_M) / 2 + 1e-6
+            if (near & upright).sum() >= _FEWEST:
+                inside[number, one.track] = points[near & upright]
+    return inside
+
+
+def read_clusters(path: Path) -> Clusters:
     """The points of each track in each frame, sensor frame, metres; empty where none were kept.
 
     Raises:
@@ -127,7 +159,7 @@ def read_clusters(path: Path) -> dict[tuple[int, str], Points]:
     with reading(frames, "a list of frames"), frames.open(encoding="utf-8", newline="") as file:
         frame_of = {row["scan"]: int(row["frame"]) for row in csv.DictReader(file)}
     source = open_tracks(path / TRACKS)
-    clusters: dict[tuple[int, str], Points] = {}
+    clusters: Clusters = {}
     for number in range(len(source)):
         track = source[number]
         for name, points in zip(track.scan_names, track.scans, strict=True):

@@ -18,7 +18,13 @@ from wildshape.evaluation.drives.average_precision import (
     pooled,
     recall_when_sure,
 )
-from wildshape.evaluation.drives.found import Found, FoundDrive, read_clusters
+from wildshape.evaluation.drives.found import (
+    Clusters,
+    Found,
+    FoundDrive,
+    points_inside,
+    read_clusters,
+)
 from wildshape.evaluation.drives.labels import LabelledDrive, LabelledFrame, View
 from wildshape.evaluation.drives.overlap import Overlaps, UprightBox, overlaps
 from wildshape.evaluation.drives.rectangles import l_shape, smallest_rectangle
@@ -151,7 +157,7 @@ def evaluate_drives(
         at: told how many rows are done.
 
     Raises:
-        BadInputError: nothing that counts is labelled, or the kept points are damaged.
+        BadInputError: nothing that counts is labelled, or kept points or scans are damaged.
     """
     if not any(one.counted for drive in labelled for frame in drive.frames for one in frame.labels):
         raise BadInputError(
@@ -160,18 +166,20 @@ def evaluate_drives(
         )
     rows = [_row(OURS, found, labelled)]
     at(1)
-    clusters = [read_clusters(drive.path) for drive in found]
+    clusters = [
+        read_clusters(drive.path) or points_inside(drive, labels.scans)
+        for drive, labels in zip(found, labelled, strict=True)
+    ]
     for number, (name, fit) in enumerate(BASELINES.items(), 2):
-        if all(clusters):
-            refitted = [_refitted(drive, kept, fit) for drive, kept in zip(found, clusters)]
-            rows.append(_row(name, refitted, labelled))
+        refitted = [_refitted(drive, kept, fit) for drive, kept in zip(found, clusters)]
+        rows.append(_row(name, refitted, labelled))
         at(number)
     errors = tuple(_trajectory(one, other) for one, other in zip(found, labelled, strict=True))
     return DriveScores(tuple(rows), errors)
 
 
 def _refitted(
-    drive: FoundDrive, clusters: dict[tuple[int, str], Points], fit: Callable[[Points], UprightBox]
+    drive: FoundDrive, clusters: Clusters, fit: Callable[[Points], UprightBox]
 ) -> FoundDrive:
     """The same vehicles, as sure, with other boxes; where no point was seen there is none."""
     frames = tuple(

@@ -105,8 +105,6 @@ def _notes(scores: DriveScores, counting: Counting) -> str:
         "AP in percent; recall in percent at IoU 0.5 in bird's eye view (BEV), as HOTA's overlap.",
         "Length, width, height: mean of found minus labelled.",
     ]
-    if len(scores.rows) == 1:
-        lines.append("No points of tracks were kept: no other boxes could be put around them.")
     known = [one for one in scores.trajectories if one is not None]
     drifts = [one.drift_percent for one in known if one.drift_percent is not None]
     if known:
