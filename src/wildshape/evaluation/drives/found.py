@@ -137,14 +137,19 @@ def points_inside(drive: FoundDrive, scans: Sequence[Path]) -> Clusters:
     for number, (scan, frame) in enumerate(zip(scans, drive.frames)):
         points = read_velodyne(scan) if frame else np.empty((0, 3), np.float32)
         for one in frame:
-            box = one.box
-            c, s = np.cos(box.yaw), np.sin(box.yaw)
-            own = (points - np.array(box[:3], np.float32)) @ np.array(((c, -s, 0), (s, c, 0), (0, 0, 1)))
-            near = (np.abs(own[:, :2]) < np.array(box[3:5]) / 2 + _AROUND_M).all(1)
-            upright = np.abs(own[:, 2] - _ABOVE_M / 2) < (box.height - _ABOVE_M) / 2 + 1e-6
-            if (near & upright).sum() >= _FEWEST:
-                inside[number, one.track] = points[near & upright]
+            own = _inside(points, one.box)
+            if len(own) >= _FEWEST:
+                inside[number, one.track] = own
     return inside
+
+
+def _inside(points: Points, box: UprightBox) -> Points:
+    c, s = np.cos(box.yaw), np.sin(box.yaw)
+    turn = np.array(((c, -s, 0), (s, c, 0), (0, 0, 1)))
+    own = (points - np.array(box[:3], np.float32)) @ turn
+    near = (np.abs(own[:, :2]) < np.array(box[3:5]) / 2 + _AROUND_M).all(1)
+    above = (own[:, 2] > _ABOVE_M - box.height / 2) & (own[:, 2] < box.height / 2)
+    return points[near & above]
 
 
 def read_clusters(path: Path) -> Clusters:
