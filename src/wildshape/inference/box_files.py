@@ -1,8 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""`--boxes`: all boxes of a finished output, in the formats of data sets."""
+"""`--boxes`: all boxes of a finished output, in the formats of data sets.
 
-from collections.abc import Sequence
+To add a format: a writer in `io/boxes/`, and what is said of it in `_FORMATS`.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,21 +17,8 @@ if TYPE_CHECKING:
     from wildshape.io.boxes.detections import Detection
     from wildshape.io.boxes.kitti import KittiCamera
 
-BOX_FORMATS = ("json", "kitti", "nuscenes", "argoverse2")
 _FOLDER = "boxes"
-_JSON, _NUSCENES = "boxes.json", "nuscenes.json"
-_ARGOVERSE2 = "argoverse2/annotations.feather"
 _CURE = "KITTI's calibration brings it"
-BOX_FILES = tuple(f"{_FOLDER}/{name}" for name in (_JSON, _NUSCENES, _ARGOVERSE2, "kitti/*.txt"))
-_UNCALIBRATED = {
-    "kitti": "KITTI's labels are written for a camera at the LiDAR's own place that looks along x;"
-    " pass --calibration FILE (KITTI's .txt) for the real one",
-    "nuscenes": "nuScenes' records are in each scan's sensor frame; apply your ego poses and"
-    " calibration for the global frame",
-    "argoverse2": "Argoverse 2's table is in the sensor frame; pass --calibration FILE"
-    " (egovehicle_SE3_sensor.feather) for the egovehicle's",
-}
-_CALIBRATES = {".txt": "kitti", ".feather": "argoverse2"}
 
 
 @dataclass(frozen=True)
@@ -59,19 +49,17 @@ class BoxFiles:
         for unknown in set(self.formats) - {*BOX_FORMATS}:
             known = ", ".join(BOX_FORMATS)
             raise BadInputError(f"--boxes {unknown}: no such format; there are {known}.")
-        if "argoverse2" in self.formats:
-            from wildshape.io.boxes.argoverse2 import load_pyarrow
-
-            load_pyarrow()
+        for kind in self.formats:
+            _FORMATS[kind].check()
         if self.calibration is None:
             return
-        wants = _CALIBRATES.get(self.calibration.suffix.lower())
-        if wants not in self.formats:
+        if not any(map(self._calibrates, self.formats)):
             raise BadInputError(
                 f"--calibration {self.calibration}: --boxes kitti takes KITTI's .txt, --boxes"
                 " argoverse2 takes egovehicle_SE3_sensor.feather; name that format, too."
             )
-        _camera(self.calibration) if wants == "kitti" else _ego(self.calibration)
+        for kind in self.formats:
+            self._calibration(kind)
 
     def write(self, out: Path) -> list[str]:
         """Write them from the `objects.json` of every track below `out`.
@@ -79,37 +67,52 @@ class BoxFiles:
         Returns:
             Sentences on what to know of them.
         """
-        from wildshape.io.boxes.detections import read_detections, write_box_list
-        from wildshape.io.boxes.nuscenes import write_nuscenes_boxes
+        from wildshape.io.boxes.detections import read_detections
 
-        detections, folder = read_detections(out), out / _FOLDER
-        if "json" in self.formats:
-            write_box_list(folder / _JSON, detections)
-        if "nuscenes" in self.formats:
-            write_nuscenes_boxes(folder / _NUSCENES, detections)
-        if "kitti" in self.formats:
-            self._kitti(folder / "kitti", detections)
-        if "argoverse2" in self.formats:
-            self._argoverse2(folder / _ARGOVERSE2, detections)
-        bare = [kind for kind in self.formats if not self._calibrates(kind)]
-        return [_UNCALIBRATED[kind] for kind in bare if kind in _UNCALIBRATED]
+        detections = read_detections(out)
+        for kind in self.formats:
+            made = _FORMATS[kind]
+            made.write(out / _FOLDER / made.file, detections, self._calibration(kind))
+        bare = [_FORMATS[kind].bare for kind in self.formats if not self._calibrates(kind)]
+        return [sentence for sentence in bare if sentence]
 
     def _calibrates(self, kind: str) -> bool:
         known = self.calibration
-        return known is not None and _CALIBRATES.get(known.suffix.lower()) == kind
+        return known is not None and known.suffix.lower() == _FORMATS[kind].suffix
 
-    def _kitti(self, folder: Path, detections: "Sequence[Detection]") -> None:
-        from wildshape.io.boxes.kitti import camera_at_the_lidar, write_kitti_labels
+    def _calibration(self, kind: str) -> Any:
+        read, known = _FORMATS[kind].calibrated, self.calibration
+        return read(known) if read and known and self._calibrates(kind) else None
 
-        known = self.calibration if self._calibrates("kitti") else None
-        camera = camera_at_the_lidar() if known is None else _camera(known)
-        write_kitti_labels(folder, detections, camera)
 
-    def _argoverse2(self, path: Path, detections: "Sequence[Detection]") -> None:
-        from wildshape.io.boxes.argoverse2 import write_argoverse2_boxes
+def _json(path: Path, detections: "Sequence[Detection]", _: None) -> None:
+    from wildshape.io.boxes.detections import write_box_list
 
-        known = self.calibration if self._calibrates("argoverse2") else None
-        write_argoverse2_boxes(path, detections, None if known is None else _ego(known))
+    write_box_list(path, detections)
+
+
+def _nuscenes(path: Path, detections: "Sequence[Detection]", _: None) -> None:
+    from wildshape.io.boxes.nuscenes import write_nuscenes_boxes
+
+    write_nuscenes_boxes(path, detections)
+
+
+def _kitti(path: Path, detections: "Sequence[Detection]", camera: "KittiCamera | None") -> None:
+    from wildshape.io.boxes.kitti import camera_at_the_lidar, write_kitti_labels
+
+    write_kitti_labels(path.parent, detections, camera or camera_at_the_lidar())
+
+
+def _argoverse2(path: Path, detections: "Sequence[Detection]", T_ego_sensor: "SE3 | None") -> None:
+    from wildshape.io.boxes.argoverse2 import write_argoverse2_boxes
+
+    write_argoverse2_boxes(path, detections, T_ego_sensor)
+
+
+def _check_arrow() -> None:
+    from wildshape.io.boxes.argoverse2 import load_pyarrow
+
+    load_pyarrow()
 
 
 def _camera(path: Path) -> "KittiCamera":
@@ -131,3 +134,54 @@ def _ego(path: Path) -> "SE3":
     from wildshape.datasets.argoverse2.log import read_sensor_pose
 
     return read_sensor_pose(path.resolve().parent.parent, "both")
+
+
+@dataclass(frozen=True)
+class _Format:
+    """What there is to know of a format.
+
+    Attributes:
+        file: below the folder of boxes; a pattern where a track has a file of its own.
+        write: the file, detections, and what `calibrated` read or None.
+        suffix: of a calibration, if it takes one.
+        calibrated: reads it.
+        bare: what to know of boxes that were written without.
+        check: whether it can be written at all.
+    """
+
+    file: str
+    write: Callable[[Path, "Sequence[Detection]", Any], None]
+    suffix: str = ""
+    calibrated: Callable[[Path], Any] | None = None
+    bare: str = ""
+    check: Callable[[], None] = lambda: None
+
+
+_FORMATS = {
+    "json": _Format("boxes.json", _json),
+    "kitti": _Format(
+        "kitti/*.txt",
+        _kitti,
+        suffix=".txt",
+        calibrated=_camera,
+        bare="KITTI's labels are written for a camera at the LiDAR's own place that looks along x;"
+        " pass --calibration FILE (KITTI's .txt) for the real one",
+    ),
+    "nuscenes": _Format(
+        "nuscenes.json",
+        _nuscenes,
+        bare="nuScenes' records are in each scan's sensor frame; apply your ego poses and"
+        " calibration for the global frame",
+    ),
+    "argoverse2": _Format(
+        "argoverse2/annotations.feather",
+        _argoverse2,
+        suffix=".feather",
+        calibrated=_ego,
+        bare="Argoverse 2's table is in the sensor frame; pass --calibration FILE"
+        " (egovehicle_SE3_sensor.feather) for the egovehicle's",
+        check=_check_arrow,
+    ),
+}
+BOX_FORMATS = tuple(_FORMATS)
+BOX_FILES = tuple(f"{_FOLDER}/{kind.file}" for kind in _FORMATS.values())
