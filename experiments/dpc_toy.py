@@ -33,8 +33,8 @@ from wildshape.baselines.dpc.checkpoint import DpcSettings
 from wildshape.baselines.dpc.completer import Dpc
 from wildshape.baselines.dpc.objective import PRESETS, DpcRecipe
 from wildshape.baselines.dpc.occupancy import project
+from wildshape.baselines.dpc.run import DpcRun, fit_dpc, setup_dpc
 from wildshape.baselines.dpc.silhouette import image_costs
-from wildshape.baselines.dpc.training import DpcRun, fit_dpc, setup_dpc
 from wildshape.baselines.dpc.viewing_volume import (
     ahead,
     coarser,

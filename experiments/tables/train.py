@@ -13,7 +13,7 @@ from experiments.tables.data import store_of
 from experiments.tables.table import Trained
 
 from wildshape.baselines.dpc.objective import DpcRecipe
-from wildshape.baselines.dpc.training import fit_dpc, setup_dpc
+from wildshape.baselines.dpc.run import fit_dpc, setup_dpc
 from wildshape.cli.process import stop_flag, stoppable
 from wildshape.cli.terminal import TERMINAL, say
 from wildshape.inference.models import choose_device
@@ -22,7 +22,7 @@ from wildshape.io.progress import SILENT
 from wildshape.io.provenance import provenance
 from wildshape.io.store.store import Store, open_store
 from wildshape.training.config import Recipe
-from wildshape.training.loop import MODEL, setup
+from wildshape.training.loop import MODEL, StopRequested, setup
 from wildshape.training.train import fit_with_progress
 
 _TRAINED = "trained.json"
@@ -119,6 +119,9 @@ def _train_dpc(
     run = setup_dpc(recipe, store, folder, seed=seed, device=device, resume=True, provenance=made)
     first, steps = run.state.step, recipe.optim.steps
     with stop_flag() as stopped, TERMINAL.bar("training DPC", steps, start=first) as bar:
-        if not fit_dpc(run, lambda at, _: bar.at(at), stopped):
-            raise stopped.error(f"stopped after step {run.state.step}; go on with `{shop.command}`")
+        try:
+            fit_dpc(run, lambda at, _: bar.at(at), stopped)
+        except StopRequested:
+            text = f"stopped after step {run.state.step}; go on with `{shop.command}`"
+            raise stopped.error(text) from None
     return first, run.state.step

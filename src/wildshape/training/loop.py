@@ -3,7 +3,8 @@
 """Training: fit, validate, save. One loop for a CPU, a GPU and several processes."""
 
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from wildshape.training.runtime.profiler import steps_profiled
 from wildshape.training.runtime.running_mean import Meter, refuse_not_finite
 from wildshape.training.self_training.headings import agreed_rotations
 from wildshape.training.setup import Run, setup, split_tracks, step_of
-from wildshape.training.state import save_state
+from wildshape.training.state import TrainState, save_state
 from wildshape.training.step import Step
 from wildshape.training.validate import Validation, truth_figures, usual_up, validate
 
@@ -51,25 +52,86 @@ def fit(
         RunLog(run.folder, run.state.step) if run.processes.leads else _Silent() as log,
         steps_profiled(run.profile) as step_done,
     ):
-        while run.state.step < run.recipe.optim.steps:
+
+        def take() -> None:
             _take(run, step, advance)
             step_done()
-            now, steps = run.state.step, run.recipe.optim.steps
-            due = now < steps and now % run.recipe.validate_every == 0
-            stop = now < steps and _stop_asked(run, stopped)
-            # Whatever is saved below, its loss is read before and refused if not finite.
-            if due or stop or now % _log_every(run) == 0 or now == steps:
-                values = meter.read(now)
-                log.write(now, values)
-                if progress is not None:
-                    _report(run, progress, values)
-            if stop:
-                _save_and_stop(run)
-            if due:
-                log.write(now, checkpoint(run))
-        log.write(run.state.step, checkpoint(run))
+
+        loop = Loop(
+            state=run.state,
+            plan=lambda: (run.recipe.optim.steps, run.recipe.validate_every),
+            log_every=_log_every(run),
+            take=take,
+            save=partial(checkpoint, run),
+            halt=partial(_save_state, run),
+        )
+        run_to_end(loop, meter, log, progress, partial(_stop_asked, run, stopped))
     run.processes.leave()
     return run.folder / MODEL
+
+
+@dataclass(frozen=True)
+class Loop:
+    """What a run hands to the loop; DPC has the same one (`baselines/dpc/run.py`).
+
+    Attributes:
+        state: its count of steps tells where the run is.
+        plan: steps to be taken in all, and from one checkpoint to the next; asked at every step,
+            for a time budget may change them.
+        log_every: steps from one line of the log to the next.
+        take: takes a step, and counts it in the state.
+        save: writes model and state; returns what the log says of them.
+        halt: writes what a later run goes on from.
+    """
+
+    state: TrainState[Any]
+    plan: Callable[[], tuple[int, int]]
+    log_every: int
+    take: Callable[[], None]
+    save: Callable[[], dict[str, Any]]
+    halt: Callable[[], object]
+
+
+def run_to_end(
+    loop: Loop,
+    meter: Meter,
+    log: "RunLog | _Silent",
+    progress: Progress | None,
+    stopped: Callable[[], bool],
+) -> None:
+    """Step to the end, logging and saving on the way; arguments and errors as of `fit`."""
+    state = loop.state
+    while state.step < loop.plan()[0]:
+        loop.take()
+        now, (steps, save_every) = state.step, loop.plan()
+        due = now < steps and now % save_every == 0
+        stop = now < steps and stopped()
+        # Whatever is saved below, its loss is read before and refused if not finite.
+        if due or stop or now % loop.log_every == 0 or now == steps:
+            values = meter.read(now)
+            log.write(now, values)
+            _report(loop, progress, values)
+        if stop:
+            loop.halt()
+            raise StopRequested
+        if due:
+            _save(loop, log)
+    _save(loop, log)
+
+
+def _save(loop: Loop, log: "RunLog | _Silent") -> None:
+    figures = loop.save()
+    if figures:
+        log.write(loop.state.step, figures)
+
+
+def _report(loop: Loop, progress: Progress | None, values: dict[str, Any]) -> None:
+    try:
+        if progress is not None:
+            progress(loop.state.step, values)
+    except (StopRequested, KeyboardInterrupt):
+        loop.halt()
+        raise
 
 
 def _log_every(run: Run) -> int:
@@ -83,19 +145,9 @@ def _stop_asked(run: Run, stopped: Callable[[], bool]) -> bool:
     return run.state.step % _log_every(run) == 0 and run.processes.any(stopped())
 
 
-def _save_and_stop(run: Run) -> None:
+def _save_state(run: Run) -> None:
     if run.processes.leads:
         save_state(run.folder, run.state, run.identity)
-    raise StopRequested
-
-
-def _report(run: Run, progress: Progress, values: dict[str, Any]) -> None:
-    try:
-        progress(run.state.step, values)
-    except (StopRequested, KeyboardInterrupt):
-        if run.processes.leads:
-            save_state(run.folder, run.state, run.identity)
-        raise
 
 
 @record_function("wildshape: step")

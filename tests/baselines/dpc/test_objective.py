@@ -12,15 +12,15 @@ from safetensors.torch import load_file
 from wildshape.baselines.dpc.completer import Dpc, load
 from wildshape.baselines.dpc.network import DpcNet
 from wildshape.baselines.dpc.objective import PRESETS, DpcObjective
+from wildshape.baselines.dpc.run import fit_dpc, setup_dpc
 from wildshape.baselines.dpc.silhouette import Hindsight
-from wildshape.baselines.dpc.training import fit_dpc, setup_dpc
 from wildshape.baselines.dpc.viewing_volume import PolarVolume
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_angle
 from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.batches.views import ViewSampler
-from wildshape.training.loop import MODEL
+from wildshape.training.loop import MODEL, StopRequested
 
 
 def tiny(name, steps=3):
@@ -107,13 +107,14 @@ def test_a_half_turn_that_wins_teaches_a_candidate_too(plane_store, monkeypatch)
 def test_training_lowers_the_loss_and_can_be_resumed(plane_store, tmp_path):
     seen = []
     whole = setup_dpc(tiny("dpc-small", 27), plane_store, tmp_path / "whole")
-    assert fit_dpc(whole, lambda _, values: seen.append(values["silhouette"]))
+    fit_dpc(whole, lambda _, values: seen.append(values["silhouette"]))
     assert seen[-1] < seen[0]
     part = setup_dpc(tiny("dpc-small", 27), plane_store, tmp_path / "part")
-    assert not fit_dpc(part, stopped=lambda: part.state.step == 9)
+    with pytest.raises(StopRequested):
+        fit_dpc(part, stopped=lambda: part.state.step == 9)
     again = setup_dpc(tiny("dpc-small", 27), plane_store, tmp_path / "part", resume=True)
     assert again.state.step == 9
-    assert fit_dpc(again)
+    fit_dpc(again)
     expected, found = (load_file(tmp_path / name / MODEL) for name in ("whole", "part"))
     assert all(torch.equal(expected[key], found[key]) for key in expected)
 

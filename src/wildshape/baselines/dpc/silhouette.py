@@ -88,10 +88,8 @@ def cheapest(
     strength: Float[Tensor, "B"],
 ) -> Int[Tensor, "B"]:
     """Row of the candidate whose image is nearest; arguments as of `hindsight`."""
-    costs = [
-        sum(_costs(posed[:, k], offset, observed, rendering, strength))
-        for k in range(posed.shape[1])
-    ]
+    each = (_costs(one, offset, observed, rendering, strength) for one in posed.unbind(1))
+    costs = [silhouette + depth for silhouette, depth in each]
     return torch.stack(costs, dim=1).argmin(1)
 
 

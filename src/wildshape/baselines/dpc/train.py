@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from wildshape.baselines.dpc.objective import PRESETS, DpcRecipe
-from wildshape.baselines.dpc.training import DpcRun, fit_dpc, setup_dpc
+from wildshape.baselines.dpc.run import DpcRun, fit_dpc, setup_dpc
 from wildshape.errors import BadInputError
 from wildshape.inference.models import MODEL, choose_device
 from wildshape.io.output import command_line
@@ -89,11 +89,13 @@ def dpc_recipe(options: TrainingOptions) -> DpcRecipe:
 def _fit(run: DpcRun, progress: Progress, stopping: Stopping) -> None:
     steps = run.recipe.optim.steps
     with stopping() as stopped, progress.bar("training DPC", steps, start=run.state.step) as bar:
-        if not fit_dpc(run, lambda at, values: bar.at(at, _line(values)), stopped):
+        try:
+            fit_dpc(run, lambda at, values: bar.at(at, _line(values)), stopped)
+        except StopRequested:
             raise StopRequested(
                 f"stopped after step {run.state.step} of {steps}, the state is saved; go on with"
                 " the same command and --resume."
-            )
+            ) from None
 
 
 def _line(values: dict[str, Any]) -> str:

@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Training of DPC from its recipe to its checkpoint, on one process."""
+"""A run of DPC from its recipe to its checkpoint, on one process, by the common loop."""
 
 import copy
 import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from wildshape.io.atomic import write_text
 from wildshape.io.store.store import Store
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.config import learning_rate
-from wildshape.training.loop import MODEL
+from wildshape.training.loop import MODEL, Loop, Progress, run_to_end
 from wildshape.training.runtime.log import RunLog
 from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.setup import split_tracks
@@ -30,7 +31,6 @@ from wildshape.training.state import STATE, TrainState, load_state, save_state
 from wildshape.training.step import average_one_by_one
 
 _LOG_EVERY, _LOOKED_AT, _SEEN = 25, 64, 0.9
-Report = Callable[[int, dict[str, Any]], None]
 
 
 @dataclass
@@ -89,9 +89,9 @@ def setup_dpc(
 
 
 def fit_dpc(
-    run: DpcRun, report: Report | None = None, stopped: Callable[[], bool] = lambda: False
-) -> bool:
-    """Train to the last step, or until `stopped`; saves, and says whether it was finished.
+    run: DpcRun, report: Progress | None = None, stopped: Callable[[], bool] = lambda: False
+) -> None:
+    """Train to the last step by the loop that all trainings have.
 
     Args:
         run: set up.
@@ -99,26 +99,18 @@ def fit_dpc(
         stopped: asked after every step.
 
     Raises:
+        StopRequested: `stopped` said so; model and state are saved.
         BadInputError: the loss is not finite; the last checkpoint stays.
     """
-    state, steps = run.state, run.recipe.optim.steps
+    state, save = run.state, partial(_save, run)
     device = next(state.network.parameters()).device
     objective = DpcObjective(state.network, run.recipe.loss)
     meter = Meter(run.recipe.network.candidates, state.step, device)
+    take = partial(_take, run, objective, meter)
+    plan = (run.recipe.optim.steps, run.recipe.save_every)
+    loop = Loop(state, lambda: plan, _LOG_EVERY, take, save, save)
     with RunLog(run.folder, state.step) as log:
-        while state.step < steps and not stopped():
-            _take(run, objective, meter)
-            now = state.step
-            due = now % run.recipe.save_every == 0
-            if now % _LOG_EVERY == 0 or due or now == steps:
-                values = meter.read(now)
-                log.write(now, values)
-                if report is not None:
-                    report(now, values)
-            if due:
-                _save(run)
-    _save(run)
-    return state.step == steps
+        run_to_end(loop, meter, log, report, stopped)
 
 
 def _take(run: DpcRun, objective: DpcObjective, meter: Meter) -> None:
@@ -141,13 +133,14 @@ def _take(run: DpcRun, objective: DpcObjective, meter: Meter) -> None:
     state.step += 1
 
 
-def _save(run: DpcRun) -> None:
-    """The checkpoint and the state."""
+def _save(run: DpcRun) -> dict[str, Any]:
+    """Write the checkpoint and the state; there are no figures of them."""
     provenance = {**run.provenance, "steps": run.state.step, "seed": run.seed}
     recipe, loss = run.recipe, run.recipe.loss
     settings = DpcSettings(recipe.network, recipe.name, loss.depth, provenance, loss.half_turn)
     save_dpc(run.folder / MODEL, run.state.mean, settings)
     save_state(run.folder, run.state, run.identity)
+    return {}
 
 
 def _refuse_unseen(recipe: DpcRecipe, store: Store, sampler: ViewSampler) -> None:
