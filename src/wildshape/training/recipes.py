@@ -4,7 +4,9 @@
 
 from dataclasses import replace
 
+from wildshape.errors import BadInputError
 from wildshape.geometry.projection.visibility import FacingBins, PixelBins, PolarBins
+from wildshape.io.store.store import Store
 from wildshape.method.encoders.named import Backbone
 from wildshape.method.multiview import LossConfig
 from wildshape.method.network import NetworkConfig
@@ -141,3 +143,23 @@ PRESETS = {
     "views": views,
     "tiny": tiny,
 }
+
+
+def recipe_for(store: Store, preset: str, steps: int | None) -> Recipe:
+    """The preset, for the kind of sensor in the store, with another number of steps if asked.
+
+    Raises:
+        BadInputError: a preset of the paper that was made for the other kind of sensor.
+    """
+    recipe = PRESETS[preset]()
+    kind = store.sensor_of(0).kind
+    if kind != recipe.views.sensor:
+        if preset.startswith("paper-"):
+            raise BadInputError(
+                f"{store.path}: holds {kind} scans, but preset {preset} is for"
+                f" {recipe.views.sensor} scans; choose another preset."
+            )
+        recipe = replace(recipe, views=replace(recipe.views, sensor=kind))
+    if steps is None:
+        return recipe
+    return replace(recipe, optim=replace(recipe.optim, steps=steps))

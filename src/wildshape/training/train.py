@@ -10,7 +10,7 @@ import os
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -36,7 +36,7 @@ from wildshape.method.checkpoint import load_checkpoint
 from wildshape.method.encoders.named import Backbone
 from wildshape.training.config import Recipe
 from wildshape.training.loop import Run, StopRequested, fit, setup
-from wildshape.training.recipes import PRESETS, with_encoder
+from wildshape.training.recipes import recipe_for, with_encoder
 from wildshape.training.runtime.profiler import PROFILE
 
 _PACKED = "data.store"
@@ -219,26 +219,6 @@ def _checkpoint(model: str | None) -> Path | None:
     if model is None:
         return None
     return weights_file(None if model == "shipped" else Path(model))
-
-
-def recipe_for(store: Store, preset: str, steps: int | None) -> Recipe:
-    """The preset, for the kind of sensor in the store, with another number of steps if asked.
-
-    Raises:
-        BadInputError: a preset of the paper that was made for the other kind of sensor.
-    """
-    recipe = PRESETS[preset]()
-    kind = store.sensor_of(0).kind
-    if kind != recipe.views.sensor:
-        if preset.startswith("paper-"):
-            raise BadInputError(
-                f"{store.path}: holds {kind} scans, but preset {preset} is for"
-                f" {recipe.views.sensor} scans; choose another preset."
-            )
-        recipe = replace(recipe, views=replace(recipe.views, sensor=kind))
-    if steps is None:
-        return recipe
-    return replace(recipe, optim=replace(recipe.optim, steps=steps))
 
 
 def fit_with_progress(

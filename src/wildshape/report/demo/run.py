@@ -13,10 +13,11 @@ from wildshape.io.progress import SILENT, Progress, duration
 from wildshape.io.provenance import provenance
 from wildshape.io.store.store import open_store
 from wildshape.report.demo.results import draw, evaluate, process, verdict
+from wildshape.report.demo.time_budget import TimeBudget
 from wildshape.report.demo.tracks import TRAIN, DemoOptions, prepare
 from wildshape.training.loop import setup
-from wildshape.training.time_budget import TimeBudget
-from wildshape.training.train import Stopping, fit_with_progress, never_stopped, recipe_for
+from wildshape.training.recipes import recipe_for
+from wildshape.training.train import Stopping, fit_with_progress, never_stopped
 
 FILES = ("report.html", *(f"{d}/**/*" for d in ("data", "run", "evaluation", "completed", "fused")))
 _DEFAULT = DemoOptions()

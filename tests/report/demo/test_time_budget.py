@@ -6,13 +6,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from wildshape.training import time_budget
+from wildshape.report.demo import time_budget
 from wildshape.training.loop import Run
 from wildshape.training.recipes import small
 
 
 def bare_run(step=0):
-    """As much of a run as pace looks at."""
+    """As much of a run as the budget reads."""
     run = object.__new__(Run)
     run.recipe, run.provenance = small(), {}
     vars(run)["state"] = SimpleNamespace(step=step)
