@@ -16,7 +16,7 @@ import wildshape
 from wildshape.drives import run
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.mounting import Mounting
-from wildshape.drives.segmentation import cut_scans
+from wildshape.drives.segmentation import Cutter
 from wildshape.drives.source import open_drive
 from wildshape.drives.trajectory import find_trajectory
 from wildshape.geometry.footprint import footprint_iou
@@ -140,7 +140,7 @@ def test_a_run_killed_at_any_stage_goes_on_to_the_same_boxes(
     def killed(*_, **__):
         raise Killed
 
-    for stage in ("find_trajectory", "cut_scans", "link", "write_sightings", "judge", "rows_of"):
+    for stage in ("find_trajectory", "Cutter", "link", "write_sightings", "judge", "rows_of"):
         with monkeypatch.context() as patched:
             patched.setattr(run, stage, killed)
             with pytest.raises(Killed):
@@ -149,6 +149,15 @@ def test_a_run_killed_at_any_stage_goes_on_to_the_same_boxes(
     assert again.seconds["trajectory"] < 1.0
     for name in ("boxes.csv", "trajectory.txt", "frames.csv", "stages/tracks.json"):
         assert (tmp_path / "out" / name).read_bytes() == (found.out / name).read_bytes(), name
+
+
+def test_several_processes_find_the_same(found, recording, tmp_path):
+    spread = wildshape.drive(recording, tmp_path / "out", workers=2)
+    assert spread.vehicles == found.vehicles
+    rows, others = (read_box_table(folder / "boxes.csv") for folder in (spread.out, found.out))
+    for row, other in zip(rows, others, strict=True):
+        assert (row.frame, row.track, row.points) == (other.frame, other.track, other.points)
+        assert (row.x, row.y, row.yaw) == pytest.approx((other.x, other.y, other.yaw), abs=1e-3)
 
 
 def test_other_settings_do_not_go_on_with_an_output(found, recording):
@@ -181,7 +190,10 @@ def test_scans_are_in_memory_one_by_one(recording, tmp_path):
 
     object.__setattr__(drive, "read", read)
     find_trajectory(drive, LEVEL, DriveConfig())
-    cut_scans(drive, LEVEL, tmp_path / "cuts", DriveConfig())
+    cutter = Cutter(drive, LEVEL, tmp_path / "cuts", DriveConfig())
+    for frame in cutter.missing():
+        cutter(frame)
+    assert cutter.missing() == []
     assert most <= 2
 
 

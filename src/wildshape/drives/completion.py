@@ -13,7 +13,7 @@ from wildshape.drives.config import CompletionConfig
 from wildshape.drives.sightings import Sightings
 from wildshape.drives.source import Drive
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.completed_files import write_completed
+from wildshape.inference.completed_files import OBJECTS, write_completed
 from wildshape.inference.predictor import Predictor
 from wildshape.io.atomic import write_json
 from wildshape.io.boxes.detections import moved
@@ -30,6 +30,7 @@ class Completer:
         predictor: completes and refines.
         drive: whose objects.
         cuts: folder of the clusters.
+        folder: where a folder of each object is written.
         T_level_sensor: of a tilted sensor; None for one held level, as networks expect it.
         config: see there.
     """
@@ -37,11 +38,22 @@ class Completer:
     predictor: Predictor
     drive: Drive
     cuts: Path
+    folder: Path
     T_level_sensor: SE3 | None
     config: CompletionConfig
 
-    def complete(self, seen: Sightings, folder: Path) -> None:
+    def missing(self, objects: list[Sightings]) -> list[Sightings]:
+        """Those that are neither completed nor ruled out yet."""
+        done = (OBJECTS, RULED_OUT)
+        return [
+            seen
+            for seen in objects
+            if not any((self.folder / seen.name / name).is_file() for name in done)
+        ]
+
+    def __call__(self, seen: Sightings) -> None:
         """Write an object as `complete --track` does, or `ruled_out.json`: what the looks said."""
+        folder = self.folder / seen.name
         looks = fullest_of_parts(seen, self.config.looks)
         found = list(self._looker().complete_many(self._clouds(looks)))
         cost = min(look.cost for look in found)

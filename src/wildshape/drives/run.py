@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from wildshape.drives.boxes import smooth
-from wildshape.drives.completion import RULED_OUT, Completer
+from wildshape.drives.completion import Completer
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.mounting import Mounting, find_mounting
 from wildshape.drives.outputs import (
@@ -32,7 +32,7 @@ from wildshape.drives.outputs import (
     write_vehicle_track,
 )
 from wildshape.drives.placing import level_poses, read_completed
-from wildshape.drives.segmentation import cut_scans, read_cuts
+from wildshape.drives.segmentation import Cutter, read_cuts
 from wildshape.drives.sightings import Sightings, read_sightings, write_sightings
 from wildshape.drives.source import Drive, open_drive
 from wildshape.drives.tracks import Seen, link
@@ -47,6 +47,7 @@ from wildshape.io.guard import read_json
 from wildshape.io.output import begin, keep_apart
 from wildshape.io.poses import read_poses
 from wildshape.io.typed_records import record_of
+from wildshape.parallel.processes import in_order
 
 FILES = (
     BOXES,
@@ -115,6 +116,7 @@ def drive(
     config: DriveConfig = _DEFAULT,
     *,
     predictor: Predictor | None = None,
+    workers: int = 1,
     overwrite: bool = False,
     watch: Watch = _silent,
 ) -> DriveResult:
@@ -125,6 +127,7 @@ def drive(
         out: folder to write (docs/drive.md); an interrupted run there is gone on with.
         config: the numbers of every stage.
         predictor: by default the shipped weights.
+        workers: processes that cut scans and complete objects.
         overwrite: remove an earlier output first.
         watch: told of progress.
 
@@ -145,7 +148,7 @@ def drive(
     }
     line = shlex.join(("wildshape", "drive", str(source), "--out", str(out)))
     output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
-    found = _Run(recording, out, config, predictor, _Clock(watch)).perform()
+    found = _Run(recording, out, config, predictor, workers, _Clock(watch)).perform()
     output.finish(result={**asdict(found), "out": str(out)})
     return found
 
@@ -158,6 +161,7 @@ class _Run:
     out: Path
     config: DriveConfig
     predictor: Predictor
+    workers: int
     clock: _Clock
 
     @property
@@ -205,8 +209,16 @@ class _Run:
             return read_poses(path, len(self.drive))
 
     def cut(self, mounting: Mounting) -> None:
-        with self.clock.stage("clusters", len(self.drive)) as at:
-            cut_scans(self.drive, mounting, self.cuts, self.config, at)
+        cutter = Cutter(self.drive, mounting, self.cuts, self.config)
+        self.spread("clusters", cutter, cutter.missing(), len(self.drive))
+
+    def spread(self, stage: str, task: Callable[[Any], None], items: list[Any], total: int) -> None:
+        """Do what is missing of a stage, by several processes where that is worth it."""
+        with self.clock.stage(stage, total) as at:
+            alone = min(self.workers, len(items)) < 2
+            done = map(task, items) if alone else in_order(task, items, self.workers)
+            for number, _ in enumerate(done, total - len(items) + 1):
+                at(number)
 
     def tracks(self, T_level_sensor: SE3) -> list[Sightings]:
         path = self.stages / "tracks.json"
@@ -246,13 +258,9 @@ class _Run:
     def complete(self, objects: list[Sightings], mounting: Mounting) -> None:
         level = mounting.levelling() if mounting.is_tilted else None
         config = self.config.completion
-        completer = Completer(self.predictor, self.drive, self.cuts, level, config)
-        with self.clock.stage("completion", len(objects)) as at:
-            for number, seen in enumerate(objects, 1):
-                folder = self.folder(seen)
-                if not any((folder / name).is_file() for name in (OBJECTS, RULED_OUT)):
-                    completer.complete(seen, folder)
-                at(number)
+        folder = self.stages / "objects"
+        completer = Completer(self.predictor, self.drive, self.cuts, folder, level, config)
+        self.spread("completion", completer, completer.missing(objects), len(objects))
 
     def vehicles(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Vehicle]:
         with self.clock.stage("vehicles", 1) as at:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each scan of a drive cut: its ground taken away, what stands on it kept in a file a scan."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -53,31 +53,32 @@ def cut(scan: Points, mounting: Mounting, config: DriveConfig) -> CutScan:
     return CutScan(scan[rows], np.array([len(part) for part in parts], np.int64), len(scan))
 
 
-def cut_scans(
-    drive: Drive,
-    mounting: Mounting,
-    folder: Path,
-    config: DriveConfig,
-    at: Callable[[int], None] = lambda _: None,
-) -> None:
-    """Cut every scan of a drive that has no file in the folder yet.
+@dataclass(frozen=True)
+class Cutter:
+    """Cuts the scans of a drive.
 
-    Args:
+    Attributes:
         drive: its scans are read one by one.
         mounting: of its sensor.
         folder: `000000.npz` of each frame is written there.
         config: see there.
-        at: told how many scans are done.
     """
-    for frame in range(len(drive)):
-        path = cut_file(folder, frame)
-        if not path.is_file():
-            found = cut(drive.scan(frame), mounting, config)
-            with atomic_write(path) as file:
-                np.savez(
-                    file, points=found.points, counts=found.counts, scanned=np.array(found.scanned)
-                )
-        at(frame + 1)
+
+    drive: Drive
+    mounting: Mounting
+    folder: Path
+    config: DriveConfig
+
+    def missing(self) -> list[int]:
+        """The frames that have no file yet."""
+        return [i for i in range(len(self.drive)) if not cut_file(self.folder, i).is_file()]
+
+    def __call__(self, frame: int) -> None:
+        """Cut one scan and write its file."""
+        found = cut(self.drive.scan(frame), self.mounting, self.config)
+        scanned = np.array(found.scanned)
+        with atomic_write(cut_file(self.folder, frame)) as file:
+            np.savez(file, points=found.points, counts=found.counts, scanned=scanned)
 
 
 def cut_file(folder: Path, frame: int) -> Path:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`wildshape drive`: every vehicle of a raw recording, without labels."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -53,6 +54,9 @@ class Settings:
     source: Sources
     out: OutFolder
     network: Network = DEFAULT_NETWORK
+    workers: Annotated[int | None, option(metavar="N", help="processes; by default one a core")] = (
+        None
+    )
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -68,15 +72,29 @@ def run(settings: Settings) -> None:
     from wildshape.drives.run import drive
     from wildshape.inference.predictor import load
 
+    workers = _workers(settings)
     folders = _folders(settings)
     predictor = load(settings.network.model, settings.network.device)
     found: list[DriveResult] = []
     for source, out in folders.items():
         with _bars() as watch:
-            overwrite = settings.overwrite
-            found.append(drive(source, out, predictor=predictor, overwrite=overwrite, watch=watch))
+            one = drive(
+                source,
+                out,
+                predictor=predictor,
+                workers=workers,
+                overwrite=settings.overwrite,
+                watch=watch,
+            )
+            found.append(one)
     text = "\n".join(map(_sentence, found))
     answer(text, {"drives": [_data(one) for one in found]}, as_json=settings.json)
+
+
+def _workers(settings: Settings) -> int:
+    if settings.workers is not None and settings.workers < 1:
+        raise BadInputError(f"--workers {settings.workers}: expected 1 or more.")
+    return settings.workers or os.cpu_count() or 1
 
 
 def _folders(settings: Settings) -> dict[Path, Path]:
