@@ -25,10 +25,10 @@ from wildshape.drives.config import (
 )
 from wildshape.drives.ground import height_above_ground
 from wildshape.drives.mounting import Mounting, ground_plane
-from wildshape.drives.sightings import Sightings
+from wildshape.drives.sightings import Sightings, merged
 from wildshape.drives.tracks import Seen, link
 from wildshape.drives.trajectory import jumps
-from wildshape.drives.vehicles import Completed, judge
+from wildshape.drives.vehicles import Completed, fragments, judge, vehicle_confidence
 from wildshape.geometry.transforms.se3 import SE3
 
 
@@ -162,17 +162,17 @@ def test_an_object_out_of_sight_goes_on_and_one_gone_too_long_does_not():
 
 def test_the_fullest_scan_of_each_part_is_completed():
     points = (10, 90, 70, 20, 80, 30, 5, 6, 7)
-    one = Sightings("a", tuple(range(9)), (0,) * 9, points)
+    one = Sightings("a", tuple(range(9)), ((0,),) * 9, points)
     assert fullest_of_parts(one, 3).frames == (1, 4, 8)
     assert fullest_of_parts(one, 3, fewest_points=60).frames == (1, 4)
     assert fullest_of_parts(one, 3, fewest_points=1000).frames == (1,)
     assert keyframes(one, CompletionConfig(scans=4, ticks=4, fewest_points=0)).frames == (1, 4, 8)
 
 
-def completed(boxes, frames=None, name="a", size=(4.0, 1.8, 1.5), cost=0.1):
+def completed(boxes, frames=None, name="a", size=(4.0, 1.8, 1.5), cost=0.1, parts=1):
     frames = tuple(range(len(boxes))) if frames is None else frames
     whole = tuple(range(frames[0], frames[-1] + 1))
-    sightings = Sightings(name, whole, (0,) * len(whole), (200,) * len(whole))
+    sightings = Sightings(name, whole, ((0,),) * len(whole), (200,) * len(whole), parts)
     return Completed(sightings, frames, np.array(boxes, float), size, cost, 0.5)
 
 
@@ -224,10 +224,48 @@ def test_vehicles_are_told_by_cost_and_size_and_counted_once():
     assert said == {
         "good": (),
         "again": ("same_place_as_good",),
-        "costly": ("cost",),
-        "high": ("height",),
+        "costly": ("unlikely",),
+        "high": ("unlikely", "height"),
         "later": (),
     }
+
+
+def test_less_cost_usual_size_and_more_scans_speak_for_a_vehicle():
+    config = VehicleConfig()
+    at = [(0.0, 0.0, 0.0, 0.0)] * 8
+
+    def sure(**other):
+        return vehicle_confidence(completed(at, **other), config)
+
+    assert 0.0 < sure(cost=0.3) < sure(cost=0.2) < sure(cost=0.1) < 1.0
+    assert sure(size=(4.3, 1.9, 1.0)) < sure() > sure(size=(4.3, 2.9, 1.5))
+    assert sure(size=(7.0, 2.5, 3.0)) > 0.5  # a lorry
+    assert sure(frames=tuple(range(0, 32, 4))) > sure()
+    # What is known in nats: the cost's own scale.
+    nats = [math.log(p / (1 - p)) for p in (sure(cost=0.1), sure(cost=0.1 + config.cost_scale_m))]
+    assert nats[0] - nats[1] == pytest.approx(1.0)
+
+
+def test_tracks_of_one_shape_in_one_place_are_put_together():
+    here, there = [(0.0, 0.0, 0.0, 0.0)], [(0.4, 0.1, 0.0, 0.0)]
+    objects = [
+        completed(here, frames=(0,), name="0"),
+        completed(there, frames=(6,), name="1"),
+        completed([(9.0, 0.0, 0.0, 0.0)], frames=(6,), name="2"),
+        completed(there, frames=(90,), name="3"),
+    ]
+    (found,) = fragments(objects, VehicleConfig())
+    assert (found.name, found.frames, found.parts) == ("0-1", (0, 6), 2)
+    whole = completed(here, frames=(0,), name="0-1", parts=2)
+    kept = {one.name for one in judge([*objects, whole], VehicleConfig()) if not one.reasons}
+    assert kept == {"0-1", "2", "3"}
+
+
+def test_pieces_of_one_scan_are_one_cloud():
+    left = Sightings("0", (3, 4), ((0,), (2,)), (40, 50))
+    right = Sightings("1", (4, 5), ((5,), (1,)), (60, 70))
+    both = merged([left, right])
+    assert both == Sightings("0-1", (3, 4, 5), ((0,), (2, 5), (1,)), (40, 110, 70), 2)
 
 
 def test_a_jump_is_counted_and_a_missing_scan_is_none():

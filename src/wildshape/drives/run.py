@@ -37,7 +37,7 @@ from wildshape.drives.sightings import Sightings, read_sightings, write_sighting
 from wildshape.drives.source import Drive, open_drive
 from wildshape.drives.tracks import Seen, link
 from wildshape.drives.trajectory import find_trajectory, jumps
-from wildshape.drives.vehicles import Judged, judge
+from wildshape.drives.vehicles import Completed, Judged, fragments, judge
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.completed_files import OBJECTS
 from wildshape.inference.predictor import Predictor, load
@@ -178,8 +178,10 @@ class _Run:
         self.cut(mounting)
         T_level_sensor = level_poses(T_world_sensor, mounting)
         objects = self.tracks(T_level_sensor)
-        self.complete(objects, mounting)
-        vehicles = self.vehicles(objects, T_level_sensor)
+        self.complete("completion", objects, mounting)
+        parts = self.merged(objects, T_level_sensor)
+        self.complete("merging", parts, mounting)
+        vehicles = self.vehicles([*objects, *parts], T_level_sensor)
         boxes = self.write(vehicles, T_level_sensor)
         return DriveResult(
             out=self.out,
@@ -246,7 +248,7 @@ class _Run:
             Sightings(
                 f"{number:04d}",
                 tuple(one.frames),
-                tuple(one.rows),
+                tuple((row,) for row in one.rows),
                 tuple(int(counts[frame][row]) for frame, row in zip(one.frames, one.rows)),
             )
             for number, one in enumerate(one for one in found if len(one.frames) >= fewest)
@@ -255,24 +257,36 @@ class _Run:
     def folder(self, seen: Sightings) -> Path:
         return self.stages / "objects" / seen.name
 
-    def complete(self, objects: list[Sightings], mounting: Mounting) -> None:
+    def complete(self, stage: str, objects: list[Sightings], mounting: Mounting) -> None:
         level = mounting.levelling() if mounting.is_tilted else None
         config = self.config.completion
         folder = self.stages / "objects"
         completer = Completer(self.predictor, self.drive, self.cuts, folder, level, config)
-        self.spread("completion", completer, completer.missing(objects), len(objects))
+        self.spread(stage, completer, completer.missing(objects), len(objects))
+
+    def completed(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Completed]:
+        """Those that were not ruled out."""
+        return [
+            read_completed(seen, self.folder(seen), self.drive, T_level_sensor)
+            for seen in objects
+            if (self.folder(seen) / OBJECTS).is_file()
+        ]
+
+    def merged(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Sightings]:
+        """Tracks that are one object by their shapes, put together."""
+        path = self.stages / "merged.json"
+        if not path.is_file():
+            completed = self.completed(objects, T_level_sensor)
+            write_sightings(path, fragments(completed, self.config.vehicles))
+        return read_sightings(path)
 
     def vehicles(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Vehicle]:
         with self.clock.stage("vehicles", 1) as at:
-            completed = [
-                read_completed(seen, self.folder(seen), self.drive, T_level_sensor)
-                for seen in objects
-                if (self.folder(seen) / OBJECTS).is_file()
-            ]
+            completed = self.completed(objects, T_level_sensor)
             said = judge(completed, self.config.vehicles)
             self.write_judged(objects, said)
             found = [
-                Vehicle(one, smooth(one, self.drive.ticks, self.config.boxes), one.confidence)
+                Vehicle(one, smooth(one, self.drive.ticks, self.config.boxes), judged.confidence)
                 for one, judged in zip(completed, said)
                 if not judged.reasons
             ]
@@ -281,13 +295,12 @@ class _Run:
 
     def write_judged(self, objects: list[Sightings], said: list[Judged]) -> None:
         """Why each object is a vehicle or not."""
-        by_name: dict[str, Any] = {one.name: list(one.reasons) for one in said}
+        judged = {one.name: (one.confidence, list(one.reasons)) for one in said}
+        rows = []
         for seen in objects:
-            by_name.setdefault(seen.name, ["first_looks"])
-        rows = [
-            {"track": name, "vehicle": not why, "reasons": why}
-            for name, why in sorted(by_name.items())
-        ]
+            confidence, why = judged.get(seen.name, (0.0, ["first_looks"]))
+            row = {"track": seen.name, "vehicle": not why, "confidence": confidence}
+            rows.append({**row, "reasons": why})
         write_json(self.stages / "vehicles.json", rows)
 
     def write(self, vehicles: list[Vehicle], T_level_sensor: SE3) -> int:

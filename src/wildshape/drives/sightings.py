@@ -5,6 +5,8 @@
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import numpy as np
+
 from wildshape.drives.segmentation import read_cut
 from wildshape.drives.source import Drive
 from wildshape.io.atomic import write_json
@@ -20,14 +22,16 @@ class Sightings:
     Attributes:
         name: of the object.
         frames: in which it was seen, rising.
-        rows: of its cluster in each of them.
-        points: of its cluster in each of them.
+        rows: of its clusters in each of them; fragments are several.
+        points: of its clusters in each of them.
+        parts: tracks that were put together.
     """
 
     name: str
     frames: tuple[int, ...]
-    rows: tuple[int, ...]
+    rows: tuple[tuple[int, ...], ...]
     points: tuple[int, ...]
+    parts: int = 1
 
     def part(self, kept: list[int]) -> "Sightings":
         """The same object in some of its frames, by place."""
@@ -36,18 +40,40 @@ class Sightings:
             tuple(self.frames[i] for i in kept),
             tuple(self.rows[i] for i in kept),
             tuple(self.points[i] for i in kept),
+            self.parts,
         )
 
     def clouds(self, cuts: Path) -> list[Points]:
         """Its points in each frame, sensor frame, metres."""
-        pairs = zip(self.frames, self.rows)
-        return [read_cut(cuts, frame).clusters()[row] for frame, row in pairs]
+        found = []
+        for frame, rows in zip(self.frames, self.rows):
+            clusters = read_cut(cuts, frame).clusters()
+            found.append(np.concatenate([clusters[row] for row in rows]))
+        return found
 
     def track(self, cuts: Path, drive: Drive, category: str) -> Track:
         """Its scans."""
         names = tuple(drive.scan_names[frame] for frame in self.frames)
         source = f"{drive.name}: cut out by `wildshape drive`, without labels"
         return Track(self.name, tuple(self.clouds(cuts)), names, category=category, source=source)
+
+
+def merged(parts: list[Sightings]) -> Sightings:
+    """Several objects as one, named after all of them."""
+    rows: dict[int, tuple[int, ...]] = {}
+    points: dict[int, int] = {}
+    for part in parts:
+        for frame, own, count in zip(part.frames, part.rows, part.points):
+            rows[frame] = (*rows.get(frame, ()), *own)
+            points[frame] = points.get(frame, 0) + count
+    frames = tuple(sorted(rows))
+    return Sightings(
+        "-".join(part.name for part in parts),
+        frames,
+        tuple(rows[frame] for frame in frames),
+        tuple(points[frame] for frame in frames),
+        sum(part.parts for part in parts),
+    )
 
 
 def write_sightings(path: Path, objects: list[Sightings]) -> None:

@@ -1,14 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which of the completed objects are vehicles: by label-free cost, by size, and none twice."""
+"""Which of the completed objects are vehicles: by cost, size and how long seen; and none twice."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from wildshape.drives.config import VehicleConfig
-from wildshape.drives.sightings import Sightings
+from wildshape.drives.sightings import Sightings, merged
 from wildshape.geometry.footprint import footprint_overlap
 
 
@@ -44,45 +45,82 @@ class Judged:
 
     Attributes:
         name: of it.
+        confidence: that it is a vehicle, 0 to 1.
         reasons: why it is no vehicle, or not this one; empty for vehicles.
     """
 
     name: str
+    confidence: float
     reasons: tuple[str, ...]
 
 
 def judge(objects: list[Completed], config: VehicleConfig) -> list[Judged]:
     """Every object, in the order given.
 
-    Of two that share a place at the same time the one with the better cost stays.
+    Of those that share a place at the same time the one of most confidence stays.
     """
-    own = {one.seen.name: _reasons(one, config) for one in objects}
+    sure = {one.seen.name: vehicle_confidence(one, config) for one in objects}
+    own = {one.seen.name: _reasons(one, sure[one.seen.name], config) for one in objects}
     kept: list[Completed] = []
-    for one in sorted(objects, key=lambda one: one.cost_m):
+    for one in sorted(objects, key=lambda one: -sure[one.seen.name]):
         name = one.seen.name
         if own[name]:
             continue
-        rival = next((other for other in kept if _same_place(one, other, config)), None)
+        rival = next((other for other in kept if same_place(one, other, config)), None)
         if rival is None:
             kept.append(one)
         else:
             own[name] = (f"same_place_as_{rival.seen.name}",)
-    return [Judged(one.seen.name, own[one.seen.name]) for one in objects]
+    names = (one.seen.name for one in objects)
+    return [Judged(name, sure[name], own[name]) for name in names]
 
 
-def _reasons(one: Completed, config: VehicleConfig) -> tuple[str, ...]:
+def vehicle_confidence(one: Completed, config: VehicleConfig) -> float:
+    """How sure it is that an object is a vehicle: what speaks for it, in nats, added up.
+
+    Its cost, its size (Gaussian around the nearest kind of vehicle), whether several tracks agree
+    on its shape, how often it was seen (at most a nat), and what the network says of its
+    completions (at most half).
+    """
+    cost = (config.even_cost_m - one.cost_m) / config.cost_scale_m
+    apart = (np.array(one.size) / np.array(config.kinds) - 1.0) / config.spread
+    size = 1.0 - 0.5 * float((apart**2).sum(1).min())
+    seen = 0.5 * math.log(len(one.seen.frames) / config.usual_scans)
+    said = 0.25 * math.log(max(one.confidence, 1e-6) / config.usual_confidence)
+    together = config.merged_nats if one.seen.parts > 1 else 0.0
+    nats = cost + size + together + min(max(seen, -1.0), 1.0) + min(max(said, -0.5), 0.5)
+    return 1.0 / (1.0 + math.exp(-min(max(nats, -20.0), 20.0)))
+
+
+def fragments(objects: list[Completed], config: VehicleConfig) -> list[Sightings]:
+    """Those of several tracks, or pieces of one scan, that are one object by their shapes.
+
+    Complete shapes that share a place at about the same time are one thing, whatever gap was
+    between the clusters that they came from.
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    shared = [[same_place(one, other, config) for other in objects] for one in objects]
+    if not objects:
+        return []
+    count, group = connected_components(np.array(shared), directed=False)
+    groups = [[objects[i].seen for i in np.flatnonzero(group == g)] for g in range(count)]
+    return [merged(parts) for parts in groups if len(parts) > 1]
+
+
+def _reasons(one: Completed, confidence: float, config: VehicleConfig) -> tuple[str, ...]:
     limits = zip(("length", "width", "height"), one.size, _sizes(config))
     wrong = [name for name, value, (low, high) in limits if not low <= value <= high]
-    costly = ["cost"] if one.cost_m > config.worst_cost_m else []
+    unlikely = ["unlikely"] if confidence < config.least_confidence else []
     few = ["few_points"] if one.fullest < config.fewest_points else []
-    return (*costly, *wrong, *few)
+    return (*unlikely, *wrong, *few)
 
 
 def _sizes(config: VehicleConfig) -> tuple[tuple[float, float], ...]:
     return config.length_m, config.width_m, config.height_m
 
 
-def _same_place(one: Completed, other: Completed, config: VehicleConfig) -> bool:
+def same_place(one: Completed, other: Completed, config: VehicleConfig) -> bool:
     """Whether the two share a place at about one time: twice the same vehicle."""
     for frame, box in zip(one.frames, one.boxes):
         nearest = int(np.abs(np.array(other.frames) - frame).argmin())
