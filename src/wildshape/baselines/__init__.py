@@ -2,5 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What Wildshape is compared with: ICP, features and robust solvers, DPC.
 
-Start with `named`.
+`pairs` makes a method of what registers two scans; `compare` measures models and baselines beside
+each other. Start with `named`.
 """
