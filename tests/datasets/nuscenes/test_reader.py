@@ -25,7 +25,7 @@ from tests.datasets.write_nuscenes import (
 )
 from tests.refusal import refusal_of
 
-from wildshape.datasets.nuscenes import index as nuscenes_index
+from wildshape.datasets.nuscenes import table_index as nuscenes_index
 from wildshape.datasets.nuscenes.reader import NuScenes
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.datasets.tracks.source import Source, all_tracks

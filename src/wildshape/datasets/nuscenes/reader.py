@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from wildshape.datasets.nuscenes.index import CHANNELS, cache_folder, index_of, lidar_of
 from wildshape.datasets.nuscenes.json_rows import json_rows
 from wildshape.datasets.nuscenes.scene import Frame, Labelled, Scene, read_scene
+from wildshape.datasets.nuscenes.table_index import CHANNELS, cache_folder, index_of, lidar_of
 from wildshape.datasets.tracks.gathering import Gathering
 from wildshape.datasets.tracks.labelled_boxes import (
     Crop,
@@ -50,7 +50,7 @@ class NuScenes:
         crop: how much around the labelled box belongs to the object.
         sweeps: also take the 20 Hz sweeps between the 2 Hz key frames; boxes are interpolated.
         lidar: channel of the LiDAR; default: the first of `CHANNELS` that there is.
-        cache: where the index of the tables is kept; default `nuscenes_index.cache_folder()`.
+        cache: where the index of the tables is kept; default `table_index.cache_folder()`.
         rejected: see `Source`.
     """
 

@@ -82,7 +82,7 @@ def read_scene(db: sqlite3.Connection, name: str, *, sweeps: bool) -> Scene:
     """A scene out of the index of its tables.
 
     Args:
-        db: see `nuscenes_index.index_of`.
+        db: see `table_index.index_of`.
         name: of the scene.
         sweeps: also the frames between the key frames.
 

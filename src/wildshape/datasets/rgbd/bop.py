@@ -27,8 +27,6 @@ from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
 from wildshape.records import Intrinsics, Sensor, Track
 
-_HELD = 300
-
 
 @dataclass
 class Bop:
@@ -39,6 +37,9 @@ class Bop:
         selection: which objects and scans; categories are such as `obj_000005`.
         cut: how points are cut out of a depth image.
         shapes: whether to sample the true shapes from the models.
+        shape_points: of a true shape.
+        longest: most scans of a track, and most frames in which an object may be unseen before its
+            track ends: memory stays flat however long a scene is.
         rejected: see `Source`.
     """
 
@@ -46,6 +47,8 @@ class Bop:
     selection: Selection = Selection()
     cut: Cut = Cut()
     shapes: bool = True
+    shape_points: int = 8192
+    longest: int = 300
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
 
     def parts(self) -> list[str]:
@@ -65,7 +68,7 @@ class Bop:
         return [file.relative_to(root).as_posix() for file in found]
 
     def tracks_of(self, part: str) -> Iterator[Track]:
-        """Tracks of a scene, one an object; an object seen more often than 300 times has several.
+        """Tracks of a scene, one an object; an object seen more often than `longest` has several.
 
         An object that occurs more than once in an image is told from its likes by the order of
         scene_gt's list, which data sets keep from image to image.
@@ -78,17 +81,20 @@ class Bop:
             self.selection, Sensor("camera", intrinsics=scene.camera), self.rejected
         )
         offers: Counter[tuple[int, int]] = Counter()
+        most = self.longest * self.selection.every
         for number, frame in enumerate(scene.frames):
             chosen = []
             for thing in self._wanted(frame):
-                name = _name(part, thing, offers[thing.identity] // (_HELD * self.selection.every))
+                name = _name(
+                    part, thing, offers[thing.identity] // (self.longest * self.selection.every)
+                )
                 offers[thing.identity] += 1
                 source = f"BOP {scene.folder.resolve().parent.name}"
                 words = {"category": thing.category, "source": source}
                 if gathering.wants(name, number, **words):
                     chosen.append((name, thing))
             self._crop_frame(scene, frame, chosen, gathering)
-            yield from self._shaped(gathering.finished(before=number - _HELD), scene)
+            yield from self._shaped(gathering.finished(before=number - self.longest), scene)
         yield from self._shaped(gathering.finished(), scene)
 
     def _wanted(self, frame: Frame) -> list[Thing]:
@@ -127,7 +133,10 @@ class Bop:
 
     def _shaped(self, tracks: Iterator[Track], scene: Scene) -> Iterator[Track]:
         for track in tracks:
-            shape = model_shape(scene.folder, track.category) if self.shapes else None
+            if not self.shapes:
+                yield track
+                continue
+            shape = model_shape(scene.folder, track.category, self.shape_points)
             yield replace(track, shape=shape)
 
 

@@ -21,7 +21,6 @@ from wildshape.records import Intrinsics, Points
 _MM = 1e-3
 _MOST = 1e9
 _IMAGE = re.compile(r"[0-9]{1,9}")
-_SHAPE_POINTS = 8192
 
 
 @dataclass(frozen=True)
@@ -116,8 +115,8 @@ def open_scene(folder: Path) -> Scene:
     return Scene(folder, tuple(frames), frames[0].camera)
 
 
-def model_shape(scene: Path, category: str) -> Points | None:
-    """Points `(8192, 3)` spread over a model's surface, metres; None where there is no model.
+def model_shape(scene: Path, category: str, count: int) -> Points | None:
+    """Points `(count, 3)` spread over a model's surface, metres; None where there is no model.
 
     Raises:
         BadInputError: the model is damaged.
@@ -126,19 +125,19 @@ def model_shape(scene: Path, category: str) -> Points | None:
         for folder in ("models", "models_cad", "models_reconst", "models_eval"):
             path = above / folder / f"{category}.ply"
             if path.is_file():
-                return _sampled(path)
+                return _sampled(path, count)
     return None
 
 
 @lru_cache(maxsize=64)
-def _sampled(path: Path) -> Points:
+def _sampled(path: Path, count: int) -> Points:
     import trimesh
 
     with reading(path, "a PLY mesh"):
         mesh = trimesh.load(path, force="mesh", process=False)
         if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
             raise BadInputError(f"{path}: holds no triangles; export the model as a mesh.")
-        points = trimesh.sample.sample_surface(mesh, _SHAPE_POINTS, seed=0)[0]
+        points = trimesh.sample.sample_surface(mesh, count, seed=0)[0]
     return np.asarray(points * _MM, np.float32)
 
 

@@ -39,9 +39,8 @@ SPLITS: dict[Split, tuple[str, ...]] = {
 PAPER = Selection(motion="parked", min_mean_points=512)
 """The selection of Gu et al., section 4."""
 
-# Of one stationary object no two scans have their middles further apart than it is long.
-_LONGEST_M = {"car": 8.0, "bicycle": 4.0, "motorcycle": 4.0, "on-rails": 60.0}
-_LONGEST_OTHER_M = 20.0
+LONGEST_M = {"car": 8.0, "bicycle": 4.0, "motorcycle": 4.0, "on-rails": 60.0}
+"""How long an object of a category can be: no two of its scans have their middles further apart."""
 
 
 @dataclass
@@ -61,6 +60,7 @@ class SemanticKitti:
         labels: folder of a sequence with the `.label` files.
         gap: an object not seen well for more frames than this comes back as another track; None:
             it stays one object over the whole sequence, as it is labelled.
+        longest_m: as `LONGEST_M`, of the categories that it does not name, metres.
         rejected: see `Source`.
     """
 
@@ -69,6 +69,7 @@ class SemanticKitti:
     split: Split = "all"
     labels: str = "labels"
     gap: int | None = None
+    longest_m: float = 20.0
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
 
     def parts(self) -> list[str]:
@@ -147,7 +148,7 @@ class SemanticKitti:
                 yield track
                 continue
             stationary_frame = stand(track.scans, track.T_sensor_object)
-            if stationary_frame.spread > _LONGEST_M.get(track.category, _LONGEST_OTHER_M):
+            if stationary_frame.spread > LONGEST_M.get(track.category, self.longest_m):
                 self._count("object: its label lies in several places", 1)
                 continue
             size = " x ".join(f"{length:.2f}" for length in stationary_frame.size)
