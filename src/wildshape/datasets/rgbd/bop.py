@@ -85,9 +85,7 @@ class Bop:
         for number, frame in enumerate(scene.frames):
             chosen = []
             for thing in self._wanted(frame):
-                name = _name(
-                    part, thing, offers[thing.identity] // (self.longest * self.selection.every)
-                )
+                name = _name(part, thing, offers[thing.identity] // most)
                 offers[thing.identity] += 1
                 source = f"BOP {scene.folder.resolve().parent.name}"
                 words = {"category": thing.category, "source": source}
