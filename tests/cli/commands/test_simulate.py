@@ -40,6 +40,7 @@ def test_the_users_meshes_drive_there(wildshape, tmp_path):
         (("--drive", "--tracks", "3"), "--tracks means nothing with --drive"),
         (("--drive", "--ground"), "--ground means nothing with --drive"),
         (("--speed", "3"), "--speed needs --drive"),
+        (("--point-times",), "--point-times needs --drive"),
         (("--drive", "--sensor", "depth-camera"), "needs a LiDAR"),
         (("--drive", "--scans", "0"), "at least 1"),
         (("--drive", "--speed", "nan"), "0 to 40"),

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Our reader of KITTI tracking reads what is written; an interrupted drive goes on."""
 
+import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +13,10 @@ import pytest
 from wildshape.datasets.kitti.tracking import KittiTracking
 from wildshape.datasets.kitti.tracking_labels import read_boxes
 from wildshape.datasets.tracks.selection import Selection
+from wildshape.io.boxes.table import read_box_table
 from wildshape.io.poses import read_poses
-from wildshape.simulate.street.drive_folder import BOXES_HEADER, write_drive
+from wildshape.io.scans.points import read_points
+from wildshape.simulate.street.drive_folder import write_drive
 from wildshape.simulate.street.whole_drive import DriveConfig, WholeDrive
 
 CONFIG = DriveConfig(scans=4, sensor="hdl32", noise_m=0.0, compensated=True)
@@ -88,13 +92,12 @@ def test_poses_times_and_truth(drive: WholeDrive, written: Path) -> None:
     np.testing.assert_allclose(poses, [drive.scan(i).T_world_sensor for i in range(4)], atol=1e-9)
     times = (written / "velodyne" / "0000" / "times.txt").read_text().split()
     assert [float(time) for time in times] == pytest.approx([0.0, 0.1, 0.2, 0.3])
-    header, *rows = (written / "truth" / "0000.csv").read_text().splitlines()
-    assert header == BOXES_HEADER
-    table = np.array([row.split(",") for row in rows], float)
+    rows = [row for row in read_box_table(written / "truth" / "0000.csv") if row.frame == 0]
     first = [box for box in drive.scan(0).boxes if box.kind != "Pedestrian"]
-    mine = table[table[:, 0] == 0]
-    assert mine[:, 11].tolist() == [box.points for box in first]
-    np.testing.assert_allclose(mine[:, 3:6], [b.T_sensor_object[:3, 3] for b in first], atol=1e-5)
+    assert [(row.track, row.points) for row in rows] == [(str(b.track), b.points) for b in first]
+    assert [row.moving for row in rows] == [box.moving for box in first]
+    places = [(row.x, row.y, row.z) for row in rows]
+    np.testing.assert_allclose(places, [b.T_sensor_object[:3, 3] for b in first], atol=1e-5)
 
 
 @pytest.mark.parametrize("left", [0, 2, 3])
@@ -119,10 +122,28 @@ def test_an_interrupted_drive_goes_on(
     assert all(path.stat().st_mtime_ns == when for path, when in kept.items())
 
 
-def test_killed_while_the_truth_is_written(
-    drive: WholeDrive, written: Path, tmp_path: Path
+@pytest.mark.parametrize("rows_left", [0, 2])
+def test_killed_while_the_lines_of_scans_are_removed(
+    drive: WholeDrive, written: Path, tmp_path: Path, rows_left: int
 ) -> None:
     out = tmp_path / "drive"
     shutil.copytree(written, out)
+    for number in range(rows_left):
+        (out / ".rows").mkdir(exist_ok=True)
+        (out / ".rows" / f"{number:06d}.json").write_text("{}")
     assert write_drive(drive, out).scans == 4
     assert _content(out) == _content(written)
+
+
+def test_the_time_of_each_point(tmp_path: Path) -> None:
+    """It is that of its azimuth: from behind over the right side."""
+    drive = WholeDrive(replace(CONFIG, scans=1, compensated=False, speed=0.0), 11)
+    write_drive(drive, tmp_path, point_times=True)
+    path = tmp_path / "scans" / "0000" / "000000.ply"
+    np.testing.assert_array_equal(read_points(path), drive.scan(0).points)
+    head, _, body = path.read_bytes().partition(b"end_header\n")
+    names = re.findall(r"property float (\w+)", head.decode())
+    assert names == ["x", "y", "z", "intensity", "time"]
+    rows = np.frombuffer(body, "<f4").reshape(-1, 5)
+    turned = np.arctan2(rows[:, 1], rows[:, 0]) / (2 * np.pi)
+    np.testing.assert_allclose(rows[:, 4], 0.1 * turned, atol=2e-4)

@@ -26,7 +26,7 @@ Meshes = Annotated[
 ]
 
 OF_TRACKS = ("tracks", "category", "occlusion", "ground", "layout", "workers")
-OF_DRIVES = ("speed", "compensated")
+OF_DRIVES = ("speed", "compensated", "point_times")
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,7 @@ class Settings:
         drive: full scans of a street with traffic, their boxes and the sensor's way.
         speed: of a drive, mean, metres a second; else drawn from 4 to 10; 0 stands still.
         compensated: of a drive: the points of a scan as from one place, its middle.
+        point_times: of a drive: write PLY scans with the time of each point, too.
     """
 
     out: Out
@@ -64,6 +65,7 @@ class Settings:
     drive: bool = False
     speed: Annotated[float | None, option(metavar="V")] = None
     compensated: bool = False
+    point_times: bool = False
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -97,7 +99,8 @@ def _refuse(settings: Settings, foreign: tuple[str, ...]) -> None:
     for name in foreign:
         if getattr(settings, name) != getattr(Settings, name):
             said = "means nothing with" if settings.drive else "needs"
-            raise BadInputError(f"--{name} {said} --drive; leave it out.")
+            option = name.replace("_", "-")
+            raise BadInputError(f"--{option} {said} --drive; leave it out.")
 
 
 def _drive(settings: Settings) -> None:
@@ -116,7 +119,7 @@ def _drive(settings: Settings) -> None:
         compensated=settings.compensated,
     )
     drive = WholeDrive(config, settings.seed)
-    identity = {**asdict(config), "seed": settings.seed}
+    identity = {**asdict(config), "seed": settings.seed, "point_times": settings.point_times}
     output = begin(
         settings.out,
         "simulate",
@@ -126,7 +129,7 @@ def _drive(settings: Settings) -> None:
         progress=TERMINAL,
     )
     with TERMINAL.bar("simulating", config.scans) as bar:
-        written = write_drive(drive, settings.out, bar.at)
+        written = write_drive(drive, settings.out, bar.at, point_times=settings.point_times)
     output.finish()
     seconds = time.monotonic() - began
     text = (

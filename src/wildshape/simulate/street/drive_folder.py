@@ -8,6 +8,7 @@ calib/0000.txt             LiDAR, camera and GPS/IMU: a camera that nobody looke
 oxts/0000.txt              GPS/IMU records without errors
 poses/0000.txt             T_world_sensor, 12 numbers a line
 truth/0000.csv             the vehicles as `wildshape drive` writes boxes, sensor frame
+scans/0000/000000.ply      if asked for: x y z intensity time, seconds from the scan's middle
 """
 
 import json
@@ -24,12 +25,21 @@ import torch
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.io.atomic import atomic_write, write_json, write_text
 from wildshape.io.boxes.kitti import label_line
+from wildshape.io.boxes.table import HEADER
 from wildshape.records import Box
 from wildshape.simulate.street.whole_drive import DriveScan, TrueBox, WholeDrive
 
 SEQUENCE = "0000"
-FILES = ("velodyne/*/*", "label_02/*", "calib/*", "oxts/*", "poses/*", "truth/*", ".rows/*")
-BOXES_HEADER = "frame,time,track,x,y,z,length,width,height,yaw,confidence,points,moving"
+FILES = (
+    "velodyne/*/*",
+    "scans/*/*",
+    "label_02/*",
+    "calib/*",
+    "oxts/*",
+    "poses/*",
+    "truth/*",
+    ".rows/*",
+)
 _ROWS = ".rows"
 _EARTH_M, _LATITUDE, _LONGITUDE = 6378137.0, 49.0, 8.4
 _UNREAD = 24  # of the 30 numbers of a GPS/IMU record
@@ -49,7 +59,11 @@ class Written:
 
 
 def write_drive(
-    drive: WholeDrive, out: Path, at: Callable[[int], None] = lambda _: None
+    drive: WholeDrive,
+    out: Path,
+    at: Callable[[int], None] = lambda _: None,
+    *,
+    point_times: bool = False,
 ) -> Written:
     """Write all scans and then their truth; scans that are there already are not made again.
 
@@ -57,6 +71,7 @@ def write_drive(
         drive: what is simulated.
         out: the folder; what an interrupted run of the same drive left in it is gone on with.
         at: called with the number of scans that are there.
+        point_times: write `scans`, too.
     """
     scans, rows = out / "velodyne" / SEQUENCE, out / _ROWS
     for number in range(drive.config.scans):
@@ -64,17 +79,24 @@ def write_drive(
         if not (scans / f"{name}.bin").is_file():
             made = drive.scan(number)
             write_json(rows / f"{name}.json", _rows(made, number, drive))
+            if point_times:
+                _write_timed(out / "scans" / SEQUENCE / f"{name}.ply", made)
             _write_bin(scans / f"{name}.bin", made)
         at(number + 1)
-    if rows.is_dir():
+    if not _truth_file(out).is_file():
         _join(out, rows, drive.config.scans)
-        shutil.rmtree(rows)
+    shutil.rmtree(rows, ignore_errors=True)
     return _counted(out)
+
+
+def _truth_file(out: Path) -> Path:
+    """What is written last."""
+    return out / "truth" / f"{SEQUENCE}.csv"
 
 
 def _counted(out: Path) -> Written:
     scans = list((out / "velodyne" / SEQUENCE).glob("*.bin"))
-    with (out / "truth" / f"{SEQUENCE}.csv").open(encoding="utf-8") as lines:
+    with _truth_file(out).open(encoding="utf-8") as lines:
         vehicles = {line.split(",")[2] for line in islice(lines, 1, None)}
     points = sum(scan.stat().st_size for scan in scans) // 16
     return Written(len(scans), points, len(vehicles))
@@ -83,6 +105,15 @@ def _counted(out: Path) -> Written:
 def _write_bin(path: Path, made: DriveScan) -> None:
     columns = np.column_stack((made.points, made.intensity))
     with atomic_write(path) as file:
+        file.write(columns.astype("<f4").tobytes())
+
+
+def _write_timed(path: Path, made: DriveScan) -> None:
+    columns = np.column_stack((made.points, made.intensity, made.times))
+    fields = "".join(f"property float {name}\n" for name in ("x", "y", "z", "intensity", "time"))
+    head = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(columns)}\n{fields}"
+    with atomic_write(path) as file:
+        file.write(f"{head}end_header\n".encode())
         file.write(columns.astype("<f4").tobytes())
 
 
@@ -112,12 +143,12 @@ def _join(out: Path, rows: Path, scans: int) -> None:
         "oxts": out / "oxts" / f"{SEQUENCE}.txt",
         "poses": out / "poses" / f"{SEQUENCE}.txt",
         "times": out / "velodyne" / SEQUENCE / "times.txt",
-        "truth": out / "truth" / f"{SEQUENCE}.csv",
+        "truth": _truth_file(out),
     }
     for name, path in files.items():
         with atomic_write(path) as file:
             if name == "truth":
-                file.write(f"{BOXES_HEADER}\n".encode())
+                file.write(f"{','.join(HEADER)}\n".encode())
             for row in each():
                 file.write("".join(f"{line}\n" for line in row[name]).encode())
 
