@@ -45,6 +45,9 @@ class RefineConfig:
         stiffness: weight of the point itself against what was seen around it.
         drawn_by: most points of the scan that draw one of the shape.
         voxel_m: the scan is thinned to this.
+        partner: each point of a refined shape gets another, in the middle between it and this many
+            neighbours away: those of a decoder lie unevenly, and middles with the nearest ones
+            would fall where there are enough.
     """
 
     iterations: int = 6
@@ -64,6 +67,7 @@ class RefineConfig:
     stiffness: float = 0.2
     drawn_by: int = 8
     voxel_m: float = 0.08
+    partner: int = 5
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,8 @@ class JointIcpConfig:
         normal_m: radius of the neighbourhood that a normal is taken from.
         holding: how much a point is held in every direction, against sliding; of its normal's 1.
         step: share of a Gauss-Newton step that is taken.
+        ridge: damping of a step, a share of the points' weight; a scan of few sides is not moved
+            along what it does not see.
     """
 
     rounds: int = 10
@@ -91,6 +97,7 @@ class JointIcpConfig:
     normal_m: float = 0.35
     holding: float = 0.1
     step: float = 0.8
+    ridge: float = 1e-3
 
 
 _FINE = JointIcpConfig(rounds=15, points=512, most=4096, normal_m=0.3, holding=0.02)
@@ -205,6 +212,19 @@ class ReasonRule:
     largest: float = 1.5
     poor_fit: float = 1.5
     low_confidence: float = 0.1
+
+
+@dataclass(frozen=True)
+class ExportRule:
+    """How near an exported file must come to torch (`export/verify.py`).
+
+    Attributes:
+        largest_m: of any coordinate of any completed point: float32 of another runtime.
+        other_share: of the scans that may be given another pose that costs as much.
+    """
+
+    largest_m: float = 1e-4
+    other_share: float = 0.1
 
 
 @dataclass(frozen=True)

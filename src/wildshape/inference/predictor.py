@@ -25,10 +25,11 @@ from wildshape.inference.confidence import (
 )
 from wildshape.inference.config import InferenceConfig, RefineConfig
 from wildshape.inference.models import choose_device, compiled, weights_file
-from wildshape.inference.prepare import MIN_POINTS, as_points, in_order, network_input
+from wildshape.inference.prepare import as_points, in_order, network_input
 from wildshape.inference.refine import filled, refine
 from wildshape.inference.registration import fuse_scans, inlier_ratio, to_middle
 from wildshape.inference.tracks.complete_track import complete_together
+from wildshape.io.scans.points import LEAST_POINTS
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint
 from wildshape.method.network import ShapePoseNet
 from wildshape.records import Completion, Points, Registration, Sensor
@@ -261,7 +262,7 @@ class Predictor:
         points = T_sensor_can.to(torch.float32).apply(shape).numpy()
         exact = self.settings.sensor == "camera"
         return Completion(
-            points=filled(points, scan, exact) if self.refines else points,
+            points=filled(points, scan, exact, self.config.refine) if self.refines else points,
             pose=T_sensor_can.to(torch.float64),
             box=box_seen(shape, T_sensor_can, seen, mirror=mirror, config=self.config.box),
             confidence=confidence,
@@ -279,7 +280,7 @@ class Predictor:
             return scan
         T_canonical_sensor = T_sensor_canonical.to(torch.float64).inverse()
         kept = scan[~skirt(T_canonical_sensor.apply_numpy(scan), shape)]
-        return kept if len(kept) >= MIN_POINTS else scan
+        return kept if len(kept) >= LEAST_POINTS else scan
 
 
 def _checked(scans: Sequence[object], first: int = 0) -> list[Points]:

@@ -14,10 +14,9 @@ from torch import Tensor
 from wildshape.errors import BadInputError
 from wildshape.geometry.centring import scan_centre
 from wildshape.geometry.projection.line_of_sight import face, roll
-from wildshape.io.scans.points import check_near, drop_nonfinite, read_scan
+from wildshape.io.scans.points import LEAST_POINTS, check_near, drop_nonfinite, read_scan
 from wildshape.records import Points, SensorKind
 
-MIN_POINTS = 16
 _USUAL_M = 5.0
 _OPEN3D_TENSOR = "point.positions"
 _PLACES = ("xyz", "vertices", _OPEN3D_TENSOR, "points")
@@ -49,9 +48,9 @@ def as_points(scan: object, name: str = "scan") -> Points:
         )
     check_near(points, name)
     points = drop_nonfinite(points).points
-    if len(points) < MIN_POINTS:
+    if len(points) < LEAST_POINTS:
         raise BadInputError(
-            f"{name}: {len(points)} finite points; at least {MIN_POINTS} are needed."
+            f"{name}: {len(points)} finite points; at least {LEAST_POINTS} are needed."
         )
     if float(np.ptp(points, axis=0).max()) == 0.0:
         raise BadInputError(f"{name}: all {len(points)} points are equal; is the file damaged?")

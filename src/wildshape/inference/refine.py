@@ -21,7 +21,7 @@ from wildshape.inference.prepare import unit_of
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
-_PARTNER, _SMALLEST_M = 5, 1e-6
+_SMALLEST_M = 1e-6
 _DEFAULT = RefineConfig()
 
 Cloud = Float[np.ndarray, "_ 3"]
@@ -203,20 +203,16 @@ def drawn_to_scan(
     return ((weight[..., None] * near).sum(axis=1) + config.stiffness * shape) / total
 
 
-def denser(points: Cloud) -> Cloud:
-    """The points, then as many more: the middle between each one and its fifth neighbour.
-
-    Points of a decoder lie unevenly: middles with the nearest ones would fall where there are
-    enough.
-    """
+def denser(points: Cloud, partner: int = _DEFAULT.partner) -> Cloud:
+    """The points, then as many more: the middle between each one and its `partner`th neighbour."""
     from scipy.spatial import KDTree
 
-    near = KDTree(points).query(points, k=_PARTNER + 1)[1]
+    near = KDTree(points).query(points, k=partner + 1)[1]
     middles = (points + points[np.asarray(near)[:, -1]]) / 2
     return np.concatenate((points, middles)).astype(points.dtype)
 
 
-def filled(points: Cloud, scan: Cloud, exact: bool) -> Cloud:
+def filled(points: Cloud, scan: Cloud, exact: bool, config: RefineConfig = _DEFAULT) -> Cloud:
     """A refined shape's points and as many more (`denser`), sensor frame; the given ones first.
 
     Args:
@@ -224,12 +220,13 @@ def filled(points: Cloud, scan: Cloud, exact: bool) -> Cloud:
         scan: it was refined against, the same frame.
         exact: the scan is dense and has hardly any noise, as a depth camera's: where it saw
             something, its own points, as far apart as the shape's, stand in for those added.
+        config: `partner`.
     """
     from scipy.spatial import KDTree
 
     from wildshape.geometry.outliers import voxel_thin
 
-    more = denser(points)
+    more = denser(points, config.partner)
     if not exact:
         return more
     gap = max(float(np.median(np.asarray(KDTree(more).query(more, k=2)[0])[:, 1])), _SMALLEST_M)

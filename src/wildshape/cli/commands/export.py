@@ -4,22 +4,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from tyro.conf import Positional, arg
 
 from wildshape.cli.options import AsJson, Overwrite, option
-from wildshape.errors import BadInputError
-
-if TYPE_CHECKING:
-    from wildshape.inference.export.verify import Difference
 
 EXAMPLES = (
     "wildshape export runs/mine --out model.onnx",
     "wildshape export airplane --out airplane.pt2",
 )
-_SUFFIXES, _ALLOWED_M = (".onnx", ".pt2"), 1e-4
 
 
 @dataclass(frozen=True)
@@ -51,39 +45,12 @@ def run(settings: Settings) -> None:
     Raises:
         BadInputError: model or output cannot be used, or the file does not do what torch does.
     """
+    from wildshape.cli.terminal import answer
+    from wildshape.inference.export.verify import export_model
     from wildshape.io.output import refuse_file
 
-    suffix = settings.out.suffix.lower()
-    if suffix not in _SUFFIXES:
-        raise BadInputError(f"{settings.out}: give --out one of {', '.join(_SUFFIXES)}.")
-    if settings.scans < 1:
-        raise BadInputError(f"--scans {settings.scans}: compare at least one scan.")
     refuse_file(settings.out, overwrite=settings.overwrite)
-    _export(settings, suffix)
-
-
-def _export(settings: Settings, suffix: str) -> None:
-    from wildshape.cli.terminal import answer
-    from wildshape.inference.export import onnx, verify
-    from wildshape.inference.predictor import load
-
-    if suffix == ".onnx":
-        onnx.require_onnx()
-    predictor = load(settings.model, raw=True)
-    if predictor.settings.network.backbone != "pcn":
-        raise BadInputError(
-            f"{settings.model}: its encoder is {predictor.settings.network.backbone}, and only"
-            " networks with PCN's encoder are exported; train without --encoder."
-        )
-    scans = verify.rehearsal_scans(predictor.settings, settings.scans)
-    write = onnx.write_onnx if suffix == ".onnx" else onnx.write_torch
-    settings.out.parent.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(dir=settings.out.parent, prefix=".export.") as folder:
-        draft = Path(folder) / f"model{suffix}"  # no file under its final name before it is checked
-        write(draft, onnx.trace(predictor), onnx.describe(predictor))
-        found = verify.compare(verify.open_exported(draft), predictor, scans)
-        _refuse_other(settings.out, found)
-        draft.replace(settings.out)
+    found = export_model(settings.model, settings.out, settings.scans)
     size = settings.out.stat().st_size
     text = (
         f"{settings.out}: {size / 1e6:.1f} MB; largest difference to torch over {found.scans}"
@@ -91,16 +58,5 @@ def _export(settings: Settings, suffix: str) -> None:
     )
     if found.other_branch:
         text += f"; {found.other_branch} took another pose that costs as much"
-    answer(
-        text, {"out": str(settings.out), "bytes": size, **found._asdict()}, as_json=settings.json
-    )
-
-
-def _refuse_other(path: Path, found: "Difference") -> None:
-    """Raise if an exported model does something else than torch."""
-    if found.largest_m > _ALLOWED_M or 10 * found.other_branch > found.scans:
-        raise BadInputError(
-            f"{path}: not written, the exported model differs from torch by"
-            f" {found.largest_m:.3g} m and chose another pose for {found.other_branch} of"
-            f" {found.scans} scans; please report this with the model."
-        )
+    data = {"out": str(settings.out), "bytes": size, **found._asdict()}
+    answer(text, data, as_json=settings.json)

@@ -4,16 +4,23 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
 import torch
 
+from wildshape.errors import BadInputError
+from wildshape.inference.config import ExportRule
+from wildshape.inference.export import onnx
 from wildshape.inference.export.onnx import INPUTS
-from wildshape.inference.predictor import Predictor
+from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.prepare import drawn, in_order
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.records import Points
+
+SUFFIXES = (".onnx", ".pt2")
+_RULE = ExportRule()
 
 Runner = Callable[[np.ndarray, np.ndarray], list[np.ndarray]]
 
@@ -30,6 +37,56 @@ class Difference(NamedTuple):
     largest_m: float
     other_branch: int
     scans: int
+
+
+def export_model(
+    model: Path | None, out: Path, scans: int = 24, rule: ExportRule = _RULE
+) -> Difference:
+    """Write a model as one file, compare it with torch, and keep it only if it does the same.
+
+    Args:
+        model: checkpoint or folder of a run; None: the shipped one.
+        out: .onnx, or .pt2 for `torch.export.load`.
+        scans: compared.
+        rule: how near it must come.
+
+    Raises:
+        BadInputError: the model cannot be exported, or the file does not do what torch does.
+        MissingExtraError: the `onnx` extra is not installed.
+    """
+    suffix = out.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise BadInputError(f"{out}: give --out one of {', '.join(SUFFIXES)}.")
+    if scans < 1:
+        raise BadInputError(f"--scans {scans}: compare at least one scan.")
+    if suffix == ".onnx":
+        onnx.require_onnx()
+    predictor = load(model, raw=True)
+    if predictor.settings.network.backbone != "pcn":
+        raise BadInputError(
+            f"{model}: its encoder is {predictor.settings.network.backbone}, and only"
+            " networks with PCN's encoder are exported; train without --encoder."
+        )
+    write = onnx.write_onnx if suffix == ".onnx" else onnx.write_torch
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(dir=out.parent, prefix=".export.") as folder:
+        draft = Path(folder) / f"model{suffix}"  # no file under its final name before it is checked
+        write(draft, onnx.trace(predictor), onnx.describe(predictor))
+        rehearsed = rehearsal_scans(predictor.settings, scans)
+        found = compare(open_exported(draft), predictor, rehearsed)
+        _refuse_other(out, found, rule)
+        draft.replace(out)
+    return found
+
+
+def _refuse_other(path: Path, found: Difference, rule: ExportRule) -> None:
+    """Raise if an exported model does something else than torch."""
+    if found.largest_m > rule.largest_m or found.other_branch > rule.other_share * found.scans:
+        raise BadInputError(
+            f"{path}: not written, the exported model differs from torch by"
+            f" {found.largest_m:.3g} m and chose another pose for {found.other_branch} of"
+            f" {found.scans} scans; please report this with the model."
+        )
 
 
 def open_exported(path: Path, threads: int = 0) -> Runner:

@@ -81,7 +81,9 @@ def complete_together(
     )
     fit = fit._replace(T_sensor_object=_scaled(fit.T_sensor_object, unit))
     fitted = _box(shape, scans, fit.T_sensor_object, config.box, mirror=mirror)
-    whole = torch.from_numpy(denser(shape.numpy())) if settings.facing else shape
+    whole = (
+        torch.from_numpy(denser(shape.numpy(), config.refine.partner)) if settings.facing else shape
+    )
     cost = track_cost(shape, fit.T_sensor_object, scans, settings)
     mean = float(np.mean([item.confidence for item in done]))
     trust = [0.0 if item.warning else mean for item in done]

@@ -20,7 +20,7 @@ from wildshape.inference.config import JointIcpConfig, TrackConfig
 from wildshape.ops.nearest import nearest
 from wildshape.records import Points
 
-_RIDGE, _BLOCK, _AWAY_M = 1e-3, 2048, 1e4
+_BLOCK, _AWAY_M = 2048, 1e4
 _TRACK = TrackConfig()
 
 
@@ -122,7 +122,7 @@ def _moved(
     residual = (off[:, :, None] * directions).sum(-1)
     A = torch.einsum("vpd,vpdi,vpdj->vij", weight, rows, rows)
     b = torch.einsum("vpd,vpdi,vpd->vi", weight, rows, residual)
-    damping = _RIDGE * kernel.sum(1)[:, None, None] + 1e-6
+    damping = config.ridge * kernel.sum(1)[:, None, None] + 1e-6
     motion = -config.step * torch.linalg.solve(A + damping * torch.eye(6), b)
     turn = torch.linalg.matrix_exp(_cross_matrix(motion[:, :3]))
     about = SE3(turn, centre[:, 0] + motion[:, 3:] - (turn @ centre[:, 0, :, None])[..., 0])

@@ -21,6 +21,7 @@ from wildshape.io.scans.text import header_unit, read_text
 from wildshape.io.scans.writers import write_ply
 
 __all__ = [
+    "LEAST_POINTS",
     "METRES",
     "SENSOR_METRES",
     "SUFFIXES",
@@ -51,7 +52,9 @@ _READERS: dict[str, tuple[str, Callable[[Path], Float[np.ndarray, "n 3"]]]] = {
 SUFFIXES = tuple(_READERS)
 """The suffixes of scan files, in lower case."""
 
-_LEAST_POINTS = 16
+LEAST_POINTS = 16
+"""Finite points that a scan has at least."""
+
 _LARGEST_EXTENT = 100.0
 _SMALLEST_EXTENT = 0.01
 _FARTHEST = 1000.0
@@ -125,9 +128,9 @@ def check_scan(points: Float[np.ndarray, "n 3"], name: str) -> None:
             f"{name}: is empty but for its header (0 finite points); write the scan again."
         )
     points = _only_finite(points)
-    if len(points) < _LEAST_POINTS:
+    if len(points) < LEAST_POINTS:
         raise BadInputError(
-            f"{name}: {len(points)} finite points; a scan needs at least {_LEAST_POINTS}: "
+            f"{name}: {len(points)} finite points; a scan needs at least {LEAST_POINTS}: "
             "use a denser one."
         )
     low, high = points.min(0).astype(np.float64), points.max(0).astype(np.float64)
