@@ -20,6 +20,7 @@ MANY_USES = ("complete", "register", "convert", "train", "evaluate", "simulate")
 LISTS = {
     "complete": {"boxes"},
     "convert": {"categories", "range_m"},
+    "drive": {"boxes"},
     "evaluate": {"model", "baselines"},
     "view": {"allow_host"},
 }
@@ -28,6 +29,7 @@ LISTS = {
 NEEDED = {
     "complete": ("in",),
     "convert": ("folder", "in", "out"),
+    "drive": ("--out=x", "in"),
     "evaluate": ("--out=x", "in"),
     "view": ("in",),
 }

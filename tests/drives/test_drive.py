@@ -20,6 +20,7 @@ from wildshape.drives.segmentation import Cutter
 from wildshape.drives.source import open_drive
 from wildshape.drives.trajectory import find_trajectory
 from wildshape.geometry.footprint import footprint_iou
+from wildshape.inference.box_files import BoxFiles
 from wildshape.io.boxes.detections import read_detections
 from wildshape.io.boxes.table import HEADER, read_box_table
 from wildshape.io.poses import read_poses, read_tum
@@ -152,12 +153,19 @@ def test_a_run_killed_at_any_stage_goes_on_to_the_same_boxes(
 
 
 def test_several_processes_find_the_same(found, recording, tmp_path):
-    spread = wildshape.drive(recording, tmp_path / "out", workers=2)
+    formats = BoxFiles(("json", "kitti"))
+    spread = wildshape.drive(recording, tmp_path / "out", workers=2, boxes=formats)
     assert spread.vehicles == found.vehicles
     rows, others = (read_box_table(folder / "boxes.csv") for folder in (spread.out, found.out))
     for row, other in zip(rows, others, strict=True):
         assert (row.frame, row.track, row.points) == (other.frame, other.track, other.points)
         assert (row.x, row.y, row.yaw) == pytest.approx((other.x, other.y, other.yaw), abs=1e-3)
+    listed = json.loads((spread.out / "boxes" / "boxes.json").read_text("utf-8"))["boxes"]
+    assert {(box["scan"], box["track"]) for box in listed} == {
+        (f"{row.frame:06d}", row.track) for row in rows
+    }
+    labels = {path.stem for path in (spread.out / "boxes" / "kitti").iterdir()}
+    assert labels == set(spread.vehicles)
 
 
 def test_other_settings_do_not_go_on_with_an_output(found, recording):

@@ -26,6 +26,7 @@ from wildshape.drives.outputs import (
     Vehicle,
     boxes_of,
     copy_object,
+    detections_in,
     rows_of,
     write_frames,
     write_trajectories,
@@ -39,6 +40,7 @@ from wildshape.drives.tracks import Seen, link
 from wildshape.drives.trajectory import find_trajectory, jumps
 from wildshape.drives.vehicles import Completed, Judged, fragments, judge
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.box_files import BOX_FILES, BoxFiles
 from wildshape.inference.completed_files import OBJECTS
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import write_json
@@ -59,6 +61,7 @@ FILES = (
     "objects/*/objects.json",
     "objects/*/poses.txt",
     "objects/*/completed/*.ply",
+    *BOX_FILES,
     "stages/**/*",
 )
 _DEFAULT = DriveConfig()
@@ -117,6 +120,7 @@ def drive(
     *,
     predictor: Predictor | None = None,
     workers: int = 1,
+    boxes: BoxFiles | None = None,
     overwrite: bool = False,
     watch: Watch = _silent,
 ) -> DriveResult:
@@ -128,6 +132,7 @@ def drive(
         config: the numbers of every stage.
         predictor: by default the shipped weights.
         workers: processes that cut scans and complete objects.
+        boxes: other formats in which the boxes are written, too, below `boxes/`.
         overwrite: remove an earlier output first.
         watch: told of progress.
 
@@ -136,6 +141,8 @@ def drive(
         MissingExtraError: a library is not installed.
     """
     source, out = Path(source), Path(out)
+    if boxes is not None:
+        boxes.check()
     recording = open_drive(source)
     predictor = load() if predictor is None else predictor
     keep_apart(source, out)
@@ -145,10 +152,11 @@ def drive(
         "drive": asdict(config),
         "model": predictor.settings.provenance,
         "inference": asdict(predictor.config),
+        **({} if boxes is None else boxes.identity()),
     }
     line = shlex.join(("wildshape", "drive", str(source), "--out", str(out)))
     output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
-    found = _Run(recording, out, config, predictor, workers, _Clock(watch)).perform()
+    found = _Run(recording, out, config, predictor, workers, boxes, _Clock(watch)).perform()
     output.finish(result={**asdict(found), "out": str(out)})
     return found
 
@@ -162,6 +170,7 @@ class _Run:
     config: DriveConfig
     predictor: Predictor
     workers: int
+    formats: BoxFiles | None
     clock: _Clock
 
     @property
@@ -305,13 +314,17 @@ class _Run:
 
     def write(self, vehicles: list[Vehicle], T_level_sensor: SE3) -> int:
         with self.clock.stage("outputs", len(vehicles)) as at:
-            rows = []
+            rows, detections = [], []
             for number, one in enumerate(vehicles, 1):
                 seen = one.completed.seen
                 write_vehicle_track(self.out / "tracks", seen, self.cuts, self.drive)
                 copy_object(self.folder(seen), self.out / "objects" / one.name)
-                rows += rows_of(one, boxes_of(one, T_level_sensor), self.drive)
+                boxes = boxes_of(one, T_level_sensor)
+                rows += rows_of(one, boxes, self.drive)
+                detections += detections_in(one, number - 1, boxes, self.drive)
                 at(number)
+            if self.formats is not None:
+                self.formats.write_detections(self.out, detections)
             write_box_table(self.out / BOXES, rows)
             return len(rows)
 

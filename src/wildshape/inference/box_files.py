@@ -69,7 +69,10 @@ class BoxFiles:
         """
         from wildshape.io.boxes.detections import read_detections
 
-        detections = read_detections(out)
+        return self.write_detections(out, read_detections(out))
+
+    def write_detections(self, out: Path, detections: "Sequence[Detection]") -> list[str]:
+        """Write these below `out`; returns as `write` does."""
         for kind in self.formats:
             made = _FORMATS[kind]
             made.write(out / _FOLDER / made.file, detections, self._calibration(kind))

@@ -17,6 +17,7 @@ from wildshape.cli.options import (
     Network,
     OutFolder,
     Overwrite,
+    listed,
     option,
 )
 from wildshape.errors import BadInputError
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 EXAMPLES = (
     "wildshape drive recording --out found",
     "wildshape drive 2011_09_26_drive_0048_sync --out found",
+    "wildshape drive recording --out found --boxes json,kitti",
     "wildshape drive monday tuesday --out found",
 )
 
@@ -57,6 +59,15 @@ class Settings:
     workers: Annotated[int | None, option(metavar="N", help="processes; by default one a core")] = (
         None
     )
+    boxes: Annotated[
+        tuple[str, ...],
+        listed("A,B"),
+        option(help="json, kitti, nuscenes, argoverse2: also write all boxes so, below DIR/boxes"),
+    ] = ()
+    calibration: Annotated[
+        Path | None,
+        option(metavar="FILE", help="of KITTI (.txt) or Argoverse 2 (.feather), for these boxes"),
+    ] = None
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -70,10 +81,13 @@ def run(settings: Settings) -> None:
     """
     from wildshape.cli.terminal import answer
     from wildshape.drives.run import drive
+    from wildshape.inference.box_files import BoxFiles
     from wildshape.inference.predictor import load
 
     workers = _workers(settings)
     folders = _folders(settings)
+    wanted = bool(settings.boxes or settings.calibration)
+    boxes = BoxFiles(settings.boxes, settings.calibration) if wanted else None
     predictor = load(settings.network.model, settings.network.device)
     found: list[DriveResult] = []
     for source, out in folders.items():
@@ -83,6 +97,7 @@ def run(settings: Settings) -> None:
                 out,
                 predictor=predictor,
                 workers=workers,
+                boxes=boxes,
                 overwrite=settings.overwrite,
                 watch=watch,
             )
