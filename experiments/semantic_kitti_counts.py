@@ -16,7 +16,7 @@ from pathlib import Path
 from wildshape.datasets.semantic_kitti.labels import (
     VEHICLES,
     count_points,
-    kinds_of,
+    categories_of,
     label_files,
 )
 from wildshape.datasets.semantic_kitti.reader import SPLITS, SemanticKitti
@@ -31,11 +31,11 @@ def main(root: Path) -> None:
     for split in ("train", "test"):
         names = [name for name in SPLITS[split] if name in found]
         missing = [name for name in SPLITS[split] if name not in found]
-        kinds = kinds_of(VEHICLES, "parked")
+        chosen = categories_of(VEHICLES, "parked")
         objects = [
-            (kinds[label & 0xFFFF].category, list(points.values()))
+            (chosen[label & 0xFFFF].category, list(points.values()))
             for name in names
-            for label, points in count_points(label_files(found[name] / "labels"), kinds).items()
+            for label, points in count_points(label_files(found[name] / "labels"), chosen).items()
         ]
         instances, scans = PAPER[split]
         print(f"{split}: the paper has {instances} instances, {scans} scans", end="")
