@@ -15,8 +15,8 @@ from pathlib import Path
 
 from wildshape.datasets.semantic_kitti.labels import (
     VEHICLES,
-    count_points,
     categories_of,
+    count_points,
     label_files,
 )
 from wildshape.datasets.semantic_kitti.reader import SPLITS, SemanticKitti
