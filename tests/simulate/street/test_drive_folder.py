@@ -17,9 +17,9 @@ from wildshape.io.boxes.table import read_box_table
 from wildshape.io.poses import read_poses
 from wildshape.io.scans.points import read_points
 from wildshape.simulate.street.drive_folder import write_drive
-from wildshape.simulate.street.whole_drive import DriveConfig, WholeDrive
+from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
 
-CONFIG = DriveConfig(scans=4, sensor="hdl32", noise_m=0.0, compensated=True)
+CONFIG = StreetConfig(scans=4, sensor="hdl32", noise_m=0.0, compensated=True)
 
 
 @pytest.fixture(scope="module")

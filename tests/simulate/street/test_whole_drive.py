@@ -10,9 +10,9 @@ import pytest
 from wildshape.errors import BadInputError
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.street.sweep import cast_turn
-from wildshape.simulate.street.whole_drive import PERIOD_S, DriveConfig, WholeDrive
+from wildshape.simulate.street.whole_drive import PERIOD_S, StreetConfig, WholeDrive
 
-CLEAN = DriveConfig(scans=40, sensor="hdl32", dropout=0.0, noise_m=0.0)
+CLEAN = StreetConfig(scans=40, sensor="hdl32", dropout=0.0, noise_m=0.0)
 MOVERS_SMEAR_M, ROUNDING_M = 0.5, 2e-3
 
 

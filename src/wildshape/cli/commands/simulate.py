@@ -108,10 +108,10 @@ def _drive(settings: Settings) -> None:
     from wildshape.io.output import begin
     from wildshape.io.progress import counted, duration
     from wildshape.simulate.street.drive_folder import FILES, write_drive
-    from wildshape.simulate.street.whole_drive import DriveConfig, WholeDrive
+    from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
 
     began = time.monotonic()
-    config = DriveConfig(
+    config = StreetConfig(
         scans=100 if settings.scans is None else settings.scans,
         sensor=settings.sensor,
         meshes=settings.meshes,

@@ -37,7 +37,7 @@ _TILT_DEG, _SWAY_DEG = 0.5, 0.25
 
 
 @dataclass(frozen=True)
-class DriveConfig:
+class StreetConfig:
     """What to simulate.
 
     Attributes:
@@ -154,7 +154,7 @@ class FromMeshes:
 class WholeDrive:
     """A street with all that is on it, and the scans taken there."""
 
-    def __init__(self, config: DriveConfig, seed: int) -> None:
+    def __init__(self, config: StreetConfig, seed: int) -> None:
         """Lay out the street.
 
         Raises:
