@@ -172,6 +172,21 @@ def test_an_index_made_to_mislead_is_refused_though_all_checksums_fit(path: Path
     assert "\n" not in str(refused.value)
 
 
+def test_an_index_off_the_grid_of_its_numbers_is_read(path: Path) -> None:
+    """safetensors pads its header, but need not: numbers may begin at any byte."""
+    _, *before = content(open_store(path))
+    data = (path / INDEX_TENSORS).read_bytes()
+    header = 8 + int.from_bytes(data[:8], "little")
+    shifted = (header - 7).to_bytes(8, "little") + data[8:header] + b" " + data[header:]
+    (path / INDEX_TENSORS).write_bytes(shifted)
+    said = json.loads((path / INDEX_JSON).read_text())
+    counts = {key: said[key] for key in ("tracks", "scans", "points")}
+    record = file_record(path / INDEX_TENSORS)
+    (path / INDEX_JSON).write_text(json.dumps(manifest_of(record, shards_of(path), counts, {})))
+    _, *after = content(open_store(path))
+    assert after == before
+
+
 def test_parts_of_an_older_version_join_into_a_store_with_checksums(track, tmp_path) -> None:
     out = tmp_path / "store"
     parts = make_parts(track, out)

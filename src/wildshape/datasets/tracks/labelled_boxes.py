@@ -114,6 +114,7 @@ def rows_in_box(
     reach = np.linalg.norm(half + crop.margin)
     near = np.flatnonzero(np.abs(cloud[:, 0] - centre[0]) <= reach)
     near = near[np.abs(cloud[near, 1] - centre[1]) <= reach]
+    near = near[np.abs(cloud[near, 2] - centre[2]) <= reach + abs(crop.ground)]
     local = (cloud[near] - centre) @ T_sensor_object.rotation.numpy()
     low = np.asarray((-half[0] - crop.margin, -half[1] - crop.margin, -half[2] + crop.ground))
     inside = ((local >= low) & (local <= half + crop.margin)).all(axis=1)

@@ -86,7 +86,7 @@ class Store:
         self._shards: dict[int, Float32[np.ndarray, "n 3"]] = {}
         # Views of memory give whole numbers at a quarter of the price of numpy.
         self._crcs = {
-            name.removesuffix("_crcs"): self._index[name].data
+            name.removesuffix("_crcs"): np.require(self._index[name], requirements="A").data
             for name in CRCS
             if name in self._index
         }

@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Points inside labelled boxes."""
+
+import warnings
+
+import numpy as np
+import torch
+
+from wildshape.datasets.tracks.labelled_boxes import Crop, rows_in_box
+from wildshape.geometry.transforms.se3 import SE3
+
+
+def test_points_inside_are_found_as_by_the_definition() -> None:
+    rng = np.random.default_rng(0)
+    cloud = rng.uniform(-4.0, 4.0, (5000, 3)).astype(np.float32)
+    yaw = 0.7
+    R = [[np.cos(yaw), -np.sin(yaw), 0.0], [np.sin(yaw), np.cos(yaw), 0.0], [0.0, 0.0, 1.0]]
+    T = SE3(torch.tensor(R), torch.tensor([0.5, -0.3, 0.2], dtype=torch.float64))
+    size, crop = (3.0, 1.6, 1.4), Crop(0.1, -0.5)
+    local = (cloud - T.translation.numpy()) @ np.asarray(R)
+    half = np.asarray(size) / 2
+    inside = (np.abs(local[:, :2]) <= half[:2] + crop.margin).all(axis=1)
+    inside &= (local[:, 2] <= half[2] + crop.margin) & (local[:, 2] >= -half[2] + crop.ground)
+    assert inside.sum() > 50
+    assert rows_in_box(cloud, T, size, crop).tolist() == np.flatnonzero(inside).tolist()
+
+
+def test_a_damaged_height_is_outside_without_a_word() -> None:
+    cloud = np.array([[0, 0, np.inf], [0, 0, np.nan], [0, 0, -3e38], [0, 0, 0.2]], np.float32)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rows = rows_in_box(cloud, SE3.identity(), (2.0, 2.0, 2.0), Crop())
+    assert rows.tolist() == [3]
