@@ -2,16 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Complete shapes of the objects of a drive.
 
-The network first looks at a few scans of each; what costs too much or is too short to be a vehicle
+The network first looks at a few scans of each; what costs too much or has no size of a vehicle
 is left there. Of the others some scans, spread over the track, are completed together.
 """
 
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from wildshape.drives.config import CompletionConfig
+from wildshape.drives.config import CompletionConfig, VehicleConfig
 from wildshape.drives.sightings import Sightings
 from wildshape.drives.source import Drive
+from wildshape.drives.vehicles import shape_nats
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.completed_files import OBJECTS, write_completed
 from wildshape.inference.predictor import Predictor
@@ -33,6 +34,7 @@ class Completer:
         folder: where a folder of each object is written.
         T_level_sensor: of a tilted sensor; None for one held level, as networks expect it.
         config: see there.
+        vehicles: what speaks for one.
     """
 
     predictor: Predictor
@@ -41,6 +43,7 @@ class Completer:
     folder: Path
     T_level_sensor: SE3 | None
     config: CompletionConfig
+    vehicles: VehicleConfig
 
     def missing(self, objects: list[Sightings]) -> list[Sightings]:
         """Those that are neither completed nor ruled out yet."""
@@ -57,9 +60,10 @@ class Completer:
         looks = fullest_of_parts(seen, self.config.looks)
         found = list(self._looker().complete_many(self._clouds(looks)))
         cost = min(look.cost for look in found)
-        length = max(max(look.box.size[:2]) for look in found)
-        if cost > self.config.worst_cost_m or length < self.config.shortest_m:
-            write_json(folder / RULED_OUT, {"cost_m": cost, "length_m": length})
+        said = [shape_nats(look.cost, look.box.size, self.vehicles) for look in found]
+        nats = sum(max(one, self.config.worst_nats) for one in said) / len(said)
+        if cost > self.config.worst_cost_m or nats < self.config.least_nats:
+            write_json(folder / RULED_OUT, {"cost_m": cost, "nats": nats})
             return
         chosen = keyframes(seen, self.config)
         done = self.predictor.complete_track(self._clouds(chosen))

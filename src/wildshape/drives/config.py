@@ -135,7 +135,9 @@ class CompletionConfig:
         looks: scans of a track that the network sees first, the fullest of equal parts of it.
         worst_cost_m: tracks whose best first look costs more are no vehicles; those of a labelled
             street cost less than 0.2 m.
-        shortest_m: tracks whose first looks are all shorter are none either.
+        least_nats: nor are those whose looks say less for a vehicle on average. Of 41 tracks of
+            vehicles in two drives none said less than -1.9, of 60 others half did.
+        worst_nats: no single look says less.
         scans: of a track that are completed together.
         ticks: between them; neighbours at 10 Hz are nearly the same scan.
         fewest_points: scans of fewer are not completed where others are fuller.
@@ -143,7 +145,8 @@ class CompletionConfig:
 
     looks: int = 3
     worst_cost_m: float = 0.2
-    shortest_m: float = 2.2
+    least_nats: float = -2.25
+    worst_nats: float = -6.0
     scans: int = 16
     ticks: int = 4
     fewest_points: int = 60

@@ -268,9 +268,9 @@ class _Run:
 
     def complete(self, stage: str, objects: list[Sightings], mounting: Mounting) -> None:
         level = mounting.levelling() if mounting.is_tilted else None
-        config = self.config.completion
+        config = self.config.completion, self.config.vehicles
         folder = self.stages / "objects"
-        completer = Completer(self.predictor, self.drive, self.cuts, folder, level, config)
+        completer = Completer(self.predictor, self.drive, self.cuts, folder, level, *config)
         self.spread(stage, completer, completer.missing(objects), len(objects))
 
     def completed(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Completed]:

@@ -82,14 +82,25 @@ def vehicle_confidence(one: Completed, config: VehicleConfig) -> float:
     on its shape, how often it was seen (at most a nat), and what the network says of its
     completions (at most half).
     """
-    cost = (config.even_cost_m - one.cost_m) / config.cost_scale_m
-    apart = (np.array(one.size) / np.array(config.kinds) - 1.0) / config.spread
-    size = 1.0 - 0.5 * float((apart**2).sum(1).min())
+    shape = shape_nats(one.cost_m, one.size, config)
     seen = 0.5 * math.log(len(one.seen.frames) / config.usual_scans)
     said = 0.25 * math.log(max(one.confidence, 1e-6) / config.usual_confidence)
     together = config.merged_nats if one.seen.parts > 1 else 0.0
-    nats = cost + size + together + min(max(seen, -1.0), 1.0) + min(max(said, -0.5), 0.5)
+    nats = shape + together + min(max(seen, -1.0), 1.0) + min(max(said, -0.5), 0.5)
     return 1.0 / (1.0 + math.exp(-min(max(nats, -20.0), 20.0)))
+
+
+def shape_nats(cost_m: float, size: tuple[float, float, float], config: VehicleConfig) -> float:
+    """What a completed shape alone says for a vehicle, log-odds: its label-free cost and its size.
+
+    Args:
+        cost_m: metres.
+        size: length, width, height, metres.
+        config: see there.
+    """
+    cost = (config.even_cost_m - cost_m) / config.cost_scale_m
+    apart = (np.array(size) / np.array(config.kinds) - 1.0) / config.spread
+    return cost + 1.0 - 0.5 * float((apart**2).sum(1).min())
 
 
 def fragments(objects: list[Completed], config: VehicleConfig) -> list[Sightings]:
