@@ -159,7 +159,7 @@ def test_what_is_left_out_is_told_by_reason_and_part(wildshape, drives, tmp_path
         (("--min-scans", 5), 0, 0),
         (("--min-mean-points", 136), 0, 0),
         (("--min-mean-points", 135), 4, 16),
-        (("--range-m", 10, 17), 2, 7),
+        (("--range-m", "10,17"), 2, 7),
         (("--categories", "Van"), 0, 0),
         (("--categories", "Car,Van"), 4, 16),
         (("--ground", 1.6), 0, 0),
@@ -176,6 +176,15 @@ def test_filters(wildshape, drives, tmp_path, options, tracks, scans):
         return
     said = json.loads(found.out)
     assert (said["tracks"], said["scans"]) == (tracks, scans)
+
+
+def test_values_apart_never_swallow_what_follows(wildshape, drives, tmp_path):
+    """`--range-m 10 17 ROOT OUT` would read ROOT as a number, or write to another place."""
+    found = wildshape("convert", "kitti-raw", "--range-m", 10, 17, drives, tmp_path / "out")
+    assert found.code == 2
+    assert not (tmp_path / "out").exists()
+    before = ("convert", "kitti-raw", "--range-m", "10,17", drives, tmp_path / "out", "--json")
+    assert json.loads(wildshape(*before, "--workers", 1).out)["tracks"] == 2
 
 
 def test_truth(wildshape, drives, tmp_path):
@@ -224,7 +233,7 @@ def test_zeros_reach_the_reader(tmp_path, option, field):
         (("--margin", "nan"), "--margin nan: expected a number"),
         (("--categories", ","), "--categories names no category"),
         (("--every", 0), "--every 0: expected 1 or more"),
-        (("--range-m", 9, 3), "nearer first"),
+        (("--range-m", "9,3"), "nearer first"),
         (("--workers", 0), "--workers 0"),
         (("--split", "train"), "--split: kitti-raw has no such option"),
     ],

@@ -30,7 +30,7 @@ Root = Annotated[Path, Positional, arg(metavar="ROOT", help="where it lies")]
 Out = Annotated[Path, Positional, arg(metavar="OUT", help="packed store, or folder, to write")]
 Count = Annotated[int | None, option(metavar="N")]
 Metres = Annotated[float | None, option(metavar="M")]
-Range = Annotated[tuple[float, float] | None, listed("LOW,HIGH", float, count=2), option()]
+Range = Annotated[tuple[float, float] | None, listed("LOW,HIGH", float, count=2, words=1), option()]
 Words = Annotated[tuple[str, ...] | None, listed("A,B", words=1), option()]
 Word = Annotated[str | None, option(metavar="WORD")]
 
