@@ -71,7 +71,7 @@ def test_the_command_table_runs_from_top_to_bottom_in_one_folder(tmp_path, monke
     monkeypatch.setattr(page, "run_until_interrupted", once)
     monkeypatch.setattr("webbrowser.open", lambda _: True)
     monkeypatch.chdir(tmp_path)
-    others = {"demo", "drive", "evaluate-drive"}
+    others = {"demo"}
     assert {words.split()[0] for words in TABLE} == set(COMMANDS) - others
     for row in TABLE:
         words = shlex.split(row)

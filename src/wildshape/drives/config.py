@@ -86,8 +86,8 @@ class ClusterConfig:
         lowest_top_m: above the ground; lower things are no vehicles.
         highest_bottom_m: above the ground; higher things do not stand on it.
         shortest_m: a car's width, half hidden.
-        longest_m: a lorry.
-        widest_m: a lorry with its mirrors.
+        longest_m: a truck.
+        widest_m: a truck with its mirrors.
     """
 
     range_m: float = 60.0

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a LiDAR's view ends above: what lies higher was not free, only not looked at.
 
-Beyond the paper. The uppermost beam of an HDL-64E looks 2 degrees up; of a lorry nearby it sees
+Beyond the paper. The uppermost beam of an HDL-64E looks 2 degrees up; of a truck nearby it sees
 half. No sensor's data sheet is asked: a track shows where its view ended.
 """
 
