@@ -10,6 +10,8 @@ import torch
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 
+_LARGEST = 1e9  # metres or pixels; squares of far larger numbers overflow
+
 
 def read_calibration(path: Path, cure: str) -> dict[str, np.ndarray]:
     """The numbers of each line by the line's name; a colon after the name is optional.
@@ -77,8 +79,8 @@ def _numbers(words: list[str], where: str) -> np.ndarray:
         numbers = np.asarray([float(word) for word in words])
     except ValueError:
         numbers = np.full(1, np.nan)
-    if not np.isfinite(numbers).all():
-        raise BadInputError(f"{where}: expected numbers, found '{' '.join(words)[:60]}'.")
+    if not (np.abs(numbers) < _LARGEST).all():
+        raise BadInputError(f"{where}: expected numbers below 1e9, found '{' '.join(words)[:60]}'.")
     return numbers
 
 

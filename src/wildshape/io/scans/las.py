@@ -121,7 +121,8 @@ def _check_compressed(path: Path, offset: int, count: int, point_size: int, reco
             f"{path}: LAZ items of {size} bytes make no point of {point_size}: damaged; "
             "copy it again."
         )
-    if kind == _LAZ_LAYERED:
+    # lazrs goes by the items, whatever kind of compression is named beside them.
+    if kind == _LAZ_LAYERED or any(item in (*_LAYERS, _BYTE14) for item, *_ in items):
         found = _count_layered(body[offset + 8 : table], items, count, chunk_size)
         if found != count:
             raise _truncated(path, count, found)
