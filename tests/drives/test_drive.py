@@ -20,7 +20,7 @@ from wildshape.drives.segmentation import Cutter
 from wildshape.drives.source import open_drive
 from wildshape.drives.trajectory import find_trajectory
 from wildshape.geometry.footprint import footprint_iou
-from wildshape.inference.box_files import BoxFiles
+from wildshape.inference.folders.box_files import BoxFiles
 from wildshape.io.boxes.detections import read_detections
 from wildshape.io.boxes.table import HEADER, read_box_table
 from wildshape.io.poses import read_poses, read_tum

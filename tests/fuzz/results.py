@@ -21,7 +21,7 @@ from wildshape.evaluation.drives.labels import Counting, read_labels
 from wildshape.evaluation.drives.protocol import evaluate_drives
 from wildshape.evaluation.drives.results import as_json
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.box_files import BoxFiles
+from wildshape.inference.folders.box_files import BoxFiles
 from wildshape.io.boxes.table import BoxRow, write_box_table
 from wildshape.io.poses import write_poses
 from wildshape.io.scans.writers import write_ply

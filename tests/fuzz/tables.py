@@ -57,6 +57,7 @@ def _changed_table(rng: Random, table: Any) -> Any:
     """A column lost, renamed, of another type, with other values; rows lost, doubled, mixed."""
     import pyarrow as pa
 
+    table.validate(full=True)  # of a damaged one `take` reads anywhere
     i = rng.randrange(table.num_columns)
     name, count = table.column_names[i], table.num_rows
     match rng.randrange(6):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from wildshape.io.progress import Bar, duration, printable
 
 if TYPE_CHECKING:
-    from wildshape.inference.folders import FolderSummary
+    from wildshape.inference.folders.complete_folder import FolderSummary
 
 
 _EVERY_SECONDS = 10.0

@@ -16,7 +16,7 @@ from wildshape.drives.sightings import Sightings
 from wildshape.drives.source import Drive
 from wildshape.drives.vehicles import Completed
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.completed_files import OBJECTS
+from wildshape.inference.folders.completed_files import OBJECTS
 from wildshape.io.atomic import write_text
 from wildshape.io.boxes.detections import Detection, number_of
 from wildshape.io.boxes.table import BoxRow

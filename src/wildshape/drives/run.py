@@ -40,8 +40,8 @@ from wildshape.drives.tracks import Seen, link
 from wildshape.drives.trajectory import find_trajectory, jumps
 from wildshape.drives.vehicles import Completed, Judged, fragments, judge
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.box_files import BOX_FILES, BoxFiles
-from wildshape.inference.completed_files import OBJECTS
+from wildshape.inference.folders.box_files import BOX_FILES, BoxFiles
+from wildshape.inference.folders.completed_files import OBJECTS
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import write_json
 from wildshape.io.boxes.table import write_box_table

@@ -25,7 +25,7 @@ from wildshape.cli.process import uncollected
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
-    from wildshape.inference.folders import FolderOptions
+    from wildshape.inference.folders.complete_folder import FolderOptions
     from wildshape.io.scans.writers import MeshFiles
     from wildshape.records import Completion, Track
 
@@ -111,7 +111,7 @@ def run(settings: Settings) -> None:
 def _to_folder(settings: Settings, out: Path) -> None:
     with uncollected():
         from wildshape.cli.terminal import TERMINAL, conclude
-        from wildshape.inference.folders import complete_folder
+        from wildshape.inference.folders.complete_folder import complete_folder
 
     if settings.format != "auto":
         raise BadInputError(f"--format {settings.format}: is for a scan on stdin; leave it away.")
@@ -121,8 +121,8 @@ def _to_folder(settings: Settings, out: Path) -> None:
 
 
 def _options(settings: Settings) -> "FolderOptions":
-    from wildshape.inference.box_files import BoxFiles
-    from wildshape.inference.folders import FolderOptions
+    from wildshape.inference.folders.box_files import BoxFiles
+    from wildshape.inference.folders.complete_folder import FolderOptions
 
     wanted = bool(settings.boxes or settings.calibration)
     boxes = BoxFiles(settings.boxes, settings.calibration) if wanted else None
@@ -190,7 +190,7 @@ def _one_scan(settings: Settings) -> "Track":
 
 def _as_json(name: str, done: "Completion") -> dict[str, object]:
     """What `objects.json` says of a scan, its pose, and its points to a tenth of a millimetre."""
-    from wildshape.inference.completed_files import describe
+    from wildshape.inference.folders.completed_files import describe
 
     pose = done.pose.matrix.tolist()
     points = [[round(x, 4) for x in row] for row in done.points.tolist()]

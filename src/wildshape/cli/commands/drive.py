@@ -81,7 +81,7 @@ def run(settings: Settings) -> None:
     """
     from wildshape.cli.terminal import answer
     from wildshape.drives.run import drive
-    from wildshape.inference.box_files import BoxFiles
+    from wildshape.inference.folders.box_files import BoxFiles
     from wildshape.inference.predictor import load
 
     workers = _workers(settings)

@@ -91,7 +91,7 @@ def run(settings: Settings) -> None:
 def _tracks(settings: Settings, out: Path) -> None:
     with uncollected():
         from wildshape.cli.terminal import TERMINAL, conclude
-        from wildshape.inference.folders import FolderOptions, complete_folder
+        from wildshape.inference.folders.complete_folder import FolderOptions, complete_folder
 
     options = FolderOptions(
         model=settings.network.model,

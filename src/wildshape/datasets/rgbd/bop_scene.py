@@ -124,8 +124,9 @@ def model_shape(scene: Path, category: str, count: int) -> Points | None:
     for above in scene.resolve().parents[:2]:
         for folder in ("models", "models_cad", "models_reconst", "models_eval"):
             path = above / folder / f"{category}.ply"
-            if path.is_file():
-                return _sampled(path, count)
+            with reading(path, "a PLY mesh"):  # the object's number may be too long for a name
+                if path.is_file():
+                    return _sampled(path, count)
     return None
 
 

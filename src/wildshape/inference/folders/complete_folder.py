@@ -14,9 +14,9 @@ from typing import Any
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import stack
-from wildshape.inference.box_files import BOX_FILES, BoxFiles
-from wildshape.inference.completed_files import COMPLETED, OBJECTS, POSES, objects_of
 from wildshape.inference.confidence import ReasonCounts
+from wildshape.inference.folders.box_files import BOX_FILES, BoxFiles
+from wildshape.inference.folders.completed_files import COMPLETED, OBJECTS, POSES, objects_of
 from wildshape.inference.models import fingerprint
 from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.registration import to_middle
