@@ -172,4 +172,9 @@ def test_train_on_folders(wildshape, dataset, tmp_path):
     assert wildshape(*shape).code == 0
     assert len(open_store(out / "data.store")) == 6
     assert "finished already" in wildshape(*shape, "--resume").out
+    for lost in ("model.safetensors", "state.safetensors", "data.store/index.json"):
+        (out / lost).unlink()
+    (out / "data.store" / "writing.json").write_text("{}")  # killed while tracks were packed
+    assert wildshape(*shape, "--resume").code == 0
+    assert len(open_store(out / "data.store")) == 6
     assert wildshape(*shape, "--overwrite").code == 0

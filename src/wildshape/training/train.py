@@ -30,6 +30,7 @@ from wildshape.io.output import (
 from wildshape.io.progress import SILENT, Progress, duration
 from wildshape.io.provenance import provenance
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates
+from wildshape.io.store.layout import INDEX_JSON
 from wildshape.io.store.store import Store, is_store, open_store
 from wildshape.io.write_tracks import write_tracks
 from wildshape.method.checkpoint import load_checkpoint
@@ -287,7 +288,7 @@ def open_training_data(
             f" `wildshape convert folder {data} OUT`."
         )
     packed = out / _PACKED
-    if options.resume and is_store(packed):
+    if options.resume and (packed / INDEX_JSON).is_file():  # else it is none, or half-written
         return open_store(packed)
     source = open_tracks(data, options.coordinates)
     write_tracks(
