@@ -118,6 +118,7 @@ def drive(
     out: Path | str,
     config: DriveConfig = _DEFAULT,
     *,
+    topic: str | None = None,
     predictor: Predictor | None = None,
     workers: int = 1,
     boxes: BoxFiles | None = None,
@@ -127,9 +128,10 @@ def drive(
     """Find every vehicle of a raw recording: its track, boxes and complete shape, without labels.
 
     Args:
-        source: a folder of full scans, or a drive of KITTI (`source.py`).
+        source: a folder of full scans, a drive of KITTI or a recording of ROS (`source.py`).
         out: folder to write (docs/drive.md); an interrupted run there is gone on with.
         config: the numbers of every stage.
+        topic: of point clouds, for a recording of ROS that holds several.
         predictor: by default the shipped weights.
         workers: processes that cut scans and complete objects.
         boxes: other formats in which the boxes are written, too, below `boxes/`.
@@ -143,18 +145,20 @@ def drive(
     source, out = Path(source), Path(out)
     if boxes is not None:
         boxes.check()
-    recording = open_drive(source)
+    recording = open_drive(source, topic)
     predictor = load() if predictor is None else predictor
     keep_apart(source, out)
     settings = {
         "source": str(source.resolve()),
         "scans": len(recording),
+        **({} if topic is None else {"topic": topic}),
         "drive": asdict(config),
         "model": predictor.settings.provenance,
         "inference": asdict(predictor.config),
         **({} if boxes is None else boxes.identity()),
     }
-    line = shlex.join(("wildshape", "drive", str(source), "--out", str(out)))
+    chosen = () if topic is None else ("--topic", topic)
+    line = shlex.join(("wildshape", "drive", str(source), "--out", str(out), *chosen))
     output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
     found = _Run(recording, out, config, predictor, workers, boxes, _Clock(watch)).perform()
     output.finish(result={**asdict(found), "out": str(out)})

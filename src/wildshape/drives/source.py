@@ -12,6 +12,8 @@ import numpy as np
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.bags.reader import Bag, bag_files, open_bag
+from wildshape.io.bags.storages import STORAGES
 from wildshape.io.guard import reading
 from wildshape.io.poses import read_poses
 from wildshape.io.scans.points import is_scan_file, read_points
@@ -64,19 +66,31 @@ class _Files:
         return read_points(self.files[frame])
 
 
-def open_drive(path: Path | str) -> Drive:
-    """A folder of full scans, a drive of KITTI raw or a sequence of KITTI odometry.
+def open_drive(path: Path | str, topic: str | None = None) -> Drive:
+    """A folder of full scans, a drive of KITTI raw, a sequence of KITTI odometry, or a bag of ROS.
 
     Scans are sorted by name. `times.txt` (seconds, a line a scan) and `poses.txt`
     (`T_world_sensor`) beside the scans are used; an odometry sequence's own poses are those of a
     camera and are not.
 
+    Args:
+        path: of the drive.
+        topic: of point clouds, for a bag that holds several.
+
     Raises:
-        BadInputError: no scans; times or poses of another number or not in order.
+        BadInputError: no scans; times or poses of another number or not in order; no such topic.
+        MissingExtraError: a bag is read, and a library for it is not installed.
     """
     path = Path(path)
+    if bag_files(path):
+        return _recorded(path, open_bag(path, topic))
     if not path.is_dir():
-        raise BadInputError(f"{path}: no such folder; a drive is a folder of full scans.")
+        raise BadInputError(
+            f"{path}: no such folder; a drive is a folder of full scans or a recording of ROS"
+            f" ({', '.join(STORAGES)})."
+        )
+    if topic is not None:
+        raise BadInputError(f"{path}: has no topics, it is no recording of ROS; drop --topic.")
     if (path / _RAW).is_dir():
         times = _timestamps(path / _RAW.parent / "timestamps.txt")
         return _drive(path, _files(path / _RAW), times, None)
@@ -99,6 +113,19 @@ def _drive(path: Path, files: list[Path], times: list[float] | None, poses: Path
         times=None if times is None else tuple(times),
         T_world_sensor=None if poses is None else read_poses(poses, len(files)),
         warnings=missing,
+    )
+
+
+def _recorded(path: Path, bag: Bag) -> Drive:
+    names = tuple(f"{frame:06d}" for frame in range(len(bag.times)))
+    ticks, missing = _ticks(names, list(bag.times))
+    return Drive(
+        name=path.resolve().stem if path.is_file() else path.resolve().name,
+        scan_names=names,
+        ticks=ticks,
+        read=bag,
+        times=bag.times,
+        warnings=(*bag.warnings, *missing),
     )
 
 

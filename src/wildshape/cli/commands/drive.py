@@ -29,6 +29,7 @@ EXAMPLES = (
     "wildshape drive recording --out found",
     "wildshape drive 2011_09_26_drive_0048_sync --out found",
     "wildshape drive recording --out found --boxes json,kitti",
+    "wildshape drive recording.bag --out found --topic /velodyne_points",
     "wildshape drive monday tuesday --out found",
 )
 
@@ -38,7 +39,8 @@ Sources = Annotated[
     option(
         metavar="SOURCE",
         help="folder of full scans, sorted by name (with times.txt or poses.txt if there are),"
-        " drive of KITTI raw, or sequence of KITTI odometry",
+        " drive of KITTI raw, sequence of KITTI odometry, or recording of ROS with PointCloud2"
+        " (folder of ROS 2 with .db3 or .mcap, or .bag of ROS 1)",
     ),
 ]
 
@@ -55,6 +57,9 @@ class Settings:
 
     source: Sources
     out: OutFolder
+    topic: Annotated[
+        str | None, option(metavar="NAME", help="of point clouds, if a recording has several")
+    ] = None
     network: Network = DEFAULT_NETWORK
     workers: Annotated[int | None, option(metavar="N", help="processes; by default one a core")] = (
         None
@@ -95,6 +100,7 @@ def run(settings: Settings) -> None:
             one = drive(
                 source,
                 out,
+                topic=settings.topic,
                 predictor=predictor,
                 workers=workers,
                 boxes=boxes,

@@ -1,0 +1,162 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The scans of a recording of ROS: listed in one pass over its files, then read one by one."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.io.bags.clouds import message_types, points_of, stamp
+from wildshape.io.bags.storages import CLOUD, STORAGES, Key, Message
+from wildshape.io.guard import first_line, reading
+from wildshape.io.scans.points import check_near, drop_nonfinite
+from wildshape.records import Points
+
+
+class _Scan(NamedTuple):
+    """Where a scan is."""
+
+    stamped: int
+    logged: int
+    file: Path
+    key: Key
+    cdr: bool
+    dropped: int
+
+
+@dataclass(frozen=True)
+class Bag:
+    """The scans of one topic of a recording, in time order.
+
+    Attributes:
+        topic: its name.
+        times: of each scan, seconds, increasing: the messages' own stamps, or when they were
+            recorded if they bear none.
+        warnings: what is odd about it, a sentence each.
+    """
+
+    topic: str
+    times: tuple[float, ...]
+    warnings: tuple[str, ...]
+    scans: tuple[_Scan, ...]
+
+    def __call__(self, frame: int) -> Points:
+        """The points of a scan that have a return, sensor frame, metres.
+
+        Raises:
+            BadInputError: damaged, or without fields x, y and z.
+        """
+        scan = self.scans[frame]
+        with reading(scan.file, f"a point cloud as scan {frame} of {self.topic}"):
+            data = STORAGES[scan.file.suffix](scan.file).data(scan.key)
+            points = points_of(data, cdr=scan.cdr)
+            check_near(points, f"{scan.file}, scan {frame}")
+            return drop_nonfinite(points[_returned(points)]).points
+
+
+def bag_files(path: Path) -> list[Path]:
+    """The files of a recording of ROS: the path itself, or the .db3 or .mcap of a folder.
+
+    Empty if it is none.
+    """
+    if path.is_file():
+        return [path] if path.suffix in STORAGES else []
+    if not path.is_dir():
+        return []
+    return sorted(file for file in path.iterdir() if file.suffix in (".db3", ".mcap"))
+
+
+def open_bag(path: Path, topic: str | None = None) -> Bag:
+    """List the scans of a recording; every file is read once, message by message.
+
+    Args:
+        path: a folder of ROS 2 with .db3 or .mcap, such a file, or a .bag of ROS 1.
+        topic: of sensor_msgs/PointCloud2; only needed if there are several.
+
+    Raises:
+        BadInputError: no or several such topics, none of that name, or no readable scan.
+        MissingExtraError: rosbags or mcap is not installed.
+    """
+    files = bag_files(path)
+    if not files:
+        raise BadInputError(f"{path}: holds no {', '.join(STORAGES)}; give a recording of ROS.")
+    message_types(True)
+    found: dict[str, list[_Scan]] = {}
+    topics: dict[str, str] = {}
+    damaged = []
+    for file in files:
+        storage = STORAGES[file.suffix](file)
+        try:
+            for message in storage.clouds():
+                found.setdefault(message.topic, []).append(_listed(message, file))
+        except (MissingExtraError, MemoryError):
+            raise
+        except Exception as error:  # noqa: BLE001 - whatever it is, the scans before it are good
+            damaged.append(f"{file.name} is cut off or damaged ({_said(error)})")
+        topics |= storage.topics
+    chosen = _chosen(path, topic, topics, damaged)
+    scans = found.get(chosen, [])
+    if not scans:
+        raise BadInputError(f"{path}: {'; '.join([*damaged, f'{chosen} holds no scan'])}.")
+    told = tuple(f"{one}; {len(scans)} scans could be read" for one in damaged)
+    return _in_order(chosen, scans, told)
+
+
+def _said(error: Exception) -> str:
+    return first_line(error) or type(error).__name__
+
+
+def _listed(message: Message, file: Path) -> _Scan:
+    """A scan's place, and how many of its points are no measurement."""
+    dropped = 0
+    with suppress(BadInputError), reading(file, "a point cloud"):  # reading the scan says why
+        points = points_of(message.data, cdr=message.cdr)
+        dropped = len(points) - int(_returned(points).sum())
+    stamped = stamp(message.data, cdr=message.cdr)
+    return _Scan(stamped, message.logged, file, message.key, message.cdr, dropped)
+
+
+def _returned(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
+    """Which points were measured: drivers write NaN or the sensor's own place for no return."""
+    return np.isfinite(points).all(1) & (points != 0).any(1)
+
+
+def _chosen(path: Path, topic: str | None, topics: dict[str, str], damaged: list[str]) -> str:
+    """The topic to read."""
+    clouds = sorted(name for name, kind in topics.items() if kind == CLOUD)
+    if topic in clouds:
+        return str(topic)
+    if not clouds:
+        there = ", ".join(sorted({kind for kind in topics.values() if kind})) or "nothing"
+        raise BadInputError(
+            f"{path}: {'; '.join([*damaged, f'no topic of {CLOUD}, found {there}'])}; record the"
+            " point clouds of the sensor's driver."
+        )
+    if topic is not None:
+        raise BadInputError(f"{path}: no topic {topic} of point clouds; there are {_all(clouds)}.")
+    if len(clouds) > 1:
+        raise BadInputError(f"{path}: choose one of its topics with --topic: {_all(clouds)}.")
+    return clouds[0]
+
+
+def _all(names: list[str]) -> str:
+    return ", ".join(names)
+
+
+def _in_order(topic: str, scans: list[_Scan], told: tuple[str, ...]) -> Bag:
+    """A bag of scans sorted in time, one an instant."""
+    stamped = all(scan.stamped for scan in scans)
+    taken = {scan.stamped if stamped else scan.logged: scan for scan in reversed(scans)}
+    instants = sorted(taken)
+    kept = tuple(taken[instant] for instant in instants)
+    repeated, dropped = len(scans) - len(kept), sum(scan.dropped for scan in kept)
+    if repeated:
+        told += (f"{repeated} scans bear the time of another and were left out",)
+    if dropped:
+        told += (f"{dropped} points without a return were left out",)
+    return Bag(topic, tuple(instant / 1e9 for instant in instants), told, kept)

@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings of ROS: every scan comes back exactly; what is cut off is read up to there."""
+
+import pickle
+from functools import partial
+
+import numpy as np
+import pytest
+from tests.refusal import refused
+
+from wildshape.drives.source import open_drive
+from wildshape.errors import MissingExtraError
+from wildshape.io.bags.reader import open_bag
+
+pytest.importorskip("rosbags")
+pytest.importorskip("mcap")
+
+from tests.io.bags.write import KINDS, Fields, write_bag
+
+TOPIC = "/velodyne_points"
+every_kind = pytest.mark.parametrize("kind", KINDS)
+
+
+def scans(count=6, points=2000):
+    rng = np.random.default_rng(0)
+    return [rng.normal(0, 10, (points, 3)).astype(np.float32) for _ in range(count)]
+
+
+@pytest.fixture
+def written(tmp_path):
+    return partial(write_bag, tmp_path / "recording")
+
+
+@every_kind
+@pytest.mark.parametrize("packed", [False, True])
+def test_every_scan_comes_back_in_time(written, kind, packed):
+    path = written(kind, {TOPIC: scans()}, packed=packed, extra=["/notes"])
+    for source in (path, path if kind == "bag" else path.parent):
+        drive = open_drive(source)
+        assert (drive.name, len(drive), drive.ticks) == ("recording", 6, tuple(range(6)))
+        assert drive.warnings == ()
+        assert drive.times == pytest.approx(1e9 + np.arange(6) / 10, abs=1e-6)
+        for frame in (5, 0, 3, 1, 2, 4):  # in any order
+            assert np.array_equal(drive.scan(frame), scans()[frame])
+        again = pickle.loads(pickle.dumps(drive))  # as other processes get it
+        assert np.array_equal(again.scan(4), scans()[4])
+
+
+@every_kind
+@pytest.mark.parametrize("fields", [Fields("f8"), Fields("f4", big=True), Fields("i2", rows=4)])
+def test_fields_are_found_by_name_type_and_order_of_bytes(written, kind, fields):
+    whole = [np.rint(scan) for scan in scans(2)] if fields.kind == "i2" else scans(2)
+    drive = open_drive(written(kind, {TOPIC: whole}, fields))
+    measured = [scan[(scan != 0).any(1)] for scan in whole]
+    assert all(np.array_equal(drive.scan(frame), measured[frame]) for frame in range(2))
+
+
+@every_kind
+def test_points_without_a_return_are_left_out_and_counted(written, kind):
+    first, second = scans(2)
+    first[:3] = np.nan
+    second[5], second[6, 1] = 0, np.inf
+    drive = open_drive(written(kind, {TOPIC: [first, second]}))
+    assert np.array_equal(drive.scan(0), first[3:])
+    assert np.array_equal(drive.scan(1), np.delete(second, (5, 6), 0))
+    assert drive.warnings == ("5 points without a return were left out",)
+
+
+@every_kind
+def test_an_empty_scan_is_a_scan(written, kind):
+    one, other = scans(2)
+    drive = open_drive(written(kind, {TOPIC: [one, one[:0], other]}))
+    assert [len(drive.scan(frame)) for frame in range(3)] == [2000, 0, 2000]
+
+
+@every_kind
+def test_stamps_of_the_scans_are_their_order(written, kind):
+    stamps = [3 * 10**8, 10**8, 2 * 10**8, 2 * 10**8]
+    drive = open_drive(written(kind, {TOPIC: scans(4)}, stamps=stamps))
+    assert drive.times == (0.1, 0.2, 0.3)
+    assert [np.array_equal(drive.scan(i), scans(4)[j]) for i, j in enumerate((1, 2, 0))] == [
+        True
+    ] * 3
+    assert drive.warnings == ("1 scans bear the time of another and were left out",)
+
+
+@every_kind
+def test_without_stamps_the_time_of_recording_counts(written, kind):
+    drive = open_drive(written(kind, {TOPIC: scans(3)}, stamps=[0, 0, 0]))
+    assert drive.times == pytest.approx(1e9 + np.arange(3) / 10, abs=1e-6)
+
+
+@every_kind
+def test_of_several_topics_one_is_chosen(written, kind):
+    front, back = scans(2), [scan + 1 for scan in scans(3)]
+    path = written(kind, {"/front": front, "/back": back}, extra=["/notes"])
+    refused(open_drive, path, match="choose one of its topics with --topic: /back, /front")
+    assert len(open_drive(path, "/back")) == 3
+    assert np.array_equal(open_drive(path, "/front").scan(1), front[1])
+    for topic in ("/middle", "/notes"):
+        refused(open_drive, path, topic, match=f"no topic {topic} of point .* are /back, /front")
+
+
+@every_kind
+def test_what_holds_no_scans_is_refused(written, kind, tmp_path):
+    path = written(kind, {}, extra=["/notes"])
+    refused(open_drive, path, match="no topic of sensor_msgs/msg/PointCloud2, found std_msgs")
+    path.write_bytes(b"nothing of the kind" * 1000)
+    refused(open_drive, path, match="cut off or damaged")
+    path.write_bytes(b"")
+    refused(open_drive, path, match="cut off or damaged|found nothing")
+    (tmp_path / "folder").mkdir()
+    np.save(tmp_path / "folder" / "000000.npy", scans(1)[0])
+    refused(open_drive, tmp_path / "folder", "/topic", match="has no topics")
+
+
+@every_kind
+def test_points_without_x_y_z_are_refused_by_their_fields(written, kind):
+    drive = open_drive(written(kind, {TOPIC: scans(1)}, Fields(names="uvw")))
+    refused(drive.read, 0, match="the fields u, v, w, but no x, y, z")
+
+
+@every_kind
+@pytest.mark.parametrize("part", [0.3, 0.5, 0.8, 0.97])
+def test_a_cut_recording_is_read_up_to_there(written, kind, part):
+    """No scan is changed: those that are read are whole."""
+    path = written(kind, {TOPIC: scans(200, 1500)})
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(part * len(whole))])
+    drive = open_drive(path)
+    assert 200 * (part - 0.2) < len(drive) <= 200
+    for frame in range(len(drive)):
+        assert np.array_equal(drive.scan(frame), scans(200, 1500)[frame])
+    (told,) = drive.warnings
+    assert "is cut off or damaged" in told
+    assert told.endswith(f"; {len(drive)} scans could be read")
+
+
+def test_a_missing_library_is_named(written, monkeypatch):
+    path = written("mcap", {TOPIC: scans(1)})
+    monkeypatch.setitem(__import__("sys").modules, "mcap.stream_reader", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'wildshape\[bags\]'"):
+        open_bag(path)

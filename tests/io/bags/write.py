@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings of ROS, written by rosbags."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Ros2Writer
+from rosbags.typesys import Stores, get_typestore
+
+CLOUD = "sensor_msgs/msg/PointCloud2"
+KINDS = ("db3", "mcap", "bag")
+TENTH = 10**8
+_ROS1, _ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
+
+
+@dataclass(frozen=True)
+class Fields:
+    """How x, y and z lie in a point."""
+
+    kind: str = "f4"
+    big: bool = False
+    rows: int = 1
+    names: str = "xyz"
+
+
+PLAIN = Fields()
+_NUMBERS = {"f4": 7, "f8": 8, "i2": 3}
+
+
+def cloud(points, stamped, fields=PLAIN, *, ros1=False):
+    """A message: a ring number, y, z, x and a time a point; rows are padded with four bytes."""
+    order = ">" if fields.big else "<"
+    y, z, x = (fields.names[i] for i in (1, 2, 0))
+    layout = [("ring", order + "u2"), *((n, order + fields.kind) for n in (y, z, x))]
+    rows = np.zeros((fields.rows, len(points) // fields.rows), [*layout, ("time", order + "f4")])
+    for name, axis in zip(fields.names, points.T):
+        rows[name] = axis.reshape(rows.shape)
+    step, bytes_ = rows.itemsize, [row.tobytes() + b"\xff" * 4 for row in rows]
+    types = (_ROS1 if ros1 else _ROS2).types
+    dtype = rows.dtype.fields
+    assert dtype is not None
+    described = [
+        types["sensor_msgs/msg/PointField"](name, dtype[name][1], _NUMBERS[fields.kind], 1)
+        for name in fields.names
+    ]
+    time = types["builtin_interfaces/msg/Time"](*divmod(stamped, 10**9))
+    header = types["std_msgs/msg/Header"](*((7,) if ros1 else ()), time, "lidar")
+    data = np.frombuffer(b"".join(bytes_), np.uint8)
+    width = rows.shape[1]
+    message = types[CLOUD](
+        header, fields.rows, width, described, fields.big, step, step * width + 4, data, True
+    )
+    return (_ROS1.serialize_ros1 if ros1 else _ROS2.serialize_cdr)(message, CLOUD)
+
+
+def write_bag(path, kind, scans, fields=PLAIN, stamps=None, packed=False, extra=()):
+    """A recording of scans, 0.1 s apart; its file.
+
+    Args:
+        scans: of each topic.
+        stamps: of each scan, nanoseconds.
+        extra: topics of text.
+    """
+    if kind == "bag":
+        writer, types, path = Ros1Writer(path.with_suffix(".bag")), _ROS1, path.with_suffix(".bag")
+        if packed:
+            writer.set_compression(Ros1Writer.CompressionFormat.LZ4)
+    else:
+        plugin = StoragePlugin.MCAP if kind == "mcap" else StoragePlugin.SQLITE3
+        writer, types = Ros2Writer(path, version=9, storage_plugin=plugin), _ROS2
+        if packed:
+            mode = "STORAGE" if kind == "mcap" else "MESSAGE"
+            writer.set_compression(
+                Ros2Writer.CompressionMode[mode], Ros2Writer.CompressionFormat.ZSTD
+            )
+        path = path / f"{path.name}.{kind}"
+    with writer:
+        topics = {topic: writer.add_connection(topic, CLOUD, typestore=types) for topic in scans}
+        for topic in extra:
+            writer.add_connection(topic, "std_msgs/msg/String", typestore=types)
+        for topic, frames in scans.items():
+            for frame, points in enumerate(frames):
+                at = 10**18 + frame * TENTH
+                stamped = at if stamps is None else stamps[frame]
+                data = cloud(points, stamped, fields, ros1=kind == "bag")
+                writer.write(topics[topic], at, data)
+    return path
