@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from tests.refusal import refused
 
+from wildshape.cli.main import main
 from wildshape.drives.source import open_drive
 from wildshape.errors import MissingExtraError
 from wildshape.io.bags.reader import open_bag
@@ -125,13 +126,14 @@ def test_points_without_x_y_z_are_refused_by_their_fields(written, kind):
 @pytest.mark.parametrize("part", [0.3, 0.5, 0.8, 0.97])
 def test_a_cut_recording_is_read_up_to_there(written, kind, part):
     """No scan is changed: those that are read are whole."""
-    path = written(kind, {TOPIC: scans(200, 1500)})
+    recorded = scans(100, 3000)
+    path = written(kind, {TOPIC: recorded})
     whole = path.read_bytes()
     path.write_bytes(whole[: int(part * len(whole))])
     drive = open_drive(path)
-    assert 200 * (part - 0.2) < len(drive) <= 200
+    assert 100 * (part - 0.2) < len(drive) <= 100
     for frame in range(len(drive)):
-        assert np.array_equal(drive.scan(frame), scans(200, 1500)[frame])
+        assert np.array_equal(drive.scan(frame), recorded[frame])
     (told,) = drive.warnings
     assert "is cut off or damaged" in told
     assert told.endswith(f"; {len(drive)} scans could be read")
@@ -142,3 +144,10 @@ def test_a_missing_library_is_named(written, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "mcap.stream_reader", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'wildshape\[bags\]'"):
         open_bag(path)
+
+
+def test_the_command_line_lists_the_topics(written, tmp_path, capsys):
+    path = written("bag", {"/front": scans(1), "/back": scans(1)})
+    with pytest.raises(SystemExit, match="2"):
+        main(["drive", str(path), "--out", str(tmp_path / "out")])
+    assert "choose one of its topics with --topic: /back, /front" in capsys.readouterr().err

@@ -3,10 +3,11 @@
 """Recordings of ROS, written by rosbags."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from rosbags.rosbag1 import Writer as Ros1Writer
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
@@ -35,15 +36,16 @@ def cloud(points, stamped, fields=PLAIN, *, ros1=False):
     order = ">" if fields.big else "<"
     y, z, x = (fields.names[i] for i in (1, 2, 0))
     layout = [("ring", order + "u2"), *((n, order + fields.kind) for n in (y, z, x))]
-    rows = np.zeros((fields.rows, len(points) // fields.rows), [*layout, ("time", order + "f4")])
+    point = np.dtype([*layout, ("time", order + "f4")])
+    rows = np.zeros((fields.rows, len(points) // fields.rows), point)
     for name, axis in zip(fields.names, points.T):
         rows[name] = axis.reshape(rows.shape)
     step, bytes_ = rows.itemsize, [row.tobytes() + b"\xff" * 4 for row in rows]
     types = (_ROS1 if ros1 else _ROS2).types
-    dtype = rows.dtype.fields
-    assert dtype is not None
-    described = [
-        types["sensor_msgs/msg/PointField"](name, dtype[name][1], _NUMBERS[fields.kind], 1)
+    assert point.fields is not None
+    offsets = {str(name): entry[1] for name, entry in point.fields.items()}
+    described: Any = [
+        types["sensor_msgs/msg/PointField"](name, offsets[name], _NUMBERS[fields.kind], 1)
         for name in fields.names
     ]
     time = types["builtin_interfaces/msg/Time"](*divmod(stamped, 10**9))
@@ -72,10 +74,8 @@ def write_bag(path, kind, scans, fields=PLAIN, stamps=None, packed=False, extra=
         plugin = StoragePlugin.MCAP if kind == "mcap" else StoragePlugin.SQLITE3
         writer, types = Ros2Writer(path, version=9, storage_plugin=plugin), _ROS2
         if packed:
-            mode = "STORAGE" if kind == "mcap" else "MESSAGE"
-            writer.set_compression(
-                Ros2Writer.CompressionMode[mode], Ros2Writer.CompressionFormat.ZSTD
-            )
+            mode = CompressionMode.STORAGE if kind == "mcap" else CompressionMode.MESSAGE
+            writer.set_compression(mode, CompressionFormat.ZSTD)
         path = path / f"{path.name}.{kind}"
     with writer:
         topics = {topic: writer.add_connection(topic, CLOUD, typestore=types) for topic in scans}
