@@ -107,6 +107,19 @@ class ClusterConfig:
 
 
 @dataclass(frozen=True)
+class DetectionConfig:
+    """What belongs to a box that a detector found (`detections.py`).
+
+    Attributes:
+        around_m: points so far around a box are taken, too: detectors' boxes are a little off.
+        fewest_points: of a box; 16 are the least that can be completed.
+    """
+
+    around_m: float = 0.2
+    fewest_points: int = 16
+
+
+@dataclass(frozen=True)
 class LinkConfig:
     """Which clusters of successive scans are one object (`tracks.py`). A tick is a scan's time.
 
@@ -221,6 +234,7 @@ class DriveConfig:
     trajectory: TrajectoryConfig = field(default_factory=TrajectoryConfig)
     ground: GroundConfig = field(default_factory=GroundConfig)
     clusters: ClusterConfig = field(default_factory=ClusterConfig)
+    detections: DetectionConfig = field(default_factory=DetectionConfig)
     tracks: LinkConfig = field(default_factory=LinkConfig)
     completion: CompletionConfig = field(default_factory=CompletionConfig)
     vehicles: VehicleConfig = field(default_factory=VehicleConfig)

@@ -7,16 +7,23 @@ goes on.
 """
 
 import shlex
-import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from wildshape.drives.boxes import smooth
+from wildshape.drives.clock import Clock, Watch, silent
 from wildshape.drives.completion import Completer
 from wildshape.drives.config import DriveConfig
+from wildshape.drives.detections import (
+    BoxCutter,
+    DetectionFile,
+    Detections,
+    check_cut,
+    find_detections,
+    given_tracks,
+)
 from wildshape.drives.mounting import Mounting, find_mounting
 from wildshape.drives.outputs import (
     BOXES,
@@ -65,13 +72,6 @@ FILES = (
     "stages/**/*",
 )
 _DEFAULT = DriveConfig()
-Watch = Callable[[str, int, int], None]
-"""Told the stage, how much of it is done, and how much there is."""
-
-
-def _silent(stage: str, done: int, total: int) -> None:
-    """Nobody is told."""
-    del stage, done, total
 
 
 @dataclass(frozen=True)
@@ -99,20 +99,6 @@ class DriveResult:
     seconds: dict[str, float]
 
 
-@dataclass
-class _Clock:
-    """Seconds by stage, and who is told of progress."""
-
-    watch: Watch
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def stage(self, name: str, total: int) -> Iterator[Callable[[int], None]]:
-        began = time.perf_counter()
-        yield lambda done: self.watch(name, done, total)
-        self.seconds[name] = round(time.perf_counter() - began, 3)
-
-
 def drive(
     source: Path | str,
     out: Path | str,
@@ -122,8 +108,9 @@ def drive(
     predictor: Predictor | None = None,
     workers: int = 1,
     boxes: BoxFiles | None = None,
+    detections: DetectionFile | None = None,
     overwrite: bool = False,
-    watch: Watch = _silent,
+    watch: Watch = silent,
 ) -> DriveResult:
     """Find every vehicle of a raw recording: its track, boxes and complete shape, without labels.
 
@@ -135,17 +122,23 @@ def drive(
         predictor: by default the shipped weights.
         workers: processes that cut scans and complete objects.
         boxes: other formats in which the boxes are written, too, below `boxes/`.
+        detections: what somebody else's detector found, in place of the clusters.
         overwrite: remove an earlier output first.
         watch: told of progress.
 
     Raises:
-        BadInputError: source or output cannot be used.
+        BadInputError: source, detections or output cannot be used.
         MissingExtraError: a library is not installed.
     """
     source, out = Path(source), Path(out)
     if boxes is not None:
         boxes.check()
     recording = open_drive(source, topic)
+    given = None
+    if detections is not None:
+        given = find_detections(detections, recording)
+        recording = given.noted(recording)
+        keep_apart(detections.path, out)
     predictor = load() if predictor is None else predictor
     keep_apart(source, out)
     settings = {
@@ -156,11 +149,14 @@ def drive(
         "model": predictor.settings.provenance,
         "inference": asdict(predictor.config),
         **({} if boxes is None else boxes.identity()),
+        **({} if detections is None else detections.identity()),
     }
-    chosen = () if topic is None else ("--topic", topic)
+    chosen = [] if topic is None else ["--topic", topic]
+    if detections is not None:
+        chosen += ["--detections", str(detections.path)]
     line = shlex.join(("wildshape", "drive", str(source), "--out", str(out), *chosen))
     output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
-    found = _Run(recording, out, config, predictor, workers, boxes, _Clock(watch)).perform()
+    found = _Run(recording, out, config, predictor, workers, boxes, given, Clock(watch)).perform()
     output.finish(result={**asdict(found), "out": str(out)})
     return found
 
@@ -175,7 +171,8 @@ class _Run:
     predictor: Predictor
     workers: int
     formats: BoxFiles | None
-    clock: _Clock
+    detections: Detections | None
+    clock: Clock
 
     @property
     def stages(self) -> Path:
@@ -224,8 +221,20 @@ class _Run:
             return read_poses(path, len(self.drive))
 
     def cut(self, mounting: Mounting) -> None:
-        cutter = Cutter(self.drive, mounting, self.cuts, self.config)
+        cutter = self.cutter(mounting)
         self.spread("clusters", cutter, cutter.missing(), len(self.drive))
+        if self.detections is not None:
+            check_cut(self.detections, read_cuts(self.cuts, len(self.drive)))
+
+    def cutter(self, mounting: Mounting) -> Cutter:
+        if self.detections is None:
+            return Cutter(self.drive, mounting, self.cuts, self.config)
+        return BoxCutter(self.drive, mounting, self.cuts, self.config, self.detections)
+
+    @property
+    def tracked(self) -> bool:
+        """Whether the detections bring their own tracks."""
+        return self.detections is not None and self.detections.tracked
 
     def spread(self, stage: str, task: Callable[[Any], None], items: list[Any], total: int) -> None:
         """Do what is missing of a stage, by several processes where that is worth it."""
@@ -244,6 +253,8 @@ class _Run:
             return read_sightings(path)
 
     def linked(self, T_level_sensor: SE3) -> list[Sightings]:
+        if self.tracked:
+            return given_tracks(read_cuts(self.cuts, len(self.drive)))
         counts = []
         usable = 0
 
@@ -289,7 +300,7 @@ class _Run:
         """Tracks that are one object by their shapes, put together."""
         path = self.stages / "merged.json"
         if not path.is_file():
-            completed = self.completed(objects, T_level_sensor)
+            completed = [] if self.tracked else self.completed(objects, T_level_sensor)
             write_sightings(path, fragments(completed, self.config.vehicles))
         return read_sightings(path)
 

@@ -27,11 +27,13 @@ class CutScan:
         points: of all clusters, one after the other, sensor frame, metres.
         counts: points of each cluster.
         scanned: points of the whole scan.
+        tracks: the object that each cluster is, if known (`detections.py`).
     """
 
     points: Points
     counts: Int[np.ndarray, "k"]
     scanned: int
+    tracks: tuple[str, ...] = ()
 
     def clusters(self) -> list[Points]:
         """The points of each cluster."""
@@ -73,12 +75,16 @@ class Cutter:
         """The frames that have no file yet."""
         return [i for i in range(len(self.drive)) if not cut_file(self.folder, i).is_file()]
 
+    def cut(self, frame: int) -> CutScan:
+        """The clusters of one frame."""
+        return cut(self.drive.scan(frame), self.mounting, self.config)
+
     def __call__(self, frame: int) -> None:
         """Cut one scan and write its file."""
-        found = cut(self.drive.scan(frame), self.mounting, self.config)
-        scanned = np.array(found.scanned)
+        found = self.cut(frame)
+        scanned, tracks = np.array(found.scanned), np.array(found.tracks, np.str_)
         with atomic_write(cut_file(self.folder, frame)) as file:
-            np.savez(file, points=found.points, counts=found.counts, scanned=scanned)
+            np.savez(file, points=found.points, counts=found.counts, scanned=scanned, tracks=tracks)
 
 
 def cut_file(folder: Path, frame: int) -> Path:
@@ -94,7 +100,8 @@ def read_cut(folder: Path, frame: int) -> CutScan:
     """
     path = cut_file(folder, frame)
     with reading(path, "the clusters of a scan"), np.load(path, allow_pickle=False) as found:
-        return CutScan(found["points"], found["counts"], int(found["scanned"]))
+        tracks = tuple(found["tracks"].tolist())
+        return CutScan(found["points"], found["counts"], int(found["scanned"]), tracks)
 
 
 def read_cuts(folder: Path, count: int) -> Iterator[CutScan]:

@@ -54,7 +54,7 @@ class Sightings:
     def track(self, cuts: Path, drive: Drive, category: str) -> Track:
         """Its scans."""
         names = tuple(drive.scan_names[frame] for frame in self.frames)
-        source = f"{drive.name}: cut out by `wildshape drive`, without labels"
+        source = f"{drive.name}: cut out by `wildshape drive`, {drive.cut_by}"
         return Track(self.name, tuple(self.clouds(cuts)), names, category=category, source=source)
 
 

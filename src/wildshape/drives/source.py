@@ -35,6 +35,7 @@ class Drive:
         T_world_sensor: `(n,)` poses, if known.
         read: gives a frame's finite points, sensor frame, metres; `BadInputError` if it cannot.
         warnings: what is odd about it, a sentence each.
+        cut_by: how its objects are cut out, for their files.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Drive:
     times: tuple[float, ...] | None = None
     T_world_sensor: SE3 | None = None
     warnings: tuple[str, ...] = ()
+    cut_by: str = "without labels"
 
     def __len__(self) -> int:
         return len(self.scan_names)

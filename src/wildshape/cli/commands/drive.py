@@ -23,13 +23,17 @@ from wildshape.cli.options import (
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
-    from wildshape.drives.run import DriveResult, Watch
+    from wildshape.drives.clock import Watch
+    from wildshape.drives.detections import DetectionFile
+    from wildshape.drives.run import DriveResult
+    from wildshape.inference.folders.box_files import BoxFiles
 
 EXAMPLES = (
     "wildshape drive recording --out found",
     "wildshape drive 2011_09_26_drive_0048_sync --out found",
     "wildshape drive recording --out found --boxes json,kitti",
     "wildshape drive recording.bag --out found --topic /velodyne_points",
+    "wildshape drive recording --out found --detections results.json",
     "wildshape drive monday tuesday --out found",
 )
 
@@ -71,7 +75,19 @@ class Settings:
     ] = ()
     calibration: Annotated[
         Path | None,
-        option(metavar="FILE", help="of KITTI (.txt) or Argoverse 2 (.feather), for these boxes"),
+        option(
+            metavar="FILE",
+            help="of KITTI (.txt) or Argoverse 2 (.feather), for these boxes and for detections",
+        ),
+    ] = None
+    detections: Annotated[
+        Path | None,
+        option(
+            metavar="FILE",
+            help="boxes of your own detector in place of our clusters: labels of KITTI (a tracking"
+            " file, or a folder with a file a scan), results of nuScenes (in the sensor frame),"
+            " OpenPCDet or mmdetection3d as .json, or a boxes.csv; their tracks are kept",
+        ),
     ] = None
     overwrite: Overwrite = False
     json: AsJson = False
@@ -86,13 +102,11 @@ def run(settings: Settings) -> None:
     """
     from wildshape.cli.terminal import answer
     from wildshape.drives.run import drive
-    from wildshape.inference.folders.box_files import BoxFiles
     from wildshape.inference.predictor import load
 
     workers = _workers(settings)
     folders = _folders(settings)
-    wanted = bool(settings.boxes or settings.calibration)
-    boxes = BoxFiles(settings.boxes, settings.calibration) if wanted else None
+    boxes, detections = _box_files(settings), _detections(settings)
     predictor = load(settings.network.model, settings.network.device)
     found: list[DriveResult] = []
     for source, out in folders.items():
@@ -104,12 +118,35 @@ def run(settings: Settings) -> None:
                 predictor=predictor,
                 workers=workers,
                 boxes=boxes,
+                detections=detections,
                 overwrite=settings.overwrite,
                 watch=watch,
             )
             found.append(one)
     text = "\n".join(map(_sentence, found))
     answer(text, {"drives": [_data(one) for one in found]}, as_json=settings.json)
+
+
+def _box_files(settings: Settings) -> "BoxFiles | None":
+    """The formats asked for; a calibration that is for the detections alone is not theirs."""
+    from wildshape.inference.folders.box_files import BoxFiles
+
+    files = BoxFiles(settings.boxes, settings.calibration)
+    if settings.detections is not None and not files.uses_calibration:
+        files = BoxFiles(settings.boxes)
+    return files if files.formats or files.calibration else None
+
+
+def _detections(settings: Settings) -> "DetectionFile | None":
+    from wildshape.drives.detections import DetectionFile
+
+    if settings.detections is None:
+        return None
+    if len(settings.source) > 1:
+        raise BadInputError(f"--detections {settings.detections}: give one drive with them.")
+    known = settings.calibration
+    kitti = known if known is not None and known.suffix.lower() == ".txt" else None
+    return DetectionFile(settings.detections, kitti)
 
 
 def _workers(settings: Settings) -> int:

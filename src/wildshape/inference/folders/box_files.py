@@ -38,6 +38,11 @@ class BoxFiles:
         calibration = self.calibration and str(self.calibration.resolve())
         return {"boxes": sorted(self.formats), "calibration": calibration}
 
+    @property
+    def uses_calibration(self) -> bool:
+        """Whether a format asked for takes the calibration."""
+        return any(map(self._calibrates, self.formats))
+
     def check(self) -> None:
         """Refuse before any work is done what could not be written after it.
 
@@ -53,7 +58,7 @@ class BoxFiles:
             _FORMATS[kind].check()
         if self.calibration is None:
             return
-        if not any(map(self._calibrates, self.formats)):
+        if not self.uses_calibration:
             raise BadInputError(
                 f"--calibration {self.calibration}: --boxes kitti takes KITTI's .txt, --boxes"
                 " argoverse2 takes egovehicle_SE3_sensor.feather; name that format, too."
@@ -118,8 +123,12 @@ def _check_arrow() -> None:
     load_pyarrow()
 
 
-def _camera(path: Path) -> "KittiCamera":
-    """The rectified camera of KITTI's calibration: tracking's, object's or odometry's file."""
+def read_camera(path: Path) -> "KittiCamera":
+    """The rectified camera of KITTI's calibration: tracking's, object's or odometry's file.
+
+    Raises:
+        BadInputError: it cannot be read.
+    """
     from wildshape.datasets.kitti.calibration import read_calibration, rigid
     from wildshape.io.boxes.kitti import KittiCamera
 
@@ -166,7 +175,7 @@ _FORMATS = {
         "kitti/*.txt",
         _kitti,
         suffix=".txt",
-        calibrated=_camera,
+        calibrated=read_camera,
         bare="KITTI's labels are written for a camera at the LiDAR's own place that looks along x;"
         " pass --calibration FILE (KITTI's .txt) for the real one",
     ),

@@ -1,0 +1,252 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What somebody else's detector found in a drive, in place of its clusters.
+
+The points in each box, the ground taken away, are the cluster. Boxes that carry tracks keep them.
+"""
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool
+
+from wildshape.drives.config import DetectionConfig, DriveConfig
+from wildshape.drives.ground import height_above_ground
+from wildshape.drives.mounting import Mounting
+from wildshape.drives.segmentation import CutScan, Cutter
+from wildshape.drives.sightings import Sightings
+from wildshape.drives.source import Drive
+from wildshape.errors import BadInputError
+from wildshape.inference.folders.box_files import read_camera
+from wildshape.io.boxes.detections import number_of, pose_of
+from wildshape.io.boxes.given import GivenBox
+from wildshape.io.boxes.kitti import camera_at_the_lidar
+from wildshape.io.boxes.read_given import fingerprint, read_given_boxes
+from wildshape.io.output import file_name
+from wildshape.records import Box, Points
+
+# Of KITTI, nuScenes, Waymo and Argoverse 2; an empty kind is not known.
+VEHICLES = frozenset(
+    (
+        *("", "car", "van", "truck", "bus", "trailer", "vehicle", "construction_vehicle"),
+        *("construction", "emergency", "regular_vehicle", "large_vehicle", "box_truck"),
+        *("truck_cab", "vehicular_trailer", "school_bus", "articulated_bus", "pickup", "suv"),
+    )
+)
+
+
+@dataclass(frozen=True)
+class DetectionFile:
+    """Where detections come from.
+
+    Attributes:
+        path: of a file, or a folder of them (docs/drive.md).
+        calibration: KITTI's `.txt`, for labels of KITTI; without, their camera is taken to be at
+            the LiDAR's place and to look along its x.
+    """
+
+    path: Path
+    calibration: Path | None = None
+
+    def identity(self) -> dict[str, Any]:
+        """What decides what is found with them.
+
+        Raises:
+            BadInputError: a file cannot be read.
+        """
+        calibration = self.calibration and fingerprint(self.calibration)
+        return {"detections": fingerprint(self.path), "detections_calibration": calibration}
+
+    def boxes(self) -> list[GivenBox]:
+        """All of them.
+
+        Raises:
+            BadInputError: a file cannot be read.
+        """
+        camera = read_camera(self.calibration) if self.calibration else camera_at_the_lidar()
+        return read_given_boxes(self.path, camera.T_rect_sensor)
+
+
+@dataclass(frozen=True)
+class Detections:
+    """The vehicles that a detector found in a drive.
+
+    Attributes:
+        path: named in errors.
+        frames: the boxes in each of its frames.
+        tracked: every box knows its track.
+        warnings: what was left out, a sentence each.
+    """
+
+    path: Path
+    frames: tuple[tuple[GivenBox, ...], ...]
+    tracked: bool
+    warnings: tuple[str, ...]
+
+    def noted(self, drive: Drive) -> Drive:
+        """The drive, which says how its objects are cut out and what was left out."""
+        cut_by = f"by the boxes of {self.path.name}"
+        return replace(drive, warnings=(*drive.warnings, *self.warnings), cut_by=cut_by)
+
+
+def find_detections(file: DetectionFile, drive: Drive) -> Detections:
+    """The boxes of vehicles by frame.
+
+    Raises:
+        BadInputError: a file cannot be read; no box is of a vehicle and of a scan of the drive; a
+            track has two boxes in one frame.
+    """
+    boxes = file.boxes()
+    vehicles = [box for box in boxes if _is_vehicle(box.category)]
+    others = Counter(box.category for box in boxes if not _is_vehicle(box.category))
+    listed = ", ".join(f"{count} {kind}" for kind, count in others.most_common())
+    if not vehicles:
+        raise BadInputError(f"{file.path}: no box of a vehicle among {listed or 'none at all'}.")
+    frames = _by_frame(vehicles, drive)
+    placed = sum(map(len, frames))
+    if not placed:
+        raise BadInputError(
+            f"{file.path}: its scans, for example '{vehicles[0].scan}', are none of {drive.name}'s,"
+            f" for example '{drive.scan_names[0]}'; name them alike."
+        )
+    warnings = []
+    if others:
+        warnings.append(f"detections that are no vehicles are left out: {listed}")
+    if placed < len(vehicles):
+        left = len(vehicles) - placed
+        warnings.append(f"{left} detections belong to scans that the drive does not have")
+    tracked = all(box.track is not None for row in frames for box in row)
+    if tracked:
+        _check_tracks(file.path, frames)
+    return Detections(file.path, frames, tracked, tuple(warnings))
+
+
+def _is_vehicle(category: str) -> bool:
+    words = category.lower().split(".")
+    return not VEHICLES.isdisjoint(words[:1] if len(words) == 1 else words[1:])
+
+
+def _by_frame(boxes: list[GivenBox], drive: Drive) -> tuple[tuple[GivenBox, ...], ...]:
+    """A scan is known by its name, by the end of a path, or by its number."""
+    names = {name: frame for frame, name in enumerate(drive.scan_names)}
+    numbers = {number_of(name, frame): frame for name, frame in names.items()}
+    frames: list[list[GivenBox]] = [[] for _ in drive.scan_names]
+    for box in boxes:
+        frame = _frame(box.scan, names, numbers)
+        if frame is not None and 0 <= frame < len(frames):
+            frames[frame].append(box)
+    return tuple(map(tuple, frames))
+
+
+def _frame(scan: str | int, names: dict[str, int], numbers: dict[int, int]) -> int | None:
+    if isinstance(scan, int):
+        return scan
+    path = PurePosixPath(scan)
+    for name in (scan, path.name, path.stem):
+        if name in names:
+            return names[name]
+    return numbers.get(number_of(path.stem, -1))
+
+
+def _check_tracks(path: Path, frames: Iterable[tuple[GivenBox, ...]]) -> None:
+    for frame, row in enumerate(frames):
+        for track, count in Counter(box.track or "" for box in row).items():
+            file_name(track)
+            if count > 1:
+                raise BadInputError(
+                    f"{path}: {count} boxes of track '{track}' in frame {frame}; a track has one."
+                )
+
+
+@dataclass(frozen=True)
+class BoxCutter(Cutter):
+    """Cuts what is in the boxes out of the scans of a drive.
+
+    Attributes:
+        detections: of the drive.
+    """
+
+    detections: Detections
+
+    def cut(self, frame: int) -> CutScan:
+        """What is in the boxes of one frame."""
+        boxes = self.detections.frames[frame]
+        return cut_boxes(self.drive.scan(frame), boxes, self.mounting, self.config)
+
+
+def cut_boxes(
+    scan: Points, boxes: tuple[GivenBox, ...], mounting: Mounting, config: DriveConfig
+) -> CutScan:
+    """The points in each box that are not ground.
+
+    Args:
+        scan: whole, sensor frame, metres; it may be empty.
+        boxes: in it.
+        mounting: of the sensor.
+        config: see there.
+    """
+    heights = height_above_ground(mounting.level(scan), mounting.height_m, config.ground)
+    above = scan[np.nan_to_num(heights, nan=0.0) > config.clusters.lowest_m]
+    rows = points_in_boxes(above, [one.box for one in boxes], config.detections)
+    full = [
+        (one, own) for one, own in zip(boxes, rows) if own.sum() >= config.detections.fewest_points
+    ]
+    return CutScan(
+        points=np.concatenate([above[:0], *(above[own] for _, own in full)]),
+        counts=np.array([own.sum() for _, own in full], np.int64),
+        scanned=len(scan),
+        tracks=tuple(one.track for one, _ in full if one.track is not None),
+    )
+
+
+def points_in_boxes(
+    points: Points, boxes: list[Box], config: DetectionConfig
+) -> Bool[np.ndarray, "k n"]:
+    """Which points belong to each box: those in it, and those around it that are in no other.
+
+    Args:
+        points: sensor frame.
+        boxes: in the same frame.
+        config: how far around.
+    """
+    apart = [np.abs(pose_of(box).inverse().apply_numpy(points)) for box in boxes]
+    halves = [np.asarray(box.size) / 2 for box in boxes]
+    shape = len(boxes), len(points)
+    inside = np.array([(a <= h).all(-1) for a, h in zip(apart, halves)], bool).reshape(shape)
+    reach = config.around_m
+    around = np.array([(a <= h + reach).all(-1) for a, h in zip(apart, halves)], bool)
+    return inside | (around.reshape(shape) & ~inside.any(0))
+
+
+def check_cut(detections: Detections, cuts: Iterable[CutScan]) -> None:
+    """Refuse boxes that miss all points: they are in another frame.
+
+    Raises:
+        BadInputError: no box holds enough points.
+    """
+    if not any(len(cut.counts) for cut in cuts):
+        raise BadInputError(
+            f"{detections.path}: no box holds the points of a vehicle; boxes must be in each scan's"
+            " own sensor frame (KITTI's labels: pass their calibration)."
+        )
+
+
+def given_tracks(cuts: Iterable[CutScan]) -> list[Sightings]:
+    """The objects by the tracks of their boxes."""
+    seen: dict[str, list[tuple[int, int, int]]] = {}
+    for frame, cut in enumerate(cuts):
+        for row, (track, count) in enumerate(zip(cut.tracks, cut.counts, strict=True)):
+            seen.setdefault(track, []).append((frame, row, int(count)))
+    return [
+        Sightings(
+            track,
+            tuple(frame for frame, _, _ in places),
+            tuple((row,) for _, row, _ in places),
+            tuple(count for _, _, count in places),
+        )
+        for track, places in sorted(seen.items())
+    ]

@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A box that somebody else's detector found, whichever format it came in."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from wildshape.records import Box
+
+
+@dataclass(frozen=True)
+class GivenBox:
+    """One object in one scan.
+
+    Attributes:
+        scan: the scan's name or its number, as the file has it; an int counts scans from 0.
+        category: as the file has it, for example `Car`; empty if unknown.
+        track: which object it is, if known.
+        box: in the scan's sensor frame, metres.
+    """
+
+    scan: str | int
+    category: str
+    track: str | None
+    box: Box
+
+
+def checked(box: Box) -> Box:
+    """The box itself.
+
+    Raises:
+        ValueError: a number is not finite, or a size is not positive.
+    """
+    numbers = (*box.centre, *box.size, *box.quaternion_wxyz)
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError("a box with a number that is not finite")
+    if min(box.size) <= 0:
+        raise ValueError(f"a box of size {box.size}")
+    return box
+
+
+def upright_box(centre: Sequence[float], size: Sequence[float], yaw: float) -> Box:
+    """A box that does not lean.
+
+    Args:
+        centre: x, y, z of its middle, metres.
+        size: length, width, height, metres.
+        yaw: about z, counter-clockwise from x, radians.
+
+    Raises:
+        ValueError: not three numbers each, or no box.
+    """
+    x, y, z = map(float, centre)
+    length, width, height = map(float, size)
+    half = float(yaw) / 2
+    return checked(
+        Box((x, y, z), (length, width, height), (math.cos(half), 0.0, 0.0, math.sin(half)))
+    )

@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Boxes given as JSON: results of nuScenes, OpenPCDet and mmdetection3d."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from wildshape.io.boxes.given import GivenBox, checked, upright_box
+from wildshape.io.guard import read_json, reading
+from wildshape.records import Box
+
+_LIDAR = "LiDAR"
+
+
+def read_results(path: Path) -> list[GivenBox]:
+    """The boxes of one file.
+
+    A JSON object with `results` is of nuScenes; its boxes are taken to be in each scan's sensor
+    frame, as `write_nuscenes_boxes` writes them. A list is of OpenPCDet or mmdetection3d, an object
+    a scan; an object with `bboxes_3d` is one scan of mmdetection3d, named as the file.
+
+    Raises:
+        BadInputError: it cannot be read, or holds something else.
+    """
+    expected = "results of nuScenes, OpenPCDet or mmdetection3d in JSON"
+    said = read_json(path, expected)
+    with reading(path, expected):
+        if isinstance(said, list):
+            return [box for place, one in enumerate(said) for box in _scan(one, place)]
+        if "bboxes_3d" in said:
+            return list(_scan({"frame_id": path.stem, **said}, 0))
+        return [_nuscenes(row, scan) for scan, rows in said["results"].items() for row in rows]
+
+
+def _nuscenes(row: dict[str, Any], scan: str) -> GivenBox:
+    """A record of detection, or of tracking; its size is width, length, height."""
+    x, y, z = map(float, row["translation"])
+    width, length, height = map(float, row["size"])
+    qw, qx, qy, qz = map(float, row["rotation"])
+    kind = "detection" if "detection_name" in row else "tracking"
+    track = row.get("tracking_id")
+    return GivenBox(
+        scan=scan,
+        category=str(row[f"{kind}_name"]),
+        track=None if track is None else str(track),
+        box=checked(Box((x, y, z), (length, width, height), (qw, qx, qy, qz))),
+    )
+
+
+def _scan(said: dict[str, Any], place: int) -> Iterator[GivenBox]:
+    """One scan of OpenPCDet or mmdetection3d; without a `frame_id` it is known by its place."""
+    scan = str(said["frame_id"]) if "frame_id" in said else place
+    boxes = _floor_boxes(said) if "bboxes_3d" in said else said["boxes_lidar"]
+    for box, name in zip(boxes, _names(said), strict=True):
+        x, y, z, length, width, height, yaw = map(float, box[:7])
+        given = upright_box((x, y, z), (length, width, height), yaw)
+        yield GivenBox(scan, name, None, given)
+
+
+def _floor_boxes(said: dict[str, Any]) -> list[list[Any]]:
+    """mmdetection3d's boxes, whose z is that of the floor, with the z of their middle."""
+    kind = said.get("box_type_3d", _LIDAR)
+    if kind != _LIDAR:
+        raise ValueError(f"box_type_3d {kind!r}, not {_LIDAR!r}")
+    return [[x, y, z + size[2] / 2, *size] for x, y, z, *size in said["bboxes_3d"]]
+
+
+def _names(said: dict[str, Any]) -> list[str]:
+    """Of the kinds: a text a box."""
+    names = said.get("name", said.get("labels_3d"))
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ValueError("no 'name', a list with the kind of each box as a text")
+    return names

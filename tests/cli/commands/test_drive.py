@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`wildshape drive --detections`: what is refused before any work is done."""
+
+import numpy as np
+import pytest
+
+CALIBRATION = "R0_rect: 1 0 0 0 1 0 0 0 1\nTr_velo_to_cam: 0 -1 0 0 0 0 -1 0 1 0 0 0\n"
+
+
+@pytest.fixture
+def recording(tmp_path):
+    folder = tmp_path / "recording"
+    folder.mkdir()
+    np.save(folder / "000000.npy", np.zeros((10, 3), np.float32))
+    return folder
+
+
+def test_a_calibration_may_be_that_of_the_detections_alone(recording, tmp_path, refused):
+    person = tmp_path / "labels.txt"
+    person.write_text("0 1 Pedestrian 0 0 0 0 0 0 0 1.7 0.6 0.6 0 1 9 0\n")
+    calibration = tmp_path / "calib.txt"
+    calibration.write_text(CALIBRATION)
+    given = ("drive", recording, "--out", tmp_path / "out", "--calibration", calibration)
+    assert "name that format" in refused(*given)
+    none = "no box of a vehicle among 1 Pedestrian"
+    assert none in refused(*given, "--detections", person)
+    assert none in refused(*given, "--detections", person, "--boxes", "json")
+    calibration.write_text("nothing")
+    assert "calib.txt" in refused(*given, "--detections", person)
+    assert not (tmp_path / "out").exists()
+
+
+def test_detections_are_those_of_one_drive(recording, tmp_path, refused):
+    given = ("drive", recording, tmp_path, "--out", tmp_path / "out", "--detections", "boxes.csv")
+    assert "give one drive" in refused(*given)
+
+
+def test_detections_in_the_output_are_refused(recording, tmp_path, refused):
+    (tmp_path / "out").mkdir()
+    labels = tmp_path / "out" / "labels.txt"
+    labels.write_text("0 1 Car 0 0 0 0 0 0 0 1.7 1.8 4.6 0 1 9 0\n")
+    given = ("drive", recording, "--out", tmp_path / "out", "--overwrite", "--detections", labels)
+    assert "holds the input" in refused(*given)
+    assert labels.exists()

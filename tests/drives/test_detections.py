@@ -1,0 +1,378 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Somebody else's detections in place of the clusters: a simulated drive's truth in each format."""
+
+import json
+import math
+import shutil
+from collections import Counter
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import torch
+from tests.refusal import refused
+
+import wildshape
+from wildshape.drives import run
+from wildshape.drives.config import DetectionConfig, DriveConfig, GroundConfig
+from wildshape.drives.detections import (
+    BoxCutter,
+    DetectionFile,
+    check_cut,
+    find_detections,
+    given_tracks,
+    points_in_boxes,
+)
+from wildshape.drives.ground import height_above_ground
+from wildshape.drives.mounting import find_mounting
+from wildshape.drives.segmentation import read_cut, read_cuts
+from wildshape.drives.sightings import read_sightings
+from wildshape.drives.source import open_drive
+from wildshape.geometry.transforms.rotation import quaternion_from_rotation
+from wildshape.io.boxes.detections import Detection
+from wildshape.io.boxes.given import upright_box
+from wildshape.io.boxes.kitti import camera_at_the_lidar, write_kitti_labels
+from wildshape.io.boxes.nuscenes import write_nuscenes_boxes
+from wildshape.io.boxes.table import read_box_table
+from wildshape.records import Box
+from wildshape.simulate.street.drive_folder import write_drive
+from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
+
+pytest.importorskip("kiss_icp")
+pytest.importorskip("pypatchworkpp")
+
+SCANS, FULL = 6, 100
+
+
+@pytest.fixture(scope="module")
+def street(tmp_path_factory):
+    """A drive of six scans on disk, and whose each of its points is."""
+    root = tmp_path_factory.mktemp("detections") / "street"
+    simulated = WholeDrive(StreetConfig(scans=SCANS), 1)
+    write_drive(simulated, root)
+    recording = root / "velodyne" / "0000"
+    shutil.copy(root / "poses" / "0000.txt", recording / "poses.txt")
+    drive = open_drive(recording)
+    mounting = find_mounting(drive, DriveConfig().mounting)
+    scans = [simulated.scan(frame) for frame in range(SCANS)]
+    return SimpleNamespace(
+        root=root,
+        recording=recording,
+        drive=drive,
+        mounting=mounting,
+        scans=scans,
+        standing=[standing(scan, mounting) for scan in scans],
+    )
+
+
+def standing(scan, mounting):
+    """Owners of the points above the ground, and how many each has."""
+    heights = height_above_ground(mounting.level(scan.points), mounting.height_m, GroundConfig())
+    return Counter(scan.owner[np.nan_to_num(heights) > 0.1].tolist())
+
+
+def true_boxes(street):
+    """Frame and true box, and that box as our writers take it."""
+    for frame, scan in enumerate(street.scans):
+        for true in scan.boxes:
+            T = torch.from_numpy(true.T_sensor_object)
+            x, y, z = T[:3, 3].tolist()
+            qw, qx, qy, qz = quaternion_from_rotation(T[:3, :3]).tolist()
+            box = Box((x, y, z), true.size, (qw, qx, qy, qz))
+            name = f"{true.track:04d}"
+            scan_name = street.drive.scan_names[frame]
+            yield (
+                frame,
+                true,
+                Detection(name, true.track, scan_name, frame, true.kind, "lidar", 0.5, box),
+            )
+
+
+def rows_of(street, frame):
+    """Each true box of a frame as x, y, z, length, width, height, yaw; and their kinds."""
+    found = []
+    for at, true, one in true_boxes(street):
+        if at == frame:
+            T = true.T_sensor_object
+            yaw = math.atan2(T[1, 0], T[0, 0])
+            found.append(([*one.box.centre, *one.box.size, yaw], true.kind))
+    return [row for row, _ in found], [kind for _, kind in found]
+
+
+def kitti_tracking(street, folder):
+    del folder
+    return DetectionFile(street.root / "label_02" / "0000.txt", street.root / "calib" / "0000.txt")
+
+
+def kitti_objects(street, folder):
+    """A file a scan, without tracks, with scores."""
+    lines = (street.root / "label_02" / "0000.txt").read_text().splitlines()
+    for frame, name in enumerate(street.drive.scan_names):
+        own = [line.split()[2:] for line in lines if int(line.split()[0]) == frame]
+        text = "".join(" ".join([*words, "0.9"]) + "\n" for words in own)
+        (folder / f"{name}.txt").write_text(f"{text}DontCare -1 -1 -10 0 0 0 0 {'-1 ' * 7}\n")
+    return DetectionFile(folder, street.root / "calib" / "0000.txt")
+
+
+def our_kitti(street, folder):
+    """As `--boxes kitti` writes: a file a track, the camera at the LiDAR's place."""
+    detections = [one for _, _, one in true_boxes(street)]
+    detections = [
+        replace(one, category="car") for one in detections if one.category != "Pedestrian"
+    ]
+    write_kitti_labels(folder, detections, camera_at_the_lidar())
+    return DetectionFile(folder)
+
+
+def our_nuscenes(street, folder):
+    detections = [one for _, _, one in true_boxes(street)]
+    write_nuscenes_boxes(folder / "nuscenes.json", detections)
+    return DetectionFile(folder / "nuscenes.json")
+
+
+def nuscenes_detection(street, folder):
+    path = our_nuscenes(street, folder).path
+    said = json.loads(path.read_text())
+    for rows in said["results"].values():
+        for row in rows:
+            for key in ("tracking_id", "tracking_name", "tracking_score"):
+                del row[key]
+    path.write_text(json.dumps(said))
+    return DetectionFile(path)
+
+
+def openpcdet(street, folder):
+    scans = []
+    for frame, name in enumerate(street.drive.scan_names):
+        boxes, names = rows_of(street, frame)
+        scores = [0.7] * len(boxes)
+        one = {
+            "name": names,
+            "score": scores,
+            "boxes_lidar": boxes,
+            "pred_labels": [1] * len(boxes),
+        }
+        scans.append({**one, "frame_id": f"samples/LIDAR_TOP/{name}.bin"})
+    (folder / "result.json").write_text(json.dumps(scans))
+    return DetectionFile(folder / "result.json")
+
+
+def mmdetection3d(street, folder):
+    """A file a scan; z is that of the floor, and velocities follow the yaw."""
+    for frame, name in enumerate(street.drive.scan_names):
+        boxes, names = rows_of(street, frame)
+        low = [[x, y, z - h / 2, n, w, h, yaw, 0, 0] for x, y, z, n, w, h, yaw in boxes]
+        said = {"bboxes_3d": low, "scores_3d": [0.7] * len(low), "labels_3d": names}
+        (folder / f"{name}.json").write_text(json.dumps({**said, "box_type_3d": "LiDAR"}))
+    return DetectionFile(folder)
+
+
+def table(street, folder):
+    del folder
+    return DetectionFile(street.root / "truth" / "0000.csv")
+
+
+TRACKED = (kitti_tracking, our_kitti, our_nuscenes, table)
+UNTRACKED = (kitti_objects, nuscenes_detection, openpcdet, mmdetection3d)
+
+
+def cut(street, detections, folder):
+    cutter = BoxCutter(street.drive, street.mounting, folder, DriveConfig(), detections)
+    for frame in cutter.missing():
+        cutter(frame)
+    assert cutter.missing() == []
+    return list(read_cuts(folder, SCANS))
+
+
+def owners(street, frame, points):
+    """Whose each point of a cluster is."""
+    scan = street.scans[frame]
+    known = {row.tobytes(): owner for row, owner in zip(scan.points, scan.owner.tolist())}
+    return np.array([known[row.tobytes()] for row in points])
+
+
+def owner_of(street, frame, points):
+    """Whose a cluster is; it must be all of a vehicle that stands above the ground, hardly more."""
+    found = owners(street, frame, points)
+    owner = int(np.bincount(found + 1).argmax()) - 1
+    assert (found == owner).mean() > 0.95
+    assert (found == owner).sum() > 0.98 * street.standing[frame][owner]
+    return owner
+
+
+def full_vehicles(street, frame):
+    """Those of many points above the ground."""
+    vehicles = {box.track for box in street.scans[frame].boxes if box.kind != "Pedestrian"}
+    return {track for track in vehicles if street.standing[frame][track] >= FULL}
+
+
+@pytest.mark.parametrize("write", [*TRACKED, *UNTRACKED])
+def test_each_cluster_is_the_points_of_one_true_vehicle(street, write, tmp_path):
+    (tmp_path / "given").mkdir()
+    detections = find_detections(write(street, tmp_path / "given"), street.drive)
+    assert detections.tracked == (write in TRACKED)
+    cuts = cut(street, detections, tmp_path / "cuts")
+    check_cut(detections, cuts)
+    for frame, found in enumerate(cuts):
+        assert found.scanned == len(street.scans[frame].points)
+        whose = [owner_of(street, frame, part) for part in found.clusters() if len(part) >= FULL]
+        assert len(set(whose)) == len(whose)
+        assert full_vehicles(street, frame) <= set(whose)
+
+
+def test_given_tracks_are_kept(street, tmp_path):
+    detections = find_detections(table(street, tmp_path), street.drive)
+    cuts = cut(street, detections, tmp_path / "cuts")
+    objects = given_tracks(cuts)
+    truth = {row.track for row in read_box_table(street.root / "truth" / "0000.csv")}
+    assert {one.name for one in objects} <= truth
+    for one in objects:
+        for frame, (row,), count in zip(one.frames, one.rows, one.points, strict=True):
+            points = cuts[frame].clusters()[row]
+            assert len(points) == count
+            assert count < FULL or owner_of(street, frame, points) == int(one.name)
+    full = {str(track) for frame in range(SCANS) for track in full_vehicles(street, frame)}
+    assert full <= {one.name for one in objects}
+
+
+class Killed(BaseException):
+    pass
+
+
+def stopped_after_tracks(street, out, detections, monkeypatch):
+    """The objects of a drive that is killed before the network sees one."""
+
+    def killed(*_, **__):
+        raise Killed
+
+    with monkeypatch.context() as patched:
+        patched.setattr(run, "Completer", killed)
+        with pytest.raises(Killed):
+            wildshape.drive(street.recording, out, detections=detections)
+    return read_sightings(out / "stages" / "tracks.json")
+
+
+def test_boxes_without_tracks_are_linked_to_those_of_the_truth(street, tmp_path, monkeypatch):
+    objects = stopped_after_tracks(
+        street, tmp_path / "out", openpcdet(street, tmp_path), monkeypatch
+    )
+    whose = []
+    for one in objects:
+        if min(one.points) < FULL:
+            continue
+        clouds = one.clouds(tmp_path / "out" / "stages" / "clusters")
+        (owner,) = {owner_of(street, *seen) for seen in zip(one.frames, clouds, strict=True)}
+        assert one.frames == tuple(range(one.frames[0], one.frames[-1] + 1))
+        whose.append(owner)
+    assert len(set(whose)) == len(whose)
+    throughout = set.intersection(*(full_vehicles(street, frame) for frame in range(SCANS)))
+    assert len(throughout) > 5
+    assert throughout <= set(whose)
+
+
+def test_another_file_does_not_go_on_with_an_output(street, tmp_path, monkeypatch):
+    path = shutil.copy(street.root / "truth" / "0000.csv", tmp_path / "boxes.csv")
+    given, out = DetectionFile(path), tmp_path / "out"
+    stopped_after_tracks(street, out, given, monkeypatch)
+    clusters = out / "stages" / "clusters" / "000003.npz"
+    written = clusters.stat().st_mtime_ns
+    stopped_after_tracks(street, out, given, monkeypatch)
+    assert clusters.stat().st_mtime_ns == written
+    refused(wildshape.drive, street.recording, out, match="--overwrite")
+    path.write_text("\n".join(path.read_text().splitlines()[:-1]) + "\n")
+    refused(wildshape.drive, street.recording, out, match="--overwrite", detections=given)
+
+
+def test_the_network_completes_what_was_given(street, tmp_path):
+    """Of a few near vehicles, to be quick."""
+    rows = read_box_table(street.root / "truth" / "0000.csv")
+    everywhere = Counter(row.track for row in rows if row.points > 400)
+    chosen = [track for track, count in everywhere.items() if count == SCANS][:2]
+    assert len(chosen) == 2
+    lines = (street.root / "truth" / "0000.csv").read_text().splitlines()
+    kept = [line for line in lines if line.split(",")[2] in ("track", *chosen)]
+    (tmp_path / "boxes.csv").write_text("\n".join(kept) + "\n")
+    given = DetectionFile(tmp_path / "boxes.csv")
+    found = wildshape.drive(street.recording, tmp_path / "out", detections=given)
+    assert found.candidates == 2
+    assert set(found.vehicles) == set(chosen)
+    track = json.loads((found.out / "tracks" / chosen[0] / "track.json").read_text())
+    assert "by the boxes of boxes.csv" in json.dumps(track)
+    truth = {(row.frame, row.track): row for row in rows}
+    for row in read_box_table(found.out / "boxes.csv"):
+        true = truth[row.frame, row.track]
+        assert math.hypot(row.x - true.x, row.y - true.y) < 0.6
+
+
+def test_what_is_no_vehicle_is_left_out_and_counted(street, tmp_path):
+    detections = find_detections(kitti_tracking(street, tmp_path), street.drive)
+    people = sum(box.kind == "Pedestrian" for scan in street.scans for box in scan.boxes)
+    assert detections.warnings == (
+        f"detections that are no vehicles are left out: {people} Pedestrian",
+    )
+    kinds = {box.category for row in detections.frames for box in row}
+    assert kinds == {"Car", "Van", "Truck"}
+    kept = sum(map(len, detections.frames))
+    assert kept == sum(len(scan.boxes) for scan in street.scans) - people
+
+
+@pytest.mark.parametrize(
+    ("kind", "vehicle"),
+    [
+        ("Car", True),
+        ("vehicle.bus.rigid", True),
+        ("vehicle.bicycle", False),
+        ("human.pedestrian.adult", False),
+        ("REGULAR_VEHICLE", True),
+        ("Cyclist", False),
+        ("motorcycle", False),
+        ("movable_object.pushable_pullable", False),
+        ("construction_vehicle", True),
+    ],
+)
+def test_vehicles_are_told_by_name(kind, vehicle, street, tmp_path):
+    one = {"frame_id": "000000", "boxes_lidar": [[9, 0, 0, 4, 2, 1, 0]], "name": [kind]}
+    (tmp_path / "one.json").write_text(json.dumps([one]))
+    given = DetectionFile(tmp_path / "one.json")
+    if vehicle:
+        assert len(find_detections(given, street.drive).frames[0]) == 1
+    else:
+        refused(find_detections, given, street.drive, match=f"no box of a vehicle among 1 {kind}")
+
+
+def test_points_around_a_box_are_its_own_unless_they_are_in_another():
+    size = (4.0, 2.0, 2.0)
+    boxes = [upright_box((0.0, 0.0, 0.0), size, 0.0), upright_box((0.0, 2.1, 0.0), size, math.pi)]
+    points = np.array(
+        [(0, 0, 0), (0, 0.9, 0), (0, 1.05, 0), (0, 1.15, 0), (2.1, 0, 0), (2.3, 0, 0)]
+    )
+    found = points_in_boxes(points.astype(np.float32), boxes, DetectionConfig(around_m=0.2))
+    assert found[0].tolist() == [True, True, True, False, True, False]
+    assert found[1].tolist() == [False, False, True, True, False, False]
+    assert points_in_boxes(points, [], DetectionConfig()).shape == (0, 6)
+
+
+def test_boxes_of_other_scans_or_in_another_frame_are_refused(street, tmp_path):
+    one = {"frame_id": "000000", "boxes_lidar": [[900.0, 0, 0, 4, 2, 1, 0]], "name": ["Car"]}
+    path = tmp_path / "one.json"
+    path.write_text(json.dumps([one, {**one, "frame_id": "000077"}]))
+    detections = find_detections(DetectionFile(path), street.drive)
+    assert detections.warnings == ("1 detections belong to scans that the drive does not have",)
+    cuts = cut(street, detections, tmp_path / "cuts")
+    refused(check_cut, detections, cuts, match="one.json: no box holds .* own sensor frame")
+    assert read_cut(tmp_path / "cuts", 0).points.shape == (0, 3)
+    path.write_text(json.dumps([{**one, "frame_id": "monday"}]))
+    refused(
+        find_detections, DetectionFile(path), street.drive, match="'monday', are none of 0000's"
+    )
+
+
+def test_a_track_has_one_box_a_frame(street, tmp_path):
+    lines = (street.root / "truth" / "0000.csv").read_text().splitlines()
+    path = tmp_path / "boxes.csv"
+    path.write_text("\n".join([*lines, lines[1]]) + "\n")
+    refused(find_detections, DetectionFile(path), street.drive, match="2 boxes of track .* frame 0")
+    path.write_text("\n".join([lines[0], lines[1].replace(",6,", ",../6,", 1)]) + "\n")
+    refused(find_detections, DetectionFile(path), street.drive, match="cannot become a file")
