@@ -237,16 +237,14 @@ def check_cut(detections: Detections, cuts: Iterable[CutScan]) -> None:
 
 def given_tracks(cuts: Iterable[CutScan]) -> list[Sightings]:
     """The objects by the tracks of their boxes."""
-    seen: dict[str, list[tuple[int, int, int]]] = {}
+    counts = []
+    seen: dict[str, tuple[list[int], list[int]]] = {}
     for frame, cut in enumerate(cuts):
-        for row, (track, count) in enumerate(zip(cut.tracks, cut.counts, strict=True)):
-            seen.setdefault(track, []).append((frame, row, int(count)))
+        counts.append(cut.counts)
+        for row, track in enumerate(cut.tracks):
+            frames, rows = seen.setdefault(track, ([], []))
+            frames.append(frame)
+            rows.append(row)
     return [
-        Sightings(
-            track,
-            tuple(frame for frame, _, _ in places),
-            tuple((row,) for _, row, _ in places),
-            tuple(count for _, _, count in places),
-        )
-        for track, places in sorted(seen.items())
+        Sightings.of(track, frames, rows, counts) for track, (frames, rows) in sorted(seen.items())
     ]

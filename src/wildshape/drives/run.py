@@ -269,12 +269,7 @@ class _Run:
         found = link(seen(), self.config.tracks)
         fewest = min(self.config.tracks.fewest_scans, usable)
         return [
-            Sightings(
-                f"{number:04d}",
-                tuple(one.frames),
-                tuple((row,) for row in one.rows),
-                tuple(int(counts[frame][row]) for frame, row in zip(one.frames, one.rows)),
-            )
+            Sightings.of(f"{number:04d}", one.frames, one.rows, counts)
             for number, one in enumerate(one for one in found if len(one.frames) >= fewest)
         ]
 

@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """An object of a drive: in which frames it was seen, as which cluster, with how many points."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Int
 
 from wildshape.drives.segmentation import read_cut
 from wildshape.drives.source import Drive
@@ -32,6 +34,14 @@ class Sightings:
     rows: tuple[tuple[int, ...], ...]
     points: tuple[int, ...]
     parts: int = 1
+
+    @classmethod
+    def of(
+        cls, name: str, frames: list[int], rows: list[int], counts: Sequence[Int[np.ndarray, "_"]]
+    ) -> "Sightings":
+        """An object that is one cluster in each frame; `counts`: of all clusters, by frame."""
+        points = tuple(int(counts[frame][row]) for frame, row in zip(frames, rows))
+        return cls(name, tuple(frames), tuple((row,) for row in rows), points)
 
     def part(self, kept: list[int]) -> "Sightings":
         """The same object in some of its frames, by place."""
