@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A raw drive in, every vehicle out: the stages one after the other.
 
-Each stage leaves its files in the output folder and is not run again where they are: a killed run
-goes on.
+A stage whose files are in the output folder is not run again: a killed run goes on.
 """
 
 import shlex
@@ -227,9 +226,8 @@ class _Run:
             check_cut(self.detections, read_cuts(self.cuts, len(self.drive)))
 
     def cutter(self, mounting: Mounting) -> Cutter:
-        if self.detections is None:
-            return Cutter(self.drive, mounting, self.cuts, self.config)
-        return BoxCutter(self.drive, mounting, self.cuts, self.config, self.detections)
+        known = self.drive, mounting, self.cuts, self.config
+        return Cutter(*known) if self.detections is None else BoxCutter(*known, self.detections)
 
     @property
     def tracked(self) -> bool:
