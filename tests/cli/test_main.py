@@ -33,7 +33,7 @@ NEEDED = {
     "evaluate": ("--out=x", "in"),
     "view": ("in",),
 }
-ONE_WORD = {"categories", "baselines"}
+ONE_WORD = {"range_m", "categories", "baselines"}
 
 
 def settings_of(command, *arguments) -> Any:

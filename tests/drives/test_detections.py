@@ -32,7 +32,7 @@ from wildshape.drives.sightings import read_sightings
 from wildshape.drives.source import open_drive
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.io.boxes.detections import Detection
-from wildshape.io.boxes.given import upright_box
+from wildshape.io.boxes.detector import upright_box
 from wildshape.io.boxes.kitti import camera_at_the_lidar, write_kitti_labels
 from wildshape.io.boxes.nuscenes import write_nuscenes_boxes
 from wildshape.io.boxes.table import read_box_table

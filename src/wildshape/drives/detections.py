@@ -23,9 +23,9 @@ from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
 from wildshape.inference.folders.box_files import read_camera
 from wildshape.io.boxes.detections import number_of, pose_of
-from wildshape.io.boxes.given import GivenBox
+from wildshape.io.boxes.detector import GivenBox
 from wildshape.io.boxes.kitti import camera_at_the_lidar
-from wildshape.io.boxes.read_given import fingerprint, read_given_boxes
+from wildshape.io.boxes.read_detector import fingerprint, read_given_boxes
 from wildshape.io.output import file_name
 from wildshape.records import Box, Points
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from wildshape.io.boxes.given import GivenBox, checked, upright_box
+from wildshape.io.boxes.detector import GivenBox, checked, upright_box
 from wildshape.io.guard import read_json, reading
 from wildshape.records import Box
 

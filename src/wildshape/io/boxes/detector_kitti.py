@@ -16,7 +16,7 @@ import torch
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detections import moved
-from wildshape.io.boxes.given import GivenBox, checked
+from wildshape.io.boxes.detector import GivenBox, checked
 from wildshape.io.guard import reading
 from wildshape.records import Box
 

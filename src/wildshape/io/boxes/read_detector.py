@@ -7,9 +7,9 @@ from pathlib import Path
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.boxes.given import GivenBox, upright_box
-from wildshape.io.boxes.given_kitti import read_kitti_file
-from wildshape.io.boxes.given_results import read_results
+from wildshape.io.boxes.detector import GivenBox, upright_box
+from wildshape.io.boxes.detector_kitti import read_kitti_file
+from wildshape.io.boxes.detector_results import read_results
 from wildshape.io.boxes.table import read_box_table
 from wildshape.io.guard import reading
 
