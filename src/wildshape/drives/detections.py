@@ -23,9 +23,9 @@ from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
 from wildshape.inference.folders.box_files import read_camera
 from wildshape.io.boxes.detections import number_of, pose_of
-from wildshape.io.boxes.detector import GivenBox
+from wildshape.io.boxes.detector import DetectorBox
 from wildshape.io.boxes.kitti import camera_at_the_lidar
-from wildshape.io.boxes.read_detector import fingerprint, read_given_boxes
+from wildshape.io.boxes.read_detector import fingerprint, read_detector_boxes
 from wildshape.io.output import file_name
 from wildshape.records import Box, Points
 
@@ -61,14 +61,14 @@ class DetectionFile:
         calibration = self.calibration and fingerprint(self.calibration)
         return {"detections": fingerprint(self.path), "detections_calibration": calibration}
 
-    def boxes(self) -> list[GivenBox]:
+    def boxes(self) -> list[DetectorBox]:
         """All of them.
 
         Raises:
             BadInputError: a file cannot be read.
         """
         camera = read_camera(self.calibration) if self.calibration else camera_at_the_lidar()
-        return read_given_boxes(self.path, camera.T_rect_sensor)
+        return read_detector_boxes(self.path, camera.T_rect_sensor)
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Detections:
     """
 
     path: Path
-    frames: tuple[tuple[GivenBox, ...], ...]
+    frames: tuple[tuple[DetectorBox, ...], ...]
     tracked: bool
     warnings: tuple[str, ...]
 
@@ -130,11 +130,11 @@ def _is_vehicle(category: str) -> bool:
     return not VEHICLES.isdisjoint(words[:1] if len(words) == 1 else words[1:])
 
 
-def _by_frame(boxes: list[GivenBox], drive: Drive) -> tuple[tuple[GivenBox, ...], ...]:
+def _by_frame(boxes: list[DetectorBox], drive: Drive) -> tuple[tuple[DetectorBox, ...], ...]:
     """A scan is known by its name, by the end of a path, or by its number."""
     names = {name: frame for frame, name in enumerate(drive.scan_names)}
     numbers = {number_of(name, frame): frame for name, frame in names.items()}
-    frames: list[list[GivenBox]] = [[] for _ in drive.scan_names]
+    frames: list[list[DetectorBox]] = [[] for _ in drive.scan_names]
     for box in boxes:
         frame = _frame(box.scan, names, numbers)
         if frame is not None and 0 <= frame < len(frames):
@@ -152,7 +152,7 @@ def _frame(scan: str | int, names: dict[str, int], numbers: dict[int, int]) -> i
     return numbers.get(number_of(path.stem, -1))
 
 
-def _check_tracks(path: Path, frames: Iterable[tuple[GivenBox, ...]]) -> None:
+def _check_tracks(path: Path, frames: Iterable[tuple[DetectorBox, ...]]) -> None:
     for frame, row in enumerate(frames):
         for track, count in Counter(box.track or "" for box in row).items():
             file_name(track)
@@ -179,7 +179,7 @@ class BoxCutter(Cutter):
 
 
 def cut_boxes(
-    scan: Points, boxes: tuple[GivenBox, ...], mounting: Mounting, config: DriveConfig
+    scan: Points, boxes: tuple[DetectorBox, ...], mounting: Mounting, config: DriveConfig
 ) -> CutScan:
     """The points in each box that are not ground.
 

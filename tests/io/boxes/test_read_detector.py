@@ -10,7 +10,7 @@ from tests.refusal import refused
 
 from wildshape.io.boxes.detections import pose_of
 from wildshape.io.boxes.kitti import camera_at_the_lidar
-from wildshape.io.boxes.read_detector import fingerprint, read_given_boxes
+from wildshape.io.boxes.read_detector import fingerprint, read_detector_boxes
 
 CAMERA = camera_at_the_lidar().T_rect_sensor
 LABEL = "Car 0 0 0 0 0 0 0 1.6 1.8 4.0 -2.0 1.8 10.0 {turn}"
@@ -20,7 +20,7 @@ LEFT = [10, 2, -1, 4.0, 1.8, 1.6, math.pi / 2]
 
 
 def read(path):
-    return read_given_boxes(path, CAMERA)
+    return read_detector_boxes(path, CAMERA)
 
 
 def written(path, content):

@@ -10,7 +10,7 @@ from wildshape.records import Box
 
 
 @dataclass(frozen=True)
-class GivenBox:
+class DetectorBox:
     """One object in one scan.
 
     Attributes:

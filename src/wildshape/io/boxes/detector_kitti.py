@@ -16,7 +16,7 @@ import torch
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detections import moved
-from wildshape.io.boxes.detector import GivenBox, checked
+from wildshape.io.boxes.detector import DetectorBox, checked
 from wildshape.io.guard import reading
 from wildshape.records import Box
 
@@ -24,7 +24,7 @@ _IGNORED = "DontCare"
 _OBJECT, _TRACKING = (15, 16), (17, 18)  # fields of a line, without and with a score
 
 
-def read_kitti_file(path: Path, T_rect_sensor: SE3) -> list[GivenBox]:
+def read_kitti_file(path: Path, T_rect_sensor: SE3) -> list[DetectorBox]:
     """The boxes of one file; of the object benchmark's the scan is the file's name.
 
     Args:
@@ -40,7 +40,7 @@ def read_kitti_file(path: Path, T_rect_sensor: SE3) -> list[GivenBox]:
         return list(_boxes(lines, path.stem, T_sensor_rect))
 
 
-def _boxes(lines: list[str], stem: str, T_sensor_rect: SE3) -> Iterator[GivenBox]:
+def _boxes(lines: list[str], stem: str, T_sensor_rect: SE3) -> Iterator[DetectorBox]:
     for number, line in enumerate(lines, start=1):
         words = line.split()
         if not words:
@@ -56,10 +56,10 @@ def _boxes(lines: list[str], stem: str, T_sensor_rect: SE3) -> Iterator[GivenBox
             yield _given(words, scan, name, T_sensor_rect)
 
 
-def _given(words: list[str], scan: str, track: str | None, T_sensor_rect: SE3) -> GivenBox:
+def _given(words: list[str], scan: str, track: str | None, T_sensor_rect: SE3) -> DetectorBox:
     height, width, length, x, y, z, turn = map(float, words[8:15])
     upright = Box((x, y - height / 2, z), (length, width, height), _quaternion(turn))
-    return GivenBox(scan, words[0], track, moved(checked(upright), T_sensor_rect))
+    return DetectorBox(scan, words[0], track, moved(checked(upright), T_sensor_rect))
 
 
 def _quaternion(turn: float) -> tuple[float, float, float, float]:

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from wildshape.io.boxes.detector import GivenBox, checked, upright_box
+from wildshape.io.boxes.detector import DetectorBox, checked, upright_box
 from wildshape.io.guard import read_json, reading
 from wildshape.records import Box
 
 _LIDAR = "LiDAR"
 
 
-def read_results(path: Path) -> list[GivenBox]:
+def read_results(path: Path) -> list[DetectorBox]:
     """The boxes of one file.
 
     A JSON object with `results` is of nuScenes; its boxes are taken to be in each scan's sensor
@@ -33,14 +33,14 @@ def read_results(path: Path) -> list[GivenBox]:
         return [_nuscenes(row, scan) for scan, rows in said["results"].items() for row in rows]
 
 
-def _nuscenes(row: dict[str, Any], scan: str) -> GivenBox:
+def _nuscenes(row: dict[str, Any], scan: str) -> DetectorBox:
     """A record of detection, or of tracking; its size is width, length, height."""
     x, y, z = map(float, row["translation"])
     width, length, height = map(float, row["size"])
     qw, qx, qy, qz = map(float, row["rotation"])
     kind = "detection" if "detection_name" in row else "tracking"
     track = row.get("tracking_id")
-    return GivenBox(
+    return DetectorBox(
         scan=scan,
         category=str(row[f"{kind}_name"]),
         track=None if track is None else str(track),
@@ -48,14 +48,14 @@ def _nuscenes(row: dict[str, Any], scan: str) -> GivenBox:
     )
 
 
-def _scan(said: dict[str, Any], place: int) -> Iterator[GivenBox]:
+def _scan(said: dict[str, Any], place: int) -> Iterator[DetectorBox]:
     """One scan of OpenPCDet or mmdetection3d; without a `frame_id` it is known by its place."""
     scan = str(said["frame_id"]) if "frame_id" in said else place
     boxes = _floor_boxes(said) if "bboxes_3d" in said else said["boxes_lidar"]
     for box, name in zip(boxes, _names(said), strict=True):
         x, y, z, length, width, height, yaw = map(float, box[:7])
         given = upright_box((x, y, z), (length, width, height), yaw)
-        yield GivenBox(scan, name, None, given)
+        yield DetectorBox(scan, name, None, given)
 
 
 def _floor_boxes(said: dict[str, Any]) -> list[list[Any]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.boxes.detector import GivenBox, upright_box
+from wildshape.io.boxes.detector import DetectorBox, upright_box
 from wildshape.io.boxes.detector_kitti import read_kitti_file
 from wildshape.io.boxes.detector_results import read_results
 from wildshape.io.boxes.table import read_box_table
@@ -17,7 +17,7 @@ _FORMATS = "KITTI's .txt, nuScenes', OpenPCDet's or mmdetection3d's .json, or bo
 _PICKLES = (".pkl", ".pickle")
 
 
-def read_given_boxes(path: Path, T_rect_sensor: SE3) -> list[GivenBox]:
+def read_detector_boxes(path: Path, T_rect_sensor: SE3) -> list[DetectorBox]:
     """All boxes of a file, or of the files in a folder by name.
 
     Args:
@@ -52,7 +52,7 @@ def _files(path: Path) -> list[Path]:
     return files
 
 
-def _read(path: Path, T_rect_sensor: SE3) -> list[GivenBox]:
+def _read(path: Path, T_rect_sensor: SE3) -> list[DetectorBox]:
     kind = path.suffix.lower()
     if kind == ".txt":
         return read_kitti_file(path, T_rect_sensor)
@@ -67,12 +67,12 @@ def _read(path: Path, T_rect_sensor: SE3) -> list[GivenBox]:
     raise BadInputError(f"{path}: no format of boxes; --detections takes {_FORMATS}.")
 
 
-def _table(path: Path) -> list[GivenBox]:
+def _table(path: Path) -> list[DetectorBox]:
     """A `boxes.csv`: kinds unknown, every box of a track."""
     rows = read_box_table(path)
     with reading(path, "boxes of a drive"):
         return [
-            GivenBox(
+            DetectorBox(
                 scan=row.frame,
                 category="",
                 track=row.track,
