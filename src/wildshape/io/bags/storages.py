@@ -9,6 +9,7 @@ import bz2
 import os
 import sqlite3
 import struct
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -45,7 +46,7 @@ class Message(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Storage:
+class Storage(ABC):
     """A file of recorded messages.
 
     Attributes:
@@ -56,13 +57,13 @@ class Storage:
     path: Path
     topics: dict[str, str] = field(default_factory=dict)
 
+    @abstractmethod
     def clouds(self) -> Iterator[Message]:
         """All point clouds, in the order of the file; any error means that the rest is damaged."""
-        raise NotImplementedError
 
+    @abstractmethod
     def data(self, key: Key) -> bytes:
         """One message again."""
-        raise NotImplementedError
 
     def has_cloud(self, topic: str) -> bool:
         """Whether a topic holds point clouds."""
