@@ -23,7 +23,7 @@ OUT ?= demo
 
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install $(PIP_ARGS) -c constraints.txt
+PIP := $(BIN)/python -m pip --disable-pip-version-check -qq install $(PIP_ARGS) -c constraints.txt
 INSTALLED := $(VENV)/.installed
 TESTED := $(VENV)/.installed-test
 BENCHED := $(VENV)/.installed-bench
