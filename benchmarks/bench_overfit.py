@@ -21,7 +21,7 @@ from wildshape.evaluation.summary import summarise
 from wildshape.evaluation.tables import markdown
 from wildshape.inference.evaluated import Learned
 from wildshape.inference.predictor import load
-from wildshape.io.provenance import provenance
+from wildshape.io.output import provenance
 from wildshape.io.store.store import open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks

@@ -8,7 +8,7 @@ from typing import Literal
 
 import torch
 
-from wildshape.io.provenance import provenance
+from wildshape.io.output import provenance
 from wildshape.ops.nearest import backend
 
 Kind = Literal["exact", "measured", "clock"]

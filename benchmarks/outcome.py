@@ -19,7 +19,7 @@ from machine import Kind, header, p95, verdict
 from turns import clock_name
 
 from wildshape.io.atomic import write_json, write_text
-from wildshape.io.provenance import provenance
+from wildshape.io.output import provenance
 from wildshape.ops.nearest import backend
 
 _OTHERS = ("scipy", "pykdtree", "small_gicp", "pykeops")

@@ -30,7 +30,7 @@ from wildshape.geometry.transforms.se3 import stack
 from wildshape.inference.models import SHIPPED, weights_file
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import write_json
-from wildshape.io.provenance import provenance
+from wildshape.io.output import provenance
 from wildshape.io.store.store import Store, open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import load_checkpoint, save_checkpoint

@@ -23,7 +23,7 @@ from tempfile import TemporaryDirectory
 import tyro
 from experiments.meshes import road_vehicles
 
-from wildshape.io.provenance import provenance
+from wildshape.io.output import provenance
 from wildshape.io.store.store import open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import load_checkpoint, save_checkpoint

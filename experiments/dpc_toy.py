@@ -45,7 +45,7 @@ from wildshape.baselines.dpc.viewing_volume import (
 )
 from wildshape.geometry.transforms.rotation import rotation_angle
 from wildshape.io.atomic import write_json
-from wildshape.io.provenance import provenance
+from wildshape.io.output import provenance
 from wildshape.io.store.store import Store, StoreWriter, open_store
 from wildshape.records import Points, Track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks

@@ -30,7 +30,7 @@ from wildshape.evaluation.protocol import run
 from wildshape.evaluation.results import Rotate
 from wildshape.evaluation.summary import figures_of
 from wildshape.io.atomic import write_json
-from wildshape.io.provenance import provenance
+from wildshape.io.output import provenance
 from wildshape.records import Track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 

@@ -21,7 +21,7 @@ from typing import Literal
 import tyro
 from experiments.meshes import stretched
 
-from wildshape.io.provenance import provenance
+from wildshape.io.output import provenance
 from wildshape.io.store.store import open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import load_checkpoint, save_checkpoint

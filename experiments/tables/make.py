@@ -16,7 +16,7 @@ from experiments.tables.train import Model, Workshop
 from wildshape.errors import BadInputError
 from wildshape.evaluation.results import Rotate
 from wildshape.io.atomic import write_json, write_text
-from wildshape.io.provenance import provenance
+from wildshape.io.output import provenance
 from wildshape.method.checkpoint import load_checkpoint
 from wildshape.training.config import Recipe
 

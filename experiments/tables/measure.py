@@ -31,7 +31,7 @@ from wildshape.inference.models import choose_device, fingerprint
 from wildshape.inference.predictor import load
 from wildshape.io.atomic import write_json
 from wildshape.io.inputs import open_tracks
-from wildshape.io.provenance import provenance
+from wildshape.io.output import provenance
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,11 @@ from experiments.tables.table import Trained
 
 from wildshape.baselines.dpc.objective import DpcRecipe
 from wildshape.baselines.dpc.run import fit_dpc, setup_dpc
-from wildshape.cli.process import stop_flag, stoppable
-from wildshape.cli.terminal import TERMINAL, say
+from wildshape.cli.terminal import TERMINAL, say, stop_flag, stoppable
 from wildshape.inference.models import choose_device
 from wildshape.io.atomic import write_json
+from wildshape.io.output import provenance
 from wildshape.io.progress import SILENT
-from wildshape.io.provenance import provenance
 from wildshape.io.store.store import Store, open_store
 from wildshape.training.config import Recipe
 from wildshape.training.loop import MODEL, StopRequested, setup

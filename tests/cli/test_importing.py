@@ -6,7 +6,7 @@ import gc
 
 import pytest
 
-from wildshape.cli.process import uncollected
+from wildshape.cli.commands import uncollected
 
 
 def test_collection_is_off_inside_and_on_afterwards():

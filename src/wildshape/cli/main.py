@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from wildshape.cli.commands import module_of
-from wildshape.cli.process import Terminated, terminable
+from wildshape.cli.terminal import Terminated, say, terminable
 from wildshape.errors import BadInputError, MissingExtraError, lacks_memory
 from wildshape.io.atomic import release_folders
 
@@ -101,8 +101,6 @@ def _print_completion(shell: str = "") -> None:
 
 def _guarded(command: str, arguments: list[str]) -> None:
     """Run a command; what a user can cure becomes one sentence and an exit code."""
-    from wildshape.cli import terminal  # noqa: F401  # without memory nothing can be imported
-
     reserved: list[bytearray] = []
     try:
         reserved.append(bytearray(_RESERVED_BYTES))
@@ -156,8 +154,6 @@ def _system_sentence(error: OSError) -> str:
 
 
 def _leave(sentence: str, code: int) -> None:
-    from wildshape.cli.terminal import say
-
     if os.environ.get("RANK", "0") == "0":  # of torchrun's processes one talks
         say(f"wildshape: {' '.join(sentence.split())}")
     raise SystemExit(code)

@@ -1,13 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the commands say: results on stdout, everything else on stderr."""
+"""The terminal of a command: what is said on it, and the signals that stop the work.
+
+Results go to stdout, everything else to stderr. Ctrl-C and SIGTERM act at once where work is
+atomic, between two steps where it is not.
+"""
 
 import json
 import math
+import signal
 import sys
+import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from wildshape.io.progress import Bar, duration, printable
@@ -15,6 +22,7 @@ from wildshape.io.progress import Bar, duration, printable
 if TYPE_CHECKING:
     from wildshape.inference.folders.complete_folder import FolderSummary
 
+Handler = Callable[[int, FrameType | None], None]
 
 _EVERY_SECONDS = 10.0
 _LISTED = 20
@@ -134,3 +142,73 @@ def _rich_bar(label: str, total: int, start: int) -> Iterator[_RichBar]:
     )
     with Progress(*columns, console=Console(stderr=True)) as bars:
         yield _RichBar(bars, bars.add_task(label, total=total or None, completed=start, text=""))
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, handled like Ctrl-C but with its own exit code."""
+
+
+class StopFlag:
+    """Set by the first signal; a second one interrupts at once."""
+
+    def __init__(self) -> None:
+        self.signal: int | None = None
+
+    def __call__(self) -> bool:
+        """Whether a signal came."""
+        return self.signal is not None
+
+    def receive(self, number: int, frame: FrameType | None) -> None:
+        """The signal handler."""
+        if self.signal is not None:
+            _raise(number, frame)
+        self.signal = number
+
+    def error(self, sentence: str) -> KeyboardInterrupt:
+        """What to raise once the work has been put away."""
+        return (Terminated if self.signal == signal.SIGTERM else KeyboardInterrupt)(sentence)
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Inside, SIGTERM raises `Terminated` as Ctrl-C raises KeyboardInterrupt."""
+    with _handled(_raise, signal.SIGTERM):
+        yield
+
+
+@contextmanager
+def stop_flag() -> Iterator[StopFlag]:
+    """Inside, Ctrl-C and SIGTERM set a flag that is looked at between two steps."""
+    flag = StopFlag()
+    with _handled(flag.receive, signal.SIGINT, signal.SIGTERM):
+        yield flag
+
+
+@contextmanager
+def stoppable() -> Iterator[StopFlag]:
+    """`stop_flag` for a training; its `StopRequested` ends the command as the signal does."""
+    from wildshape.training.loop import StopRequested
+
+    with stop_flag() as flag:
+        try:
+            yield flag
+        except StopRequested as stop:
+            raise flag.error(str(stop)) from None
+
+
+def _raise(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+    raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
+
+
+@contextmanager
+def _handled(handler: Handler, *numbers: signal.Signals) -> Iterator[None]:
+    """Signals can be handled in the main thread only; elsewhere nothing changes."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, handler) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, old in before.items():
+            signal.signal(number, old)

@@ -18,10 +18,10 @@ from wildshape.io.output import (
     begin,
     command_line,
     file_name,
+    provenance,
     unfinished,
 )
 from wildshape.io.progress import SILENT, Progress
-from wildshape.io.provenance import provenance
 from wildshape.io.store.join import finish_join, is_joining, join_stores
 from wildshape.io.store.layout import FORMAT, JOINING_JSON, PARTS, VERSION, WRITING_JSON
 from wildshape.io.store.writer import check_room

@@ -51,10 +51,9 @@ from wildshape.inference.folders.completed_files import OBJECTS
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import write_json
 from wildshape.io.boxes.table import write_box_table
-from wildshape.io.guard import read_json
+from wildshape.io.guard import read_json, record_of
 from wildshape.io.output import begin, keep_apart
 from wildshape.io.poses import read_poses
-from wildshape.io.typed_records import record_of
 from wildshape.parallel.processes import in_order
 
 FILES = (

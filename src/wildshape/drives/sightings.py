@@ -12,8 +12,7 @@ from jaxtyping import Int
 from wildshape.drives.segmentation import read_cut
 from wildshape.drives.source import Drive
 from wildshape.io.atomic import write_json
-from wildshape.io.guard import read_json
-from wildshape.io.typed_records import record_of
+from wildshape.io.guard import read_json, record_of
 from wildshape.records import Points, Track
 
 

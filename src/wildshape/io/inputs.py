@@ -26,7 +26,7 @@ from wildshape.io.tracks import (
     scan_files,
     track_of_files,
 )
-from wildshape.records import Track, as_text
+from wildshape.records import Sensor, Track, as_text
 
 _NO_SCANS = ("poses.txt", "shape.ply")  # truth beside scans, not scans
 _CURE = (
@@ -212,11 +212,13 @@ def _single_scan(path: Path, coordinates: Coordinates) -> TrackSource:
 
 def _read_single(path: Path, coordinates: Coordinates) -> TrackFile:
     """One scan; where it lies in a TRACK folder, of the unit and sensor that track.json says."""
-    beside = path.parent.parent / "track.json" if path.parent.name == "scans" else path / "none"
-    info = read_info(beside)
-    scan = read_scan(path, coordinates.in_unit(info["unit"]))
+    sensor = Sensor()
+    if path.parent.name == "scans":
+        info = read_info(path.parent.parent / "track.json")
+        sensor, coordinates = info["sensor"], coordinates.in_unit(info["unit"])
+    scan = read_scan(path, coordinates)
     dropped = ((path.name, scan.dropped_nonfinite),) if scan.dropped_nonfinite else ()
-    track = Track(path.stem, (scan.points,), (path.stem,), sensor=info["sensor"])
+    track = Track(path.stem, (scan.points,), (path.stem,), sensor=sensor)
     return TrackFile(track, (), dropped)
 
 

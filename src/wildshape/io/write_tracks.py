@@ -12,9 +12,8 @@ from typing import Any, Literal, NamedTuple
 
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import lock_folder
-from wildshape.io.output import begin, command_line, file_name
+from wildshape.io.output import begin, command_line, file_name, provenance
 from wildshape.io.progress import SILENT, Progress
-from wildshape.io.provenance import provenance
 from wildshape.io.store.layout import INDEX_JSON, WRITING_JSON
 from wildshape.io.store.store import StoreWriter
 from wildshape.io.tracks import write_track

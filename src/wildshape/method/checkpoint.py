@@ -12,7 +12,7 @@ import torch
 
 from wildshape.geometry.projection.visibility import Projection
 from wildshape.io.atomic import atomic_write
-from wildshape.io.typed_records import record_of
+from wildshape.io.guard import record_of
 from wildshape.method.confidence import Calibration, ConfidenceFeatures
 from wildshape.method.network import NetworkConfig, ShapePoseNet
 from wildshape.method.saved_network import Format, load_network, packed_network

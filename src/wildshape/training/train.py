@@ -25,10 +25,10 @@ from wildshape.io.output import (
     command_line,
     is_begun,
     keep_apart,
+    provenance,
     remove_leftovers,
 )
 from wildshape.io.progress import SILENT, Progress, duration
-from wildshape.io.provenance import provenance
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates
 from wildshape.io.store.layout import INDEX_JSON
 from wildshape.io.store.store import Store, is_store, open_store

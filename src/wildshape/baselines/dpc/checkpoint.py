@@ -11,7 +11,7 @@ from safetensors import SafetensorError, safe_open
 
 from wildshape.baselines.dpc.network import DpcConfig, DpcNet
 from wildshape.io.atomic import atomic_write
-from wildshape.io.typed_records import record_of
+from wildshape.io.guard import record_of
 from wildshape.method.saved_network import Format, load_network, packed_network
 
 FORMAT, VERSION = "wildshape-dpc", 1

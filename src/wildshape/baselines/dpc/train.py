@@ -12,9 +12,8 @@ from wildshape.baselines.dpc.objective import PRESETS, DpcRecipe
 from wildshape.baselines.dpc.run import DpcRun, fit_dpc, setup_dpc
 from wildshape.errors import BadInputError
 from wildshape.inference.models import MODEL, choose_device
-from wildshape.io.output import command_line
+from wildshape.io.output import command_line, provenance
 from wildshape.io.progress import SILENT, Progress
-from wildshape.io.provenance import provenance
 from wildshape.training.loop import StopRequested
 from wildshape.training.train import (
     Stopping,

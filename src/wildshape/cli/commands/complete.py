@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
+from wildshape.cli.commands import uncollected
 from wildshape.cli.options import (
     DEFAULT_FILES,
     DEFAULT_NETWORK,
@@ -21,7 +22,6 @@ from wildshape.cli.options import (
     listed,
     option,
 )
-from wildshape.cli.process import uncollected
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:

@@ -49,8 +49,7 @@ def run(settings: Settings) -> None:
     Raises:
         BadInputError: the user's data cannot be used, or a demo is there already.
     """
-    from wildshape.cli.process import stoppable
-    from wildshape.cli.terminal import TERMINAL, answer
+    from wildshape.cli.terminal import TERMINAL, answer, stoppable
     from wildshape.report.demo.run import run_demo
     from wildshape.report.demo.tracks import DemoOptions
 

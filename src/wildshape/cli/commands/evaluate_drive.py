@@ -64,8 +64,7 @@ def run(settings: Settings) -> None:
     from wildshape.evaluation.drives.labels import Counting, read_labels
     from wildshape.evaluation.drives.protocol import evaluate_drives
     from wildshape.evaluation.drives.results import as_json, markdown
-    from wildshape.io.output import command_line
-    from wildshape.io.provenance import provenance
+    from wildshape.io.output import command_line, provenance
 
     _check(settings)
     drives = drives_of(settings.folder, settings.labels)

@@ -94,8 +94,7 @@ def run(settings: Settings) -> None:
         BadInputError: data or settings that cannot be used, an existing run without `--resume`.
         KeyboardInterrupt: stopped by a signal, the state saved.
     """
-    from wildshape.cli.process import stoppable
-    from wildshape.cli.terminal import TERMINAL, answer
+    from wildshape.cli.terminal import TERMINAL, answer, stoppable
     from wildshape.training.train import TrainingOptions, train
 
     options = TrainingOptions(

@@ -20,7 +20,7 @@ from wildshape.errors import MissingExtraError
 from wildshape.inference.export.graph import OUTPUTS, CompletionGraph
 from wildshape.inference.predictor import Predictor
 from wildshape.io.atomic import atomic_write
-from wildshape.io.provenance import provenance
+from wildshape.io.output import provenance
 from wildshape.method.checkpoint import ModelSettings
 
 INPUTS, OPSET = ("scans", "drawn"), 18

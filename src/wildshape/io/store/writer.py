@@ -55,7 +55,7 @@ class StoreWriter:
 
         Args:
             path: the folder to make.
-            provenance: JSON values kept with the store (`io.provenance.provenance`).
+            provenance: JSON values kept with the store (`io.output.provenance`).
             overwrite: replace a store, finished or half-written, at this path.
             shard_bytes: a shard is closed once it holds this much.
 

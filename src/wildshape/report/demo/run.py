@@ -8,9 +8,8 @@ from pathlib import Path
 
 from wildshape.inference.models import SHIPPED, choose_device
 from wildshape.inference.predictor import Predictor, load
-from wildshape.io.output import begin, command_line, unfinished
+from wildshape.io.output import begin, command_line, provenance, unfinished
 from wildshape.io.progress import SILENT, Progress, duration
-from wildshape.io.provenance import provenance
 from wildshape.io.store.store import open_store
 from wildshape.report.demo.results import draw, evaluate, process, verdict
 from wildshape.report.demo.time_budget import TimeBudget

@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 
-from wildshape.io.provenance import provenance
+from wildshape.io.output import provenance
 
 
 def test_says_what_is_needed_to_do_it_again() -> None:
@@ -17,6 +17,6 @@ def test_says_what_is_needed_to_do_it_again() -> None:
 
 
 def test_does_not_import_torch() -> None:
-    code = "import sys; from wildshape.io.provenance import provenance; provenance('x')"
+    code = "import sys; from wildshape.io.output import provenance; provenance('x')"
     code += "; assert 'torch' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
