@@ -16,6 +16,7 @@ import torch
 from jaxtyping import Float
 
 from wildshape.geometry.box import SIGNS, box_axes
+from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.transforms.se3 import SE3
 
 if TYPE_CHECKING:
@@ -87,6 +88,9 @@ class Track:
         source: where it comes from, in words.
         T_sensor_object: truth, one pose a scan, for evaluation only.
         shape: truth, `(g, 3)` float32 surface points in the object frame, for evaluation only.
+        rays: of each scan's frame those near the object that did not hit it, None for a scan
+            without; empty where no scan has any.
+        label_size_m: truth, length, width and height of the labelled box, for evaluation only.
     """
 
     name: str
@@ -97,12 +101,16 @@ class Track:
     source: str = ""
     T_sensor_object: SE3 | None = None
     shape: Points | None = None
+    rays: tuple[SightLines | None, ...] = ()
+    label_size_m: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         """Names are text, whatever the file system holds."""
         object.__setattr__(self, "scan_names", tuple(map(as_text, self.scan_names)))
         for kept in ("name", "category", "source"):
             object.__setattr__(self, kept, as_text(getattr(self, kept)))
+        if not any(rays is not None for rays in self.rays):
+            object.__setattr__(self, "rays", ())
 
     def __repr__(self) -> str:
         counts = sorted(len(scan) for scan in self.scans) or [0]
@@ -124,6 +132,7 @@ class Track:
             scans=tuple(self.scans[i] for i in kept),
             scan_names=tuple(self.scan_names[i] for i in kept),
             T_sensor_object=None if poses is None else poses[torch.tensor(kept, dtype=torch.long)],
+            rays=tuple(self.rays[i] for i in kept) if self.rays else (),
         )
 
 

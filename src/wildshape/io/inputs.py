@@ -21,6 +21,7 @@ from wildshape.io.tracks import (
     NoUsableScanError,
     TrackFile,
     folder_name,
+    rays_beside,
     read_info,
     read_track_file,
     scan_files,
@@ -211,14 +212,15 @@ def _single_scan(path: Path, coordinates: Coordinates) -> TrackSource:
 
 
 def _read_single(path: Path, coordinates: Coordinates) -> TrackFile:
-    """One scan; where it lies in a TRACK folder, of the unit and sensor that track.json says."""
-    sensor = Sensor()
+    """One scan; where it lies in a TRACK folder, with its rays, its unit and its sensor."""
+    sensor, rays = Sensor(), ()
     if path.parent.name == "scans":
         info = read_info(path.parent.parent / "track.json")
         sensor, coordinates = info["sensor"], coordinates.in_unit(info["unit"])
+        rays = (rays_beside(path, coordinates),)
     scan = read_scan(path, coordinates)
     dropped = ((path.name, scan.dropped_nonfinite),) if scan.dropped_nonfinite else ()
-    track = Track(path.stem, (scan.points,), (path.stem,), sensor=sensor)
+    track = Track(path.stem, (scan.points,), (path.stem,), sensor=sensor, rays=rays)
     return TrackFile(track, (), dropped)
 
 

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Track folders: scans/ and, if known, poses.txt, shape.ply, track.json (docs/formats.md)."""
+"""Track folders: scans/, and if known rays/, poses.txt, shape.ply, track.json (docs/formats.md)."""
 
 import math
 import shutil
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import read_json
 from wildshape.io.poses import read_poses, write_poses
+from wildshape.io.rays import read_rays, write_rays
 from wildshape.io.scans.points import (
     METRES,
     SENSOR_METRES,
@@ -26,7 +28,7 @@ from wildshape.io.scans.points import (
     read_scan,
 )
 from wildshape.io.scans.writers import ply_bytes, write_ply
-from wildshape.records import Intrinsics, Sensor, Track
+from wildshape.records import Intrinsics, Sensor, SightLines, Track
 
 __all__ = [
     "NoUsableScanError",
@@ -41,7 +43,7 @@ __all__ = [
 
 Skipped = tuple[tuple[str, str], ...]
 
-_MOST_PIXELS = 1e9
+_MOST_PIXELS, _MOST_METRES = 1e9, 1e3
 
 
 @dataclass(frozen=True)
@@ -77,13 +79,13 @@ def read_track_file(folder: Path | str, coordinates: Coordinates = SENSOR_METRES
     """The track in a folder with the list of the scans that had to be skipped.
 
     Args:
-        folder: holds scans/, and perhaps poses.txt, shape.ply, track.json.
+        folder: holds scans/, and perhaps rays/, poses.txt, shape.ply, track.json.
         coordinates: the unit is that of scans, shape and the poses' translations; the "unit" of
             track.json goes before the default `m`. The origin is subtracted from scans and poses.
             Everything returned is in metres.
 
     Raises:
-        BadInputError: no scans, none of them usable, or damaged poses, shape or track.json.
+        BadInputError: no scans, none of them usable, or damaged rays, poses, shape or track.json.
     """
     folder = Path(folder)
     files = scan_files(folder / "scans")
@@ -101,6 +103,8 @@ def read_track_file(folder: Path | str, coordinates: Coordinates = SENSOR_METRES
         source=info["source"],
         T_sensor_object=poses,
         shape=_read_shape(folder / "shape.ply", Coordinates(coordinates.unit)),
+        rays=tuple(rays_beside(file, coordinates) for file in kept),
+        label_size_m=info["label_size_m"],
     )
     return TrackFile(track, skipped, dropped)
 
@@ -161,6 +165,18 @@ def _stems(files: list[Path]) -> tuple[str, ...]:
     return stems if len(set(stems)) == len(stems) else tuple(file.name for file in files)
 
 
+def rays_beside(scan: Path, coordinates: Coordinates) -> SightLines | None:
+    """The rays of a scan of a track folder, if it has any; they bear its name, or its file's.
+
+    Raises:
+        BadInputError: they are damaged.
+    """
+    folder = scan.parent.parent / "rays"
+    names = (f"{scan.stem}.npz", f"{scan.name}.npz")
+    file = next((folder / name for name in names if (folder / name).is_file()), None)
+    return None if file is None else read_rays(file, coordinates)
+
+
 def _read_truth(path: Path, count: int, kept: list[int], coordinates: Coordinates) -> SE3 | None:
     """Truth poses of the scans that were kept."""
     if not path.exists():
@@ -190,7 +206,20 @@ def read_info(path: Path) -> dict[str, Any]:
         "sensor": sensor_from_json(raw, path),
         "category": str(raw.get("category") or ""),
         "source": str(raw.get("source") or ""),
+        "label_size_m": _label_size(raw.get("label_size_m"), path),
     }
+
+
+def _label_size(raw: object, path: Path) -> tuple[float, float, float] | None:
+    if raw is None:
+        return None
+    with suppress(TypeError, ValueError):
+        length, width, height = (float(side) for side in raw)  # pyright: ignore[reportGeneralTypeIssues]
+        if all(0 < side < _MOST_METRES for side in (length, width, height)):
+            return length, width, height
+    raise BadInputError(
+        f"{path}: label_size_m is {raw!r}, expected length, width and height in metres."
+    )
 
 
 def sensor_from_json(raw: dict[str, Any], path: Path) -> Sensor:
@@ -255,8 +284,13 @@ def write_track(folder: Path | str, track: Track) -> None:
         write_poses(folder / "poses.txt", track.T_sensor_object)
     if track.shape is not None:
         write_ply(folder / "shape.ply", track.shape)
-    info = {"category": track.category, "source": track.source, "unit": "m"}
+    info: dict[str, Any] = {"category": track.category, "source": track.source, "unit": "m"}
+    if track.label_size_m is not None:
+        info["label_size_m"] = list(track.label_size_m)
     write_json(folder / "track.json", sensor_to_json(track.sensor) | info)
+    for name, rays in zip(_file_names(track), track.rays):
+        if rays is not None:
+            write_rays(folder / "rays" / f"{name}.npz", rays)
     _write_scans(folder, track)
 
 

@@ -22,7 +22,7 @@ from wildshape.records import Track
 Layout = Literal["packed", "folders"]
 """One packed store, or track folders with a file a scan."""
 
-FILES = ("*/scans/*.ply", "*/poses.txt", "*/shape.ply", "*/track.json")
+FILES = ("*/scans/*.ply", "*/rays/*.npz", "*/poses.txt", "*/shape.ply", "*/track.json")
 _UNFINISHED = ".unfinished"
 
 

@@ -7,10 +7,8 @@ The way in for anybody's own scans, for choosing from a store, and for making fo
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-
-import torch
 
 from wildshape.datasets.tracks.gathering import Damage
 from wildshape.datasets.tracks.parts import groups, members
@@ -128,18 +126,8 @@ def filtered(track: Track, selection: Selection, rejected: dict[str, int]) -> Tr
             rejected[objection] += 1
         else:
             kept.append(i)
-    chosen = track if len(kept) == len(track.scans) else _only(track, kept)
+    chosen = track if len(kept) == len(track.scans) else track.part(kept)
     objection = selection.objection_to_track(chosen, None)
     if objection:
         rejected[objection] += 1
     return None if objection else chosen
-
-
-def _only(track: Track, kept: list[int]) -> Track:
-    poses = track.T_sensor_object
-    return replace(
-        track,
-        scans=tuple(track.scans[i] for i in kept),
-        scan_names=tuple(track.scan_names[i] for i in kept),
-        T_sensor_object=poses[torch.tensor(kept)] if poses is not None and kept else None,
-    )

@@ -5,7 +5,7 @@
 import math
 import os
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -92,6 +92,28 @@ def read_npz(path: Path) -> Float[np.ndarray, "n 3"]:
         check_unpacked(path, info.file_size, info.compress_size)
         with archive.open(info) as file:
             return _read_member(file, info.file_size, path)
+
+
+def read_npz_arrays(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Those of the named arrays of real numbers that an archive holds.
+
+    Raises:
+        BadInputError: a damaged archive, or an array of another kind.
+    """
+    found = {}
+    with zipfile.ZipFile(path) as archive:
+        for name in set(names) & {m.removesuffix(".npy") for m in archive.namelist()}:
+            info = archive.getinfo(f"{name}.npy")
+            check_unpacked(path, info.file_size, info.compress_size)
+            with archive.open(info) as file:
+                shape, is_fortran, dtype = _npy_header(file, info.file_size, path)
+                if dtype.kind not in "fiu":
+                    raise BadInputError(f"{path}: {name} holds {dtype}, expected numbers.")
+                data = _exactly(file, math.prod(shape) * dtype.itemsize, path)
+                order = "F" if is_fortran else "C"
+                found[name] = np.frombuffer(data, dtype).reshape(shape, order=order)
+                file.read(1)  # to the end: only there the checksum is compared
+    return found
 
 
 def _read_member(file: _Unpacking, size: int, path: Path) -> Float[np.ndarray, "n 3"]:

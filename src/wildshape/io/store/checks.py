@@ -21,8 +21,17 @@ from jaxtyping import Float32
 
 from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
-from wildshape.io.store.layout import CRCS, CURE, INDEX, INDEX_JSON, INDEX_TENSORS, FileRecord
+from wildshape.io.store.layout import (
+    CRCS,
+    CURE,
+    EXTRAS,
+    INDEX,
+    INDEX_JSON,
+    INDEX_TENSORS,
+    FileRecord,
+)
 from wildshape.io.store.manifest import is_sealed
+from wildshape.io.store.rays import rows_that_fit
 
 _OF_SCANS = ("scan_starts", "scan_sizes", "scan_names", "scan_crcs")
 _TEXTS_OF_TRACKS = ("track_names", "categories", "sources", "sensors")
@@ -98,7 +107,8 @@ def check_index(index: dict[str, np.ndarray], manifest: dict[str, Any], path: Pa
         BadInputError: something does not fit.
     """
     needed = INDEX.keys() if any(name in index for name in CRCS) else INDEX.keys() - set(CRCS)
-    wrong = sorted(n for n in needed if n not in index or index[n].dtype != INDEX[n])
+    kinds = {n: INDEX[n] for n in needed} | {n: EXTRAS[n] for n in EXTRAS if n in index}
+    wrong = sorted(n for n in kinds if n not in index or index[n].dtype != kinds[n])
     if wrong:
         raise BadInputError(f"{path / INDEX_TENSORS}: lacks {', '.join(wrong)}; {CURE}.")
     with reading(path / INDEX_TENSORS, "the index of a packed store"):
@@ -134,6 +144,28 @@ def _fits(index: dict[str, np.ndarray], shards: int) -> Iterator[bool]:
     yield _within(index["shape_starts"], -1, points - index["shape_sizes"])
     posed = np.where(index["pose_starts"] < 0, 0, np.diff(index["track_starts"]))
     yield _within(index["pose_starts"], -1, len(index["poses"]) - posed)
+    yield from _extras_fit({n: index[n] for n in EXTRAS if n in index}, tracks, scans, points)
+
+
+def _extras_fit(
+    extras: dict[str, np.ndarray], tracks: int, scans: int, points: int
+) -> Iterator[bool]:
+    """Whether the rays and labelled boxes of a store, if it has any, fit the rest."""
+    rays = [extras.get(name) for name in EXTRAS if name.startswith("ray_")]
+    known = [column for column in rays if column is not None]
+    yield len(known) in (0, len(rays)) and len({column.shape for column in known}) <= 1
+    if known:
+        yield _within(extras["ray_scans"], 0, scans - 1) and _climbs(extras["ray_scans"])
+        yield bool(rows_that_fit(extras["ray_counts"], extras["ray_rows"]).all())
+        yield _within(extras["ray_rows"], 0, points)
+        yield _within(extras["ray_starts"], 0, points - extras["ray_rows"])
+    labelled, sizes = (extras.get(name, np.zeros(0)) for name in ("label_tracks", "label_sizes"))
+    yield sizes.shape == (3 * len(labelled),) and bool((sizes > 0).all())
+    yield _within(labelled, 0, tracks - 1) and _climbs(labelled)
+
+
+def _climbs(numbers: np.ndarray) -> bool:
+    return bool((np.diff(numbers) > 0).all())
 
 
 def _rises(starts: np.ndarray, count: int, last: int) -> bool:

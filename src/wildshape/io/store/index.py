@@ -12,22 +12,23 @@ from typing import IO
 import numpy as np
 
 from wildshape.io.atomic import atomic_write
-from wildshape.io.store.layout import DTYPES, INDEX, INDEX_TENSORS, FileRecord
+from wildshape.io.store.layout import DTYPES, EXTRAS, INDEX, INDEX_TENSORS, FileRecord
 
 _CODES = {"int64": "q", "int32": "i", "float64": "d", "uint8": "B"}
 _BUFFERED = 1 << 13
 _TEXTS_KNOWN = 1 << 16
+_KINDS = INDEX | EXTRAS
 # The order in which safetensors lays tensors out: what needs most alignment first.
 _ORDER = ("I64", "F64", "I32", "U8")
 
 
 class IndexWriter:
-    """The tensors of `INDEX`; memory holds the last values of each and the last texts."""
+    """The tensors of `INDEX` and `EXTRAS`; memory holds the last values and the last texts."""
 
     def __init__(self, folder: Path) -> None:
         """Columns that have outgrown their room in memory lie in `folder`, hidden."""
         self.folder = folder
-        self._columns = {n: _Column(folder / f".{n}.part", kind) for n, kind in INDEX.items()}
+        self._columns = {n: _Column(folder / f".{n}.part", kind) for n, kind in _KINDS.items()}
         self._texts: dict[str, int] = {}
         self.abandon()  # what a writer that was killed left
         for name in ("track_starts", "shard_starts", "text_starts"):
@@ -67,7 +68,7 @@ class IndexWriter:
         path = self.folder / INDEX_TENSORS
         with atomic_write(path) as file:
             file.write(self._header())
-            for name in _layout():
+            for name in self._layout():
                 self._columns[name].copy_to(file)
         self.abandon()
         return file_record(path)
@@ -79,19 +80,20 @@ class IndexWriter:
 
     def _header(self) -> bytes:
         header, end = {}, 0
-        for name in _layout():
+        for name in self._layout():
             count, start = self.count(name), end
-            end += count * np.dtype(INDEX[name]).itemsize
+            end += count * np.dtype(_KINDS[name]).itemsize
             shape = [count // 12, 3, 4] if name == "poses" else [count]
-            dtype = DTYPES[INDEX[name]]
+            dtype = DTYPES[_KINDS[name]]
             header[name] = {"dtype": dtype, "shape": shape, "data_offsets": [start, end]}
         text = json.dumps(header, separators=(",", ":")).encode()
         text += b" " * (-len(text) % 8)
         return len(text).to_bytes(8, "little") + text
 
-
-def _layout() -> list[str]:
-    return sorted(INDEX, key=lambda name: (_ORDER.index(DTYPES[INDEX[name]]), name))
+    def _layout(self) -> list[str]:
+        """The tensors in their order; extras only where there are any."""
+        kept = [name for name in _KINDS if name in INDEX or self.count(name)]
+        return sorted(kept, key=lambda name: (_ORDER.index(DTYPES[_KINDS[name]]), name))
 
 
 class _Column:

@@ -20,6 +20,7 @@ from wildshape.io.atomic import write_json
 from wildshape.io.guard import reading
 from wildshape.io.store.index import IndexWriter
 from wildshape.io.store.layout import (
+    EXTRAS,
     INDEX,
     INDEX_JSON,
     JOINING_JSON,
@@ -33,7 +34,7 @@ from wildshape.io.store.store import Store
 from wildshape.io.store.writer import remove_store
 
 _TEXTS = ("track_names", "categories", "sources", "sensors", "scan_names")
-_POINTS = ("scan_starts", "shape_starts")
+_POINTS = ("scan_starts", "shape_starts", "ray_starts")
 
 
 def is_joining(out: Path) -> bool:
@@ -131,13 +132,15 @@ def _append(writer: IndexWriter, part: Store) -> None:
         **dict.fromkeys(_TEXTS, writer.count("text_starts") - 1),
         **dict.fromkeys(_POINTS, points),
         "pose_starts": writer.count("poses") // 12,
+        "ray_scans": writer.count("scan_sizes"),
+        "label_tracks": writer.count("track_names"),
     }
     heads = {
         "track_starts": writer.count("scan_sizes"),
         "shard_starts": points,
         "text_starts": writer.count("text_bytes"),
     }
-    for name in INDEX:
+    for name in (*INDEX, *EXTRAS):
         values = part.column(name)
         if name in heads:
             writer.extend(name, values[1:] + heads[name])

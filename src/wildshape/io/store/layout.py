@@ -5,8 +5,10 @@
 A store is a folder:
 
 - `points-00000.safetensors`, ...: one tensor `points` `(n, 3)` float32 each. All clouds (the
-  scans of a track, then its shape) lie one after the other; no track crosses a shard. Row numbers
-  below count through all shards.
+  scans of a track, each with its rays after it, then its shape) lie one after the other; no track
+  crosses a shard. Row numbers below count through all shards. Of a scan's `m` rays there are `m`
+  rows of directions, then the ranges, three a row and 0 where nothing came back, then, where
+  several sensors are merged, `m` rows of origins.
 - `index.safetensors`: where everything lies, the poses and all texts (tensors of `INDEX`).
 - `index.json`: format, version, checksums, provenance. Written last: no store without it.
   (`store_checks.py` says what is compared with which checksum.)
@@ -55,6 +57,17 @@ INDEX: dict[str, str] = {
     "shape_crcs": "int64",  # (T) of each truth shape's bytes, 0: none
 }
 """Tensors of `index.safetensors` and their types; T tracks, S scans, K shards."""
+
+EXTRAS: dict[str, str] = {
+    "ray_scans": "int64",  # (R) the scans that have rays, rising
+    "ray_counts": "int64",  # (R) rays of each
+    "ray_starts": "int64",  # (R) first row of each
+    "ray_rows": "int64",  # (R) rows of each
+    "ray_crcs": "int64",  # (R) CRC-32 of each one's bytes
+    "label_tracks": "int64",  # (L) the tracks with a labelled box, rising
+    "label_sizes": "float64",  # (3 L) its length, width and height, metres
+}
+"""Tensors of the index that stores without rays and labelled boxes do not have."""
 
 CRCS = ("scan_crcs", "shape_crcs")
 """Tensors that stores of older versions lack."""

@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from jaxtyping import Float32, Int64
@@ -25,6 +25,7 @@ from wildshape.io.store.checks import (
 from wildshape.io.store.layout import (
     CRCS,
     CURE,
+    EXTRAS,
     INDEX_JSON,
     INDEX_TENSORS,
     WRITING_JSON,
@@ -32,9 +33,10 @@ from wildshape.io.store.layout import (
     map_tensors,
 )
 from wildshape.io.store.manifest import files_of, read_manifest
+from wildshape.io.store.rays import rays_of_rows
 from wildshape.io.store.writer import StoreWriter
 from wildshape.io.tracks import sensor_from_json
-from wildshape.records import Sensor, Track
+from wildshape.records import Sensor, SightLines, Track
 
 __all__ = ["Store", "StoreWriter", "is_store", "open_store"]
 
@@ -129,6 +131,8 @@ class Store:
             source=self._text("sources", index),
             T_sensor_object=self.poses_of(index),
             shape=self.shape_of(index),
+            rays=tuple(self.rays_of(s) for s in scans) if self._rays else (),
+            label_size_m=self._labels.get(index),
         )
 
     def scan_points(self, scan: int) -> Float32[np.ndarray, "n 3"]:
@@ -144,6 +148,34 @@ class Store:
             self._check_cloud(points, "scan", scan)
             self._checked[scan] = True
         return points
+
+    def rays_of(self, scan: int) -> SightLines | None:
+        """The rays of scan number `scan` of the whole store; None if it has none.
+
+        Raises:
+            IndexError: there is no such scan.
+            BadInputError: they are not those that were written.
+        """
+        row = self._rays.get(_inside(scan, len(self.scan_sizes), "scan"))
+        if row is None:
+            return None
+        start, rows = (int(self._index[name][row]) for name in ("ray_starts", "ray_rows"))
+        found = self._rows(start, rows)
+        if cloud_crc(found) != int(self._index["ray_crcs"][row]):
+            self._refuse(start, f"the rays of scan {scan}")
+        return rays_of_rows(found, int(self._index["ray_counts"][row]))
+
+    @cached_property
+    def _rays(self) -> dict[int, int]:
+        """Where among the rays those of a scan are."""
+        return {scan: row for row, scan in enumerate(self.column("ray_scans").tolist())}
+
+    @cached_property
+    def _labels(self) -> dict[int, tuple[float, float, float]]:
+        """Size of each track's labelled box, metres."""
+        sizes = self.column("label_sizes").reshape(-1, 3).tolist()
+        tracks = self.column("label_tracks").tolist()
+        return {track: (x, y, z) for track, (x, y, z) in zip(tracks, sizes)}
 
     def shape_of(self, track: int) -> Float32[np.ndarray, "n 3"] | None:
         """Truth: surface points in the object frame, a view, metres; None if unknown.
@@ -186,13 +218,16 @@ class Store:
         return self._sensors[number]
 
     def column(self, name: str) -> np.ndarray:
-        """A column of the index (`store_format.INDEX`): a view of the mapped file.
+        """A column of the index (`layout.INDEX`, `EXTRAS`): a view of the mapped file.
 
-        CRCs that an older version did not write are made of the points.
+        CRCs that an older version did not write are made of the points; extras that a store does
+        not have are empty.
 
         Raises:
             BadInputError: these are not those that were written.
         """
+        if name in EXTRAS and name not in self._index:
+            return np.empty(0, EXTRAS[name])
         if name in self._index or name not in CRCS:
             return self._index[name]
         scans = name == "scan_crcs"
@@ -220,10 +255,12 @@ class Store:
         # A writer of CRCs takes numbers only. Without CRCs the shard was compared whole.
         if is_finite(points) if crcs is None else cloud_crc(points) == crcs[number]:
             return
-        start = int(self._index[f"{what}_starts"][number])
+        self._refuse(int(self._index[f"{what}_starts"][number]), f"the points of {what} {number}")
+
+    def _refuse(self, start: int, what: str) -> NoReturn:
         file = self.path / self._files[self._shard_at(start) + 1].file
         raise BadInputError(
-            f"{file}: the points of {what} {number} of the store are not those that were written;"
+            f"{file}: {what} of the store are not those that were written;"
             f" the file is damaged: {CURE}."
         )
 

@@ -5,6 +5,7 @@
 import json
 import os
 import shutil
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +30,9 @@ from wildshape.io.store.layout import (
     FileRecord,
 )
 from wildshape.io.store.manifest import manifest_of
+from wildshape.io.store.rays import rows_of_rays
 from wildshape.io.tracks import sensor_to_json
-from wildshape.records import Track
+from wildshape.records import SightLines, Track
 
 _SHARD_BYTES = 256 << 20
 _HEADER_BYTES = 256
@@ -101,7 +103,9 @@ class StoreWriter:
         index = self._index
         if self._shard is None:
             self._shard = _Shard(self.path / SHARD_NAME.format(len(self._shards)))
-        for points, name in zip(track.scans, track.scan_names):
+        for points, name, rays in zip(track.scans, track.scan_names, track.rays or repeat(None)):
+            if rays is not None:
+                self._add_rays(rays)
             index.append("scan_names", index.text(name))
             index.append("scan_sizes", len(points))
             start, crc = self._write(points)
@@ -113,6 +117,9 @@ class StoreWriter:
         index.append("sources", index.text(track.source))
         index.append("sensors", index.text(json.dumps(sensor_to_json(track.sensor))))
         self._add_truth(track.T_sensor_object, track.shape)
+        if track.label_size_m is not None:
+            index.append("label_tracks", len(self) - 1)
+            index.extend("label_sizes", np.array(track.label_size_m))
         if self._shard.points * POINT_BYTES >= self._shard_bytes:
             self._end_shard()
 
@@ -139,10 +146,12 @@ class StoreWriter:
     def _check(self, track: Track) -> None:
         poses = track.T_sensor_object
         lengths = {len(track.scans), len(track.scan_names), len(poses or track.scans)}
+        lengths.add(len(track.rays or track.scans))
         if len(lengths) > 1 or not track.scans:
             raise BadInputError(
-                f"track {track.name}: {len(track.scans)} scans, {len(track.scan_names)} names and "
-                f"{'no' if poses is None else len(poses)} poses do not fit together."
+                f"track {track.name}: {len(track.scans)} scans, {len(track.scan_names)} names, "
+                f"{len(track.rays) or 'no'} rays and {'no' if poses is None else len(poses)} poses "
+                "do not fit together."
             )
         if track.name in self._names:
             raise BadInputError(f"two tracks are named '{track.name}'; rename one of them.")
@@ -160,6 +169,16 @@ class StoreWriter:
         start, crc = (-1, 0) if shape is None else self._write(shape)
         index.append("shape_starts", start)
         index.append("shape_crcs", crc)
+
+    def _add_rays(self, rays: SightLines) -> None:
+        """Of the scan that comes next."""
+        index, rows = self._index, rows_of_rays(rays)
+        index.append("ray_scans", index.count("scan_sizes"))
+        index.append("ray_counts", len(rays))
+        index.append("ray_rows", len(rows))
+        start, crc = self._write(rows)
+        index.append("ray_starts", start)
+        index.append("ray_crcs", crc)
 
     def _write(self, points: Float32[np.ndarray, "n 3"]) -> tuple[int, int]:
         """Append a cloud to the shard; returns its first row and its CRC."""

@@ -1,0 +1,220 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The rays of a frame around an object: which to keep, and what they say of a shape (METHOD 13).
+
+A ray that ended before a point hides it. A ray that went on says that nothing stands there. Both
+are asked of the ray that passes nearest, the object's own returns among them, so that the border
+between what was hit and what was missed lies in the middle between two rays.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.se3 import SE3
+
+MOST_RAYS = 2048
+"""Rays that are kept with a scan at most."""
+
+_MARGIN_M, _NEAREST_M = 1.0, 1.0
+_UNIT = 1e-3  # how far from 1 the length of a direction may be
+
+
+@dataclass(frozen=True)
+class SightLines:
+    """Rays of a frame near an object that did not hit it.
+
+    Attributes:
+        directions: `(m, 3)` float32 unit vectors, sensor frame.
+        ranges: `(m,)` float32 metres; infinite where the sensor's grid says that nothing came back.
+        origins: `(m, 3)` float32 where the rays start, sensor frame, metres, where several sensors
+            are merged; None: all at the sensor.
+    """
+
+    directions: np.ndarray
+    ranges: np.ndarray
+    origins: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what are no rays.
+
+        Raises:
+            BadInputError: shapes that do not fit each other, a direction that is no unit vector, a
+                range that is not above 0, an origin that is not finite.
+        """
+        for name in ("directions", "ranges", "origins"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, _as_floats(name, value))
+        count = len(self.ranges)
+        found = {"directions": self.directions, "origins": self.origins}
+        for name, value in found.items():
+            if value is not None and value.shape != (count, 3):
+                raise BadInputError(
+                    f"rays: {name} {value.shape} do not fit ranges {self.ranges.shape};"
+                    f" expected ({count}, 3)."
+                )
+        lengths = np.linalg.norm(self.directions, axis=1)
+        if not (np.abs(lengths - 1) <= _UNIT).all():
+            raise BadInputError("rays: a direction is no unit vector; divide each by its length.")
+        if not (self.ranges > 0).all():
+            raise BadInputError(
+                "rays: a range is not above 0; leave such rays out, or give infinity where nothing"
+                " came back."
+            )
+        if self.origins is not None and not np.isfinite(self.origins).all():
+            raise BadInputError("rays: an origin is not finite; leave such rays out.")
+
+    def __len__(self) -> int:
+        return len(self.ranges)
+
+    @classmethod
+    def of_returns(
+        cls, points: Float[np.ndarray, "m 3"], origins: Float[np.ndarray, "m 3"] | None = None
+    ) -> "SightLines":
+        """The rays that ended in points; no point lies where its ray starts."""
+        away = points.astype(np.float64) if origins is None else points - origins.astype(np.float64)
+        ranges = np.linalg.norm(away, axis=1)
+        return cls(away / ranges[:, None], ranges, origins)
+
+    @classmethod
+    def joined(cls, parts: "Sequence[SightLines]") -> "SightLines":
+        """All rays of several sets, one after the other."""
+        origins = None
+        if any(part.origins is not None for part in parts):
+            origins = np.concatenate([part.starts for part in parts])
+        directions = np.concatenate([part.directions for part in parts])
+        return cls(directions, np.concatenate([part.ranges for part in parts]), origins)
+
+    @property
+    def starts(self) -> Float[np.ndarray, "m 3"]:
+        """Where the rays start, metres; zeros at the sensor itself."""
+        return np.zeros_like(self.directions) if self.origins is None else self.origins
+
+    @property
+    def returned(self) -> "SightLines":
+        """Those that came back."""
+        return self.part(np.flatnonzero(np.isfinite(self.ranges)))
+
+    def part(self, rows: Int[np.ndarray, "k"]) -> "SightLines":
+        """Some of the rays."""
+        origins = None if self.origins is None else self.origins[rows]
+        return SightLines(self.directions[rows], self.ranges[rows], origins)
+
+    def moved(self, T_a_sensor: SE3) -> "SightLines":
+        """The same in another frame; from a turn alone no origins come."""
+        turned = self.directions @ T_a_sensor.rotation.numpy().T.astype(np.float32)
+        if self.origins is None and not T_a_sensor.translation.any():
+            return replace(self, directions=turned)
+        return replace(self, directions=turned, origins=T_a_sensor.apply_numpy(self.starts))
+
+
+def _as_floats(name: str, value: object) -> Float[np.ndarray, "..."]:
+    try:
+        return np.ascontiguousarray(value, np.float32)
+    except (TypeError, ValueError) as error:
+        raise BadInputError(f"rays: {name} are no array of numbers.") from error
+
+
+class NearestRays(NamedTuple):
+    """Of each point the ray that passes nearest.
+
+    Attributes:
+        ray: its number; -1 where none passes near.
+        beyond: how far behind the point it ended, metres; negative where it ended before the point,
+            infinite where nothing came back, NaN where no ray passes near.
+    """
+
+    ray: Int[np.ndarray, "n"]
+    beyond: Float[np.ndarray, "n"]
+
+
+def rays_near(
+    frame: Float[np.ndarray, "s 3"], rows: Int[np.ndarray, "k"], most: int = MOST_RAYS
+) -> Int[np.ndarray, "m"]:
+    """The returns of a frame beside those of one object, as rows of it in rising order.
+
+    They lie in the object's frustum widened by 1 m at its nearest point. Of more than `most` every
+    so many-th is taken.
+
+    Args:
+        frame: all returns, sensor frame, metres.
+        rows: of the object's own returns; at least one.
+        most: rows returned at most.
+    """
+    points = frame[rows].astype(np.float64)
+    axes = _facing(points)
+    own = _angles(points @ axes)
+    nearest = max(float(np.linalg.norm(points, axis=1).min()), _NEAREST_M)
+    low, high = own.min(0) - _MARGIN_M / nearest, own.max(0) + _MARGIN_M / nearest
+    ahead = np.flatnonzero(frame @ axes[:, 0].astype(frame.dtype) > 0)
+    angles = _angles(frame[ahead] @ axes.astype(frame.dtype))
+    inside = np.zeros(len(frame), bool)
+    inside[ahead[((angles >= low) & (angles <= high)).all(1)]] = True
+    inside[rows] = False
+    found = np.flatnonzero(inside & (frame != 0).any(1))
+    return found if len(found) <= most else found[np.arange(most) * len(found) // most]
+
+
+def _facing(points: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "3 3"]:
+    """Axes as columns: along the mean direction of points, to its left and up."""
+    away = points / np.maximum(np.linalg.norm(points, axis=1, keepdims=True), 1e-9)
+    forward = away.mean(0) / max(float(np.linalg.norm(away.mean(0))), 1e-9)
+    up = np.array((0.0, 0.0, 1.0) if abs(forward[2]) < 0.9 else (1.0, 0.0, 0.0))
+    left = np.cross(up, forward)
+    left /= np.linalg.norm(left)
+    return np.stack((forward, left, np.cross(forward, left)), axis=1)
+
+
+def _angles(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:
+    """Azimuth and pitch, radians, in axes x forward, y left, z up."""
+    x, y, z = points.T
+    return np.stack((np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))), axis=1)
+
+
+def nearest_rays(
+    points: Float[np.ndarray, "n 3"], rays: SightLines, *, within_m: float = 0.15
+) -> NearestRays:
+    """Of each point the ray that passes nearest, and how far behind the point it ended.
+
+    Where several sensors are merged, each says its own, and of a point the one that saw farthest
+    past it is believed: what one of them saw through is free.
+
+    Args:
+        points: of a shape, the rays' frame, metres.
+        rays: those that hit the object among them (`SightLines.of_returns`).
+        within_m: rays that pass farther away say nothing of a point.
+    """
+    ray, beyond = np.full(len(points), -1), np.full(len(points), np.nan)
+    for origin, rows in _by_origin(rays):
+        place = _from_one_place(points - origin, rays.part(rows), within_m)
+        farther = (place.ray >= 0) & ~(place.beyond <= beyond)
+        ray[farther] = rows[place.ray[farther]]
+        beyond[farther] = place.beyond[farther]
+    return NearestRays(ray, beyond)
+
+
+def _by_origin(rays: SightLines) -> list[tuple[Float[np.ndarray, "3"], Int[np.ndarray, "k"]]]:
+    """Each place from which rays start, and the rows of its rays."""
+    if rays.origins is None:
+        return [(np.zeros(3), np.arange(len(rays)))] if len(rays) else []
+    places, which = np.unique(np.round(rays.origins, 2), axis=0, return_inverse=True)
+    which = which.reshape(-1)
+    return [(place, np.flatnonzero(which == i)) for i, place in enumerate(places)]
+
+
+def _from_one_place(
+    points: Float[np.ndarray, "n 3"], rays: SightLines, within_m: float
+) -> NearestRays:
+    from scipy.spatial import KDTree
+
+    away = np.maximum(np.linalg.norm(points, axis=1), 1e-9)
+    tree = KDTree(rays.directions, balanced_tree=False)
+    apart, ray = tree.query(points / away[:, None])
+    near = np.asarray(apart) * away <= within_m
+    beyond = rays.ranges[ray].astype(np.float64) - away
+    return NearestRays(np.where(near, ray, -1), np.where(near, beyond, np.nan))

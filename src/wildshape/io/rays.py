@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Sight lines on disk: `rays/<scan>.npz` of a track folder (docs/formats.md)."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wildshape.errors import BadInputError
+from wildshape.geometry.projection.sight_lines import SightLines
+from wildshape.io.atomic import atomic_write
+from wildshape.io.guard import reading
+from wildshape.io.scans.arrays import read_npz_arrays
+from wildshape.io.scans.coordinates import METRES, SENSOR_METRES, Coordinates
+
+_NEEDED, _OPTIONAL = ("directions", "ranges"), "origins"
+
+
+def read_rays(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> SightLines:
+    """The rays in an `.npz` of `directions (m, 3)`, `ranges (m,)` and perhaps `origins (m, 3)`.
+
+    Args:
+        path: of the file.
+        coordinates: of ranges and origins on disk; what is returned is in metres and the sensor's
+            frame.
+
+    Raises:
+        BadInputError: an array is missing, shapes do not fit, or they are no rays.
+    """
+    path = Path(path)
+    with reading(path, "a numpy archive of rays"):
+        found = read_npz_arrays(path, (*_NEEDED, _OPTIONAL))
+        missing = [name for name in _NEEDED if name not in found]
+        if missing:
+            raise BadInputError(
+                f"{path}: lacks {' and '.join(missing)}; save directions (m, 3) and ranges (m,)."
+            )
+        metres = METRES[coordinates.unit]
+        ranges, origins = found["ranges"] * metres, found.get(_OPTIONAL)
+        if origins is not None:
+            origins = (origins - np.asarray(coordinates.origin)) * metres
+        try:
+            return SightLines(found["directions"], ranges, origins)
+        except BadInputError as error:
+            raise BadInputError(f"{path}: {error}") from error
+
+
+def write_rays(path: Path | str, rays: SightLines) -> None:
+    """Write rays as `.npz`, atomically, metres."""
+    known = {"directions": rays.directions, "ranges": rays.ranges, _OPTIONAL: rays.origins}
+    arrays: dict[str, Any] = {name: value for name, value in known.items() if value is not None}
+    with atomic_write(path) as file:
+        np.savez(file, **arrays)

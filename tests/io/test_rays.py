@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Rays and labelled sizes through track folders and packed stores."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.io.store.stores import make_parts
+from tests.refusal import refused
+
+from wildshape.io.inputs import open_tracks
+from wildshape.io.rays import read_rays, write_rays
+from wildshape.io.scans.points import Coordinates
+from wildshape.io.store.join import join_stores
+from wildshape.io.store.layout import PARTS, WRITING_JSON
+from wildshape.io.store.store import StoreWriter, open_store
+from wildshape.io.tracks import read_track, write_track
+from wildshape.records import SightLines, Track
+
+SIZE = (4.1, 1.7, 1.5)
+
+
+def rays_of(count: int, *, merged: bool = False) -> SightLines:
+    rng = np.random.default_rng(count)
+    rays = SightLines.of_returns(
+        rng.uniform(1, 5, (count, 3)), rng.random((count, 3)) if merged else None
+    )
+    rays.ranges[::3] = np.inf
+    return rays
+
+
+@pytest.fixture
+def seen(track: Track) -> Track:
+    """Three scans: with rays, without, and with those of several sensors."""
+    return replace(track, rays=(rays_of(7), None, rays_of(4, merged=True)), label_size_m=SIZE)
+
+
+def assert_same_rays(found: Track, truth: Track) -> None:
+    assert found.label_size_m == truth.label_size_m
+    assert len(found.rays) == len(truth.rays)
+    for one, other in zip(found.rays, truth.rays):
+        assert (one is None) == (other is None)
+        if one is not None and other is not None:
+            assert np.array_equal(one.directions, other.directions)
+            assert np.array_equal(one.ranges, other.ranges)
+            assert (one.origins is None) == (other.origins is None)
+            assert np.array_equal(one.starts, other.starts)
+
+
+def test_folders_keep_rays(seen: Track, tmp_path: Path) -> None:
+    write_track(tmp_path / "t", seen)
+    assert_same_rays(read_track(tmp_path / "t"), seen)
+    alone = open_tracks(tmp_path / "t" / "scans" / "000012.ply")[0]
+    assert_same_rays(replace(seen.part([2]), label_size_m=None), alone)
+    (tmp_path / "t" / "scans" / "000010.ply").write_bytes(b"ply\nbroken")
+    assert_same_rays(read_track(tmp_path / "t"), seen.part([1, 2]))
+
+
+def test_stores_keep_rays_however_they_are_joined(seen: Track, tmp_path: Path) -> None:
+    (tmp_path / "out" / PARTS).mkdir(parents=True)
+    (tmp_path / "out" / WRITING_JSON).write_text("{}")
+    parts = [tmp_path / "out" / PARTS / name for name in "ab"]
+    bare = replace(seen, rays=(), label_size_m=None)
+    for path, order in zip(parts, ((bare, seen), (seen, bare, seen))):
+        with StoreWriter(path, {}) as writer:
+            for number, one in enumerate(order):
+                writer.add(replace(one, name=f"{path.name}{number}"))
+    join_stores(parts, tmp_path / "out", {})
+    found = list(open_store(tmp_path / "out"))
+    for one, truth in zip(found, (bare, seen, seen, bare, seen), strict=True):
+        assert_same_rays(one, truth)
+
+
+def test_a_store_without_rays_is_what_it_was(track: Track, tmp_path: Path) -> None:
+    """Not a byte more: fingerprints of the data that weights were trained on stay."""
+    (path, _) = make_parts(track, tmp_path)
+    names = (path / "index.safetensors").read_bytes()[:4000]
+    assert b"ray_" not in names
+    assert b"label_" not in names
+    assert open_store(path).track(0).rays == ()
+
+
+def test_rays_that_were_changed_are_refused(seen: Track, tmp_path: Path) -> None:
+    with StoreWriter(tmp_path / "s", {}) as writer:
+        writer.add(seen)
+    shard = tmp_path / "s" / "points-00000.safetensors"
+    damaged = bytearray(shard.read_bytes())
+    damaged[256 + 5] ^= 1  # rays come before the first scan
+    shard.write_bytes(damaged)
+    refused(open_store(tmp_path / "s").track, 0, match="rays of scan 0 of the store are not those")
+
+
+def test_units_and_refusals_name_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "r.npz"
+    write_rays(path, rays_of(4, merged=True))
+    metres, moved = read_rays(path), read_rays(path, Coordinates("mm", (1.0, 0.0, 0.0)))
+    assert np.allclose(moved.ranges, metres.ranges / 1000)
+    assert np.allclose(moved.starts, (metres.starts - (1, 0, 0)) / 1000)
+    np.savez(path, directions=np.eye(3))
+    refused(read_rays, path, match="r.npz: lacks ranges")
+    np.savez(path, directions=np.eye(3), ranges=np.ones(2))
+    refused(read_rays, path, match="r.npz: rays: directions .3, 3. do not fit")
+    path.write_bytes(path.read_bytes()[:100])
+    refused(read_rays, path, match="r.npz: expected a numpy archive of rays")
+    refused(read_rays, tmp_path / "none.npz", match="no such file")
