@@ -78,4 +78,4 @@ def test_what_are_no_rays_is_refused() -> None:
     refused(SightLines, unit, np.ones(2), match=r"\(3, 3\) do not fit ranges \(2,\)")
     refused(SightLines, unit, np.array((1.0, 0.0, np.nan)), match="not above 0")
     refused(SightLines, unit, np.ones(3), np.full((3, 3), np.inf), match="origin is not finite")
-    refused(SightLines, [["a"]], np.ones(1), match="no array of numbers")
+    refused(SightLines, np.array([["a"]]), np.ones(1), match="no array of numbers")
