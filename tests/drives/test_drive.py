@@ -9,12 +9,15 @@ import weakref
 
 import numpy as np
 import pytest
+import trimesh
+from pyarrow import feather
 from tests.drives.street import street
 from tests.refusal import refused
 
 import wildshape
 from wildshape.drives import run
-from wildshape.drives.config import DriveConfig
+from wildshape.drives.config import ClusterConfig, DriveConfig
+from wildshape.drives.files import DriveFiles
 from wildshape.drives.mounting import Mounting
 from wildshape.drives.segmentation import Cutter
 from wildshape.drives.source import open_drive
@@ -153,8 +156,8 @@ def test_a_run_killed_at_any_stage_goes_on_to_the_same_boxes(
 
 
 def test_several_processes_find_the_same(found, recording, tmp_path):
-    formats = BoxFiles(("json", "kitti"))
-    spread = wildshape.drive(recording, tmp_path / "out", workers=2, boxes=formats)
+    files = DriveFiles(BoxFiles(("json", "kitti")))
+    spread = wildshape.drive(recording, tmp_path / "out", workers=2, files=files)
     assert spread.vehicles == found.vehicles
     rows, others = (read_box_table(folder / "boxes.csv") for folder in (spread.out, found.out))
     for row, other in zip(rows, others, strict=True):
@@ -164,12 +167,65 @@ def test_several_processes_find_the_same(found, recording, tmp_path):
     assert {(box["scan"], box["track"]) for box in listed} == {
         (f"{row.frame:06d}", row.track) for row in rows
     }
-    labels = {path.stem for path in (spread.out / "boxes" / "kitti").iterdir()}
-    assert labels == set(spread.vehicles)
+    (labels,) = (spread.out / "boxes" / "kitti").iterdir()
+    assert labels.name == "recording.txt"
+    places = [tuple(map(int, line.split()[:2])) for line in labels.read_text().splitlines()]
+    assert places == sorted(places)
+    assert len(places) == len(rows)
 
 
 def test_other_settings_do_not_go_on_with_an_output(found, recording):
-    refused(wildshape.drive, recording, found.out, match="--overwrite")
+    other = DriveConfig(clusters=ClusterConfig(range_m=40.0))
+    refused(wildshape.drive, recording, found.out, other, match="--overwrite")
+
+
+def test_a_finished_drive_gets_other_files_and_is_not_found_again(found, recording, monkeypatch):
+    def never(*_):
+        raise AssertionError("the drive was gone through again")
+
+    monkeypatch.setattr(run._Run, "perform", never)
+    boxes = (found.out / "boxes.csv").stat().st_mtime_ns
+    files = DriveFiles(BoxFiles(("json", "kitti", "nuscenes", "argoverse2")), mesh="glb")
+    assert wildshape.drive(recording, found.out, files=files) == found
+    assert (found.out / "boxes.csv").stat().st_mtime_ns == boxes
+    sizes = {row.track: (row.length, row.width, row.height) for row in _rows(found)}
+    for name in found.vehicles:
+        mesh = trimesh.load_mesh(found.out / "meshes" / f"{name}.glb")
+        assert mesh.is_watertight
+        assert mesh.bounds == pytest.approx(np.outer((-0.5, 0.5), sizes[name]), abs=0.3)
+    _boxes_are_those_of_the_table(found)
+
+
+def _rows(found):
+    return read_box_table(found.out / "boxes.csv")
+
+
+def _boxes_are_those_of_the_table(found):
+    """Each format's boxes, one by one; columns as their formats' documents have them."""
+    rows, folder = _rows(found), found.out / "boxes"
+    for line in (folder / "kitti" / "recording.txt").read_text().splitlines():
+        frame, _, kind, *numbers = line.split()
+        height, width, length, x, y, z, turn, score = map(float, numbers[7:])
+        at = (z, -x, -y + height / 2, length, width, height, score)
+        (row,) = [r for r in rows if r.frame == int(frame) and abs(r.x - z) + abs(r.y + x) < 0.01]
+        assert kind == "Car"
+        assert (row.x, row.y, row.z, row.length, row.width, row.height, row.confidence) == (
+            pytest.approx(at, abs=1e-3)
+        )
+        assert math.cos(row.yaw + turn + math.pi / 2) == pytest.approx(1, abs=1e-3)
+    table = feather.read_table(folder / "argoverse2" / "annotations.feather").to_pylist()
+    keys = {(row.frame, row.track): row for row in rows}
+    assert len(table) == len(rows)
+    for one in table:
+        row = keys[round(one["timestamp_ns"] / 1e8), one["track_uuid"]]
+        assert (one["tx_m"], one["num_interior_pts"]) == (pytest.approx(row.x), row.points)
+    results = json.loads((folder / "nuscenes.json").read_text())["results"]
+    assert sum(map(len, results.values())) == len(rows)
+    for one in (one for some in results.values() for one in some):
+        row = keys[int(one["sample_token"]), one["tracking_id"]]
+        assert one["size"] == pytest.approx([row.width, row.length, row.height])
+        speed = 9.0 if row.moving else 0.0  # metres a second: 0.9 m a frame
+        assert math.hypot(*one["velocity"]) == pytest.approx(speed, abs=1.5)
 
 
 def test_poses_beside_the_scans_skip_the_odometry(recording, truth, tmp_path):

@@ -16,15 +16,18 @@ from wildshape.drives.sightings import Sightings
 from wildshape.drives.source import Drive
 from wildshape.drives.vehicles import Completed
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.folders.completed_files import OBJECTS
+from wildshape.inference.folders.completed_files import COMPLETED, OBJECTS
 from wildshape.io.atomic import write_text
-from wildshape.io.boxes.detections import Detection, number_of
+from wildshape.io.boxes.detections import detections_of, pose_of
 from wildshape.io.boxes.table import BoxRow
+from wildshape.io.guard import read_json
 from wildshape.io.poses import write_poses, write_tum
+from wildshape.io.scans.points import read_points, write_ply
 from wildshape.io.tracks import write_track
 from wildshape.records import Box
 
 TRAJECTORY, TUM, FRAMES, BOXES = "trajectory.txt", "trajectory.tum", "frames.csv", "boxes.csv"
+SHAPES, MESHES = "shapes", "meshes"
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,21 @@ def copy_object(folder: Path, target: Path) -> None:
     write_text(target / OBJECTS, (folder / OBJECTS).read_text("utf-8"))
 
 
+def write_shape(path: Path, folder: Path) -> None:
+    """A vehicle's complete shape in the frame of its box: x forward, origin in the middle.
+
+    Args:
+        path: file to write.
+        folder: of the completed object; all its scans have one shape.
+    """
+    if path.is_file():
+        return
+    said = read_json(folder / OBJECTS, "what complete writes")
+    first = next(detections_of(said, 0))
+    points = read_points(folder / COMPLETED / f"{first.scan}.ply")
+    write_ply(path, pose_of(first.box).inverse().apply_numpy(points))
+
+
 def boxes_of(vehicle: Vehicle, T_level_sensor: SE3) -> list[tuple[int, Box]]:
     """Frame and box in that frame's sensor frame, of all frames of a vehicle."""
     size, way = vehicle.completed.size, vehicle.way
@@ -103,25 +121,6 @@ def rows_of(vehicle: Vehicle, boxes: list[tuple[int, Box]], drive: Drive) -> lis
             confidence=vehicle.confidence,
             points=points.get(frame, 0),
             moving=vehicle.way.moving,
-        )
-        for frame, box in boxes
-    ]
-
-
-def detections_in(
-    vehicle: Vehicle, number: int, boxes: list[tuple[int, Box]], drive: Drive
-) -> list[Detection]:
-    """A vehicle's boxes for the formats of data sets; `number`: of it among all."""
-    return [
-        Detection(
-            track=vehicle.name,
-            track_number=number,
-            scan=drive.scan_names[frame],
-            scan_number=number_of(drive.scan_names[frame], frame),
-            category=CATEGORY,
-            sensor="lidar",
-            score=vehicle.confidence,
-            box=box,
         )
         for frame, box in boxes
     ]

@@ -23,18 +23,22 @@ from wildshape.drives.detections import (
     find_detections,
     given_tracks,
 )
+from wildshape.drives.files import DriveFiles
+from wildshape.drives.finished import read_finished
 from wildshape.drives.mounting import Mounting, find_mounting
 from wildshape.drives.outputs import (
     BOXES,
     FRAMES,
+    MESHES,
+    SHAPES,
     TRAJECTORY,
     TUM,
     Vehicle,
     boxes_of,
     copy_object,
-    detections_in,
     rows_of,
     write_frames,
+    write_shape,
     write_trajectories,
     write_vehicle_track,
 )
@@ -46,16 +50,18 @@ from wildshape.drives.tracks import Seen, link
 from wildshape.drives.trajectory import find_trajectory, jumps
 from wildshape.drives.vehicles import Completed, Judged, fragments, judge
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.folders.box_files import BOX_FILES, BoxFiles
+from wildshape.inference.folders.box_files import BOX_FILES
 from wildshape.inference.folders.completed_files import OBJECTS
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import write_json
 from wildshape.io.boxes.table import write_box_table
-from wildshape.io.guard import read_json, record_of
-from wildshape.io.output import begin, keep_apart
+from wildshape.io.guard import read_json, reading, record_of
+from wildshape.io.output import MARKER, begin, finished, keep_apart
 from wildshape.io.poses import read_poses
+from wildshape.io.scans.writers import MESH_FORMATS
 from wildshape.parallel.processes import in_order
 
+REPORT = "report.html"
 FILES = (
     BOXES,
     FRAMES,
@@ -66,10 +72,14 @@ FILES = (
     "objects/*/objects.json",
     "objects/*/poses.txt",
     "objects/*/completed/*.ply",
+    f"{SHAPES}/*.ply",
+    *(f"{MESHES}/*.{kind}" for kind in MESH_FORMATS),
     *BOX_FILES,
+    REPORT,
     "stages/**/*",
 )
 _DEFAULT = DriveConfig()
+_NO_FILES = DriveFiles()
 
 
 @dataclass(frozen=True)
@@ -84,7 +94,7 @@ class DriveResult:
         boxes: lines of `boxes.csv`.
         moving: vehicles that move.
         warnings: what is odd about the drive, a sentence each.
-        seconds: by stage, of this run.
+        seconds: by stage, of the run that found them.
     """
 
     out: Path
@@ -105,21 +115,24 @@ def drive(
     topic: str | None = None,
     predictor: Predictor | None = None,
     workers: int = 1,
-    boxes: BoxFiles | None = None,
+    files: DriveFiles = _NO_FILES,
     detections: DetectionFile | None = None,
     overwrite: bool = False,
     watch: Watch = silent,
 ) -> DriveResult:
     """Find every vehicle of a raw recording: its track, boxes and complete shape, without labels.
 
+    An interrupted run is gone on with. Of a finished one nothing is done again: the files asked for
+    are written.
+
     Args:
         source: a folder of full scans, a drive of KITTI or a recording of ROS (`source.py`).
-        out: folder to write (docs/drive.md); an interrupted run there is gone on with.
+        out: folder to write (docs/drive.md).
         config: the numbers of every stage.
         topic: of point clouds, for a recording of ROS that holds several.
         predictor: by default the shipped weights.
         workers: processes that cut scans and complete objects.
-        boxes: other formats in which the boxes are written, too, below `boxes/`.
+        files: what else to write into the folder.
         detections: what somebody else's detector found, in place of the clusters.
         overwrite: remove an earlier output first.
         watch: told of progress.
@@ -129,8 +142,7 @@ def drive(
         MissingExtraError: a library is not installed.
     """
     source, out = Path(source), Path(out)
-    if boxes is not None:
-        boxes.check()
+    files.check()
     recording = open_drive(source, topic)
     given = None
     if detections is not None:
@@ -146,17 +158,29 @@ def drive(
         "drive": asdict(config),
         "model": predictor.settings.provenance,
         "inference": asdict(predictor.config),
-        **({} if boxes is None else boxes.identity()),
         **({} if detections is None else detections.identity()),
     }
     chosen = [] if topic is None else ["--topic", topic]
     if detections is not None:
         chosen += ["--detections", str(detections.path)]
     line = shlex.join(("wildshape", "drive", str(source), "--out", str(out), *chosen))
-    output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
-    found = _Run(recording, out, config, predictor, workers, boxes, given, Clock(watch)).perform()
-    output.finish(result={**asdict(found), "out": str(out)})
+    done = None if overwrite else finished(out, "drive", settings, parts=(BOXES, FRAMES))
+    if done is None:
+        output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
+        found = _Run(recording, out, config, predictor, workers, given, Clock(watch)).perform()
+        output.finish(result={**asdict(found), "out": str(out)})
+    else:
+        found = _earlier(out, done)
+    files.write(read_finished(out))
     return found
+
+
+def _earlier(out: Path, record: dict[str, Any]) -> DriveResult:
+    """What an earlier run found, by its record."""
+    with reading(out / MARKER, "what `wildshape drive` says of itself"):
+        said = record["result"]
+        lists = {name: tuple(said[name]) for name in ("vehicles", "warnings")}
+        return DriveResult(**{**said, **lists, "out": out})
 
 
 @dataclass(frozen=True)
@@ -168,7 +192,6 @@ class _Run:
     config: DriveConfig
     predictor: Predictor
     workers: int
-    formats: BoxFiles | None
     detections: Detections | None
     clock: Clock
 
@@ -321,17 +344,14 @@ class _Run:
 
     def write(self, vehicles: list[Vehicle], T_level_sensor: SE3) -> int:
         with self.clock.stage("outputs", len(vehicles)) as at:
-            rows, detections = [], []
+            rows = []
             for number, one in enumerate(vehicles, 1):
                 seen = one.completed.seen
                 write_vehicle_track(self.out / "tracks", seen, self.cuts, self.drive)
                 copy_object(self.folder(seen), self.out / "objects" / one.name)
-                boxes = boxes_of(one, T_level_sensor)
-                rows += rows_of(one, boxes, self.drive)
-                detections += detections_in(one, number - 1, boxes, self.drive)
+                write_shape(self.out / SHAPES / f"{one.name}.ply", self.folder(seen))
+                rows += rows_of(one, boxes_of(one, T_level_sensor), self.drive)
                 at(number)
-            if self.formats is not None:
-                self.formats.write_detections(self.out, detections)
             write_box_table(self.out / BOXES, rows)
             return len(rows)
 

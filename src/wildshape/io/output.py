@@ -99,6 +99,33 @@ def begin(
     return Output(path, record, resumed)
 
 
+def finished(
+    path: Path, command: str, settings: dict[str, Any], *, parts: Sequence[str]
+) -> dict[str, Any] | None:
+    """What `wildshape.json` says of a finished output of these settings, the folder claimed.
+
+    Args:
+        path: the folder.
+        command: that made it.
+        settings: JSON values, as given to `begin`.
+        parts: files that must be there, else the output is not taken for finished.
+
+    Returns:
+        None where `begin` has to decide what is there.
+
+    Raises:
+        BadInputError: another process is writing there.
+    """
+    if not (path / MARKER).is_file():
+        return None
+    lock_folder(path)
+    record = _read(path)
+    asked = (command, json.loads(json.dumps(settings, default=str)), "finished")
+    known = (record.get("command"), record.get("settings"), record.get("status"))
+    whole = all((path / part).is_file() for part in parts)
+    return record if asked == known and whole else None
+
+
 def keep_apart(source: Path, out: Path) -> None:
     """Refuse to read from what is written: `--overwrite` would remove the input.
 

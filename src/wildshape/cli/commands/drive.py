@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from wildshape.cli.options import (
     DEFAULT_NETWORK,
@@ -25,6 +25,7 @@ from wildshape.errors import BadInputError
 if TYPE_CHECKING:
     from wildshape.drives.clock import Watch
     from wildshape.drives.detections import DetectionFile
+    from wildshape.drives.files import DriveFiles
     from wildshape.drives.run import DriveResult
     from wildshape.inference.folders.box_files import BoxFiles
 
@@ -56,7 +57,7 @@ class Settings:
     Writes DIR/boxes.csv (a line a vehicle and frame, in that frame's sensor frame), trajectory.txt
     (T_world_sensor), tracks/ (input for every other command) and objects/ (completed shapes); of
     several drives each into a folder of its name. An interrupted run goes on where it stopped when
-    repeated.
+    repeated. Repeated with --boxes or --mesh, a finished one gets these files and nothing else.
     """
 
     source: Sources
@@ -80,6 +81,8 @@ class Settings:
             help="of KITTI (.txt) or Argoverse 2 (.feather), for these boxes and for detections",
         ),
     ] = None
+    mesh: Annotated[bool, arg(help="also write a closed mesh of each vehicle")] = False
+    mesh_format: Annotated[Literal["ply", "obj", "glb"], arg(help="of the meshes")] = "ply"
     detections: Annotated[
         Path | None,
         option(
@@ -106,7 +109,7 @@ def run(settings: Settings) -> None:
 
     workers = _workers(settings)
     folders = _folders(settings)
-    boxes, detections = _box_files(settings), _detections(settings)
+    files, detections = _files(settings), _detections(settings)
     predictor = load(settings.network.model, settings.network.device)
     found: list[DriveResult] = []
     for source, out in folders.items():
@@ -117,7 +120,7 @@ def run(settings: Settings) -> None:
                 topic=settings.topic,
                 predictor=predictor,
                 workers=workers,
-                boxes=boxes,
+                files=files,
                 detections=detections,
                 overwrite=settings.overwrite,
                 watch=watch,
@@ -125,6 +128,12 @@ def run(settings: Settings) -> None:
             found.append(one)
     text = "\n".join(map(_sentence, found))
     answer(text, {"drives": [_data(one) for one in found]}, as_json=settings.json)
+
+
+def _files(settings: Settings) -> "DriveFiles":
+    from wildshape.drives.files import DriveFiles
+
+    return DriveFiles(_box_files(settings), settings.mesh_format if settings.mesh else None)
 
 
 def _box_files(settings: Settings) -> "BoxFiles | None":

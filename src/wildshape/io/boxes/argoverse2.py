@@ -43,21 +43,29 @@ def write_argoverse2_boxes(
         )
         for i, name in enumerate(names)
     }
-    count = len(detections)
     table = pyarrow.table(
         {
-            "timestamp_ns": pyarrow.array([one.scan_number for one in detections], pyarrow.int64()),
+            "timestamp_ns": pyarrow.array(list(map(_time, detections)), pyarrow.int64()),
             "track_uuid": pyarrow.array([one.track for one in detections], pyarrow.string()),
             "category": [
                 _CATEGORIES.get(c, c.upper()) for c in (one.category for one in detections)
             ],
             **numbers,
-            "num_interior_pts": pyarrow.array([-1] * count, pyarrow.int64()),
+            "num_interior_pts": pyarrow.array(list(map(_points, detections)), pyarrow.int64()),
             "score": [one.score for one in detections],
         }
     )
     with atomic_write(path) as file:
         feather.write_feather(table, file)
+
+
+def _time(one: Detection) -> int:
+    """The scan's time, or else its number, which is a time where the data set named the scans."""
+    return one.scan_number if one.time_ns is None else one.time_ns
+
+
+def _points(one: Detection) -> int:
+    return -1 if one.points is None else one.points
 
 
 def load_pyarrow() -> Any:

@@ -25,6 +25,8 @@ FRAME = (
     "size along the box's own x (forward), y (left), z (up)"
 )
 
+_IF_KNOWN = ("sequence", "time_ns", "points", "velocity")
+
 
 @dataclass(frozen=True)
 class Detection:
@@ -39,6 +41,10 @@ class Detection:
         sensor: tells the axes of the frame.
         score: confidence, 0 to 1.
         box: in the scan's sensor frame.
+        sequence: name of the drive; empty where each track is one of its own.
+        time_ns: when the scan was taken, if known.
+        points: of the scan that belong to the object, if known.
+        velocity: `(2,)` over the ground, along the sensor's x and y, m/s, if known.
     """
 
     track: str
@@ -49,6 +55,10 @@ class Detection:
     sensor: SensorKind
     score: float
     box: Box
+    sequence: str = ""
+    time_ns: int | None = None
+    points: int | None = None
+    velocity: tuple[float, float] | None = None
 
 
 def pose_of(box: Box) -> SE3:
@@ -131,8 +141,13 @@ def _finite(raw: Sequence[Any]) -> list[float]:
 
 
 def write_box_list(path: Path, detections: Sequence[Detection]) -> None:
-    """Write all boxes as one JSON object, atomically."""
-    rows = [{**asdict(one), **asdict(one.box)} for one in detections]
-    for row in rows:
-        del row["box"]
+    """Write all boxes as one JSON object, atomically; what is not known is left out."""
+    rows = [
+        {
+            name: value
+            for name, value in {**asdict(one), **asdict(one.box)}.items()
+            if name != "box" and not (name in _IF_KNOWN and value in (None, ""))
+        }
+        for one in detections
+    ]
     write_json(path, {"format": 1, "frame": FRAME, "boxes": rows})

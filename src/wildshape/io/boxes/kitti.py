@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Boxes as labels of KITTI tracking: a line a scan, in the rectified camera frame, yaw alone."""
+"""Boxes as labels of KITTI tracking: a line a box, in the rectified camera frame, yaw alone."""
 
 import math
 from collections.abc import Sequence
@@ -44,18 +44,26 @@ def camera_at_the_lidar() -> KittiCamera:
 def write_kitti_labels(
     folder: Path, detections: Sequence[Detection], camera: KittiCamera
 ) -> list[Path]:
-    """Write `TRACK.txt` of each track as KITTI tracking's label_02 has it, with a score at the end.
+    """Write labels as KITTI tracking's label_02 has them, with a score at the end of a line.
+
+    A drive is a file, `SEQUENCE.txt`, by frame and track, as evaluations read it. Where no drive is
+    known each track is a file, `TRACK.txt`.
 
     Scans of a camera are in a camera's frame already and stay there. Truncation and occlusion are
     not known (-1). A line holds a turn about the camera's y and no other: a box that leans is
     stood upright about its centre.
     """
     lines: dict[str, list[str]] = {}
-    for one in detections:
-        lines.setdefault(one.track, []).append(_line(one, camera))
-    for track, rows in lines.items():
-        write_text(folder / f"{track}.txt", "".join(f"{row}\n" for row in rows))
-    return [folder / f"{track}.txt" for track in lines]
+    for one in sorted(detections, key=_place):
+        lines.setdefault(one.sequence or one.track, []).append(_line(one, camera))
+    for name, rows in lines.items():
+        write_text(folder / f"{name}.txt", "".join(f"{row}\n" for row in rows))
+    return [folder / f"{name}.txt" for name in lines]
+
+
+def _place(one: Detection) -> tuple[int, int]:
+    """Where a box stands in a drive's file; tracks keep their order."""
+    return (one.scan_number, one.track_number) if one.sequence else (0, 0)
 
 
 def _line(one: Detection, camera: KittiCamera) -> str:

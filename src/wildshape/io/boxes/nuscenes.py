@@ -24,7 +24,7 @@ def write_nuscenes_boxes(path: Path, detections: Sequence[Detection]) -> None:
     """Write one JSON object, `meta` and `results` by sample token, atomically.
 
     The token is the scan's name. A record has the fields of nuScenes' detection and tracking
-    results; velocity is not estimated and 0.
+    results. Velocity is 0 where it is not known.
     """
     results: dict[str, list[dict[str, Any]]] = {}
     for one in detections:
@@ -40,7 +40,7 @@ def _record(one: Detection) -> dict[str, Any]:
         "translation": list(one.box.centre),
         "size": [width, length, height],
         "rotation": list(one.box.quaternion_wxyz),
-        "velocity": [0.0, 0.0],
+        "velocity": list(one.velocity or (0.0, 0.0)),
         "detection_name": name,
         "detection_score": one.score,
         "attribute_name": "",

@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a finished drive is written as beside its tables: boxes of data sets, meshes, recordings."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from wildshape.drives.completion import CATEGORY
+from wildshape.drives.finished import FinishedDrive, FoundVehicle
+from wildshape.drives.outputs import MESHES
+from wildshape.geometry.meshing import closed_mesh
+from wildshape.inference.folders.box_files import BoxFiles
+from wildshape.io.boxes.detections import Detection, number_of
+from wildshape.io.scans.writers import MeshFormat, write_mesh
+
+_LONGEST_NUMBER = 10  # digits: longer names of scans are times
+
+
+@dataclass(frozen=True)
+class DriveFiles:
+    """What to write of a drive; every one can be asked for later, too.
+
+    Attributes:
+        boxes: all boxes in formats of data sets, below `boxes/`.
+        mesh: a closed mesh of each vehicle, in this format, below `meshes/`.
+    """
+
+    boxes: BoxFiles | None = None
+    mesh: MeshFormat | None = None
+
+    def check(self) -> None:
+        """Refuse before any work is done what could not be written after it.
+
+        Raises:
+            BadInputError: no such format, or a calibration that cannot be used.
+            MissingExtraError: a library is not installed.
+        """
+        if self.boxes is not None:
+            self.boxes.check()
+
+    def write(self, found: FinishedDrive) -> None:
+        """Write what is asked for into the drive's folder."""
+        if self.boxes is not None:
+            self.boxes.write_detections(found.out, list(detections_of(found)))
+        if self.mesh is not None:
+            for one in found.vehicles:
+                _write_mesh(found, one, self.mesh)
+
+
+def detections_of(found: FinishedDrive) -> Iterator[Detection]:
+    """All boxes of a drive, for the formats of data sets."""
+    times = found.times
+    for number, one in enumerate(found.vehicles):
+        velocities = found.velocities(one).tolist()
+        for frame, box, points, (x, y, _) in zip(one.frames, one.boxes, one.points, velocities):
+            scan = found.scan_names[frame]
+            yield Detection(
+                track=one.name,
+                track_number=number,
+                scan=scan,
+                scan_number=number_of(scan, frame) if len(scan) <= _LONGEST_NUMBER else frame,
+                category=CATEGORY,
+                sensor="lidar",
+                score=one.confidence,
+                box=box,
+                sequence=found.name,
+                time_ns=None if times is None else round(times[frame] * 1e9),
+                points=points,
+                velocity=None if times is None else (round(x, 3), round(y, 3)),
+            )
+
+
+def _write_mesh(found: FinishedDrive, one: FoundVehicle, kind: MeshFormat) -> None:
+    """A vehicle's mesh, in the frame of its box."""
+    path: Path = found.out / MESHES / f"{one.name}.{kind}"
+    write_mesh(path, closed_mesh(found.shape(one)))

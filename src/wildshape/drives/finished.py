@@ -1,0 +1,230 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A finished drive, read back from its folder: what other formats, pages and viewers are made of.
+
+The level world is the sensor frame of the first frame with z vertical (`placing.py`).
+"""
+
+import csv
+import math
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from wildshape.drives.mounting import Mounting
+from wildshape.drives.outputs import BOXES, FRAMES, SHAPES, TRAJECTORY, TUM
+from wildshape.drives.placing import box_in_scan, level_poses
+from wildshape.drives.source import Drive, open_drive
+from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.boxes.detections import pose_of
+from wildshape.io.boxes.table import BoxRow, read_box_table
+from wildshape.io.guard import read_json, reading, record_of
+from wildshape.io.output import MARKER
+from wildshape.io.poses import read_poses, read_tum
+from wildshape.io.scans.points import read_points
+from wildshape.records import Box, Points
+
+_PERIOD_S = 0.1  # of a scan, where no times are known
+
+
+@dataclass(frozen=True)
+class FoundVehicle:
+    """A vehicle in all frames from the first to the last in which it was seen.
+
+    Attributes:
+        name: that of its folders.
+        size: length, width, height, metres.
+        confidence: that it is a vehicle, 0 to 1.
+        moving: or standing.
+        frames: rising.
+        boxes: in each frame's sensor frame.
+        points: of each frame's scan that belong to it.
+    """
+
+    name: str
+    size: tuple[float, float, float]
+    confidence: float
+    moving: bool
+    frames: tuple[int, ...]
+    boxes: tuple[Box, ...]
+    points: tuple[int, ...]
+
+    @property
+    def fullest(self) -> int:
+        """The frame of most points."""
+        return self.frames[int(np.argmax(self.points))]
+
+    @property
+    def nearest_m(self) -> float:
+        """The least distance from the sensor to its middle, metres."""
+        return min(math.dist((0.0, 0.0, 0.0), box.centre) for box in self.boxes)
+
+
+@dataclass(frozen=True)
+class FinishedDrive:
+    """What `wildshape drive` left in a folder.
+
+    Attributes:
+        out: the folder.
+        scan_names: one a frame.
+        times: seconds, if known.
+        ticks: when each scan was taken, counted in scans, if times are not known.
+        scanned: points of each scan.
+        T_level_sensor: from each frame's sensor frame to the level world.
+        ground_m: height of the sensor above the ground.
+        vehicles: by name.
+        record: what `wildshape.json` holds.
+    """
+
+    out: Path
+    scan_names: tuple[str, ...]
+    times: tuple[float, ...] | None
+    ticks: tuple[float, ...]
+    scanned: tuple[int, ...]
+    T_level_sensor: SE3
+    ground_m: float
+    vehicles: tuple[FoundVehicle, ...]
+    record: dict[str, Any]
+
+    def __len__(self) -> int:
+        return len(self.scan_names)
+
+    @property
+    def source(self) -> Path:
+        """Where the scans were."""
+        return Path(self.record["settings"]["source"])
+
+    @property
+    def name(self) -> str:
+        """Of the recording."""
+        return self.source.stem if self.source.suffix else self.source.name
+
+    @property
+    def seconds(self) -> tuple[float, ...]:
+        """Since the first scan; ten scans a second where no times are known."""
+        at = self.times or tuple(_PERIOD_S * tick for tick in self.ticks)
+        return tuple(time - at[0] for time in at)
+
+    @property
+    def travelled_m(self) -> float:
+        """Length of the sensor's way."""
+        places = self.T_level_sensor.translation.numpy()
+        return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+
+    def open_source(self, moved: Path | None = None) -> Drive:
+        """The recording, to read its scans again; `moved`: where it is now.
+
+        Raises:
+            BadInputError: it is not there, or has another number of scans.
+        """
+        source = moved or self.source
+        drive = open_drive(source, self.record["settings"].get("topic"))
+        if len(drive) != len(self):
+            raise BadInputError(
+                f"{source}: {len(drive)} scans, and {self.out} was made of {len(self)}; name the"
+                " recording it was made of."
+            )
+        return drive
+
+    def shape(self, vehicle: FoundVehicle) -> Points:
+        """`(n, 3)` complete shape, metres, in its box's frame: x forward, origin in the middle.
+
+        Raises:
+            BadInputError: the file is damaged.
+        """
+        return read_points(self.out / SHAPES / f"{vehicle.name}.ply")
+
+    def velocities(self, vehicle: FoundVehicle) -> Float[np.ndarray, "f 3"]:
+        """Over the ground, in each frame's sensor axes, m/s; 0 for what stands."""
+        frames = np.array(vehicle.frames)
+        found = np.zeros((len(frames), 3))
+        if not vehicle.moving or len(frames) < 2:
+            return found
+        at = np.array(self.seconds)[frames]
+        places = [place.translation.numpy() for place in self.placed(vehicle)]
+        rates = np.gradient(np.array(places), at, axis=0)
+        turns = self.T_level_sensor.rotation.numpy()[frames]
+        return np.einsum("fij,fi->fj", turns, rates)
+
+    def placed(self, vehicle: FoundVehicle) -> Iterator[SE3]:
+        """`T_level_box` in each of a vehicle's frames."""
+        for frame, box in zip(vehicle.frames, vehicle.boxes):
+            yield self.T_level_sensor[frame] @ pose_of(box)
+
+
+def is_drive(out: Path) -> bool:
+    """Whether a folder holds a finished drive."""
+    return (out / BOXES).is_file() and (out / FRAMES).is_file() and (out / MARKER).is_file()
+
+
+def read_finished(out: Path | str) -> FinishedDrive:
+    """What `wildshape drive` left in a folder.
+
+    Raises:
+        BadInputError: no drive, or a damaged one.
+    """
+    out = Path(out)
+    if not is_drive(out):
+        raise BadInputError(f"{out}: holds no finished drive; run `wildshape drive` with --out.")
+    names, times, scanned = _read_frames(out / FRAMES)
+    path = out / "stages" / "mounting.json"
+    mounting = record_of(Mounting, read_json(path, "the sensor's mounting"), {})
+    T_level_sensor = level_poses(read_poses(out / TRAJECTORY, len(names)), mounting)
+    ticks, _ = read_tum(out / TUM)
+    rows: dict[str, list[BoxRow]] = defaultdict(list)
+    for row in read_box_table(out / BOXES):
+        if not 0 <= row.frame < len(names):
+            raise BadInputError(f"{out / BOXES}: frame {row.frame} of {len(names)}; write it anew.")
+        rows[row.track].append(row)
+    return FinishedDrive(
+        out=out,
+        scan_names=names,
+        times=times,
+        ticks=tuple(ticks),
+        scanned=scanned,
+        T_level_sensor=T_level_sensor,
+        ground_m=mounting.height_m,
+        vehicles=tuple(_vehicle(rows[name], T_level_sensor) for name in sorted(rows)),
+        record=read_json(out / MARKER, "what a command says of itself"),
+    )
+
+
+def _read_frames(
+    path: Path,
+) -> tuple[tuple[str, ...], tuple[float, ...] | None, tuple[int, ...]]:
+    with reading(path, "a list of frames"), path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+        times = tuple(float(row["time"]) for row in rows if row["time"])
+        names = tuple(row["scan"] for row in rows)
+        points = tuple(int(row["points"]) for row in rows)
+    return names, times if len(times) == len(names) else None, points
+
+
+def _vehicle(rows: list[BoxRow], T_level_sensor: SE3) -> FoundVehicle:
+    first = rows[0]
+    return FoundVehicle(
+        name=first.track,
+        size=(first.length, first.width, first.height),
+        confidence=first.confidence,
+        moving=first.moving,
+        frames=tuple(row.frame for row in rows),
+        boxes=tuple(_upright(row, T_level_sensor[row.frame]) for row in rows),
+        points=tuple(row.points for row in rows),
+    )
+
+
+def _upright(row: BoxRow, T_level_sensor: SE3) -> Box:
+    """The box of a line, upright in the level world, in its frame's sensor frame."""
+    rotation = T_level_sensor.rotation.numpy()
+    c, s = math.cos(row.yaw), math.sin(row.yaw)
+    rise = -(rotation[2, 0] * c + rotation[2, 1] * s) / rotation[2, 2]
+    ahead = rotation @ (c, s, rise)  # level, and along the yaw as the sensor sees it
+    place = T_level_sensor.apply_numpy(np.array([(row.x, row.y, row.z)]))[0]
+    upright = np.append(place, math.atan2(ahead[1], ahead[0]))
+    return box_in_scan(upright, (row.length, row.width, row.height), T_level_sensor)
