@@ -29,10 +29,8 @@ from wildshape.drives.mounting import Mounting, find_mounting
 from wildshape.drives.outputs import (
     BOXES,
     FRAMES,
-    MESHES,
     SHAPES,
     TRAJECTORY,
-    TUM,
     Vehicle,
     boxes_of,
     copy_object,
@@ -43,6 +41,7 @@ from wildshape.drives.outputs import (
     write_vehicle_track,
 )
 from wildshape.drives.placing import level_poses, read_completed
+from wildshape.drives.result import FILES, DriveResult, earlier_result
 from wildshape.drives.segmentation import Cutter, read_cuts
 from wildshape.drives.sightings import Sightings, read_sightings, write_sightings
 from wildshape.drives.source import Drive, open_drive
@@ -50,61 +49,17 @@ from wildshape.drives.tracks import Seen, link
 from wildshape.drives.trajectory import find_trajectory, jumps
 from wildshape.drives.vehicles import Completed, Judged, fragments, judge
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.folders.box_files import BOX_FILES
 from wildshape.inference.folders.completed_files import OBJECTS
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import write_json
 from wildshape.io.boxes.table import write_box_table
-from wildshape.io.guard import read_json, reading, record_of
-from wildshape.io.output import MARKER, begin, finished, keep_apart
+from wildshape.io.guard import read_json, record_of
+from wildshape.io.output import begin, finished, keep_apart
 from wildshape.io.poses import read_poses
-from wildshape.io.scans.writers import MESH_FORMATS
 from wildshape.parallel.processes import in_order
 
-REPORT = "report.html"
-FILES = (
-    BOXES,
-    FRAMES,
-    TRAJECTORY,
-    TUM,
-    "tracks/*/track.json",
-    "tracks/*/scans/*.ply",
-    "objects/*/objects.json",
-    "objects/*/poses.txt",
-    "objects/*/completed/*.ply",
-    f"{SHAPES}/*.ply",
-    *(f"{MESHES}/*.{kind}" for kind in MESH_FORMATS),
-    *BOX_FILES,
-    REPORT,
-    "stages/**/*",
-)
 _DEFAULT = DriveConfig()
 _NO_FILES = DriveFiles()
-
-
-@dataclass(frozen=True)
-class DriveResult:
-    """What was found in a drive.
-
-    Attributes:
-        out: the folder written.
-        frames: of the drive.
-        candidates: objects tracked, vehicles or not.
-        vehicles: their names.
-        boxes: lines of `boxes.csv`.
-        moving: vehicles that move.
-        warnings: what is odd about the drive, a sentence each.
-        seconds: by stage, of the run that found them.
-    """
-
-    out: Path
-    frames: int
-    candidates: int
-    vehicles: tuple[str, ...]
-    boxes: int
-    moving: int
-    warnings: tuple[str, ...]
-    seconds: dict[str, float]
 
 
 def drive(
@@ -170,17 +125,9 @@ def drive(
         found = _Run(recording, out, config, predictor, workers, given, Clock(watch)).perform()
         output.finish(result={**asdict(found), "out": str(out)})
     else:
-        found = _earlier(out, done)
+        found = earlier_result(out, done)
     files.write(read_finished(out))
     return found
-
-
-def _earlier(out: Path, record: dict[str, Any]) -> DriveResult:
-    """What an earlier run found, by its record."""
-    with reading(out / MARKER, "what `wildshape drive` says of itself"):
-        said = record["result"]
-        lists = {name: tuple(said[name]) for name in ("vehicles", "warnings")}
-        return DriveResult(**{**said, **lists, "out": out})
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from wildshape.drives.clock import Watch
     from wildshape.drives.detections import DetectionFile
     from wildshape.drives.files import DriveFiles
-    from wildshape.drives.run import DriveResult
+    from wildshape.drives.result import DriveResult
     from wildshape.inference.folders.box_files import BoxFiles
 
 EXAMPLES = (

@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What `drive` gives back, and which files it may write."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from wildshape.drives.outputs import BOXES, FRAMES, MESHES, SHAPES, TRAJECTORY, TUM
+from wildshape.inference.folders.box_files import BOX_FILES
+from wildshape.io.guard import reading
+from wildshape.io.output import MARKER
+from wildshape.io.scans.writers import MESH_FORMATS
+
+REPORT = "report.html"
+FILES = (
+    BOXES,
+    FRAMES,
+    TRAJECTORY,
+    TUM,
+    "tracks/*/track.json",
+    "tracks/*/scans/*.ply",
+    "objects/*/objects.json",
+    "objects/*/poses.txt",
+    "objects/*/completed/*.ply",
+    f"{SHAPES}/*.ply",
+    *(f"{MESHES}/*.{kind}" for kind in MESH_FORMATS),
+    *BOX_FILES,
+    REPORT,
+    "stages/**/*",
+)
+
+
+@dataclass(frozen=True)
+class DriveResult:
+    """What was found in a drive.
+
+    Attributes:
+        out: the folder written.
+        frames: of the drive.
+        candidates: objects tracked, vehicles or not.
+        vehicles: their names.
+        boxes: lines of `boxes.csv`.
+        moving: vehicles that move.
+        warnings: what is odd about the drive, a sentence each.
+        seconds: by stage, of the run that found them.
+    """
+
+    out: Path
+    frames: int
+    candidates: int
+    vehicles: tuple[str, ...]
+    boxes: int
+    moving: int
+    warnings: tuple[str, ...]
+    seconds: dict[str, float]
+
+
+def earlier_result(out: Path, record: dict[str, Any]) -> DriveResult:
+    """What an earlier run found, by its record."""
+    with reading(out / MARKER, "what `wildshape drive` says of itself"):
+        said = record["result"]
+        lists = {name: tuple(said[name]) for name in ("vehicles", "warnings")}
+        return DriveResult(**{**said, **lists, "out": out})
