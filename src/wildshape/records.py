@@ -76,6 +76,19 @@ class Sensor:
 
 
 @dataclass(frozen=True)
+class Turn:
+    """A whole scan: one turn of a sensor.
+
+    Attributes:
+        points: each from where the sensor was when it was taken, sensor frame, metres.
+        seconds: `(n,)` when each was taken, since the scan's own time; None if that is unknown.
+    """
+
+    points: Points
+    seconds: Float[np.ndarray, "_"] | None = None
+
+
+@dataclass(frozen=True)
 class Track:
     """The scans of one rigid object in time order: the method's only supervision.
 

@@ -26,9 +26,9 @@ from wildshape.drives.detections import (
 )
 from wildshape.drives.ground import height_above_ground
 from wildshape.drives.mounting import find_mounting
+from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.segmentation import read_cut, read_cuts
 from wildshape.drives.sightings import read_sightings
-from wildshape.drives.source import open_drive
 from wildshape.io.boxes.detector import upright_box
 from wildshape.io.boxes.table import read_box_table
 from wildshape.simulate.street.drive_folder import write_drive

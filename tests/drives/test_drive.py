@@ -19,8 +19,8 @@ from wildshape.drives import run
 from wildshape.drives.config import ClusterConfig, DriveConfig
 from wildshape.drives.files import DriveFiles
 from wildshape.drives.mounting import Mounting
+from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.segmentation import Cutter
-from wildshape.drives.source import open_drive
 from wildshape.drives.trajectory import find_trajectory
 from wildshape.geometry.footprint import footprint_iou
 from wildshape.inference.folders.box_files import BoxFiles
@@ -28,6 +28,7 @@ from wildshape.io.boxes.detections import read_detections
 from wildshape.io.boxes.table import HEADER, read_box_table
 from wildshape.io.poses import read_poses, read_tum
 from wildshape.io.tracks import read_track
+from wildshape.records import Turn
 
 pytest.importorskip("kiss_icp")
 pytest.importorskip("pypatchworkpp")
@@ -250,7 +251,7 @@ def test_scans_are_in_memory_one_by_one(recording, tmp_path):
         scan = np.load(recording / f"{frame:06d}.npy").view(Held)
         alive.add(scan)
         most = max(most, len(alive))
-        return scan
+        return Turn(scan)
 
     object.__setattr__(drive, "read", read)
     find_trajectory(drive, LEVEL, DriveConfig())

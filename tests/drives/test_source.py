@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.refusal import refused
 
-from wildshape.drives.source import open_drive
+from wildshape.drives.recordings.opening import open_drive
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.poses import write_poses
 
@@ -44,6 +44,13 @@ def test_times_beside_the_scans_are_seconds(folder):
     drive = open_drive(folder)
     assert drive.times == (5.0, 5.1, 5.2, 5.5)
     assert drive.ticks == (0, 1, 2, 5)
+
+
+def test_of_a_time_for_each_number_those_of_the_scans_are_taken(tmp_path):
+    write_scans(tmp_path, (2, 3, 4, 7))
+    (tmp_path / "times.txt").write_text("".join(f"{0.1 * n:.1f}\n" for n in range(8)))
+    drive = open_drive(tmp_path)
+    assert (drive.times, drive.ticks) == ((0.2, 0.3, 0.4, 0.7), (0, 1, 2, 5))
 
 
 def test_poses_beside_the_scans_are_used(folder):

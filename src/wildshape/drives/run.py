@@ -41,10 +41,11 @@ from wildshape.drives.outputs import (
     write_vehicle_track,
 )
 from wildshape.drives.placing import level_poses, read_completed
+from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.result import FILES, DriveResult, earlier_result
 from wildshape.drives.segmentation import Cutter, read_cuts
 from wildshape.drives.sightings import Sightings, read_sightings, write_sightings
-from wildshape.drives.source import Drive, open_drive
+from wildshape.drives.source import Drive
 from wildshape.drives.tracks import Seen, link
 from wildshape.drives.trajectory import find_trajectory, jumps
 from wildshape.drives.vehicles import Completed, Judged, fragments, judge
@@ -81,7 +82,8 @@ def drive(
     are written.
 
     Args:
-        source: a folder of full scans, a drive of KITTI or a recording of ROS (`source.py`).
+        source: a folder of full scans, a drive of a published data set or a recording of ROS
+            (`recordings`).
         out: folder to write (docs/drive.md).
         config: the numbers of every stage.
         topic: of point clouds, for a recording of ROS that holds several.

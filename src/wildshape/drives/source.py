@@ -1,26 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where a drive comes from: its scans in time order, read one by one, and what is known of them."""
+"""A drive: its scans in time order, read one by one, and what is known of them."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from datetime import UTC, datetime
-from itertools import pairwise
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.bags.reader import Bag, bag_files, open_bag
-from wildshape.io.bags.storages import STORAGES
-from wildshape.io.guard import reading
-from wildshape.io.poses import read_poses
-from wildshape.io.scans.points import is_scan_file, read_points
-from wildshape.records import Points
+from wildshape.geometry.transforms.twist import Twist
+from wildshape.records import Points, Turn
 
-_BESIDE = ("poses.txt", "times.txt", "timestamps.txt", "calib.txt")
-_RAW, _ODOMETRY = Path("velodyne_points") / "data", Path("velodyne")
+_NOTHING = Turn(np.empty((0, 3), np.float32))
 
 
 @dataclass(frozen=True)
@@ -31,120 +23,95 @@ class Drive:
         name: of the recording.
         scan_names: one a frame; frames are counted from 0.
         ticks: when each was taken, counted in scans: a missing scan leaves its number out.
-        times: the same in seconds, if known.
+        read: gives a frame's finite points, sensor frame, metres, and when each was taken, if
+            that is known; `BadInputError` if it cannot.
+        times: when each scan was taken, seconds, if known.
         T_world_sensor: `(n,)` poses, if known.
-        read: gives a frame's finite points, sensor frame, metres; `BadInputError` if it cannot.
         warnings: what is odd about it, a sentence each.
         cut_by: how its objects are cut out, for their files.
+        motion: of the sensor at each frame, once known: scans are corrected by it.
     """
 
     name: str
     scan_names: tuple[str, ...]
     ticks: tuple[int, ...]
-    read: Callable[[int], Points]
+    read: Callable[[int], Turn]
     times: tuple[float, ...] | None = None
     T_world_sensor: SE3 | None = None
     warnings: tuple[str, ...] = ()
     cut_by: str = "without labels"
+    motion: tuple[Twist, ...] | None = None
+
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        scan_names: Sequence[str],
+        read: Callable[[int], Turn],
+        times: Sequence[float] | None = None,
+        T_world_sensor: SE3 | None = None,
+        warnings: Sequence[str] = (),
+    ) -> "Drive":
+        """A drive whose ticks come from the scans' times, or from their names if these count.
+
+        Raises:
+            BadInputError: names that count do not rise.
+        """
+        names = tuple(scan_names)
+        ticks, missing = _ticks(names, times)
+        return cls(
+            name=name,
+            scan_names=names,
+            ticks=ticks,
+            read=read,
+            times=None if times is None else tuple(times),
+            T_world_sensor=T_world_sensor,
+            warnings=(*warnings, *missing),
+        )
 
     def __len__(self) -> int:
         return len(self.scan_names)
 
-    def scan(self, frame: int) -> Points:
-        """A frame's points; none where its file is damaged or empty."""
+    def turn(self, frame: int) -> Turn:
+        """A frame as it was read; without points where its file is damaged or empty."""
         try:
             return self.read(frame)
         except BadInputError:
-            return np.empty((0, 3), np.float32)
+            return _NOTHING
+
+    def scan(self, frame: int) -> Points:
+        """A frame's points where they would be seen from the sensor's place at the scan's time.
+
+        Points are as they were measured where the motion or their times are not known.
+        """
+        turn = self.turn(frame)
+        if self.motion is None or turn.seconds is None:
+            return turn.points
+        return self.motion[frame].carry(turn.points, turn.seconds)
+
+    def moved_by(self, T_world_sensor: SE3) -> "Drive":
+        """The drive with its scans corrected for the sensor's motion during each turn.
+
+        Args:
+            T_world_sensor: of every frame.
+        """
+        if self.times is None or len(self) < 2:
+            return self
+        return replace(self, motion=tuple(_motion(T_world_sensor, self.times)))
 
 
-@dataclass(frozen=True)
-class _Files:
-    """Reads a frame's file."""
-
-    files: tuple[Path, ...]
-
-    def __call__(self, frame: int) -> Points:
-        return read_points(self.files[frame])
-
-
-def open_drive(path: Path | str, topic: str | None = None) -> Drive:
-    """A folder of full scans, a drive of KITTI raw, a sequence of KITTI odometry, or a bag of ROS.
-
-    Scans are sorted by name. `times.txt` (seconds, a line a scan) and `poses.txt`
-    (`T_world_sensor`) beside the scans are used; an odometry sequence's own poses are those of a
-    camera and are not.
-
-    Args:
-        path: of the drive.
-        topic: of point clouds, for a bag that holds several.
-
-    Raises:
-        BadInputError: no scans; times or poses of another number or not in order; no such topic.
-        MissingExtraError: a bag is read, and a library for it is not installed.
-    """
-    path = Path(path)
-    if bag_files(path):
-        return _recorded(path, open_bag(path, topic))
-    if not path.is_dir():
-        raise BadInputError(
-            f"{path}: no such folder; a drive is a folder of full scans or a recording of ROS"
-            f" ({', '.join(STORAGES)})."
-        )
-    if topic is not None:
-        raise BadInputError(f"{path}: has no topics, it is no recording of ROS; drop --topic.")
-    if (path / _RAW).is_dir():
-        times = _timestamps(path / _RAW.parent / "timestamps.txt")
-        return _drive(path, _files(path / _RAW), times, None)
-    if (path / _ODOMETRY).is_dir():
-        return _drive(path, _files(path / _ODOMETRY), _seconds(path / "times.txt"), None)
-    poses = path / "poses.txt" if (path / "poses.txt").is_file() else None
-    return _drive(path, _files(path), _seconds(path / "times.txt"), poses)
-
-
-def _drive(path: Path, files: list[Path], times: list[float] | None, poses: Path | None) -> Drive:
-    names = tuple(file.stem for file in files)
-    if times is not None:
-        _check_times(times, len(files), path)
-    ticks, missing = _ticks(names, times)
-    return Drive(
-        name=path.name or path.resolve().name,
-        scan_names=names,
-        ticks=ticks,
-        read=_Files(tuple(files)),
-        times=None if times is None else tuple(times),
-        T_world_sensor=None if poses is None else read_poses(poses, len(files)),
-        warnings=missing,
-    )
-
-
-def _recorded(path: Path, bag: Bag) -> Drive:
-    names = tuple(f"{frame:06d}" for frame in range(len(bag.times)))
-    ticks, missing = _ticks(names, list(bag.times))
-    return Drive(
-        name=path.resolve().stem if path.is_file() else path.resolve().name,
-        scan_names=names,
-        ticks=ticks,
-        read=bag,
-        times=bag.times,
-        warnings=(*bag.warnings, *missing),
-    )
-
-
-def _files(folder: Path) -> list[Path]:
-    """The scan files of a folder, sorted by name."""
-    entries = sorted(folder.iterdir(), key=lambda entry: entry.name)
-    files = [entry for entry in entries if is_scan_file(entry) and entry.name not in _BESIDE]
-    if not files:
-        raise BadInputError(f"{folder}: holds no scan (.bin .pcd .ply .npy .laz ...).")
-    for one, other in pairwise(files):
-        if one.stem == other.stem:
-            raise BadInputError(f"{folder}: {one.name} and {other.name} are one frame; remove one.")
-    return files
+def _motion(T_world_sensor: SE3, times: Sequence[float]) -> list[Twist]:
+    """At each frame, from the frame before it to the one after it."""
+    last = len(times) - 1
+    around = [(max(frame - 1, 0), min(frame + 1, last)) for frame in range(last + 1)]
+    return [
+        Twist.between(T_world_sensor[start], T_world_sensor[end], times[end] - times[start])
+        for start, end in around
+    ]
 
 
 def _ticks(
-    names: tuple[str, ...], times: list[float] | None
+    names: tuple[str, ...], times: Sequence[float] | None
 ) -> tuple[tuple[int, ...], tuple[str, ...]]:
     """When each scan was taken, in scans since the first, and a sentence if some are missing."""
     count = len(names)
@@ -161,34 +128,3 @@ def _ticks(
     missing = int(ticks[-1]) + 1 - count
     told = (f"{missing} scans are missing between the others",) if missing else ()
     return tuple(ticks.tolist()), told
-
-
-def _check_times(times: list[float], count: int, path: Path) -> None:
-    if len(times) != count:
-        raise BadInputError(f"{path}: {len(times)} times for {count} scans; give a line a scan.")
-    for row, (before, after) in enumerate(pairwise(times), 2):
-        if not after > before:
-            raise BadInputError(
-                f"{path}: time {row} ({after:.10g}) is not after the one before it; sort the scans"
-                " in the order in which they were taken."
-            )
-
-
-def _seconds(path: Path) -> list[float] | None:
-    """The numbers of a text file, if it is there."""
-    if not path.is_file():
-        return None
-    with reading(path, "a time a line, seconds"):
-        times = [float(line) for line in path.read_text("utf-8").split()]
-        if not np.isfinite(times).all():
-            raise ValueError("a time that is not finite")
-        return times
-
-
-def _timestamps(path: Path) -> list[float] | None:
-    """KITTI raw's dates and times, seconds since 1970; nanoseconds are kept to the microsecond."""
-    if not path.is_file():
-        return None
-    with reading(path, "a date and time a line"):
-        lines = [line.strip() for line in path.read_text("utf-8").splitlines() if line.strip()]
-        return [datetime.fromisoformat(line[:26]).replace(tzinfo=UTC).timestamp() for line in lines]

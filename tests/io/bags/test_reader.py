@@ -10,7 +10,7 @@ import pytest
 from tests.refusal import refused
 
 from wildshape.cli.main import main
-from wildshape.drives.source import open_drive
+from wildshape.drives.recordings.opening import open_drive
 from wildshape.errors import MissingExtraError
 from wildshape.io.bags.reader import open_bag
 

@@ -36,6 +36,7 @@ EXAMPLES = (
     "wildshape drive recording.bag --out found --topic /velodyne_points",
     "wildshape drive recording --out found --detections results.json",
     "wildshape drive monday tuesday --out found",
+    "wildshape drive nuscenes/scene-0061 --out found",
 )
 
 Sources = Annotated[
@@ -44,8 +45,9 @@ Sources = Annotated[
     option(
         metavar="SOURCE",
         help="folder of full scans, sorted by name (with times.txt or poses.txt if there are),"
-        " drive of KITTI raw, sequence of KITTI odometry, or recording of ROS with PointCloud2"
-        " (folder of ROS 2 with .db3 or .mcap, or .bag of ROS 1)",
+        " recording of ROS with PointCloud2 (folder of ROS 2 with .db3 or .mcap, or .bag of ROS 1),"
+        " or folder of KITTI, nuScenes, Argoverse 2, Waymo or PandaSet (all its drives, or one:"
+        " nuscenes/scene-0061)",
     ),
 ]
 
@@ -109,7 +111,7 @@ def run(settings: Settings) -> None:
 
     workers = _workers(settings)
     folders = _folders(settings)
-    files, detections = _files(settings), _detections(settings)
+    files, detections = _files(settings), _detections(settings, len(folders))
     predictor = load(settings.network.model, settings.network.device)
     found: list[DriveResult] = []
     for source, out in folders.items():
@@ -146,12 +148,12 @@ def _box_files(settings: Settings) -> "BoxFiles | None":
     return files if files.formats or files.calibration else None
 
 
-def _detections(settings: Settings) -> "DetectionFile | None":
+def _detections(settings: Settings, drives: int) -> "DetectionFile | None":
     from wildshape.drives.detections import DetectionFile
 
     if settings.detections is None:
         return None
-    if len(settings.source) > 1:
+    if drives > 1:
         raise BadInputError(f"--detections {settings.detections}: give one drive with them.")
     known = settings.calibration
     kitti = known if known is not None and known.suffix.lower() == ".txt" else None
@@ -168,13 +170,26 @@ def _folders(settings: Settings) -> dict[Path, Path]:
     """Where each drive goes."""
     if not settings.source:
         raise BadInputError("drive needs a SOURCE: a folder of full scans.")
-    if len(settings.source) == 1:
-        return {settings.source[0]: settings.out}
-    names = [source.resolve().name for source in settings.source]
+    drives = [drive for source in settings.source for drive in _drives_in(source)]
+    if len(drives) == 1:
+        return {drives[0]: settings.out}
+    names = [drive.resolve().name for drive in drives]
     for name in names:
         if names.count(name) > 1:
             raise BadInputError(f"{name}: two drives of one name; rename one.")
-    return {source: settings.out / name for source, name in zip(settings.source, names)}
+    return {drive: settings.out / name for drive, name in zip(drives, names)}
+
+
+def _drives_in(source: Path) -> list[Path]:
+    """The drives of a source; says what it was taken for."""
+    from wildshape.cli.terminal import say
+    from wildshape.drives.recordings.opening import find_drives
+    from wildshape.io.progress import counted
+
+    found = find_drives(source)
+    several = f"{counted(len(found.drives), 'drive')} of " if len(found.drives) > 1 else ""
+    say(f"{source}: taken for {several}{found.what}")
+    return found.drives
 
 
 @contextmanager

@@ -91,7 +91,7 @@ class NuScenes:
         channel = lidar_of(tables, self.lidar)
         with index_of(tables, self.cache or cache_folder(), channel) as db:
             scene = read_scene(db, part, sweeps=self.sweeps)
-        if not any(_file(tables, frame).is_file() for frame in scene.frames):
+        if not any(file_of(tables, frame).is_file() for frame in scene.frames):
             self.rejected[f"scene: none of its {channel} files is here"] += 1
             return
         sensor = HDL32E if channel == CHANNELS[0] else Sensor("lidar")
@@ -103,7 +103,7 @@ class NuScenes:
                 for token, box in scene.boxes_at(frame).items()
                 if token in wanted
             ]
-            read = partial(read_sweep, _file(tables, frame))
+            read = partial(read_sweep, file_of(tables, frame))
             crop_objects(objects, frame.name, read, self.crop, gathering)
         yield from gathering.finished()
 
@@ -135,7 +135,7 @@ class NuScenes:
         )
 
 
-def _file(tables: Path, frame: Frame) -> Path:
+def file_of(tables: Path, frame: Frame) -> Path:
     """A frame's file: Lyft's lie in train_lidar, its tables say lidar."""
     path = tables.parent / frame.file
     renamed = tables.parent / f"train_{frame.file}"

@@ -73,7 +73,7 @@ class Waymo:
         Raises:
             BadInputError: a table of the segment is missing or corrupt.
         """
-        tables = _tables(Path(self.root), part)
+        tables = tables_of(Path(self.root), part)
         boxes = self._wanted(read_boxes(tables["lidar_box"]))
         gathering = Gathering(self.selection, TOP, self.rejected)
         unseen = set(boxes)
@@ -156,8 +156,12 @@ def frames(tables: dict[str, Path], boxes: dict[int, list[Labelled]]) -> Iterato
         yield Frame(time, image, pixel_poses, calibration, T_world_vehicle[time], boxes[time])
 
 
-def find_splits(root: Path) -> list[Path]:
+def find_splits(root: Path, components: tuple[str, ...] = COMPONENTS) -> list[Path]:
     """Split folders at, or just below `root`, that have all tables needed, sorted.
+
+    Args:
+        root: the folder.
+        components: the tables needed.
 
     Raises:
         BadInputError: there is none.
@@ -165,9 +169,9 @@ def find_splits(root: Path) -> list[Path]:
     if not root.is_dir():
         raise BadInputError(f"{root}: no such folder; expected {_LAYOUT}.")
     splits = [path for path in (root, *sorted(root.iterdir())) if (path / "lidar").is_dir()]
-    whole = [path for path in splits if not _absent(path)]
+    whole = [path for path in splits if not _absent(path, components)]
     if splits and not whole:
-        absent = ", ".join(_absent(splits[0]))
+        absent = ", ".join(_absent(splits[0], components))
         raise BadInputError(f"{splits[0]}: no {absent} beside lidar; download these components.")
     if not splits:
         raise _not_waymo(root)
@@ -183,13 +187,20 @@ def _not_waymo(root: Path) -> BadInputError:
     return BadInputError(f"{root}: expected {_LAYOUT}, {found_in(root)}.")
 
 
-def _absent(split: Path) -> list[str]:
-    return [name for name in COMPONENTS if not (split / name).is_dir()]
+def _absent(split: Path, components: tuple[str, ...]) -> list[str]:
+    return [name for name in components if not (split / name).is_dir()]
 
 
-def _tables(root: Path, segment: str) -> dict[str, Path]:
-    for split in find_splits(root):
-        tables = {name: split / name / f"{segment}.parquet" for name in COMPONENTS}
+def tables_of(
+    root: Path, segment: str, components: tuple[str, ...] = COMPONENTS
+) -> dict[str, Path]:
+    """The file of each component of a segment.
+
+    Raises:
+        BadInputError: no split has all of them, or none has the segment.
+    """
+    for split in find_splits(root, components):
+        tables = {name: split / name / f"{segment}.parquet" for name in components}
         if tables["lidar"].is_file():
             return tables
     raise BadInputError(f"{root}: no segment {segment} in any split; check its name.")

@@ -20,6 +20,7 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import reading
 
 COMPONENTS = ("lidar", "lidar_box", "lidar_calibration", "lidar_pose", "vehicle_pose")
+WITHOUT_LABELS = ("lidar", "lidar_calibration", "lidar_pose", "vehicle_pose")
 TYPES = {1: "vehicle", 2: "pedestrian", 3: "sign", 4: "cyclist"}
 _TOP = 1
 _TIME, _LASER, _OBJECT = "key.frame_timestamp_micros", "key.laser_name", "key.laser_object_id"

@@ -15,7 +15,7 @@ from wildshape.io.bags.clouds import message_types, points_of, stamp
 from wildshape.io.bags.storages import CLOUD, STORAGES, Key, Message
 from wildshape.io.guard import first_line, reading
 from wildshape.io.scans.points import check_near, drop_nonfinite
-from wildshape.records import Points
+from wildshape.records import Turn
 
 
 class _Scan(NamedTuple):
@@ -45,7 +45,7 @@ class Bag:
     warnings: tuple[str, ...]
     scans: tuple[_Scan, ...]
 
-    def __call__(self, frame: int) -> Points:
+    def __call__(self, frame: int) -> Turn:
         """The points of a scan that have a return, sensor frame, metres.
 
         Raises:
@@ -56,7 +56,7 @@ class Bag:
             data = STORAGES[scan.file.suffix](scan.file).data(scan.key)
             points = points_of(data, cdr=scan.cdr)
             check_near(points, f"{scan.file}, scan {frame}")
-            return drop_nonfinite(points[_returned(points)]).points
+            return Turn(drop_nonfinite(points[_returned(points)]).points)
 
 
 def bag_files(path: Path) -> list[Path]:

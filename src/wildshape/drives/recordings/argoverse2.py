@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Logs of Argoverse 2's sensor data set: the sweeps of both LiDARs, in `up_lidar`'s axes."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from wildshape.datasets.argoverse2.log import read_city_poses, read_sensor_pose, read_sweep
+from wildshape.drives.source import Drive
+from wildshape.geometry.transforms.se3 import SE3, stack
+from wildshape.records import Turn
+
+_SWEEPS = "sensors/lidar"
+_POSES = "city_SE3_egovehicle.feather"
+
+
+@dataclass(frozen=True)
+class _Sweeps:
+    """Reads a frame's sweep: the data set has undone the motion during it."""
+
+    files: tuple[Path, ...]
+    T_sensor_ego: SE3
+
+    def __call__(self, frame: int) -> Turn:
+        points, _ = read_sweep(self.files[frame])
+        return Turn(self.T_sensor_ego.apply_numpy(points))
+
+
+def find_logs(root: Path) -> list[Path]:
+    """Logs at, or one to three levels below a folder."""
+    for level in ("", "*/", "*/*/", "*/*/*/"):
+        logs = sorted(path.parent for path in root.glob(f"{level}{_POSES}"))
+        found = [log for log in logs if (log / _SWEEPS).is_dir()]
+        if found:
+            return found
+    return []
+
+
+def open_log(path: Path) -> Drive:
+    """One log.
+
+    Raises:
+        BadInputError: a file is missing or corrupt.
+        MissingExtraError: pyarrow is not installed.
+    """
+    files = sorted((path / _SWEEPS).glob("*.feather"))
+    stamps = [int(file.stem) for file in files]
+    T_ego_sensor = read_sensor_pose(path, "both")
+    T_city_ego = read_city_poses(path)
+    known = all(stamp in T_city_ego for stamp in stamps)
+    return Drive.of(
+        name=path.resolve().name,
+        scan_names=[file.stem for file in files],
+        read=_Sweeps(tuple(files), T_ego_sensor.inverse()),
+        times=[stamp / 1e9 for stamp in stamps],
+        T_world_sensor=stack([T_city_ego[t] for t in stamps]) @ T_ego_sensor if known else None,
+    )

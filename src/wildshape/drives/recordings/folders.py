@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Folders of scans: one's own, and KITTI's layouts."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from wildshape.drives.source import Drive
+from wildshape.errors import BadInputError
+from wildshape.io.guard import reading
+from wildshape.io.poses import read_poses
+from wildshape.io.scans.points import is_scan_file, read_points
+from wildshape.records import Turn
+
+_BESIDE = ("poses.txt", "times.txt", "timestamps.txt", "calib.txt")
+_RAW, _ODOMETRY = Path("velodyne_points") / "data", "velodyne"
+_TEXT = (".txt", ".csv")
+_OBJECTS = "velodyne_objects_xyz0"  # a drive of KITTI raw cut down to its vehicles
+
+
+@dataclass(frozen=True)
+class _Files:
+    """Reads a frame's file."""
+
+    files: tuple[Path, ...]
+
+    def __call__(self, frame: int) -> Turn:
+        return Turn(read_points(self.files[frame]))
+
+
+def holds_scans(path: Path) -> bool:
+    """Whether scans lie in a folder itself; text may be anything."""
+    return path.is_dir() and any(
+        is_scan_file(entry) and entry.suffix not in _TEXT for entry in path.iterdir()
+    )
+
+
+def find_folders(root: Path) -> list[Path]:
+    """Folders of scans below a folder that holds none itself."""
+    if _holds_objects(root):
+        return []
+    return sorted(folder for folder in root.glob("*/") if holds_scans(folder))
+
+
+def open_folder(path: Path) -> Drive:
+    """A folder of full scans, sorted by name.
+
+    `times.txt` (seconds, a line a scan) and `poses.txt` (`T_world_sensor`) beside them are used.
+
+    Raises:
+        BadInputError: no full scans; times or poses of another number or not in order.
+    """
+    if not path.is_dir():
+        raise BadInputError(
+            f"{path}: no such folder; a drive is a folder of full scans, a data set's folder or a"
+            " recording of ROS or of packets (docs/drive.md)."
+        )
+    if _holds_objects(path):
+        raise BadInputError(
+            f"{path}: holds objects that were cut out of their scans; drive needs the whole scans."
+            f" For objects there is: wildshape complete {path} --track."
+        )
+    files = _files(path)
+    poses = path / "poses.txt"
+    return _drive(path, files, _seconds(path / "times.txt"), poses if poses.is_file() else None)
+
+
+def find_kitti_raw(root: Path) -> list[Path]:
+    """Drives of KITTI raw at, one or two levels below a folder."""
+    for level in ("", "*/", "*/*/"):
+        found = sorted(folder.parents[1] for folder in root.glob(f"{level}{_RAW.as_posix()}"))
+        if found:
+            return found
+    return []
+
+
+def open_kitti_raw(path: Path) -> Drive:
+    """A drive of KITTI raw; see `open_folder`."""
+    return _drive(path, _files(path / _RAW), _timestamps(path / _RAW.parent / "timestamps.txt"))
+
+
+def find_kitti_tracking(root: Path) -> list[Path]:
+    """The folders of scans of KITTI tracking's sequences, in the folder of a half or above it."""
+    for above in (root, root / "training", root / "testing"):
+        folders = sorted((above / _ODOMETRY).glob("*/"))
+        found = [folder for folder in folders if folder.name.isdigit()]
+        if found:
+            return found
+    return []
+
+
+def find_sequences(root: Path) -> list[Path]:
+    """Sequences of KITTI odometry or SemanticKITTI: a folder itself, or those in it."""
+    for level in ("", "*/", "sequences/*/", "dataset/sequences/*/"):
+        found = sorted(folder.parent for folder in root.glob(f"{level}{_ODOMETRY}"))
+        if found:
+            return found
+    return []
+
+
+def open_sequence(path: Path) -> Drive:
+    """A sequence; its own poses are those of a camera and are not used. See `open_folder`."""
+    return _drive(path, _files(path / _ODOMETRY), _seconds(path / "times.txt"))
+
+
+def _drive(
+    path: Path, files: list[Path], times: list[float] | None, poses: Path | None = None
+) -> Drive:
+    if times is not None:
+        times = _times_of(files, times)
+        _check_times(times, len(files), path)
+    return Drive.of(
+        name=path.name or path.resolve().name,
+        scan_names=[file.stem for file in files],
+        read=_Files(tuple(files)),
+        times=times,
+        T_world_sensor=None if poses is None else read_poses(poses, len(files)),
+    )
+
+
+def _holds_objects(path: Path) -> bool:
+    """Whether a folder holds objects cut out of scans, as the other commands take them."""
+    tracks = [path / "scans", *path.glob("*/scans")]
+    return (path / _OBJECTS).is_dir() or any(
+        is_scan_file(entry) for track in tracks for entry in track.glob("*")
+    )
+
+
+def _files(folder: Path) -> list[Path]:
+    """The scan files of a folder, sorted by name."""
+    entries = sorted(folder.iterdir(), key=lambda entry: entry.name)
+    files = [entry for entry in entries if is_scan_file(entry) and entry.name not in _BESIDE]
+    if not files:
+        raise BadInputError(f"{folder}: holds no scan (.bin .pcd .ply .npy .laz ...).")
+    for one, other in pairwise(files):
+        if one.stem == other.stem:
+            raise BadInputError(f"{folder}: {one.name} and {other.name} are one frame; remove one.")
+    return files
+
+
+def _seconds(path: Path) -> list[float] | None:
+    """The numbers of a text file, if it is there."""
+    if not path.is_file():
+        return None
+    with reading(path, "a time a line, seconds"):
+        times = [float(line) for line in path.read_text("utf-8").split()]
+        if not np.isfinite(times).all():
+            raise ValueError("a time that is not finite")
+        return times
+
+
+def _timestamps(path: Path) -> list[float] | None:
+    """KITTI raw's dates and times, seconds since 1970; nanoseconds are kept to the microsecond."""
+    if not path.is_file():
+        return None
+    with reading(path, "a date and time a line"):
+        lines = [line.strip() for line in path.read_text("utf-8").splitlines() if line.strip()]
+        return [datetime.fromisoformat(line[:26]).replace(tzinfo=UTC).timestamp() for line in lines]
+
+
+def _times_of(files: list[Path], times: list[float]) -> list[float]:
+    """Of a time for each number, those of the scans that are there."""
+    names = [file.stem for file in files]
+    if len(times) <= len(names) or not all(name.isascii() and name.isdigit() for name in names):
+        return times
+    numbers = [int(name) for name in names]
+    return [times[number] for number in numbers] if max(numbers) < len(times) else times
+
+
+def _check_times(times: list[float], count: int, path: Path) -> None:
+    if len(times) != count:
+        raise BadInputError(f"{path}: {len(times)} times for {count} scans; give a line a scan.")
+    for row, (before, after) in enumerate(pairwise(times), 2):
+        if not after > before:
+            raise BadInputError(
+                f"{path}: time {row} ({after:.10g}) is not after the one before it; sort the scans"
+                " in the order in which they were taken."
+            )

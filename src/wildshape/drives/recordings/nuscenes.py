@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes of nuScenes: the sweeps of LIDAR_TOP, 20 a second, x right, y forward, z up."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from wildshape.datasets.nuscenes.json_rows import json_rows
+from wildshape.datasets.nuscenes.reader import file_of, find_tables, read_sweep
+from wildshape.datasets.nuscenes.scene import read_scene
+from wildshape.datasets.nuscenes.table_index import cache_folder, index_of, lidar_of
+from wildshape.drives.source import Drive
+from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.se3 import stack
+from wildshape.records import Turn
+
+
+@dataclass(frozen=True)
+class _Sweeps:
+    """Reads a frame's sweep."""
+
+    files: tuple[Path, ...]
+
+    def __call__(self, frame: int) -> Turn:
+        return Turn(read_sweep(self.files[frame]))
+
+
+def find_scenes(root: Path) -> list[Path]:
+    """The scenes of a release, as paths below its folder."""
+    if not (root / "scene.json").is_file() and not any(root.glob("*/scene.json")):
+        return []
+    tables = find_tables(root)
+    return sorted(root / str(row.get("name")) for row in json_rows(tables / "scene.json"))
+
+
+def open_scene(path: Path) -> Drive:
+    """One scene, by its name below the release's folder.
+
+    Raises:
+        BadInputError: a table is missing or corrupt, or none of the scene's sweeps is there.
+    """
+    tables = find_tables(path.parent)
+    channel = lidar_of(tables, "")
+    with index_of(tables, cache_folder(), channel) as db:
+        scene = read_scene(db, path.name, sweeps=True)
+    there = [(frame, file_of(tables, frame)) for frame in scene.frames]
+    there = [(frame, file) for frame, file in there if file.is_file()]
+    if not there:
+        raise BadInputError(f"{path}: none of its {channel} files is here; unpack their blobs.")
+    return Drive.of(
+        name=path.name,
+        scan_names=[frame.name for frame, _ in there],
+        read=_Sweeps(tuple(file for _, file in there)),
+        times=[frame.microseconds / 1e6 for frame, _ in there],
+        T_world_sensor=stack([frame.T_global_sensor for frame, _ in there]),
+    )

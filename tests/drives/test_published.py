@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Drives of published data sets, as their own layouts have them."""
+
+import pickle
+import shutil
+
+import numpy as np
+import pytest
+from tests.datasets.street import street
+from tests.datasets.write_argoverse2 import STAMPS, write_log
+from tests.datasets.write_kitti_raw import write_drive
+from tests.datasets.write_nuscenes import Scene, Thing, write_nuscenes
+from tests.datasets.write_nuscenes import off_surface as off_box
+from tests.datasets.write_pandaset import write_scene
+from tests.datasets.write_waymo import PERIOD, SEGMENT, START, write_waymo
+from tests.datasets.write_waymo import Thing as WaymoThing
+from tests.refusal import refused
+
+from wildshape.cli.main import main
+from wildshape.drives.recordings.opening import find_drives, open_drive
+from wildshape.io.scans.points import write_ply
+
+SCENE = street(frames=3)
+
+
+def in_world(drive, frame):
+    """A scan's points by the drive's own poses, the motion since the first frame included."""
+    scan = drive.scan(frame)
+    assert scan.dtype == np.float32
+    return drive.T_world_sensor[frame].apply_numpy(scan.astype(np.float64))
+
+
+def test_argoverse2_logs(tmp_path):
+    for name in ("one", "other"):
+        write_log(tmp_path / "val" / name, SCENE)
+    (tmp_path / "val" / "one" / "annotations.feather").unlink()  # split test has none
+    what, drives = find_drives(tmp_path)
+    assert what.startswith("Argoverse 2: its own poses")
+    assert [drive.name for drive in drives] == ["one", "other"]
+    refused(open_drive, tmp_path, match="holds 2 drives: one, other; give one")
+    drive = open_drive(tmp_path / "val" / "one")
+    assert drive.times == pytest.approx([stamp / 1e9 for stamp in STAMPS[:3]])
+    for frame, cloud in enumerate(SCENE.clouds):
+        assert np.abs(in_world(drive, frame) - cloud).max() < 0.03  # the file's float16
+
+
+def test_pandaset_scenes(tmp_path):
+    write_scene(tmp_path / "pandaset" / "001", SCENE)
+    what, drives = find_drives(tmp_path)
+    assert what.startswith("PandaSet")
+    drive = open_drive(drives[0])
+    assert (drive.name, drive.scan_names, drive.ticks) == ("001", ("00", "01", "02"), (0, 1, 2))
+    for frame, cloud in enumerate(SCENE.clouds):
+        assert np.allclose(in_world(drive, frame), cloud, atol=1e-4)
+        assert np.median(drive.scan(frame)[:, 2]) < 0  # x forward, y left, z up
+        assert np.median(drive.scan(frame)[:, 0]) > 0
+
+
+def test_nuscenes_scenes(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    car = Thing("car", keys=(0, 1))
+    scenes = [Scene("scene-0061", (car,), keys=2), Scene("scene-0103", (car,), keys=2)]
+    root = write_nuscenes(tmp_path / "nuscenes", scenes)
+    what, drives = find_drives(root)
+    assert what.startswith("nuScenes")
+    assert drives == [root / "scene-0061", root / "scene-0103"]
+    refused(open_drive, root, match=r"holds 2 drives: scene-0061, scene-0103")
+    drive = open_drive(root / "scene-0103")
+    assert drive.name == "scene-0103"
+    assert drive.times is not None
+    assert np.diff(drive.times) == pytest.approx(0.1, abs=1e-5)
+    for frame in range(len(drive)):
+        rotation, place = car.pose(0.0)
+        local = rotation.inv().apply(in_world(drive, frame) - place)
+        assert (np.abs(off_box(local, car.size)) < 1e-3).mean() > 0.4
+
+
+def test_waymo_segments(tmp_path):
+    parked = WaymoThing("parked")
+    split = write_waymo(tmp_path / "waymo" / "training", [parked], frames=3)
+    shutil.rmtree(split / "lidar_box")  # split test has none
+    what, drives = find_drives(tmp_path / "waymo")
+    assert what.startswith("the Waymo Open Dataset")
+    assert drives == [tmp_path / "waymo" / SEGMENT]
+    drive = pickle.loads(pickle.dumps(open_drive(drives[0])))
+    assert drive.times == pytest.approx([(START + PERIOD * frame) / 1e6 for frame in range(3)])
+    for frame in (0, 2, 1):  # in any order
+        rotation, place = parked.pose(frame)
+        local = rotation.inv().apply(in_world(drive, frame) - place)
+        near = local[(np.abs(local) < np.array(parked.size)).all(1)]
+        assert len(near) > 100
+        assert np.abs(off_box(near, parked.size)).max() < 0.02
+
+
+def test_kitti_s_layouts(tmp_path):
+    scan = np.zeros((20, 4), np.float32)
+    layouts = {
+        "KITTI tracking": ("training/velodyne/0000", "training/velodyne/0001"),
+        "KITTI odometry or SemanticKITTI": ("sequences/00/velodyne", "sequences/08/velodyne"),
+    }
+    for what, folders in layouts.items():
+        root = tmp_path / what
+        for folder in folders:
+            (root / folder).mkdir(parents=True)
+            for frame in range(2):
+                scan.tofile(root / folder / f"{frame:06d}.bin")
+        found = find_drives(root)
+        assert found.what == what
+        assert [len(open_drive(drive)) for drive in found.drives] == [2, 2]
+    raw = tmp_path / "raw" / "2011_09_26"
+    for name in ("2011_09_26_drive_0001_sync", "2011_09_26_drive_0048_sync"):
+        write_drive(raw / name, [], {0: np.zeros((20, 3))})
+    found = find_drives(tmp_path / "raw")
+    assert (found.what, len(found.drives)) == ("KITTI raw", 2)
+
+
+def test_folders_of_scans_side_by_side_are_several_drives(tmp_path):
+    for name in ("monday", "tuesday"):
+        (tmp_path / name).mkdir()
+        np.save(tmp_path / name / "000000.npy", np.zeros((20, 3)))
+    assert find_drives(tmp_path) == (
+        "folders of full scans",
+        [tmp_path / "monday", tmp_path / "tuesday"],
+    )
+
+
+def test_objects_cut_out_of_their_scans_are_refused(tmp_path):
+    (tmp_path / "car" / "scans").mkdir(parents=True)
+    write_ply(tmp_path / "car" / "scans" / "000000.ply", np.ones((20, 3), np.float32))
+    for folder in (tmp_path, tmp_path / "car"):
+        refused(open_drive, folder, match=r"objects that were cut out .* complete .* --track")
+    write_drive(tmp_path / "raw", [], {0: np.zeros((20, 3))}, "velodyne_objects_xyz0")
+    refused(open_drive, tmp_path / "raw", match="objects that were cut out")
+
+
+def test_the_command_says_what_it_took_the_source_for(tmp_path, capsys):
+    for name in ("001", "002"):
+        write_scene(tmp_path / name, SCENE)
+    with pytest.raises(SystemExit, match="2"):
+        main(["drive", str(tmp_path), "--out", str(tmp_path / "out"), "--detections", "x.json"])
+    said = capsys.readouterr().err
+    assert "taken for 2 drives of PandaSet: its own poses are used in place of odometry" in said
+    assert "give one drive with them" in said
