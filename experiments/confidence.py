@@ -27,13 +27,12 @@ from wildshape.evaluation.cases import turn_track
 from wildshape.evaluation.confidence import RiskCoverage, rank_correlation, risk_coverage
 from wildshape.evaluation.metrics import completion_error
 from wildshape.geometry.transforms.se3 import stack
-from wildshape.inference.models import SHIPPED, weights_file
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import write_json
 from wildshape.io.output import provenance
 from wildshape.io.store.store import Store, open_store
 from wildshape.io.store.writer import StoreWriter
-from wildshape.method.checkpoint import load_checkpoint, save_checkpoint
+from wildshape.method.checkpoint import SHIPPED, load_checkpoint, save_checkpoint, weights_file
 from wildshape.method.confidence import Calibration, ConfidenceFeatures, fit_calibration
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 

@@ -17,8 +17,8 @@ from experiments.tables.train import Workshop, model_of
 from experiments.tables.tsne import tsne
 
 from wildshape.evaluation.pictures import project
+from wildshape.inference.choose_hypothesis import network_input
 from wildshape.inference.predictor import Predictor, load
-from wildshape.inference.prepare import network_input
 from wildshape.io.atomic import atomic_write
 from wildshape.io.store.store import open_store
 

@@ -27,11 +27,12 @@ from wildshape.evaluation.results import (
     Skipped,
 )
 from wildshape.inference.evaluated import Learned
-from wildshape.inference.models import choose_device, fingerprint
 from wildshape.inference.predictor import load
 from wildshape.io.atomic import write_json
 from wildshape.io.inputs import open_tracks
 from wildshape.io.output import provenance
+from wildshape.method.checkpoint import fingerprint
+from wildshape.ops.device import choose_device
 
 
 @dataclass(frozen=True)

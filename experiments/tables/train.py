@@ -15,11 +15,11 @@ from experiments.tables.table import Trained
 from wildshape.baselines.dpc.objective import DpcRecipe
 from wildshape.baselines.dpc.run import fit_dpc, setup_dpc
 from wildshape.cli.terminal import TERMINAL, say, stop_flag, stoppable
-from wildshape.inference.models import choose_device
 from wildshape.io.atomic import write_json
 from wildshape.io.output import provenance
 from wildshape.io.progress import SILENT
 from wildshape.io.store.store import Store, open_store
+from wildshape.ops.device import choose_device
 from wildshape.training.config import Recipe
 from wildshape.training.loop import MODEL, StopRequested, setup
 from wildshape.training.train import fit_with_progress

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 Points = Float[np.ndarray, "_ 3"]
 SensorKind = Literal["lidar", "camera"]
+Unit = Literal["m", "cm", "mm"]
 
 
 def as_text(name: str) -> str:

@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 import math
 
+import numpy as np
 import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wildshape.geometry.box import fit_box
+from wildshape.geometry.box import extent, fit_box
 from wildshape.geometry.transforms.rotation import rotation_angle, rotation_z
 
 
@@ -60,3 +61,7 @@ def test_order_does_not_matter():
     shuffled = fit_box(points[torch.randperm(len(points))])
     for a, b in zip(fit_box(points), shuffled):
         assert torch.equal(a, b)
+
+
+def test_extent_is_the_diagonal():
+    assert extent(np.array([[0, 0, 0], [2, 3, 6], [1, 1, 1]], np.float32)) == pytest.approx(7)

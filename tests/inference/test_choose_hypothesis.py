@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 import torch
 
+from wildshape.geometry.centring import box_centre, frustum_centre
+from wildshape.geometry.sampling import drawn, sorted_points
 from wildshape.geometry.transforms.rotation import random_rotation
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference import choose_hypothesis as module
-from wildshape.inference.choose_hypothesis import choose_hypothesis, look, look_twice
+from wildshape.inference.choose_hypothesis import choose_hypothesis, look, look_twice, network_input
 from wildshape.inference.predictor import load
-from wildshape.inference.prepare import network_input
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.multiview import LossConfig
 
@@ -83,3 +84,17 @@ def test_the_shipped_weights_know_a_car_at_any_roll():
     for turn, done in zip(turns, predictor.complete_many(scans)):
         off = (turn @ upright.rotation).mT @ done.pose.rotation
         assert torch.rad2deg(torch.acos(((off.trace() - 1) / 2).clamp(-1, 1))) < 10
+
+
+@pytest.mark.parametrize(
+    ("sensor", "centre_of"), [("lidar", frustum_centre), ("camera", box_centre)]
+)
+def test_network_input_is_centred_and_the_centres_bring_it_back(sensor, centre_of):
+    rng = np.random.default_rng(0)
+    scans = [rng.normal((8, 1, -1), 1, (n, 3)).astype(np.float32) for n in (40, 300)]
+    inputs, centres, turn = network_input(scans, 64, sensor)
+    assert torch.equal(turn, torch.eye(3).expand(len(scans), 3, 3))
+    for i, points in enumerate(scans):
+        torch.testing.assert_close(centres[i], centre_of(torch.from_numpy(points)))
+        back = (inputs[i] + centres[i]).numpy()
+        np.testing.assert_allclose(back, sorted_points(points)[drawn(len(points), 64)], atol=1e-6)

@@ -13,7 +13,7 @@ import sys
 _PROGRAM = """
 import json, warnings
 import torch
-from wildshape.inference.models import compiled
+from wildshape.inference.compiled import compiled
 from wildshape.method.network import NetworkConfig, ShapePoseNet
 
 torch.manual_seed(0)

@@ -16,10 +16,9 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.confidence import confidence_of
-from wildshape.inference.models import weights_file
 from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.registration import inlier_ratio
-from wildshape.method.checkpoint import save_checkpoint
+from wildshape.method.checkpoint import save_checkpoint, weights_file
 from wildshape.method.confidence import ConfidenceFeatures
 from wildshape.method.network import ShapePoseNet
 from wildshape.records import Sensor

@@ -18,10 +18,9 @@ from wildshape.baselines.dpc.checkpoint import DpcSettings, load_dpc, save_dpc
 from wildshape.baselines.dpc.network import DpcConfig, DpcNet
 from wildshape.baselines.dpc.viewing_volume import PolarVolume
 from wildshape.errors import BadInputError
-from wildshape.inference.models import SHIPPED
 from wildshape.inference.predictor import load
 from wildshape.method import checkpoint
-from wildshape.method.checkpoint import load_checkpoint, save_checkpoint
+from wildshape.method.checkpoint import SHIPPED, load_checkpoint, save_checkpoint
 from wildshape.method.network import NetworkConfig, ShapePoseNet
 
 WRONG = (None, True, 0, -1, 0.5, 2_000_000, 10**30, 1e308, math.nan, math.inf, -math.inf)

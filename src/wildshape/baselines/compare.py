@@ -16,12 +16,13 @@ from wildshape.evaluation.evaluate import evaluate_once, write_evaluation
 from wildshape.evaluation.method import Method
 from wildshape.evaluation.results import Results, Rotate
 from wildshape.inference.evaluated import Learned
-from wildshape.inference.models import MODEL, choose_device, fingerprint, weights_file
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.inputs import TrackSource, open_tracks
 from wildshape.io.output import begin, keep_apart
 from wildshape.io.progress import SILENT, Progress
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates
+from wildshape.method.checkpoint import MODEL, fingerprint, weights_file
+from wildshape.ops.device import choose_device
 
 OURS = "wildshape"
 """The name of our row, where it has no other."""

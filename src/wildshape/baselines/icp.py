@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from wildshape.baselines.pairs import Cloud, about_centroids
-from wildshape.geometry.outliers import voxel_thin
+from wildshape.geometry.sampling import voxel_thin
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor, SensorKind

@@ -13,7 +13,7 @@ import numpy as np
 
 from wildshape.baselines.pairs import about_centroids
 from wildshape.errors import MissingExtraError
-from wildshape.geometry.outliers import radius_inliers, voxel_thin
+from wildshape.geometry.sampling import radius_inliers, voxel_thin
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor
 

@@ -13,7 +13,7 @@ from tyro.conf import OmitArgPrefixes, Positional, arg
 from tyro.constructors import PrimitiveConstructorSpec
 
 if TYPE_CHECKING:
-    from wildshape.io.scans.coordinates import Coordinates
+    from wildshape.io.scans.points import Coordinates
 
 
 def _hint(default: str) -> str:
@@ -152,7 +152,7 @@ class FileOptions:
     @property
     def coordinates(self) -> "Coordinates":
         """The same for the library."""
-        from wildshape.io.scans.coordinates import Coordinates
+        from wildshape.io.scans.points import Coordinates
 
         return Coordinates(self.unit, self.origin)
 

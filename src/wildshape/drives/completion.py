@@ -14,7 +14,7 @@ from wildshape.drives.sightings import Sightings
 from wildshape.drives.source import Drive
 from wildshape.drives.vehicles import shape_nats
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.folders.completed_files import OBJECTS, write_completed
+from wildshape.inference.folders.complete_folder import OBJECTS, write_completed
 from wildshape.inference.predictor import Predictor
 from wildshape.io.atomic import write_json
 from wildshape.io.boxes.detections import moved

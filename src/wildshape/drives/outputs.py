@@ -16,7 +16,7 @@ from wildshape.drives.sightings import Sightings
 from wildshape.drives.source import Drive
 from wildshape.drives.vehicles import Completed
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.folders.completed_files import COMPLETED, OBJECTS
+from wildshape.inference.folders.complete_folder import COMPLETED, OBJECTS
 from wildshape.io.atomic import write_text
 from wildshape.io.boxes.detections import detections_of, pose_of
 from wildshape.io.boxes.table import BoxRow

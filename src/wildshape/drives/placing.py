@@ -17,7 +17,7 @@ from wildshape.drives.source import Drive
 from wildshape.drives.vehicles import Completed
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation, rotation_z
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.folders.completed_files import OBJECTS
+from wildshape.inference.folders.complete_folder import OBJECTS
 from wildshape.io.boxes.detections import Detection, detections_of, pose_of
 from wildshape.io.guard import read_json
 from wildshape.records import Box

@@ -50,7 +50,7 @@ from wildshape.drives.tracks import Seen, link
 from wildshape.drives.trajectory import find_trajectory, jumps
 from wildshape.drives.vehicles import Completed, Judged, fragments, judge
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.folders.completed_files import OBJECTS
+from wildshape.inference.folders.complete_folder import OBJECTS
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import write_json
 from wildshape.io.boxes.table import write_box_table

@@ -19,6 +19,7 @@ from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rot
 # A box of edge 2 about the origin; its edges join corners that differ in one coordinate.
 SIGNS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
 EDGES = [(i, j) for i in range(8) for j in range(i) if np.abs(SIGNS[i] - SIGNS[j]).sum() == 2]
+_VEHICLE_M = 5.0  # the diagonal of a usual car, metres
 _INSIDE, _FLAT = 1e-9, 1e-12  # of a box's diagonal: rounding
 
 
@@ -128,3 +129,17 @@ def _hull_volume(points: Float[np.ndarray, "n 3"]) -> float:
         return float(ConvexHull(points).volume)
     except QhullError:  # a sliver thinner than qhull can tell from flat
         return 0.0
+
+
+def unit_of(largest_m: float) -> float:
+    """Metres of one unit in which objects of up to that extent are as large as vehicles, at most 1.
+
+    Lengths that a method takes for granted (noise, gaps, how far off a pose may be) are stated for
+    vehicles; those of smaller objects are as much smaller.
+    """
+    return min(1.0, largest_m / _VEHICLE_M)
+
+
+def extent(points: Float[np.ndarray, "n 3"]) -> float:
+    """Diagonal of the axis-aligned bounding box, metres."""
+    return float(np.linalg.norm(np.ptp(points, axis=0)))

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which pose hypothesis of a network speaks, and a second look at tilted scans (beyond the paper).
+"""A network's look at scans: what it is given, which pose hypothesis speaks, and a second look.
 
-Turned towards its object (`line_of_sight.py`), nothing of a scan's rotation is unknown but the
-roll about the line of sight, and upright is what a network knows best. A scan that turns out to be
-tilted is rolled upright, as the first look says, and seen once more; the cheaper answer speaks.
+The second look goes beyond the paper. Turned towards its object (`line_of_sight.py`), nothing of a
+scan's rotation is unknown but the roll about the line of sight, and upright is what a network knows
+best. A scan that turns out to be tilted is rolled upright, as the first look says, and seen once
+more; the cheaper answer speaks.
 """
 
 from collections.abc import Callable
@@ -12,19 +13,64 @@ from dataclasses import dataclass
 from typing import Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Int64
 from torch import Tensor
 
-from wildshape.geometry.projection.line_of_sight import roll_angle
+from wildshape.geometry.centring import scan_centre
+from wildshape.geometry.projection.line_of_sight import face, roll, roll_angle
 from wildshape.geometry.projection.visibility import Projection
+from wildshape.geometry.sampling import drawn, sorted_points
 from wildshape.inference.confidence import look_features
 from wildshape.inference.config import HypothesisRule
-from wildshape.inference.prepare import NetworkInput
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.network import Poses, ShapePoseNet
+from wildshape.records import Points, SensorKind
 
 _RULE = HypothesisRule()
+
+
+class NetworkInput(NamedTuple):
+    """What a network sees of scans.
+
+    Attributes:
+        scans: turned, centred and resampled.
+        centres: in the turned sensor frames.
+        turn: `R_turned_sensor`; the identity unless scans are turned towards their object.
+    """
+
+    scans: Float[Tensor, "B N 3"]
+    centres: Float[Tensor, "B 3"]
+    turn: Float[Tensor, "B 3 3"]
+
+    def to(self, device: torch.device) -> "NetworkInput":
+        """The same on a device."""
+        return NetworkInput(*(part.to(device) for part in self))
+
+    def part(self, rows: Int64[Tensor, "b"]) -> "NetworkInput":
+        """Some of the scans."""
+        return NetworkInput(*(part[rows] for part in self))
+
+    def rolled(self, angle: Float[Tensor, "B"]) -> "NetworkInput":
+        """Rolled about the line of sight, on which the centres lie."""
+        by = roll(angle)
+        return NetworkInput(self.scans @ by.mT, self.centres, by @ self.turn)
+
+
+def network_input(
+    scans: list[Points], count: int, sensor: SensorKind, facing: bool = False
+) -> NetworkInput:
+    """Scans as a network is given them; `facing` turns them towards their object."""
+    ordered = [torch.from_numpy(sorted_points(scan)) for scan in scans]
+    sampled = torch.stack([scan[torch.from_numpy(drawn(len(scan), count))] for scan in ordered])
+    if facing:
+        frames = [face(scan, sensor_kind=sensor) for scan in ordered]
+        turn = torch.stack([frame.turn for frame in frames])
+        centres = torch.stack([frame.centre for frame in frames])
+        return NetworkInput(sampled @ turn.mT - centres[:, None], centres, turn)
+    centres = torch.stack([scan_centre(scan, sensor) for scan in ordered])
+    turn = torch.eye(3).repeat(len(scans), 1, 1)
+    return NetworkInput(sampled - centres[:, None], centres, turn)
 
 
 @runtime_checkable

@@ -22,9 +22,9 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from wildshape.geometry.box import extent
 from wildshape.geometry.projection.line_of_sight import surrounded
 from wildshape.inference.config import ReasonRule
-from wildshape.inference.prepare import extent
 from wildshape.io.progress import counted
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.confidence import COVERED_M, SMALLEST_M, ConfidenceFeatures

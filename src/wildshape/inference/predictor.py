@@ -13,9 +13,12 @@ import torch
 from torch import Tensor
 
 from wildshape.geometry.ground import skirt
+from wildshape.geometry.sampling import sorted_points
 from wildshape.geometry.transforms.se3 import SE3, stack
+from wildshape.inference.as_points import as_points
 from wildshape.inference.boxes import box_seen
-from wildshape.inference.choose_hypothesis import Found, look, look_twice
+from wildshape.inference.choose_hypothesis import Found, look, look_twice, network_input
+from wildshape.inference.compiled import compiled
 from wildshape.inference.confidence import (
     confidence_of,
     features_of,
@@ -24,14 +27,13 @@ from wildshape.inference.confidence import (
     warning_of,
 )
 from wildshape.inference.config import InferenceConfig, RefineConfig
-from wildshape.inference.models import choose_device, compiled, weights_file
-from wildshape.inference.prepare import as_points, in_order, network_input
 from wildshape.inference.refine import filled, refine
 from wildshape.inference.registration import fuse_scans, inlier_ratio, to_middle
 from wildshape.inference.tracks.complete_track import complete_together
 from wildshape.io.scans.points import LEAST_POINTS
-from wildshape.method.checkpoint import ModelSettings, load_checkpoint
+from wildshape.method.checkpoint import ModelSettings, load_checkpoint, weights_file
 from wildshape.method.network import ShapePoseNet
+from wildshape.ops.device import choose_device
 from wildshape.records import Completion, Points, Registration, Sensor
 
 _BATCH = 32
@@ -300,6 +302,8 @@ def _refined(
     """Shape and pose fitted to the scan (`refine.py`)."""
     pose = (T_sensor_canonical.rotation.numpy(), T_sensor_canonical.translation.numpy())
     level = None if up is None else np.array(up)
-    found = refine(in_order(scan), shape.numpy(), *pose, mirror=mirror, up=level, config=config)
+    found = refine(
+        sorted_points(scan), shape.numpy(), *pose, mirror=mirror, up=level, config=config
+    )
     rotation, translation = torch.from_numpy(found.rotation), torch.from_numpy(found.translation)
     return torch.from_numpy(found.shape), SE3(rotation, translation)

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from wildshape.geometry.box import extent, unit_of
 from wildshape.inference.config import RefineConfig
-from wildshape.inference.prepare import unit_of
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
@@ -71,7 +71,7 @@ def refine(
         config: how it is fitted.
     """
     exact = shape.astype(np.float64)
-    unit = unit_of(float(np.linalg.norm(np.ptp(exact, axis=0))))
+    unit = unit_of(extent(exact))
     order = np.random.default_rng(0).permutation(len(scan))
     points = scan[order[: config.scan_points]].astype(np.float64)
     start = Refined(exact / unit, rotation, translation / unit)
@@ -190,7 +190,7 @@ def drawn_to_scan(
     """
     from scipy.spatial import KDTree
 
-    from wildshape.geometry.outliers import voxel_thin
+    from wildshape.geometry.sampling import voxel_thin
 
     both = np.concatenate((seen, seen * (1, -1, 1))) if mirror else seen
     thin = voxel_thin(both.astype(np.float32), config.voxel_m).astype(np.float64)
@@ -224,7 +224,7 @@ def filled(points: Cloud, scan: Cloud, exact: bool, config: RefineConfig = _DEFA
     """
     from scipy.spatial import KDTree
 
-    from wildshape.geometry.outliers import voxel_thin
+    from wildshape.geometry.sampling import voxel_thin
 
     more = denser(points, config.partner)
     if not exact:

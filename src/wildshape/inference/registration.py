@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 
+from wildshape.geometry.box import extent
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.prepare import extent
 from wildshape.ops.nearest import nearest
 from wildshape.records import Points
 

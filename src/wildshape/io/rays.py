@@ -12,7 +12,7 @@ from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.io.atomic import atomic_write
 from wildshape.io.guard import reading
 from wildshape.io.scans.arrays import read_npz_arrays
-from wildshape.io.scans.coordinates import METRES, SENSOR_METRES, Coordinates
+from wildshape.io.scans.points import METRES, SENSOR_METRES, Coordinates
 
 _NEEDED, _OPTIONAL = ("directions", "ranges"), "origins"
 

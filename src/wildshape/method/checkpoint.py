@@ -1,7 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The only file that knows the checkpoint format: one safetensors file (docs/formats.md)."""
+"""Checkpoints: where they lie, and their format, one safetensors file (docs/formats.md).
 
+No other module knows either.
+"""
+
+import hashlib
 import json
 import math
 from dataclasses import asdict, dataclass, field
@@ -10,6 +14,7 @@ from typing import Any
 
 import torch
 
+from wildshape.errors import BadInputError
 from wildshape.geometry.projection.visibility import Projection
 from wildshape.io.atomic import atomic_write
 from wildshape.io.guard import record_of
@@ -18,6 +23,11 @@ from wildshape.method.network import NetworkConfig, ShapePoseNet
 from wildshape.method.saved_network import Format, load_network, packed_network
 from wildshape.records import SensorKind
 
+MODEL = "model.safetensors"
+"""The checkpoint in the folder of a training run."""
+
+_WEIGHTS = Path(__file__).parent.parent / "weights"
+SHIPPED = _WEIGHTS / "default.safetensors"
 FORMAT, VERSION = "wildshape-checkpoint", 1
 _UNIT_WITHIN = 0.01
 _WIDTH = (1.0, 2.0**16)
@@ -82,6 +92,39 @@ class ModelSettings:
     calibration: Calibration | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
     metrics: dict[str, Any] = field(default_factory=dict)
+
+
+def weights_file(model: str | Path | None) -> Path:
+    """The checkpoint meant: a file, a run's folder, shipped weights by name, or the default ones.
+
+    What exists goes before a name.
+
+    Raises:
+        BadInputError: none of these; names the weights that are shipped.
+    """
+    path = Path(model) if model is not None else SHIPPED
+    if path.is_dir():
+        return path / MODEL
+    named = _WEIGHTS / f"{path.name}.safetensors"
+    bare = path.name == str(path) and not path.exists()
+    if bare and named.is_file():
+        return named
+    if not path.exists():
+        shipped = ", ".join(sorted(file.stem for file in _WEIGHTS.glob("*.safetensors")))
+        raise BadInputError(
+            f"{path}: no such checkpoint; name a .safetensors file, the folder of a run, or one of"
+            f" those shipped: {shipped}."
+        )
+    return path
+
+
+def fingerprint(model: Path | None) -> str:
+    """Short hash of the checkpoint's bytes; empty if there is no such file."""
+    path = weights_file(model)
+    if not path.is_file():
+        return ""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
 
 
 def save_checkpoint(

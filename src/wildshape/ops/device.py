@@ -1,14 +1,30 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The processor and its memory: what it is good at, and memory kept between training steps."""
+"""Where tensors are computed: which device, what the processor is good at, and its memory."""
 
 import ctypes
 import platform
 
 import torch
 
+from wildshape.errors import BadInputError
+
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 _NEVER = 2**31 - 1
+
+
+def choose_device(device: str) -> str:
+    """What torch calls it; `auto` is the GPU where there is one.
+
+    Raises:
+        BadInputError: a GPU is asked for, and torch finds none.
+    """
+    found = torch.cuda.is_available()
+    if device.startswith("cuda") and not found:
+        raise BadInputError(f"--device {device}: torch finds no GPU here; use --device cpu.")
+    if device == "auto":
+        return "cuda" if found else "cpu"
+    return device
 
 
 def keep_memory() -> bool:

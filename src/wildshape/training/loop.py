@@ -10,8 +10,7 @@ from typing import Any
 
 from torch.profiler import record_function
 
-from wildshape.inference.models import MODEL
-from wildshape.method.checkpoint import ModelSettings, save_checkpoint
+from wildshape.method.checkpoint import MODEL, ModelSettings, save_checkpoint
 from wildshape.training.runtime.log import RunLog
 from wildshape.training.runtime.profiler import steps_profiled
 from wildshape.training.runtime.running_mean import Meter, refuse_not_finite

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 
 from wildshape.errors import BadInputError
-from wildshape.inference.prepare import unit_of
+from wildshape.geometry.box import unit_of
 from wildshape.io.atomic import write_text
 from wildshape.io.store.store import Store
 from wildshape.method.checkpoint import load_checkpoint

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 from wildshape.errors import BadInputError
-from wildshape.inference.models import MODEL, choose_device, weights_file
 from wildshape.io.atomic import lock_folder, write_json
 from wildshape.io.inputs import open_tracks
 from wildshape.io.output import (
@@ -33,8 +32,9 @@ from wildshape.io.scans.points import SENSOR_METRES, Coordinates
 from wildshape.io.store.layout import INDEX_JSON
 from wildshape.io.store.store import Store, is_store, open_store
 from wildshape.io.write_tracks import write_tracks
-from wildshape.method.checkpoint import load_checkpoint
+from wildshape.method.checkpoint import MODEL, load_checkpoint, weights_file
 from wildshape.method.encoders.named import Backbone
+from wildshape.ops.device import choose_device
 from wildshape.training.config import Recipe
 from wildshape.training.loop import Run, StopRequested, fit, setup
 from wildshape.training.recipes import recipe_for, with_encoder

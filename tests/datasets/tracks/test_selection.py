@@ -10,9 +10,8 @@ import pytest
 from wildshape.datasets.tracks.selection import LARGEST_M, Selection
 from wildshape.datasets.tracks.source import all_tracks
 from wildshape.datasets.tracks.whole_tracks import Folder
-from wildshape.inference.models import SHIPPED
 from wildshape.io.scans.points import write_ply
-from wildshape.method.checkpoint import load_checkpoint
+from wildshape.method.checkpoint import SHIPPED, load_checkpoint
 
 
 def scene(reach, sides=2 * np.pi):

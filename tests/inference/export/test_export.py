@@ -14,14 +14,13 @@ import pytest
 import torch
 
 from wildshape.geometry.projection.visibility import Bins, FacingBins, PixelBins, PolarBins
+from wildshape.geometry.sampling import drawn, sorted_points
 from wildshape.inference.config import HypothesisRule, InferenceConfig
 from wildshape.inference.export.onnx import describe, graph_of, trace, write_torch
 from wildshape.inference.export.plain_scores import nearest_both_plain, score_plain, visible_plain
 from wildshape.inference.export.verify import compare, open_exported, prepared, rehearsal_scans
-from wildshape.inference.models import SHIPPED
 from wildshape.inference.predictor import Predictor, load
-from wildshape.inference.prepare import resample
-from wildshape.method.checkpoint import ModelSettings, save_checkpoint
+from wildshape.method.checkpoint import SHIPPED, ModelSettings, save_checkpoint
 from wildshape.method.confidence import Calibration
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.network import NetworkConfig, ShapePoseNet
@@ -73,6 +72,10 @@ OTHERS = {
         "calibration": CALIBRATION,
     },
 }
+
+
+def resample(points, count):
+    return sorted_points(points)[drawn(len(points), count)]
 
 
 def predictor(**changes):
@@ -189,7 +192,12 @@ def test_onnx_is_torch(facing, onnx_file):
 def test_onnx_takes_any_batch_and_any_number_of_points(facing, onnx_file):
     runner = open_exported(onnx_file, threads=1)
     for batch, count, seen in ((1, 16, 16), (3, 33, 40), (5, 200, 96)):
-        scans = np.stack([resample(s, count) for s in rehearsal_scans(facing.settings, batch)])
+        scans = np.stack(
+            [
+                sorted_points(s)[drawn(len(s), count)]
+                for s in rehearsal_scans(facing.settings, batch)
+            ]
+        )
         drawn = np.arange(seen)[None].repeat(batch, axis=0) % count
         together = runner(scans, drawn)
         for i in range(batch):

@@ -12,8 +12,8 @@ import torch
 
 from wildshape.geometry.transforms.rotation import random_rotation
 from wildshape.inference.export.verify import prepared
-from wildshape.inference.models import SHIPPED
 from wildshape.inference.predictor import load
+from wildshape.method.checkpoint import SHIPPED
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "06_onnx_inference.py"

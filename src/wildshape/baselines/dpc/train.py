@@ -11,9 +11,10 @@ from typing import Any
 from wildshape.baselines.dpc.objective import PRESETS, DpcRecipe
 from wildshape.baselines.dpc.run import DpcRun, fit_dpc, setup_dpc
 from wildshape.errors import BadInputError
-from wildshape.inference.models import MODEL, choose_device
 from wildshape.io.output import command_line, provenance
 from wildshape.io.progress import SILENT, Progress
+from wildshape.method.checkpoint import MODEL
+from wildshape.ops.device import choose_device
 from wildshape.training.loop import StopRequested
 from wildshape.training.train import (
     Stopping,

@@ -190,7 +190,7 @@ def _one_scan(settings: Settings) -> "Track":
 
 def _as_json(name: str, done: "Completion") -> dict[str, object]:
     """What `objects.json` says of a scan, its pose, and its points to a tenth of a millimetre."""
-    from wildshape.inference.folders.completed_files import describe
+    from wildshape.inference.folders.complete_folder import describe
 
     pose = done.pose.matrix.tolist()
     points = [[round(x, 4) for x in row] for row in done.points.tolist()]

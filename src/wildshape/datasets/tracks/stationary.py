@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Float
 
 from wildshape.geometry.box import fit_box
-from wildshape.geometry.outliers import radius_inliers, voxel_thin
+from wildshape.geometry.sampling import radius_inliers, voxel_thin
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.outliers import radius_inliers, statistical_inliers, voxel_thin
+from wildshape.geometry.sampling import radius_inliers, statistical_inliers, voxel_thin
 from wildshape.records import Points, Track
 
 VOXEL_M = 0.04
@@ -72,7 +72,7 @@ class TruthBuilder:
     Attributes:
         kind: `partial` is what the sensor saw of the object over the track; `mirrored` adds the
             reflection at the object's own x-z plane (y -> -y).
-        outliers: which rule removes stray points; see `geometry.outliers`.
+        outliers: which rule removes stray points; see `geometry.sampling`.
         radius: of the rule `radius`: a point needs `neighbours` others within this, metres.
         neighbours: see `radius`.
         strip: height above the lowest points that is left out as ground, metres; for readers

@@ -10,11 +10,10 @@ from torch import Tensor, nn
 
 from wildshape.geometry.centring import scan_centre
 from wildshape.geometry.projection.line_of_sight import face, roll, roll_angle
-from wildshape.inference.choose_hypothesis import choose_hypothesis, in_sensor_frame
+from wildshape.inference.choose_hypothesis import NetworkInput, choose_hypothesis, in_sensor_frame
 from wildshape.inference.config import HypothesisRule
 from wildshape.inference.export.plain_confidence import confidence_plain, look_plain
 from wildshape.inference.export.plain_scores import score_plain
-from wildshape.inference.prepare import NetworkInput
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.network import ShapePoseNet
 

@@ -11,11 +11,11 @@ import numpy as np
 import torch
 
 from wildshape.errors import BadInputError
+from wildshape.geometry.sampling import drawn, sorted_points
 from wildshape.inference.config import ExportRule
 from wildshape.inference.export import onnx
 from wildshape.inference.export.onnx import INPUTS
 from wildshape.inference.predictor import Predictor, load
-from wildshape.inference.prepare import drawn, in_order
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.records import Points
 
@@ -118,7 +118,7 @@ def compare(runner: Runner, predictor: Predictor, scans: Sequence[Points]) -> Di
 
 def prepared(scan: Points, count: int) -> tuple[np.ndarray, np.ndarray]:
     """What an exported file takes of one scan."""
-    return in_order(scan)[None], drawn(len(scan), count)[None]
+    return sorted_points(scan)[None], drawn(len(scan), count)[None]
 
 
 def rehearsal_scans(settings: ModelSettings, count: int, seed: int = 0) -> list[Points]:

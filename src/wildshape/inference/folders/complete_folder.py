@@ -7,7 +7,7 @@
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,6 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import stack
 from wildshape.inference.confidence import ReasonCounts
 from wildshape.inference.folders.box_files import BOX_FILES, BoxFiles
-from wildshape.inference.folders.completed_files import COMPLETED, OBJECTS, POSES, objects_of
-from wildshape.inference.models import fingerprint
 from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.registration import to_middle
 from wildshape.io.atomic import write_json
@@ -28,8 +26,10 @@ from wildshape.io.poses import times_of, write_poses, write_trajectory, write_tu
 from wildshape.io.progress import SILENT, Progress, counted, duration
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates, write_ply
 from wildshape.io.scans.writers import MESH_FORMATS, MeshFiles, write_mesh
+from wildshape.method.checkpoint import fingerprint
 from wildshape.records import Completion, Track
 
+OBJECTS, POSES, COMPLETED = "objects.json", "poses.txt", "completed"
 MIDDLE, MESH, TUM, TRAJECTORY = "T_middle_scan.txt", "mesh", "trajectory.tum", "trajectory.json"
 FILES = (
     f"*/{COMPLETED}/*.ply",
@@ -41,6 +41,8 @@ FILES = (
     f"*/{OBJECTS}",
     *BOX_FILES,
 )
+
+_MODEL = ("command", "code", "time_utc", "steps", "seed")  # said of a model
 
 
 @dataclass(frozen=True)
@@ -267,3 +269,62 @@ def _write_track(
         write_tum(folder / TUM, poses, times_of(track.scan_names))
         write_trajectory(folder / TRAJECTORY, poses, track.scan_names)
     return found
+
+
+def write_completed(
+    folder: Path, track: Track, done: Sequence[Completion], predictor: Predictor, source: Path
+) -> None:
+    """Write a track completed from all its scans together; `objects.json` last.
+
+    Args:
+        folder: of the track.
+        track: its scans' names become names of files.
+        done: one a scan.
+        predictor: what completed them.
+        source: where the scans come from.
+    """
+    for name, one in zip(track.scan_names, done, strict=True):
+        write_ply(folder / COMPLETED / f"{file_name(name)}.ply", one.points)
+    write_poses(folder / POSES, stack([one.pose for one in done]))
+    said = objects_of(track, done, predictor, source, together=True)
+    write_json(folder / OBJECTS, said)
+
+
+def objects_of(
+    track: Track,
+    done: Sequence[Completion],
+    predictor: Predictor,
+    source: Path,
+    *,
+    together: bool,
+    skipped: Sequence[tuple[str, str]] = (),
+) -> dict[str, Any]:
+    """What `objects.json` holds; `skipped`: names of scans and why they could not be used."""
+    return {
+        "format": 1,
+        "track": track.name,
+        "input": str(source.resolve()),
+        "uses": "track" if together else "scan",
+        "together": together,
+        "category": track.category,
+        "sensor": track.sensor.kind,
+        "model": {name: predictor.settings.provenance.get(name) for name in _MODEL},
+        "inference": asdict(predictor.config),
+        "scans": [describe(name, one) for name, one in zip(track.scan_names, done)],
+        "skipped": [{"scan": scan, "reason": reason} for scan, reason in skipped],
+    }
+
+
+def describe(name: str, done: Completion) -> dict[str, Any]:
+    """A completed scan without its points; metres, the scan's sensor frame."""
+    return {
+        "scan": name,
+        "box": asdict(done.box),
+        "confidence": done.confidence,
+        "refined": done.refined,
+        "seconds": done.seconds,
+        "branch": done.branch,
+        "cost_m": done.cost,
+        "warning": done.warning,
+        "reasons": done.reasons,
+    }

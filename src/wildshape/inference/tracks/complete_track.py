@@ -14,13 +14,13 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from wildshape.geometry.box import FittedBox
-from wildshape.geometry.outliers import voxel_thin
+from wildshape.geometry.box import FittedBox, unit_of
+from wildshape.geometry.sampling import voxel_thin
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
+from wildshape.inference.choose_hypothesis import network_input
 from wildshape.inference.confidence import judged_again
 from wildshape.inference.config import BoxConfig, InferenceConfig, TrackConfig
-from wildshape.inference.prepare import network_input, unit_of
 from wildshape.inference.refine import denser
 from wildshape.inference.tracks.heading_vote import (
     half_turn,

@@ -14,8 +14,8 @@ from jaxtyping import Float
 
 from wildshape.errors import BadInputError
 from wildshape.io.guard import lines_of
-from wildshape.io.scans.coordinates import Unit
 from wildshape.io.scans.text_header import Columns, columns_of, split
+from wildshape.records import Unit
 
 _LONGEST = 65_536  # characters of a line
 _COMMENTS = 10  # before the points, among which a header may be

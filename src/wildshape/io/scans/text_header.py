@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from wildshape.errors import BadInputError
-from wildshape.io.scans.coordinates import Unit
+from wildshape.records import Unit
 
 _UNITS: dict[str, Unit] = {
     **dict.fromkeys(("m", "meter", "meters", "metre", "metres"), "m"),

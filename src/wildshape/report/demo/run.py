@@ -6,11 +6,12 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from wildshape.inference.models import SHIPPED, choose_device
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.output import begin, command_line, provenance, unfinished
 from wildshape.io.progress import SILENT, Progress, duration
 from wildshape.io.store.store import open_store
+from wildshape.method.checkpoint import SHIPPED
+from wildshape.ops.device import choose_device
 from wildshape.report.demo.results import draw, evaluate, process, verdict
 from wildshape.report.demo.time_budget import TimeBudget
 from wildshape.report.demo.tracks import TRAIN, DemoOptions, prepare

@@ -22,7 +22,7 @@ import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
-from wildshape.geometry.outliers import voxel_thin
+from wildshape.geometry.sampling import voxel_thin
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points

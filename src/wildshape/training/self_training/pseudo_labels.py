@@ -21,12 +21,12 @@ import torch
 from jaxtyping import Float, Float32
 from torch import Tensor
 
+from wildshape.geometry.box import unit_of
 from wildshape.geometry.gravity import level_turn
 from wildshape.geometry.projection.field_of_view import slope, view_top
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import TrackConfig
 from wildshape.inference.predictor import Predictor, load
-from wildshape.inference.prepare import unit_of
 from wildshape.inference.tracks.joint_icp import refine_jointly, stayed_near
 from wildshape.inference.tracks.pose_outliers import without_outliers
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Outliers of accumulated clouds, and thinning to an even density (METHOD 8)."""
+"""Which points of a cloud are kept: no outliers, evenly dense (METHOD 8), or so many (METHOD 2)."""
 
 import math
 
 import numpy as np
-from jaxtyping import Bool, Float, Int64
+from jaxtyping import Bool, Float, Float32, Int64
 
 
 def statistical_inliers(
@@ -60,3 +60,24 @@ def _cell_numbers(points: Float[np.ndarray, "n 3"], size: float) -> Int64[np.nda
     if math.prod(counts) >= 2**63:  # tens of kilometres at centimetres
         return np.unique(cells, axis=0, return_inverse=True)[1].reshape(-1)
     return np.asarray(np.ravel_multi_index(tuple(cells.T), tuple(counts)))
+
+
+def sorted_points(points: Float32[np.ndarray, "n 3"]) -> Float32[np.ndarray, "n 3"]:
+    """The same points by z, y, x: sums over them then do not depend on the file's order.
+
+    z and y are sorted as one whole number; x is looked at only where both are equal somewhere.
+    """
+    bits = (points[:, 1:] + np.float32(0)).view(np.int32)  # no -0
+    y, z = (bits ^ ((bits >> 31) & 0x7FFFFFFF)).T.astype(np.int64)  # ordered as the floats are
+    key = (z << 32) + y
+    order = np.argsort(key)
+    ordered = key[order]
+    tied = bool((ordered[1:] == ordered[:-1]).any())
+    return points[np.lexsort(points.T)] if tied else points[order]
+
+
+def drawn(size: int, count: int) -> Int64[np.ndarray, "count"]:
+    """Which of `size` ordered points a network sees: some of them, or all over and over."""
+    if size > count:
+        return np.random.default_rng(0).choice(size, count, replace=False)
+    return np.arange(count) % size

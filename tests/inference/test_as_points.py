@@ -9,8 +9,7 @@ import torch
 import trimesh
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.centring import box_centre, frustum_centre
-from wildshape.inference.prepare import as_points, extent, network_input, resample
+from wildshape.inference.as_points import as_points
 
 RNG = np.random.default_rng(0)
 
@@ -60,49 +59,6 @@ def test_what_is_no_scan_is_refused(given, said):
     with pytest.raises(BadInputError, match=said) as refused:
         as_points(given, "scan 7")
     assert str(refused.value).startswith("scan 7: ")
-
-
-@pytest.mark.parametrize("count", [16, 50, 51, 200])
-def test_resampling_keeps_to_the_scan_and_does_not_see_its_order(count):
-    points = scan()
-    found = resample(points, count)
-    assert found.shape == (count, 3)
-    rows = {tuple(p) for p in points.tolist()}
-    taken = [tuple(p) for p in found.tolist()]
-    assert set(taken) <= rows
-    assert len(set(taken)) == min(count, len(points))
-    np.testing.assert_array_equal(resample(points[RNG.permutation(50)], count), found)
-
-
-@pytest.mark.parametrize(
-    ("sensor", "centre_of"), [("lidar", frustum_centre), ("camera", box_centre)]
-)
-def test_network_input_is_centred_and_the_centres_bring_it_back(sensor, centre_of):
-    scans = [scan(40), scan(300)]
-    inputs, centres, turn = network_input(scans, 64, sensor)
-    assert torch.equal(turn, torch.eye(3).expand(len(scans), 3, 3))
-    for i, points in enumerate(scans):
-        torch.testing.assert_close(centres[i], centre_of(torch.from_numpy(points)))
-        back = (inputs[i] + centres[i]).numpy()
-        np.testing.assert_allclose(back, resample(points, 64), atol=1e-6)
-
-
-def test_extent_is_the_diagonal():
-    assert extent(np.array([[0, 0, 0], [2, 3, 6], [1, 1, 1]], np.float32)) == pytest.approx(7)
-
-
-@pytest.mark.parametrize("ties", ["none", "z", "z and y", "signed zeros"])
-def test_points_are_ordered_by_z_then_y_then_x(ties):
-    points = scan(60) - np.array([8, 1, -1], np.float32)
-    if ties != "none":
-        points[::2, 2] = 0.5
-    if ties == "z and y":
-        points[::4, 1] = -0.25
-    if ties == "signed zeros":
-        points[::4, 2], points[1::4, 2] = 0.0, -0.0
-        points[:40, 1] = np.where(np.arange(40) % 3 == 0, np.float32(-0.0), np.float32(0.0))
-    expected = sorted(points.tolist(), key=lambda p: (p[2], p[1], p[0]))
-    assert resample(points, 60).tolist() == expected
 
 
 def test_points_of_other_libraries_and_paths(tmp_path):

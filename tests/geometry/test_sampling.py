@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from wildshape.geometry.outliers import radius_inliers, statistical_inliers, voxel_thin
+from wildshape.geometry.sampling import (
+    drawn,
+    radius_inliers,
+    sorted_points,
+    statistical_inliers,
+    voxel_thin,
+)
 
 
 def naive_statistical(points, neighbours, ratio):
@@ -63,3 +69,40 @@ def test_voxel_thin_does_not_depend_on_order():
 def test_voxel_thin_of_points_with_more_cells_than_an_integer_counts():
     points = np.array([[1e6, 0, 0], [0, 1e6, 0], [0, 0, 1e6], [0, 0, 1e6 + 1e-4]])
     assert voxel_thin(points, 1e-3) == pytest.approx(points[[2, 1, 0]], abs=1e-3)
+
+
+RNG = np.random.default_rng(0)
+
+
+def scan(count=50):
+    return RNG.normal(size=(count, 3)).astype(np.float32) + np.array([8, 1, -1], np.float32)
+
+
+def resample(points, count):
+    return sorted_points(points)[drawn(len(points), count)]
+
+
+@pytest.mark.parametrize("count", [16, 50, 51, 200])
+def test_resampling_keeps_to_the_scan_and_does_not_see_its_order(count):
+    points = scan()
+    found = resample(points, count)
+    assert found.shape == (count, 3)
+    rows = {tuple(p) for p in points.tolist()}
+    taken = [tuple(p) for p in found.tolist()]
+    assert set(taken) <= rows
+    assert len(set(taken)) == min(count, len(points))
+    np.testing.assert_array_equal(resample(points[RNG.permutation(50)], count), found)
+
+
+@pytest.mark.parametrize("ties", ["none", "z", "z and y", "signed zeros"])
+def test_points_are_ordered_by_z_then_y_then_x(ties):
+    points = scan(60) - np.array([8, 1, -1], np.float32)
+    if ties != "none":
+        points[::2, 2] = 0.5
+    if ties == "z and y":
+        points[::4, 1] = -0.25
+    if ties == "signed zeros":
+        points[::4, 2], points[1::4, 2] = 0.0, -0.0
+        points[:40, 1] = np.where(np.arange(40) % 3 == 0, np.float32(-0.0), np.float32(0.0))
+    expected = sorted(points.tolist(), key=lambda p: (p[2], p[1], p[0]))
+    assert resample(points, 60).tolist() == expected
