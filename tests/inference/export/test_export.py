@@ -192,12 +192,7 @@ def test_onnx_is_torch(facing, onnx_file):
 def test_onnx_takes_any_batch_and_any_number_of_points(facing, onnx_file):
     runner = open_exported(onnx_file, threads=1)
     for batch, count, seen in ((1, 16, 16), (3, 33, 40), (5, 200, 96)):
-        scans = np.stack(
-            [
-                sorted_points(s)[drawn(len(s), count)]
-                for s in rehearsal_scans(facing.settings, batch)
-            ]
-        )
+        scans = np.stack([resample(s, count) for s in rehearsal_scans(facing.settings, batch)])
         drawn = np.arange(seen)[None].repeat(batch, axis=0) % count
         together = runner(scans, drawn)
         for i in range(batch):
