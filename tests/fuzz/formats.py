@@ -20,6 +20,8 @@ MUTATIONS: dict[str, tuple[Mutation, ...]] = {
     ".json": (documents.change_json,),
     ".jsonl": (documents.change_json_lines,),
     ".gltf": (documents.change_json,),
+    ".obj": (documents.change_table,),
+    ".off": (documents.change_table,),
     ".xml": (documents.change_xml,),
     ".safetensors": (containers.change_safetensors,),
     ".glb": (containers.change_glb,),

@@ -230,6 +230,12 @@ def _build_meshes(folder: Path) -> None:
         else:
             data = made.encode() if isinstance(made, str) else made
             (place / f"car.{kind}").write_bytes(data)
+    for name, kind, options in (
+        ("car.stl", "stl_ascii", {}),
+        ("car.ply", "ply", {"encoding": "ascii"}),
+    ):
+        (folder / f"text-{kind}").mkdir()
+        box.export(folder / f"text-{kind}" / name, file_type=kind, **options)
 
 
 def _read_meshes(folder: Path) -> Arrays:

@@ -5,8 +5,11 @@
 import subprocess
 import sys
 from pathlib import Path
+from random import Random
 
 import pytest
+from tests.fuzz.containers import change_zip, zip_bomb
+from tests.fuzz.mutations import LARGEST
 
 RUN = Path(__file__).parent / "run.py"
 
@@ -69,6 +72,10 @@ def test_a_run_goes_on_from_its_state(tmp_path):
     assert row(first, "mute") == row(second, "mute")
     assert "mute 0: message" in first.stdout
     assert "mute 0: message" not in second.stdout  # nothing was left to be done
+
+
+def test_a_bomb_is_damaged_as_it_is():  # unpacked and packed again it would take seconds
+    assert all(len(change_zip(Random(seed), zip_bomb())) < LARGEST for seed in range(20))
 
 
 def test_our_readers_break_no_rule(tmp_path):

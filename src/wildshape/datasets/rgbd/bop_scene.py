@@ -16,6 +16,7 @@ from wildshape.datasets.rgbd.depth_image import read_png
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import read_json, reading
+from wildshape.io.scans.ply_mesh import read_ply_mesh
 from wildshape.records import Intrinsics, Points
 
 _MM = 1e-3
@@ -135,9 +136,10 @@ def _sampled(path: Path, count: int) -> Points:
     import trimesh
 
     with reading(path, "a PLY mesh"):
-        mesh = trimesh.load(path, force="mesh", process=False)
-        if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+        vertices, faces = read_ply_mesh(path)
+        if not len(faces):
             raise BadInputError(f"{path}: holds no triangles; export the model as a mesh.")
+        mesh = trimesh.Trimesh(vertices, faces, process=False)
         points = trimesh.sample.sample_surface(mesh, count, seed=0)[0]
     return np.asarray(points * _MM, np.float32)
 

@@ -2,21 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """The user's own meshes as objects: PLY, OBJ, STL, OFF, GLB; x forward, y left, z up."""
 
-import re
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from wildshape.errors import BadInputError
-from wildshape.io.guard import reading
+from wildshape.io.scans.ply_mesh import read_ply_mesh
 from wildshape.simulate.shapes.gltf import read_gltf
 from wildshape.simulate.shapes.solid import Solid
+from wildshape.simulate.shapes.text_meshes import read_obj, read_off, read_stl
 from wildshape.simulate.shapes.triangles import used
 
-_GLTF = (".glb", ".gltf")
-_SUFFIXES = (".ply", ".obj", ".stl", ".off", *_GLTF)
-_PLY_HEADER, _FACE_BYTES = 65536, 7  # a face is `3 0 1 2` at least
+_READERS: dict[str, Callable[[Path], tuple[np.ndarray, np.ndarray]]] = {
+    ".ply": read_ply_mesh,
+    ".obj": read_obj,
+    ".stl": read_stl,
+    ".off": read_off,
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
+}
 _SMALLEST_M, _LARGEST_M = 0.5, 30.0
 
 
@@ -28,9 +34,9 @@ def mesh_files(folder: Path) -> tuple[Path, ...]:
     """
     if not folder.is_dir():
         raise BadInputError(f"{folder} is no folder, expected one with meshes.")
-    found = sorted(p for p in folder.rglob("*") if p.suffix.lower() in _SUFFIXES)
+    found = sorted(p for p in folder.rglob("*") if p.suffix.lower() in _READERS)
     if not found:
-        raise BadInputError(f"{folder} holds no mesh, expected files {' '.join(_SUFFIXES)}.")
+        raise BadInputError(f"{folder} holds no mesh, expected files {' '.join(_READERS)}.")
     return tuple(found)
 
 
@@ -45,12 +51,13 @@ def read_mesh(path: Path, metres: bool) -> Solid:
     Raises:
         BadInputError: unreadable, no triangles, not finite, or of a size that is not in metres.
     """
-    _check_faces(path)
     try:
-        vertices, faces = used(*_loaded(path))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of a damaged file's numbers
+            vertices, faces = used(*_READERS[path.suffix.lower()](path))
     except BadInputError:
         raise
-    except Exception as cause:  # trimesh's readers raise nearly anything
+    except Exception as cause:  # a damaged file raises nearly anything
         raise BadInputError(
             f"{path} cannot be read as a mesh ({cause}); export it anew."
         ) from cause
@@ -67,35 +74,6 @@ def read_mesh(path: Path, metres: bool) -> Solid:
     no_glass, one_part = np.zeros(len(faces), bool), np.zeros(len(faces), np.int64)
     solid = Solid(vertices, faces, no_glass, one_part, path.stem, closed=False)
     return solid.centred(None if metres else 1.0)
-
-
-def _loaded(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    import trimesh
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of a damaged file's numbers
-        if path.suffix.lower() in _GLTF:
-            return read_gltf(path)
-        mesh = trimesh.load(path, force="mesh", process=False, skip_materials=True)
-        vertices = np.asarray(getattr(mesh, "vertices", np.empty((0, 3))), np.float64)
-        faces = np.asarray(getattr(mesh, "faces", np.empty((0, 3))), np.int64)
-    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
-        raise ValueError(f"vertices {vertices.shape}, triangles {faces.shape}")
-    return vertices, faces
-
-
-def _check_faces(path: Path) -> None:
-    """Refuse a PLY with more faces than it can hold the corners of; trimesh would make each."""
-    if path.suffix.lower() != ".ply":
-        return
-    with reading(path, "a mesh"), path.open("rb") as file:
-        head, size = file.read(_PLY_HEADER), path.stat().st_size
-    said = re.search(rb"element +face +(\d{1,18})\b", head)
-    if said and int(said[1]) * _FACE_BYTES > size:
-        raise BadInputError(
-            f"{path} promises {int(said[1])} triangles, more than its {size} bytes hold; export it "
-            "anew."
-        )
 
 
 def _advice(extent: float) -> str:
