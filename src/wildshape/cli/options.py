@@ -13,6 +13,7 @@ from tyro.conf import OmitArgPrefixes, Positional, arg
 from tyro.constructors import PrimitiveConstructorSpec
 
 if TYPE_CHECKING:
+    from wildshape.inference.folders.complete_folder import FolderOptions
     from wildshape.io.scans.points import Coordinates
 
 
@@ -160,3 +161,30 @@ class FileOptions:
 Network = Annotated[NetworkOptions, OmitArgPrefixes]
 Files = Annotated[FileOptions, OmitArgPrefixes]
 DEFAULT_NETWORK, DEFAULT_FILES = NetworkOptions(), FileOptions()
+
+
+@dataclass(frozen=True)
+class ScanOptions:
+    """Which scans go together, and what becomes of results."""
+
+    network: Network = DEFAULT_NETWORK
+    files: Files = DEFAULT_FILES
+    together: Together = False
+    overwrite: Overwrite = False
+    json: AsJson = False
+
+    def of_folder(self) -> "FolderOptions":
+        """The same for the library."""
+        from wildshape.inference.folders.complete_folder import FolderOptions
+
+        return FolderOptions(
+            model=self.network.model,
+            device=self.network.device,
+            coordinates=self.files.coordinates,
+            track=self.together,
+            overwrite=self.overwrite,
+        )
+
+
+Scans = Annotated[ScanOptions, OmitArgPrefixes]
+DEFAULT_SCANS = ScanOptions()

@@ -71,8 +71,8 @@ def _told(results: list[PartResult]) -> dict[str, Any]:
 
 
 @dataclass
-class PackedStore:
-    """One packed store; an older one in its place stays until the new one is whole.
+class _Folder:
+    """What every destination is told.
 
     Attributes:
         path: its folder.
@@ -85,6 +85,10 @@ class PackedStore:
     settings: dict[str, Any]
     overwrite: bool
     progress: Progress = SILENT
+
+
+class PackedStore(_Folder):
+    """One packed store; an older one in its place stays until the new one is whole."""
 
     def begin(self) -> list[PartResult] | None:
         """See `Destination`."""
@@ -139,21 +143,8 @@ class PackedStore:
         shutil.rmtree(self.path / PARTS, ignore_errors=True)
 
 
-@dataclass
-class TrackFolders:
-    """A DATASET folder; each track appears in it whole.
-
-    Attributes:
-        path: the folder.
-        settings: JSON values; all that decides the content.
-        overwrite: replace what is there.
-        progress: is told that an earlier run is gone on with.
-    """
-
-    path: Path
-    settings: dict[str, Any]
-    overwrite: bool
-    progress: Progress = SILENT
+class TrackFolders(_Folder):
+    """A DATASET folder; each track appears in it whole."""
 
     def begin(self) -> list[PartResult] | None:
         """See `Destination`."""

@@ -2,26 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """`wildshape complete`: shape, pose, box and confidence of each scan."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
 from wildshape.cli.commands import uncollected
-from wildshape.cli.options import (
-    DEFAULT_FILES,
-    DEFAULT_NETWORK,
-    AsJson,
-    Files,
-    Format,
-    Network,
-    Overwrite,
-    Together,
-    is_pipe,
-    listed,
-    option,
-)
+from wildshape.cli.options import DEFAULT_SCANS, Format, Scans, is_pipe, listed, option
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -66,9 +54,7 @@ class Settings:
 
     input: Input
     out: Out = None
-    network: Network = DEFAULT_NETWORK
-    files: Files = DEFAULT_FILES
-    together: Together = False
+    scans: Scans = DEFAULT_SCANS
     mesh: Annotated[bool, arg(help="also write a closed mesh of each shape")] = False
     mesh_format: Annotated[Literal["ply", "obj", "glb"], arg(help="of the meshes")] = "ply"
     mesh_colours: Annotated[
@@ -85,8 +71,6 @@ class Settings:
         option(metavar="FILE", help="of KITTI (.txt) or Argoverse 2 (.feather), for these boxes"),
     ] = None
     format: Format = "auto"
-    overwrite: Overwrite = False
-    json: AsJson = False
 
 
 def run(settings: Settings) -> None:
@@ -116,25 +100,17 @@ def _to_folder(settings: Settings, out: Path) -> None:
     if settings.format != "auto":
         raise BadInputError(f"--format {settings.format}: is for a scan on stdin; leave it away.")
     conclude(
-        complete_folder(settings.input, out, _options(settings), TERMINAL), as_json=settings.json
+        complete_folder(settings.input, out, _options(settings), TERMINAL),
+        as_json=settings.scans.json,
     )
 
 
 def _options(settings: Settings) -> "FolderOptions":
     from wildshape.inference.folders.box_files import BoxFiles
-    from wildshape.inference.folders.complete_folder import FolderOptions
 
     wanted = bool(settings.boxes or settings.calibration)
     boxes = BoxFiles(settings.boxes, settings.calibration) if wanted else None
-    return FolderOptions(
-        model=settings.network.model,
-        device=settings.network.device,
-        coordinates=settings.files.coordinates,
-        track=settings.together,
-        mesh=_mesh(settings),
-        boxes=boxes,
-        overwrite=settings.overwrite,
-    )
+    return replace(settings.scans.of_folder(), mesh=_mesh(settings), boxes=boxes)
 
 
 def _mesh(settings: Settings) -> "MeshFiles | None":
@@ -157,14 +133,14 @@ def _to_stdout(settings: Settings) -> None:
         from wildshape.inference.predictor import load
 
     mesh = _mesh(settings)
-    if not settings.json:
+    if not settings.scans.json:
         refuse_terminal()
     track = _one_scan(settings)
-    predictor = load(settings.network.model, settings.network.device)
+    predictor = load(settings.scans.network.model, settings.scans.network.device)
     (done,) = predictor.complete_checked(track.scans, track.sensor)
     if done.reasons:
         say(reasons_sentence(done))
-    if settings.json:
+    if settings.scans.json:
         answer("", _as_json(track.scan_names[0], done), as_json=True)
     else:
         write_stdout(_as_file(done, track, mesh))
@@ -176,7 +152,7 @@ def _one_scan(settings: Settings) -> "Track":
     from wildshape.io.inputs import open_tracks
 
     with as_file(settings.input, settings.format) as path:
-        source = open_tracks(path, settings.files.coordinates)
+        source = open_tracks(path, settings.scans.files.coordinates)
         track = source.single("--out -")
     if len(track.scans) != 1:
         raise BadInputError(

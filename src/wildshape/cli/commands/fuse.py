@@ -8,15 +8,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from wildshape.cli.options import (
-    DEFAULT_FILES,
-    DEFAULT_NETWORK,
-    AsJson,
-    Files,
-    Network,
-    Overwrite,
-    Together,
-)
+from wildshape.cli.options import DEFAULT_SCANS, Scans
 
 EXAMPLES = (
     "wildshape fuse track --out fused.ply",
@@ -35,11 +27,7 @@ class Settings:
 
     track: TrackFolder
     out: OutFile
-    network: Network = DEFAULT_NETWORK
-    files: Files = DEFAULT_FILES
-    together: Together = False
-    overwrite: Overwrite = False
-    json: AsJson = False
+    scans: Scans = DEFAULT_SCANS
 
 
 def run(settings: Settings) -> None:
@@ -58,12 +46,13 @@ def run(settings: Settings) -> None:
     from wildshape.io.progress import counted
     from wildshape.io.scans.writers import check_suffix, write_cloud
 
+    asked = settings.scans
     check_suffix(settings.out)
-    refuse_file(settings.out, overwrite=settings.overwrite)
-    source = open_tracks(settings.track, settings.files.coordinates)
+    refuse_file(settings.out, overwrite=asked.overwrite)
+    source = open_tracks(settings.track, asked.files.coordinates)
     track = source.single("fuse")
-    predictor = load(settings.network.model, settings.network.device)
-    done = list(predictor.complete_checked(track.scans, track.sensor, track=settings.together))
+    predictor = load(asked.network.model, asked.network.device)
+    done = list(predictor.complete_checked(track.scans, track.sensor, track=asked.together))
     fused = fuse_scans(track.scans, to_middle(stack([scan.pose for scan in done])))
     write_cloud(settings.out, fused)
     say_skipped(source.skipped)
@@ -76,5 +65,5 @@ def run(settings: Settings) -> None:
         f" {middle}; see {settings.out}"
     )
     data = {"out": str(settings.out), "points": len(fused), "scans": len(track.scans)}
-    data |= {**reasons.data, "uses": "track" if settings.together else "scan"}
-    answer(text, {**data, "middle_scan": middle}, as_json=settings.json)
+    data |= {**reasons.data, "uses": "track" if asked.together else "scan"}
+    answer(text, {**data, "middle_scan": middle}, as_json=asked.json)

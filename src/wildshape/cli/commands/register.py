@@ -9,18 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, arg
 
 from wildshape.cli.commands import uncollected
-from wildshape.cli.options import (
-    DEFAULT_FILES,
-    DEFAULT_NETWORK,
-    AsJson,
-    Files,
-    Format,
-    Network,
-    Overwrite,
-    Together,
-    is_pipe,
-    option,
-)
+from wildshape.cli.options import DEFAULT_SCANS, Format, Scans, is_pipe, option
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -58,12 +47,8 @@ class Settings:
     source: Source
     target: Target = None
     out: Out = None
-    network: Network = DEFAULT_NETWORK
-    files: Files = DEFAULT_FILES
-    together: Together = False
+    scans: Scans = DEFAULT_SCANS
     format: Format = "auto"
-    overwrite: Overwrite = False
-    json: AsJson = False
 
 
 def run(settings: Settings) -> None:
@@ -76,7 +61,7 @@ def run(settings: Settings) -> None:
         raise BadInputError(
             "register SOURCE TARGET prints its result; leave --out away, or name one TRACK alone."
         )
-    if settings.target is not None and settings.together:
+    if settings.target is not None and settings.scans.together:
         raise BadInputError("--track poses the scans of a TRACK together; a pair has no track.")
     if settings.format != "auto" and not (is_pipe(settings.source) or is_pipe(settings.target)):
         raise BadInputError(f"--format {settings.format}: is for a scan on stdin; leave it away.")
@@ -91,17 +76,11 @@ def run(settings: Settings) -> None:
 def _tracks(settings: Settings, out: Path) -> None:
     with uncollected():
         from wildshape.cli.terminal import TERMINAL, conclude
-        from wildshape.inference.folders.complete_folder import FolderOptions, complete_folder
+        from wildshape.inference.folders.complete_folder import complete_folder
 
-    options = FolderOptions(
-        model=settings.network.model,
-        device=settings.network.device,
-        coordinates=settings.files.coordinates,
-        track=settings.together,
-        overwrite=settings.overwrite,
-    )
+    options = settings.scans.of_folder()
     found = complete_folder(settings.source, out, options, TERMINAL, registers=True)
-    conclude(found, as_json=settings.json)
+    conclude(found, as_json=settings.scans.json)
 
 
 def _pair(settings: Settings, target: Path) -> None:
@@ -112,7 +91,7 @@ def _pair(settings: Settings, target: Path) -> None:
     if is_pipe(settings.source) and is_pipe(target):
         raise BadInputError("register - -: stdin holds one scan; name a file for the other.")
     source, target_track = (_scan(path, settings) for path in (settings.source, target))
-    predictor = load(settings.network.model, settings.network.device)
+    predictor = load(settings.scans.network.model, settings.scans.network.device)
     found = predictor.register(source.scans[0], target_track.scans[0], source.sensor)
     matrix = found.T_target_source.matrix.tolist()
     lines = [" ".join(f"{value:12.6f}" for value in row) for row in matrix]
@@ -126,7 +105,7 @@ def _pair(settings: Settings, target: Path) -> None:
     }
     if found.reasons:
         say(reasons_sentence(found))
-    answer("\n".join(("T_target_source", *lines, shares)), data, as_json=settings.json)
+    answer("\n".join(("T_target_source", *lines, shares)), data, as_json=settings.scans.json)
 
 
 def _scan(path: Path, settings: Settings) -> "Track":
@@ -135,7 +114,7 @@ def _scan(path: Path, settings: Settings) -> "Track":
 
     kind = settings.format if is_pipe(path) else "auto"
     with as_file(path, kind) as file:
-        track = open_tracks(file, settings.files.coordinates).single("a pair")
+        track = open_tracks(file, settings.scans.files.coordinates).single("a pair")
     if len(track.scans) != 1:
         raise BadInputError(
             f"{path}: holds {len(track.scans)} scans, but a pair takes two files of one scan each;"
