@@ -3,6 +3,7 @@
 """Each stage of a drive on its own."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,24 +12,30 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wildshape.drives.boxes import moves, smooth
+from wildshape.drives.claims import claim
 from wildshape.drives.clusters import connected, extents, find_clusters
 from wildshape.drives.completion import fullest_of_parts, keyframes
 from wildshape.drives.config import (
     BoxConfig,
     ClusterConfig,
     CompletionConfig,
+    DriveConfig,
     GroundConfig,
     LinkConfig,
+    MergeConfig,
     MountingConfig,
     TrajectoryConfig,
     VehicleConfig,
 )
 from wildshape.drives.ground import height_above_ground
+from wildshape.drives.merging import Places
 from wildshape.drives.mounting import Mounting, ground_plane
+from wildshape.drives.placing import Completed
+from wildshape.drives.segmentation import cut_file
 from wildshape.drives.sightings import Sightings, merged
 from wildshape.drives.tracks import Seen, link
 from wildshape.drives.trajectory import jumps
-from wildshape.drives.vehicles import Completed, fragments, judge, vehicle_confidence
+from wildshape.drives.vehicles import judge, vehicle_confidence
 from wildshape.geometry.transforms.se3 import SE3
 
 
@@ -211,6 +218,10 @@ def test_little_or_slow_motion_is_none():
     assert moves(ticks, still + np.outer(ticks, (0.1, 0, 0, 0)), config)
 
 
+def places():
+    return Places(tuple(range(100)), MergeConfig(), BoxConfig())
+
+
 def test_vehicles_are_told_by_cost_and_size_and_counted_once():
     at = [(0.0, 0.0, 0.0, 0.0)]
     objects = [
@@ -220,13 +231,13 @@ def test_vehicles_are_told_by_cost_and_size_and_counted_once():
         completed([(20.0, 0.0, 0.0, 0.0)], name="high", size=(4.0, 1.8, 5.0)),
         completed([(0.5, 0.1, 0.0, 0.1)], frames=(90,), name="later"),
     ]
-    said = {one.name: one.reasons for one in judge(objects, VehicleConfig())}
+    said = {one.name: one.reasons for one in judge(objects, places(), VehicleConfig())}
     assert said == {
         "good": (),
         "again": ("same_place_as_good",),
         "costly": ("unlikely",),
         "high": ("unlikely", "height"),
-        "later": (),
+        "later": ("same_place_as_good",),
     }
 
 
@@ -250,15 +261,51 @@ def test_tracks_of_one_shape_in_one_place_are_put_together():
     here, there = [(0.0, 0.0, 0.0, 0.0)], [(0.4, 0.1, 0.0, 0.0)]
     objects = [
         completed(here, frames=(0,), name="0"),
-        completed(there, frames=(6,), name="1"),
+        completed(there, frames=(90,), name="1"),  # long hidden, and standing
         completed([(9.0, 0.0, 0.0, 0.0)], frames=(6,), name="2"),
-        completed(there, frames=(90,), name="3"),
     ]
-    (found,) = fragments(objects, VehicleConfig())
-    assert (found.name, found.frames, found.parts) == ("0-1", (0, 6), 2)
+    (found,) = places().fragments(objects)
+    assert (found.name, found.frames, found.parts) == ("0-1", (0, 90), 2)
     whole = completed(here, frames=(0,), name="0-1", parts=2)
-    kept = {one.name for one in judge([*objects, whole], VehicleConfig()) if not one.reasons}
-    assert kept == {"0-1", "2", "3"}
+    said = judge([*objects, whole], places(), VehicleConfig())
+    assert {one.name for one in said if not one.reasons} == {"0-1", "2"}
+
+
+def test_a_moving_vehicle_is_looked_for_where_its_way_leads():
+    def driving(frames, x=0.0, y=0.0, **other):
+        return completed([(x + frame, y, 0.0, 0.0) for frame in frames], frames=frames, **other)
+
+    first = driving((0, 4, 8, 12, 16), name="0")
+    beside = completed([(10.0, 3.0, 0.0, 0.0)], frames=(12,), name="parked")
+    passed = completed([(10.0, 0.0, 0.0, 0.0)], frames=(40,), name="stands there later")
+    hidden = driving((26, 30, 34), name="1")
+    behind = driving((26, 30, 34), x=-9.0, name="2")
+    (found,) = places().fragments([first, beside, hidden, behind, passed])
+    assert found.name == "0-1"
+
+
+def test_clusters_in_the_box_of_a_vehicle_are_its_own(tmp_path):
+    rng = np.random.default_rng(0)
+
+    def piece(x, y):
+        return rng.uniform((x - 0.3, y - 0.3, -0.5), (x + 0.3, y + 0.3, 0.5), (20, 3))
+
+    front, rear, beside = piece(1.5, 0.0), piece(-1.5, 0.0), piece(0.0, 1.4)
+    for frame in range(3):
+        counts = np.array([20, 20, 20])
+        points = np.concatenate((beside, front, rear)).astype(np.float32)
+        with cut_file(tmp_path, frame).open("wb") as file:
+            np.savez(file, points=points, counts=counts, scanned=90, tracks=np.array([], str))
+    at = [(0.0, 0.0, 0.0, 0.0)]
+    whole = replace(completed(at, name="whole"), seen=Sightings("whole", (0,), ((1,),), (20,)))
+    again = replace(completed(at, name="again"), seen=Sightings("again", (2,), ((2,),), (20,)))
+    still = SE3(torch.eye(3).double().expand(3, 3, 3), torch.zeros(3, 3).double())
+    found = claim([whole, again], tmp_path, still, (0, 1, 2), DriveConfig())
+    assert found.parts == {"again": "whole"}
+    (only,) = found.vehicles
+    assert only.seen.frames == (0, 1, 2)
+    assert only.seen.rows == ((1, 2),) * 3
+    assert only.seen.points == (40,) * 3
 
 
 def test_pieces_of_one_scan_are_one_cloud():

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The box of a vehicle in every frame from the first to the last in which it was seen.
+"""The box of a vehicle in every frame in which it was seen, and in short gaps between them.
 
 A vehicle that stands has one box in the world: the middle of those of its completed scans. One
 that moves goes a smooth way through them: in each frame a straight line is fitted to the places
@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from wildshape.drives.config import BoxConfig
-from wildshape.drives.vehicles import Completed
+from wildshape.drives.placing import Completed
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Way:
     """A vehicle's boxes in the drive's level world frame.
 
     Attributes:
-        frames: every one from the first to the last in which it was seen.
+        frames: in which it has a box, rising.
         boxes: `(f, 4)` centre x, y, z and yaw in each, metres and radians.
         moving: or standing.
     """
@@ -32,14 +32,26 @@ class Way:
 
 
 def smooth(one: Completed, ticks: tuple[int, ...], config: BoxConfig) -> Way:
-    """The way of one vehicle.
+    """The way of one vehicle over the frames in which it was seen, and short gaps between.
 
     Args:
         one: completed.
         ticks: when each frame of the drive was taken.
         config: see there.
     """
-    frames = tuple(range(one.seen.frames[0], one.seen.frames[-1] + 1))
+    seen = one.seen.frames
+    frames = [seen[0]]
+    for frame in seen[1:]:
+        if ticks[frame] - ticks[frames[-1]] <= config.longest_gap:
+            frames.extend(range(frames[-1] + 1, frame))
+        frames.append(frame)
+    return way_over(one, tuple(frames), ticks, config)
+
+
+def way_over(
+    one: Completed, frames: tuple[int, ...], ticks: tuple[int, ...], config: BoxConfig
+) -> Way:
+    """The way of one vehicle over frames, seen or not; see `smooth`."""
     at = np.array([ticks[frame] for frame in one.frames], np.float64)
     wanted = np.array([ticks[frame] for frame in frames], np.float64)
     if not moves(at, one.boxes, config):
@@ -47,6 +59,14 @@ def smooth(one: Completed, ticks: tuple[int, ...], config: BoxConfig) -> Way:
     places, velocities = _lines(at, one.boxes[:, :3], wanted, config.smooth_ticks)
     yaws = _yaws(at, one.boxes, wanted, velocities, config)
     return Way(frames, np.column_stack((places, yaws)), moving=True)
+
+
+def expected(one: Completed, ticks: tuple[int, ...], beyond_ticks: int, config: BoxConfig) -> Way:
+    """Where one may be: standing, in every frame; moving, a little beyond its track."""
+    low, high = ticks[one.seen.frames[0]] - beyond_ticks, ticks[one.seen.frames[-1]] + beyond_ticks
+    way = way_over(one, (one.seen.frames[0],), ticks, config)
+    frames = [i for i, tick in enumerate(ticks) if not way.moving or low <= tick <= high]
+    return way_over(one, tuple(frames), ticks, config)
 
 
 def moves(

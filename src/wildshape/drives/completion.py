@@ -9,6 +9,8 @@ is left there. Of the others some scans, spread over the track, are completed to
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from wildshape.drives.config import CompletionConfig, VehicleConfig
 from wildshape.drives.sightings import Sightings
 from wildshape.drives.source import Drive
@@ -61,7 +63,8 @@ class Completer:
         found = list(self._looker().complete_many(self._clouds(looks)))
         cost = min(look.cost for look in found)
         said = [shape_nats(look.cost, look.box.size, self.vehicles) for look in found]
-        nats = sum(max(one, self.config.worst_nats) for one in said) / len(said)
+        kept = [max(one, self.config.worst_nats) for one in said]
+        nats = float(np.average(kept, weights=looks.points))
         if cost > self.config.worst_cost_m or nats < self.config.least_nats:
             write_json(folder / RULED_OUT, {"cost_m": cost, "nats": nats})
             return

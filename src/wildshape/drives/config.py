@@ -148,7 +148,8 @@ class CompletionConfig:
         looks: scans of a track that the network sees first, the fullest of equal parts of it.
         worst_cost_m: tracks whose best first look costs more are no vehicles; those of a labelled
             street cost less than 0.2 m.
-        least_nats: nor are those whose looks say less for a vehicle on average. Of 41 tracks of
+        least_nats: nor are those whose looks say less for a vehicle on average, the fuller the
+            heavier. Of 41 tracks of
             vehicles in two drives none said less than -1.9, of 60 others half did.
         worst_nats: no single look says less.
         scans: of a track that are completed together.
@@ -178,6 +179,8 @@ class VehicleConfig:
         even_cost_m: a label-free cost that speaks neither for nor against a vehicle.
         cost_scale_m: a nat for so much less.
         usual_scans: a track of more scans speaks for a vehicle.
+        sure_of_parts: several tracks put together that are surer than this come before their
+            parts.
         merged_nats: what several tracks of one shape in one place say for a vehicle.
         usual_confidence: of the completions; more speaks for a vehicle.
         least_confidence: objects of less are left out.
@@ -185,8 +188,6 @@ class VehicleConfig:
         width_m: from and to.
         height_m: from and to.
         fewest_points: that the fullest scan must have.
-        overlap: of two objects that share more of the smaller footprint one is left out.
-        same_time_frames: completed scans so near in time are compared.
     """
 
     kinds: tuple[tuple[float, float, float], ...] = (
@@ -198,6 +199,7 @@ class VehicleConfig:
     even_cost_m: float = 0.15
     cost_scale_m: float = 0.03
     usual_scans: int = 8
+    sure_of_parts: float = 0.6
     merged_nats: float = 1.0
     usual_confidence: float = 0.1
     least_confidence: float = 0.4
@@ -205,8 +207,39 @@ class VehicleConfig:
     width_m: tuple[float, float] = (1.2, 3.2)
     height_m: tuple[float, float] = (1.0, 3.6)
     fewest_points: int = 60
+
+
+@dataclass(frozen=True)
+class MergeConfig:
+    """Which tracks are one object by their complete shapes (`merging.py`).
+
+    Attributes:
+        least_confidence: objects that are hardly vehicles are not asked.
+        overlap: share of the smaller footprint that one object's shapes have in common.
+        beyond_ticks: a moving object is expected so long before and after it was seen; a standing
+            one always.
+    """
+
+    least_confidence: float = 0.05
     overlap: float = 0.3
-    same_time_frames: int = 8
+    beyond_ticks: int = 15
+
+
+@dataclass(frozen=True)
+class ClaimConfig:
+    """Which clusters belong to a vehicle that was found (`claims.py`).
+
+    Attributes:
+        around_m: of its box; points so near belong to it.
+        inside: share of a cluster's points that must.
+        lost: a vehicle that surer ones take so much of its scans from is a part of them.
+        beyond_ticks: a moving vehicle is looked for so long before and after it was seen.
+    """
+
+    around_m: float = 0.2
+    inside: float = 0.8
+    lost: float = 0.5
+    beyond_ticks: int = 5
 
 
 @dataclass(frozen=True)
@@ -218,12 +251,14 @@ class BoxConfig:
         moving_m_per_tick: and it must be as fast as this: 0.5 m/s at 10 Hz.
         heading_m_per_tick: an object as fast as this looks where it goes: 1 m/s at 10 Hz.
         smooth_ticks: over which the way of a moving object is smoothed, standard deviation.
+        longest_gap: ticks in which a vehicle was not seen and still has boxes.
     """
 
     moving_m: float = 1.0
     moving_m_per_tick: float = 0.05
     heading_m_per_tick: float = 0.1
     smooth_ticks: float = 3.0
+    longest_gap: int = 10
 
 
 @dataclass(frozen=True)
@@ -238,4 +273,6 @@ class DriveConfig:
     tracks: LinkConfig = field(default_factory=LinkConfig)
     completion: CompletionConfig = field(default_factory=CompletionConfig)
     vehicles: VehicleConfig = field(default_factory=VehicleConfig)
+    merging: MergeConfig = field(default_factory=MergeConfig)
+    claims: ClaimConfig = field(default_factory=ClaimConfig)
     boxes: BoxConfig = field(default_factory=BoxConfig)

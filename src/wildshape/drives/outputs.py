@@ -11,10 +11,9 @@ from pathlib import Path
 
 from wildshape.drives.boxes import Way
 from wildshape.drives.completion import CATEGORY
-from wildshape.drives.placing import box_in_scan
+from wildshape.drives.placing import Completed, box_in_scan
 from wildshape.drives.sightings import Sightings
 from wildshape.drives.source import Drive
-from wildshape.drives.vehicles import Completed
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import COMPLETED, OBJECTS
 from wildshape.io.atomic import write_text

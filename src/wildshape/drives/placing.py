@@ -5,6 +5,7 @@
 The world is the sensor frame of the first frame; the level world is it with z vertical.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +15,38 @@ from jaxtyping import Float
 from wildshape.drives.mounting import Mounting
 from wildshape.drives.sightings import Sightings
 from wildshape.drives.source import Drive
-from wildshape.drives.vehicles import Completed
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation, rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import OBJECTS
 from wildshape.io.boxes.detections import Detection, detections_of, pose_of
 from wildshape.io.guard import read_json
 from wildshape.records import Box
+
+
+@dataclass(frozen=True)
+class Completed:
+    """A completed object in the drive's level world frame (z vertical).
+
+    Attributes:
+        seen: in which frames, all of them.
+        frames: those of its completed scans.
+        boxes: `(k, 4)` centre x, y, z and yaw in each of them.
+        size: `(3,)` length, width, height, metres.
+        cost_m: label-free cost, the middle one of its scans, the fuller the heavier.
+        confidence: of the completions, 0 to 1.
+    """
+
+    seen: Sightings
+    frames: tuple[int, ...]
+    boxes: Float[np.ndarray, "k 4"]
+    size: tuple[float, float, float]
+    cost_m: float
+    confidence: float
+
+    @property
+    def fullest(self) -> int:
+        """Points of its fullest scan."""
+        return max(self.seen.points)
 
 
 def level_poses(T_world_sensor: SE3, mounting: Mounting) -> SE3:
@@ -44,15 +70,24 @@ def read_completed(seen: Sightings, folder: Path, drive: Drive, T_level_sensor: 
     found = list(detections_of(said, 0))
     place = {name: frame for frame, name in enumerate(drive.scan_names)}
     frames = tuple(place[one.scan] for one in found)
-    costs = [float(scan["cost_m"]) for scan in said["scans"]]
+    costs = np.array([float(scan["cost_m"]) for scan in said["scans"]])
+    points = dict(zip(seen.frames, seen.points))
+    weights = np.array([points[frame] for frame in frames], float)
     return Completed(
         seen=seen,
         frames=frames,
         boxes=np.stack([_placed(one, T_level_sensor[frame]) for one, frame in zip(found, frames)]),
         size=found[0].box.size,
-        cost_m=float(np.mean(costs)),
+        cost_m=weighted_median(costs, weights),
         confidence=float(np.mean([one.score for one in found])),
     )
+
+
+def weighted_median(values: Float[np.ndarray, "k"], weights: Float[np.ndarray, "k"]) -> float:
+    """The value that half of the weight lies below."""
+    order = np.argsort(values)
+    below = np.cumsum(weights[order])
+    return float(values[order[np.searchsorted(below, below[-1] / 2)]])
 
 
 def _placed(one: Detection, T_level_sensor: SE3) -> Float[np.ndarray, "4"]:

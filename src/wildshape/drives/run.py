@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from wildshape.drives.boxes import smooth
+from wildshape.drives.claims import claim
 from wildshape.drives.clock import Clock, Watch, silent
 from wildshape.drives.completion import Completer
 from wildshape.drives.config import DriveConfig
@@ -25,6 +26,7 @@ from wildshape.drives.detections import (
 )
 from wildshape.drives.files import DriveFiles
 from wildshape.drives.finished import read_finished
+from wildshape.drives.merging import Places
 from wildshape.drives.mounting import Mounting, find_mounting
 from wildshape.drives.outputs import (
     BOXES,
@@ -40,7 +42,7 @@ from wildshape.drives.outputs import (
     write_trajectories,
     write_vehicle_track,
 )
-from wildshape.drives.placing import level_poses, read_completed
+from wildshape.drives.placing import Completed, level_poses, read_completed
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.result import FILES, DriveResult, earlier_result
 from wildshape.drives.segmentation import Cutter, read_cuts
@@ -48,7 +50,12 @@ from wildshape.drives.sightings import Sightings, read_sightings, write_sighting
 from wildshape.drives.source import Drive
 from wildshape.drives.tracks import Seen, link
 from wildshape.drives.trajectory import find_trajectory, jumps
-from wildshape.drives.vehicles import Completed, Judged, fragments, judge
+from wildshape.drives.vehicles import (
+    Judged,
+    judge,
+    vehicle_confidence,
+    without_parts,
+)
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import OBJECTS
 from wildshape.inference.predictor import Predictor, load
@@ -264,22 +271,36 @@ class _Run:
         """Tracks that are one object by their shapes, put together."""
         path = self.stages / "merged.json"
         if not path.is_file():
-            completed = [] if self.tracked else self.completed(objects, T_level_sensor)
-            write_sightings(path, fragments(completed, self.config.vehicles))
+            write_sightings(path, [] if self.tracked else self.fragments(objects, T_level_sensor))
         return read_sightings(path)
 
+    def fragments(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Sightings]:
+        of = self.config
+        likely = [
+            one
+            for one in self.completed(objects, T_level_sensor)
+            if vehicle_confidence(one, of.vehicles) >= of.merging.least_confidence
+        ]
+        return Places(self.drive.ticks, of.merging, of.boxes).fragments(likely)
+
     def vehicles(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Vehicle]:
+        ticks = self.drive.ticks
+        places = Places(ticks, self.config.merging, self.config.boxes)
         with self.clock.stage("vehicles", 1) as at:
             completed = self.completed(objects, T_level_sensor)
-            said = judge(completed, self.config.vehicles)
+            said = judge(completed, places, self.config.vehicles)
+            kept = {one.name: one.confidence for one in said if not one.reasons}
+            found = [one for one in completed if one.seen.name in kept]
+            if not self.tracked:
+                found.sort(key=lambda one: -kept[one.seen.name])
+                claimed = claim(found, self.cuts, T_level_sensor, ticks, self.config)
+                found, said = claimed.vehicles, without_parts(said, claimed.parts)
             self.write_judged(objects, said)
-            found = [
-                Vehicle(one, smooth(one, self.drive.ticks, self.config.boxes), judged.confidence)
-                for one, judged in zip(completed, said)
-                if not judged.reasons
-            ]
             at(1)
-            return found
+            return [
+                Vehicle(one, smooth(one, ticks, self.config.boxes), kept[one.seen.name])
+                for one in sorted(found, key=lambda one: one.seen.name)
+            ]
 
     def write_judged(self, objects: list[Sightings], said: list[Judged]) -> None:
         """Why each object is a vehicle or not."""

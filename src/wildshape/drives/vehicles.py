@@ -3,40 +3,13 @@
 """Which of the completed objects are vehicles: by cost, size and how long seen; and none twice."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
 
 from wildshape.drives.config import VehicleConfig
-from wildshape.drives.sightings import Sightings, merged
-from wildshape.geometry.footprint import footprint_overlap
-
-
-@dataclass(frozen=True)
-class Completed:
-    """A completed object in the drive's level world frame (z vertical).
-
-    Attributes:
-        seen: in which frames, all of them.
-        frames: those of its completed scans.
-        boxes: `(k, 4)` centre x, y, z and yaw in each of them.
-        size: `(3,)` length, width, height, metres.
-        cost_m: mean label-free cost.
-        confidence: of the completions, 0 to 1.
-    """
-
-    seen: Sightings
-    frames: tuple[int, ...]
-    boxes: Float[np.ndarray, "k 4"]
-    size: tuple[float, float, float]
-    cost_m: float
-    confidence: float
-
-    @property
-    def fullest(self) -> int:
-        """Points of its fullest scan."""
-        return max(self.seen.points)
+from wildshape.drives.merging import Places
+from wildshape.drives.placing import Completed
 
 
 @dataclass(frozen=True)
@@ -54,19 +27,25 @@ class Judged:
     reasons: tuple[str, ...]
 
 
-def judge(objects: list[Completed], config: VehicleConfig) -> list[Judged]:
-    """Every object, in the order given.
+def judge(objects: list[Completed], places: Places, config: VehicleConfig) -> list[Judged]:
+    """Every object, in the order given; `places`: where they are.
 
-    Of those that share a place at the same time the one of most confidence stays.
+    Of those that share a place at the same time the surest stays; several tracks put together come
+    before their parts if they are sure enough.
     """
     sure = {one.seen.name: vehicle_confidence(one, config) for one in objects}
     own = {one.seen.name: _reasons(one, sure[one.seen.name], config) for one in objects}
     kept: list[Completed] = []
-    for one in sorted(objects, key=lambda one: -sure[one.seen.name]):
+
+    def order(one: Completed) -> tuple[bool, float]:
+        confidence = sure[one.seen.name]
+        return one.seen.parts > 1 and confidence > config.sure_of_parts, confidence
+
+    for one in sorted(objects, key=order, reverse=True):
         name = one.seen.name
         if own[name]:
             continue
-        rival = next((other for other in kept if same_place(one, other, config)), None)
+        rival = next((other for other in kept if places.share(one, other)), None)
         if rival is None:
             kept.append(one)
         else:
@@ -103,20 +82,12 @@ def shape_nats(cost_m: float, size: tuple[float, float, float], config: VehicleC
     return cost + 1.0 - 0.5 * float((apart**2).sum(1).min())
 
 
-def fragments(objects: list[Completed], config: VehicleConfig) -> list[Sightings]:
-    """Those of several tracks, or pieces of one scan, that are one object by their shapes.
-
-    Complete shapes that share a place at about the same time are one thing, whatever gap was
-    between the clusters that they came from.
-    """
-    from scipy.sparse.csgraph import connected_components
-
-    shared = [[same_place(one, other, config) for other in objects] for one in objects]
-    if not objects:
-        return []
-    count, group = connected_components(np.array(shared), directed=False)
-    groups = [[objects[i].seen for i in np.flatnonzero(group == g)] for g in range(count)]
-    return [merged(parts) for parts in groups if len(parts) > 1]
+def without_parts(said: list[Judged], parts: dict[str, str]) -> list[Judged]:
+    """What was said, and that some are parts of others; `parts`: their names, and whose."""
+    return [
+        replace(one, reasons=(f"part_of_{parts[one.name]}",)) if one.name in parts else one
+        for one in said
+    ]
 
 
 def _reasons(one: Completed, confidence: float, config: VehicleConfig) -> tuple[str, ...]:
@@ -129,16 +100,3 @@ def _reasons(one: Completed, confidence: float, config: VehicleConfig) -> tuple[
 
 def _sizes(config: VehicleConfig) -> tuple[tuple[float, float], ...]:
     return config.length_m, config.width_m, config.height_m
-
-
-def same_place(one: Completed, other: Completed, config: VehicleConfig) -> bool:
-    """Whether the two share a place at about one time: twice the same vehicle."""
-    for frame, box in zip(one.frames, one.boxes):
-        nearest = int(np.abs(np.array(other.frames) - frame).argmin())
-        if abs(other.frames[nearest] - frame) > config.same_time_frames:
-            continue
-        beside = other.boxes[nearest]
-        near = np.hypot(*(box[:2] - beside[:2])) < (one.size[0] + other.size[0]) / 2
-        if near and footprint_overlap(box, one.size, beside, other.size) > config.overlap:
-            return True
-    return False

@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Clusters that lie in the box of a vehicle belong to it, whatever track they came from.
+
+So pieces of a vehicle are gathered that are too small to be completed, and scans in which it was
+seen before or after its track.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from wildshape.drives.boxes import Way, expected
+from wildshape.drives.config import DriveConfig
+from wildshape.drives.placing import Completed
+from wildshape.drives.segmentation import read_cuts
+from wildshape.drives.sightings import Sightings
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.records import Points
+
+
+@dataclass(frozen=True)
+class Claimed:
+    """Vehicles with all that is theirs.
+
+    Attributes:
+        vehicles: with more frames and clusters, in the order given.
+        parts: names of those that are a part of another, and its name.
+    """
+
+    vehicles: list[Completed]
+    parts: dict[str, str]
+
+
+def claim(
+    vehicles: list[Completed],
+    cuts: Path,
+    T_level_sensor: SE3,
+    ticks: tuple[int, ...],
+    config: DriveConfig,
+) -> Claimed:
+    """Give every cluster to the first vehicle in whose box it lies.
+
+    Args:
+        vehicles: the surest first.
+        cuts: folder of the clusters.
+        T_level_sensor: of every frame.
+        ticks: when each frame was taken.
+        config: see there.
+    """
+    ways = [expected(one, ticks, config.claims.beyond_ticks, config.boxes) for one in vehicles]
+    own = [
+        {(frame, row): i for frame, rows in zip(one.seen.frames, one.seen.rows) for row in rows}
+        for i, one in enumerate(vehicles)
+    ]
+    owner = {key: i for rows in reversed(own) for key, i in rows.items()}
+    counts = []
+    for frame, cut in enumerate(read_cuts(cuts, len(ticks))):
+        counts.append(cut.counts)
+        clusters = [T_level_sensor[frame].apply_numpy(part) for part in cut.clusters()]
+        for row, i in _claims(clusters, vehicles, ways, frame, config):
+            owner[frame, row] = min(i, owner.get((frame, row), i))
+    return _shared_out(vehicles, own, owner, counts, config)
+
+
+def _claims(
+    clusters: list[Points],
+    vehicles: list[Completed],
+    ways: list[Way],
+    frame: int,
+    config: DriveConfig,
+) -> Iterator[tuple[int, int]]:
+    """Each cluster of a frame that lies in a vehicle's box, and whose: places in the lists."""
+    centres = np.array([part.mean(0)[:2] for part in clusters]).reshape(-1, 2)
+    for i, (one, way) in enumerate(zip(vehicles, ways)):
+        place = np.searchsorted(way.frames, frame)
+        if place == len(way.frames) or way.frames[place] != frame:
+            continue
+        box = way.boxes[place]
+        near = np.hypot(*(centres - box[:2]).T) < one.size[0]
+        for row in np.flatnonzero(near).tolist():
+            inside = in_box(clusters[row], box, one.size, config.claims.around_m)
+            if inside.mean() >= config.claims.inside:
+                yield row, i
+
+
+def in_box(
+    points: Points, box: Float[np.ndarray, "4"], size: tuple[float, float, float], around_m: float
+) -> Bool[np.ndarray, "n"]:
+    """Which points lie in an upright box or so near around it.
+
+    Args:
+        points: in the box's frame.
+        box: centre x, y, z and yaw.
+        size: length, width, height.
+        around_m: metres.
+    """
+    off = points - box[:3]
+    c, s = np.cos(box[3]), np.sin(box[3])
+    turned = np.stack((c * off[:, 0] + s * off[:, 1], c * off[:, 1] - s * off[:, 0], off[:, 2]))
+    reach = np.array(size)[:, None] / 2 + around_m
+    return np.all(np.abs(turned) <= reach, axis=0)
+
+
+def _shared_out(
+    vehicles: list[Completed],
+    own: list[dict[tuple[int, int], int]],
+    owner: dict[tuple[int, int], int],
+    counts: list[np.ndarray],
+    config: DriveConfig,
+) -> Claimed:
+    """The vehicles with what they own; those that lost too much are parts of others."""
+    parts = {}
+    for i, one in enumerate(vehicles):
+        lost = [owner[key] for key in own[i] if owner[key] != i]
+        if len(lost) >= config.claims.lost * len(own[i]):
+            winner = max(set(lost), key=lost.count)
+            parts[one.seen.name] = vehicles[winner].seen.name
+    rows: list[dict[int, list[int]]] = [{} for _ in vehicles]
+    for (frame, row), i in sorted(owner.items()):
+        rows[i].setdefault(frame, []).append(row)
+    found = [
+        replace(one, seen=_with(one.seen, rows[i], counts))
+        for i, one in enumerate(vehicles)
+        if one.seen.name not in parts
+    ]
+    return Claimed(found, parts)
+
+
+def _with(seen: Sightings, rows: dict[int, list[int]], counts: list[np.ndarray]) -> Sightings:
+    """An object that is these clusters."""
+    frames = tuple(sorted(rows))
+    points = tuple(int(counts[frame][rows[frame]].sum()) for frame in frames)
+    return replace(seen, frames=frames, rows=tuple(tuple(rows[f]) for f in frames), points=points)
