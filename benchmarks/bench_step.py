@@ -38,8 +38,8 @@ from wildshape.method.network import ShapePoseNet
 from wildshape.ops.device import keep_memory
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.batches.views import Batch, ViewSampler
-from wildshape.training.config import Recipe, template_weight
-from wildshape.training.objectives import WeaklySupervised
+from wildshape.training.config import Recipe
+from wildshape.training.objectives import WeaklySupervised, template_weight
 from wildshape.training.recipes import PRESETS
 
 VARIANTS = ("ours", "plain", "plain, kept")

@@ -54,14 +54,13 @@ def _paper_drives(given: Given) -> Block:
 
 def _ours_drives(given: Given) -> Block:
     base = default_form(given.size, given.drives("train"))
-    plain = changed(base, "default, w/o selector", "network", selector=False)
     rows = (
         replace(base, name="default, full"),
         changed(base, "default, w/o facing: turned in yaw", "views", turn="yaw", roll=0.0),
         changed(base, "default, w/o mirror", "network", mirror=False),
-        changed(base, "default, w/o template", "loss", template=0.0, template_end=0.0),
+        changed(base, "default, w/o template", "loss", template=0.0),
         changed(base, "default, w/o agreed headings", "loss", time_ordered=False, agree_at=()),
-        changed(plain, plain.name, "loss", belief=0.0),
+        changed(base, "default, w/o selector", "network", selector=False),
         replace(base, name="default, taught by the full one", teacher=base),
     )
     return Block("Simulated drives, default form", given.drives("test"), rows, (), _TURNS)

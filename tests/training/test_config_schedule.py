@@ -5,7 +5,8 @@ import math
 import pytest
 
 from wildshape.method.multiview import LossConfig
-from wildshape.training.config import OptimConfig, learning_rate, template_weight
+from wildshape.training.config import OptimConfig, learning_rate
+from wildshape.training.objectives import template_weight
 
 
 def test_warmup_rises_linearly_to_the_full_rate():

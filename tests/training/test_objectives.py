@@ -101,6 +101,33 @@ def test_views_in_no_order_are_held_to_what_was_agreed_on_alone(batch):
     assert bool((handicap[agreed] > 1).any())
 
 
+def objectives_of(batch, network, loss):
+    """What both objectives ask of a network that has seen these scans."""
+    turns, ends = batch.turn[:4], torch.full((4,), 0.1)
+    shapes, sensors = torch.randn(4, 80, 3), 5 * torch.randn(4, 2, 3)
+    taught = FusedBatch(batch.scans[:4], turns, torch.ones(4, 3), shapes, sensors, ends)
+    yield WeaklySupervised(network, loss)(batch, 1.0).loss
+    yield SelfTaught(network, loss, False)(taught, 1.0).loss
+
+
+@pytest.mark.parametrize("left_out", ["template", "selector"])
+def test_one_field_leaves_the_template_or_the_selector_out(batch, left_out):
+    """Other weights of what is left out change no gradient."""
+    grads = []
+    for weight in (0.1, 0.9):
+        torch.manual_seed(0)
+        if left_out == "template":
+            sizes, loss = SMALLEST.network, replace(SMALLEST.loss, template=0.0)
+            loss = replace(loss, template_end=weight)
+        else:
+            sizes = replace(SMALLEST.network, selector=False)
+            loss = replace(SMALLEST.loss, belief=weight)
+        network = ShapePoseNet(sizes)
+        sum(objectives_of(batch, network, loss)).backward()
+        grads.append([p.grad for p in network.parameters()])
+    torch.testing.assert_close(*grads)
+
+
 def test_what_is_taught_does_not_depend_on_the_size_of_the_objects():
     generator = torch.Generator().manual_seed(0)
     scans, shapes, sensors = (torch.randn(4, n, 3, generator=generator) for n in (64, 80, 2))

@@ -14,8 +14,8 @@ from tests.training.steps import CPU, RECIPES, step_of, take
 from tests.training.worker import SMALLEST
 
 from wildshape.training.batches.resident import ResidentViews
-from wildshape.training.config import learning_rate, template_weight
-from wildshape.training.objectives import Objective, WeaklySupervised
+from wildshape.training.config import learning_rate
+from wildshape.training.objectives import Objective, WeaklySupervised, template_weight
 from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.step import average_one_by_one, average_together
 

@@ -34,7 +34,7 @@ class NetworkConfig:
         branches: K, pose hypotheses.
         spread: where the branches start, about z (`yaw`) or over all rotations (`sphere`).
         selector: the pose decoder also says which branch it believes in (beyond the paper, which
-            asks the label-free cost alone).
+            asks the label-free cost alone). False leaves it out of training and of the choice.
         mirror: the canonical shape is symmetric in its plane y = 0 (beyond the paper).
         start: half lengths, in network units, of the ellipsoid of points the shape starts from.
             Longer along x than along y, it puts a mirror plane along the object, not across.

@@ -95,11 +95,3 @@ def learning_rate(step: int, config: OptimConfig) -> float:
         return rise * config.lr * config.decay ** (step // config.decay_every)
     fall = (1 + math.cos(math.pi * min(1.0, step / config.steps))) / 2
     return rise * config.lr * (config.end + (1 - config.end) * fall)
-
-
-def template_weight(step: int, steps: int, config: LossConfig) -> float:
-    """Weight of the template pull: geometric from `template` to `template_end`."""
-    if config.template <= 0 or config.template_end <= 0:
-        return config.template
-    share = min(1.0, step / max(1, steps - 1))
-    return config.template * (config.template_end / config.template) ** share

@@ -133,3 +133,11 @@ def template_deviation(shapes: Float[Tensor, "I P 3"]) -> Float[Tensor, ""]:
     """
     deviation = shapes - shapes.mean(0, keepdim=True)
     return deviation.square().sum(-1).clamp_min(1e-12).sqrt().mean()
+
+
+def template_weight(step: int, steps: int, config: LossConfig) -> float:
+    """Weight of the template pull: geometric from `template` to `template_end`."""
+    if config.template <= 0 or config.template_end <= 0:
+        return config.template
+    share = min(1.0, step / max(1, steps - 1))
+    return config.template * (config.template_end / config.template) ** share

@@ -16,8 +16,8 @@ from torch.profiler import record_function
 
 from wildshape.training.batches.host import HostViews
 from wildshape.training.batches.resident import ResidentViews
-from wildshape.training.config import Recipe, learning_rate, template_weight
-from wildshape.training.objectives import Objective
+from wildshape.training.config import Recipe, learning_rate
+from wildshape.training.objectives import Objective, template_weight
 from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.state import TrainState
 

@@ -12,9 +12,9 @@ import torch
 from safetensors.torch import load_file
 from tests.training.worker import FEW_STEPS, SEED
 
-from wildshape.training.config import learning_rate, template_weight
+from wildshape.training.config import learning_rate
 from wildshape.training.loop import setup
-from wildshape.training.objectives import WeaklySupervised
+from wildshape.training.objectives import WeaklySupervised, template_weight
 
 ROOT = Path(__file__).parents[3]
 

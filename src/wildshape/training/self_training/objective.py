@@ -49,7 +49,7 @@ class SelfTaught(nn.Module):
 
     Args:
         network: is taught.
-        config: `template_end` is the weight of the template.
+        config: `template_end` is the weight of the template, where there is one.
         complete: the target shapes are whole; else only what the sensors saw is taught.
         encoding: how the network encodes (see there).
         unit: metres of the unit in which losses are taken (`unit_of`).
@@ -91,7 +91,8 @@ class SelfTaught(nn.Module):
             part.mean() for part in (shape.precision, shape.coverage, pose.distance)
         )
         loss = distance + precision + coverage - self.distances.belief * belief
-        loss = loss + self.config.template_end * deviation
+        if self.config.template > 0:
+            loss = loss + self.config.template_end * deviation
         lengths = {
             "pose": distance,
             "coverage": coverage,
