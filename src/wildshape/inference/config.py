@@ -215,6 +215,19 @@ class ReasonRule:
 
 
 @dataclass(frozen=True)
+class InlierRule:
+    """Which points of a registered source lie on its target.
+
+    Attributes:
+        within_m: nearest target points are no farther; the noise of scans and their spacing.
+        within_share: nor than this share of the target's extent.
+    """
+
+    within_m: float = 0.2
+    within_share: float = 0.05
+
+
+@dataclass(frozen=True)
 class ExportRule:
     """How near an exported file must come to torch (`export/verify.py`).
 
@@ -237,6 +250,7 @@ class InferenceConfig:
         track: how the scans of a track make one object.
         box: how a box is laid around a shape.
         reasons: when a result is flagged.
+        inliers: which points count for a registration's inlier ratio.
         ground_share: a scan of which more than this share is ground beside the object is given to
             the network once more without it.
     """
@@ -246,4 +260,5 @@ class InferenceConfig:
     track: TrackConfig = field(default_factory=TrackConfig)
     box: BoxConfig = field(default_factory=BoxConfig)
     reasons: ReasonRule = field(default_factory=ReasonRule)
+    inliers: InlierRule = field(default_factory=InlierRule)
     ground_share: float = 0.05

@@ -178,7 +178,7 @@ class Predictor:
         pair = (as_points(source, "source"), as_points(target, "target"))
         done_source, done_target = self._each(pair, sensor)
         T_target_source = done_target.pose @ done_source.pose.inverse()
-        ratio = inlier_ratio(T_target_source, *pair)
+        ratio = inlier_ratio(T_target_source, *pair, self.config.inliers)
         confidence = min(done_source.confidence, done_target.confidence)
         warning = done_source.warning or done_target.warning
         reasons = tuple(dict.fromkeys((*done_source.reasons, *done_target.reasons)))

@@ -9,10 +9,11 @@ import torch
 
 from wildshape.geometry.box import extent
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.config import InlierRule
 from wildshape.ops.nearest import nearest
 from wildshape.records import Points
 
-_INLIER_M, _INLIER_SHARE = 0.2, 0.05
+_RULE = InlierRule()
 
 
 def to_middle(T_sensor_canonical: SE3) -> SE3:
@@ -27,9 +28,11 @@ def fuse_scans(scans: Sequence[Points], T_middle_scan: SE3) -> Points:
     return np.concatenate(moved).astype(np.float32)
 
 
-def inlier_ratio(T_target_source: SE3, source: Points, target: Points) -> float:
+def inlier_ratio(
+    T_target_source: SE3, source: Points, target: Points, rule: InlierRule = _RULE
+) -> float:
     """Share of moved source points near a target point (`Registration.inlier_ratio`)."""
-    reach = min(_INLIER_M, _INLIER_SHARE * extent(target))
+    reach = min(rule.within_m, rule.within_share * extent(target))
     moved = torch.from_numpy(T_target_source.apply_numpy(source))
     found = nearest(moved[None], torch.from_numpy(np.ascontiguousarray(target))[None])
     return float((found.distance_squared <= reach * reach).float().mean())

@@ -12,7 +12,10 @@ from torch.nn.functional import leaky_relu, normalize
 
 from wildshape.baselines.dpc.viewing_volume import PinholeVolume, RangeImage, Volume, beyond
 
+# Of the authors' network: slope of its activation, width of a pose branch, side of the last map,
+# and how widely the first weights are spread.
 _LEAK, _BRANCH, _SMALLEST_MAP = 0.2, 32, 4
+_SPREAD, _SPREAD_OF_TRANSLATION = 0.025, 0.05
 
 
 @dataclass(frozen=True)
@@ -89,10 +92,10 @@ class DpcNet(nn.Module):
                 nn.init.kaiming_normal_(module.weight, a=_LEAK)
                 if module.bias is not None:
                     nn.init.zeros_(module.bias)
-        nn.init.trunc_normal_(self.shape.weight, std=0.025)
-        nn.init.trunc_normal_(self.strength.weight, std=0.025)
+        nn.init.trunc_normal_(self.shape.weight, std=_SPREAD)
+        nn.init.trunc_normal_(self.strength.weight, std=_SPREAD)
         if self.translation is not None:
-            nn.init.trunc_normal_(self.translation.weight, std=0.05)
+            nn.init.trunc_normal_(self.translation.weight, std=_SPREAD_OF_TRANSLATION)
 
     def encode(self, image: RangeImage) -> Float[Tensor, "B code"]:
         """Code of images `image` pixels wide: what is covered, and how near it is."""

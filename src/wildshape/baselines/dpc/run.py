@@ -30,7 +30,8 @@ from wildshape.training.setup import split_tracks
 from wildshape.training.state import STATE, TrainState, load_state, save_state
 from wildshape.training.step import average_one_by_one
 
-_LOG_EVERY, _LOOKED_AT, _SEEN = 25, 64, 0.9
+_LOG_EVERY = 25
+_LOOKED_AT, _SEEN = 64, 0.9  # scans, and the share of their points that the image must hold
 
 
 @dataclass
