@@ -8,6 +8,7 @@ camera, so a shift between two panels is a shift in metres.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -100,6 +101,7 @@ class ReportObject:
         details: (label, value) pairs under the name.
         sensor: tells which way is up; the sensor stands at the origin.
         scans: what is known of each scan of it.
+        paper: whether it has a picture on paper, too.
     """
 
     name: str
@@ -109,6 +111,20 @@ class ReportObject:
     details: tuple[tuple[str, str], ...] = ()
     sensor: SensorKind = "lidar"
     scans: Table | None = None
+    paper: bool = True
+
+
+@dataclass(frozen=True)
+class SceneView:
+    """A scene that is played over time.
+
+    Attributes:
+        data: what the page's script draws, JSON values.
+        picture: WebP, for paper and browsers without WebGL.
+    """
+
+    data: dict[str, Any]
+    picture: bytes
 
 
 @dataclass(frozen=True)
@@ -132,6 +148,8 @@ class Report:
         findings: the main figures in plain language, a sentence each, under the summary.
         cost: (label, value) tiles: time, steps, points.
         index: all objects, those to look at first on top.
+        facts: (label, value) tiles on top.
+        scene: of a drive.
         provenance: name -> anything; shown folded at the end.
     """
 
@@ -146,6 +164,8 @@ class Report:
     figures: tuple[Figure, ...] = ()
     findings: tuple[str, ...] = ()
     index: tuple[Table, ...] = ()
+    facts: tuple[tuple[str, str], ...] = ()
+    scene: SceneView | None = None
 
 
 def track_object(

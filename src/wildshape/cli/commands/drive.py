@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from tyro.conf import Positional, arg
+from tyro.conf import FlagCreatePairsOff, Positional, arg
 
 from wildshape.cli.options import (
     DEFAULT_NETWORK,
@@ -57,9 +57,10 @@ class Settings:
     """Find every vehicle of a raw recording: its track, boxes and complete shape, without labels.
 
     Writes DIR/boxes.csv (a line a vehicle and frame, in that frame's sensor frame), trajectory.txt
-    (T_world_sensor), tracks/ (input for every other command) and objects/ (completed shapes); of
-    several drives each into a folder of its name. An interrupted run goes on where it stopped when
-    repeated. Repeated with --boxes or --mesh, a finished one gets these files and nothing else.
+    (T_world_sensor), tracks/ (input for every other command), objects/ and shapes/ (completed
+    shapes) and report.html (the drive over time, in 3D); of several drives each into a folder of
+    its name. Repeated, an interrupted run goes on where it stopped; a finished one gets the files
+    asked for that it lacks.
     """
 
     source: Sources
@@ -94,6 +95,7 @@ class Settings:
             " OpenPCDet or mmdetection3d as .json, or a boxes.csv; their tracks are kept",
         ),
     ] = None
+    no_report: Annotated[FlagCreatePairsOff[bool], arg(help="write no report.html")] = False
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -128,8 +130,22 @@ def run(settings: Settings) -> None:
                 watch=watch,
             )
             found.append(one)
+        if not settings.no_report:
+            _report(out)
     text = "\n".join(map(_sentence, found))
     answer(text, {"drives": [_data(one) for one in found]}, as_json=settings.json)
+
+
+def _report(out: Path) -> None:
+    """Draw the page, if it is not there yet."""
+    from wildshape.cli.terminal import TERMINAL
+    from wildshape.drives.result import REPORT
+    from wildshape.report.drive.page import write_drive_report
+
+    if not (out / REPORT).is_file():
+        with TERMINAL.bar("report", 1) as bar:
+            write_drive_report(out)
+            bar.at(1)
 
 
 def _files(settings: Settings) -> "DriveFiles":

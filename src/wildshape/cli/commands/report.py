@@ -13,10 +13,13 @@ from wildshape.cli.options import AsJson, Overwrite, option
 EXAMPLES = (
     "wildshape report completed --out completed/report.html",
     "wildshape report runs/cars",
+    "wildshape report found",
 )
 
 Folder = Annotated[
-    Path, Positional, arg(metavar="DIR", help="the --out of complete, register, evaluate or train")
+    Path,
+    Positional,
+    arg(metavar="DIR", help="the --out of drive, complete, register, evaluate or train"),
 ]
 OutFile = Annotated[
     Path | None, option(metavar="FILE", help="page to write; by default DIR/report.html")
@@ -28,7 +31,10 @@ Inputs = Annotated[
 
 @dataclass(frozen=True)
 class Settings:
-    """Draw results as one self-contained HTML page: objects in 3D, tables, curves, cost."""
+    """Draw results as one self-contained HTML page: objects in 3D, tables, curves, cost.
+
+    Of a drive: its scene over time, and each vehicle with its shape.
+    """
 
     folder: Folder
     out: OutFile = None
@@ -44,13 +50,16 @@ def run(settings: Settings) -> None:
         BadInputError: nothing there to report, or the page exists.
     """
     from wildshape.cli.terminal import answer
+    from wildshape.drives.finished import is_drive
     from wildshape.io.output import refuse_file
+    from wildshape.report.drive.page import report_from_drive
     from wildshape.report.page.folder import report_from_folder
     from wildshape.report.page.html import write_report
 
     out = settings.out or settings.folder / "report.html"
     refuse_file(out, overwrite=settings.overwrite)
-    found = report_from_folder(settings.folder, settings.inputs)
+    read = report_from_drive if is_drive(settings.folder) else report_from_folder
+    found = read(settings.folder, settings.inputs)
     write_report(found, out)
     data = {"out": str(out), "objects": len(found.objects), "tables": len(found.tables)}
     answer(f"the report is {out}", data, as_json=settings.json)

@@ -27,6 +27,7 @@ from wildshape.report.content import (
     Numbers,
     Report,
     ReportObject,
+    SceneView,
     Table,
 )
 from wildshape.report.picture import still
@@ -53,15 +54,16 @@ def render(report: Report) -> str:
     """The page's text."""
     from plotly.offline import get_plotlyjs
 
-    template = files("wildshape.report.page") / "template"
     scenes = [scene_of(shown) for shown in report.objects]
-    return Template((template / "page.html").read_text(encoding="utf-8")).substitute(
+    return Template(_template("page.html")).substitute(
         title=escape(report.title),
         summary=_paragraphs(report.summary),
-        style=(template / "page.css").read_text(encoding="utf-8"),
+        style=_texts(report, "page.css", "scene.css"),
+        facts=_tiles(report.facts),
+        scene=_scene_section(report.scene),
         stills=_stills(report, scenes),
         objects_hidden="" if report.objects else "hidden",
-        cost=_cost(report),
+        cost=_section("Cost", _tiles(report.cost)),
         findings=_findings(report.findings),
         index="".join(_section(t.title, _html_table(t)) for t in report.index),
         tables="".join(_section(t.title, _html_table(t)) for t in report.tables),
@@ -71,8 +73,24 @@ def render(report: Report) -> str:
         provenance=_provenance(report.provenance),
         data=_json(_data(report, scenes)),
         plotly=get_plotlyjs(),
-        script=(template / "page.js").read_text(encoding="utf-8"),
+        script=_texts(report, "page.js", "scene_drawing.js", "scene.js"),
     )
+
+
+def _template(name: str) -> str:
+    return (files("wildshape.report.page") / "template" / name).read_text(encoding="utf-8")
+
+
+def _texts(report: Report, always: str, *of_scenes: str) -> str:
+    """A part of the page, and what it needs for a scene."""
+    return "".join(map(_template, (always, *of_scenes) if report.scene else (always,)))
+
+
+def _scene_section(scene: SceneView | None) -> str:
+    if scene is None:
+        return ""
+    picture = f'<img alt="the drive from above" src="{_embedded(scene.picture, "webp")}">'
+    return Template(_template("scene.html")).substitute(picture=picture, scene=_json(scene.data))
 
 
 def quantise(points: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[str, list[float]]:
@@ -164,12 +182,11 @@ def _section(title: str, body: str) -> str:
     return f"<section><h2>{escape(title)}</h2>{body}</section>" if body else ""
 
 
-def _cost(report: Report) -> str:
-    tiles = "".join(
-        f"<div><dt>{escape(label)}</dt><dd>{escape(value)}</dd></div>"
-        for label, value in report.cost
+def _tiles(tiles: tuple[tuple[str, str], ...]) -> str:
+    parts = "".join(
+        f"<div><dt>{escape(label)}</dt><dd>{escape(value)}</dd></div>" for label, value in tiles
     )
-    return _section("Cost", f'<dl class="tiles">{tiles}</dl>' if tiles else "")
+    return f'<dl class="tiles">{parts}</dl>' if tiles else ""
 
 
 def _curves(curves: tuple[Curve, ...]) -> str:
@@ -185,7 +202,7 @@ def _figures(report: Report) -> str:
     images = "".join(
         f"<figure{' class=wide' if figure.wide else ''}><figcaption>{escape(figure.title)}"
         f'</figcaption><img alt="{escape(figure.title)}"'
-        f' src="{_png(figure.png)}"></figure>'
+        f' src="{_embedded(figure.png, "png")}"></figure>'
         for figure in report.figures
     )
     return _section("Figures", f"<div class=grid>{images}</div>" if images else "")
@@ -209,14 +226,18 @@ def _stills(report: Report, scenes: list[Scene]) -> str:
 
 
 def _still(shown: ReportObject, scene: Scene) -> str:
-    image = f'<img alt="{escape(shown.name)}" src="{_png(still(scene))}">' if scene.clouds else ""
+    image = (
+        f'<img alt="{escape(shown.name)}" src="{_embedded(still(scene), "png")}">'
+        if scene.clouds and shown.paper
+        else ""
+    )
     details = "; ".join(f"{label} {value}" for label, value in shown.details)
     table = f"<div class=scans>{_html_table(shown.scans)}</div>" if shown.scans else ""
     return f"{image}<p>{escape(details)}</p>{table}"
 
 
-def _png(png: bytes) -> str:
-    return f"data:image/png;base64,{base64.b64encode(png).decode('ascii')}"
+def _embedded(image: bytes, kind: str) -> str:
+    return f"data:image/{kind};base64,{base64.b64encode(image).decode('ascii')}"
 
 
 def _notes(notes: tuple[str, ...]) -> str:

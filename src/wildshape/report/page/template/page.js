@@ -213,6 +213,11 @@
     draw();
   }
 
+  function take(index) { // by the reader: the scene, if there is one, follows
+    select(index);
+    document.dispatchEvent(new CustomEvent("object", { detail: index }));
+  }
+
   function scans(index) { // the table that is printed, shown here for the object chosen
     const table = document.querySelectorAll(".stills figure")[index]?.querySelector(".scans");
     $("scans").hidden = !table;
@@ -267,7 +272,7 @@
   }
 
   function leads(row) { // to the object's pictures
-    const go = () => { select(Number(row.dataset.object)); $("objects").scrollIntoView({ behavior: "smooth" }); };
+    const go = () => { take(Number(row.dataset.object)); $("objects").scrollIntoView({ behavior: "smooth" }); };
     row.addEventListener("click", go);
     row.addEventListener("keydown", (e) => { if (e.key === "Enter") go(); });
   }
@@ -283,7 +288,8 @@
   }
 
   function start() {
-    data.objects.forEach((object, i) => button($("picker"), object.name, () => select(i)));
+    data.objects.forEach((object, i) => button($("picker"), object.name, () => take(i)));
+    document.addEventListener("vehicle", (e) => { if (data.objects[e.detail]) select(e.detail); });
     $("picker").hidden = data.objects.length < 2;
     for (const name of Object.keys(presets)) button($("views"), name, () => { look(name); turned(); });
     $("closer").addEventListener("click", () => { view.distance /= 1.2; turned(); });

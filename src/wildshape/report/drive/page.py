@@ -1,0 +1,188 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""`report.html` of a drive: the scene played over time, and each vehicle with its shape."""
+
+from pathlib import Path
+
+import numpy as np
+
+from wildshape.drives.finished import FinishedDrive, FoundVehicle, read_finished
+from wildshape.drives.result import REPORT
+from wildshape.drives.source import Drive
+from wildshape.errors import BadInputError
+from wildshape.inference.registration import fuse_scans, to_middle
+from wildshape.io.progress import counted, duration
+from wildshape.records import as_text
+from wildshape.report.content import Cloud, Report, ReportObject, SceneView, Table
+from wildshape.report.drive.picture import picture_from_above
+from wildshape.report.drive.scene import drawn_scans, scene_data
+from wildshape.report.page.html import write_report
+from wildshape.report.results import Inputs, TrackResult, box_of, read_result
+from wildshape.report.scene import thin
+
+MOST_OBJECTS = 150
+_POINTS = 2500  # of a panel
+_NOTES = (
+    "Drift can be told only where true poses are known: `wildshape evaluate-drive` measures it.",
+)
+_COLUMNS = (
+    "vehicle",
+    "",
+    "confidence",
+    "length, m",
+    "width, m",
+    "height, m",
+    "frames",
+    "seen, s",
+    "nearest, m",
+    "most points",
+)
+
+
+def report_from_drive(out: Path, moved: Path | None = None) -> Report:
+    """The page of a finished drive.
+
+    Args:
+        out: the drive's folder.
+        moved: where the recording is now, if it is no longer where it was. Where it cannot be read
+            the scene shows no scans.
+
+    Raises:
+        BadInputError: no finished drive, or a damaged one; `moved` is another recording.
+    """
+    found = read_finished(out)
+    return drive_report(found, _source(found, moved))
+
+
+def write_drive_report(out: Path) -> None:
+    """Write `report.html` into a finished drive's folder.
+
+    Raises:
+        BadInputError: no finished drive, or a damaged one.
+    """
+    write_report(report_from_drive(out), out / REPORT)
+
+
+def _source(found: FinishedDrive, moved: Path | None) -> Drive | None:
+    """The recording; None where it has gone, and nobody said where to."""
+    try:
+        return found.open_source(moved)
+    except BadInputError:
+        if moved is not None:
+            raise
+        return None
+
+
+def drive_report(found: FinishedDrive, drive: Drive | None) -> Report:
+    """The page's content; without the recording the scene shows no scans."""
+    said = found.record.get("result") or {}
+    gone = () if drive is not None else (f"{found.source} cannot be read: no scans are drawn.",)
+    shown = found.vehicles[:MOST_OBJECTS]
+    scans = drawn_scans(found, drive)
+    where = Inputs(found.out / "tracks")
+    return Report(
+        title=f"Wildshape drive: {as_text(found.name)}",
+        facts=tuple(_facts(found)),
+        scene=SceneView(scene_data(found, scans), picture_from_above(found, scans)),
+        index=(_index(found),) if found.vehicles else (),
+        objects=tuple(_object(found, one, where) for one in shown),
+        cost=tuple(_cost(said.get("seconds") or {})),
+        notes=(*gone, *map(str, said.get("warnings") or ()), *_NOTES),
+        provenance=found.record.get("provenance") or {},
+    )
+
+
+def _facts(found: FinishedDrive) -> list[tuple[str, str]]:
+    moving = sum(one.moving for one in found.vehicles)
+    return [
+        ("vehicles", str(len(found.vehicles))),
+        ("of them moving", str(moving)),
+        ("scans", str(len(found))),
+        ("time", f"{found.seconds[-1]:.1f} s" if len(found) else "0 s"),
+        ("way of the sensor", f"{found.travelled_m:.0f} m"),
+        ("drift", "n/a"),
+    ]
+
+
+def _cost(seconds: dict[str, float]) -> list[tuple[str, str]]:
+    if not seconds:
+        return []
+    return [
+        ("all of it", duration(sum(seconds.values()))),
+        *((stage, f"{spent:.1f} s") for stage, spent in seconds.items()),
+    ]
+
+
+def _index(found: FinishedDrive) -> Table:
+    rows = tuple(_row(found, one) for one in found.vehicles)
+    count = range(len(rows))
+    return Table(
+        title=counted(len(rows), "vehicle"),
+        columns=_COLUMNS,
+        rows=rows,
+        caption="Click a row for its complete shape and its scans.",
+        sortable=True,
+        objects=tuple(i if i < MOST_OBJECTS else None for i in count),
+    )
+
+
+def _row(found: FinishedDrive, one: FoundVehicle) -> tuple[str | int, ...]:
+    first, last = (found.seconds[one.frames[i]] for i in (0, -1))
+    return (
+        one.name,
+        "moving" if one.moving else "standing",
+        f"{one.confidence:.2f}",
+        *(f"{side:.2f}" for side in one.size),
+        len(one.frames),
+        f"{first:.1f} to {last:.1f}",
+        f"{one.nearest_m:.1f}",
+        max(one.points),
+    )
+
+
+def _object(found: FinishedDrive, one: FoundVehicle, where: Inputs) -> ReportObject:
+    """Panels in the sensor frame of its fullest completed scan."""
+    result = read_result(found.out / "objects" / one.name, where)
+    scan = _fullest(result)
+    entry = result.entry(scan)
+    clouds = [Cloud("input scan", _scan(result, scan), size=2.6), *_fused(result, scan)]
+    completed = result.completed(scan)
+    if completed is not None:
+        clouds.append(Cloud("completed", thin(completed, _POINTS)))
+    size = " x ".join(f"{side:.2f}" for side in one.size)
+    return ReportObject(
+        name=one.name,
+        subtitle=f"scan {scan}, {counted(len(result.scans), 'scan')} completed together",
+        clouds=tuple(cloud for cloud in clouds if len(cloud.points)),
+        box=box_of(entry),
+        details=(
+            ("box", f"{size} m"),
+            ("confidence", f"{one.confidence:.2f}"),
+            ("", "moving" if one.moving else "standing"),
+            ("frames", f"{one.frames[0]} to {one.frames[-1]}"),
+        ),
+        paper=False,
+    )
+
+
+def _fullest(result: TrackResult) -> str:
+    """The completed scan of most points."""
+    return max(result.scans, key=lambda name: len(_scan(result, name)))
+
+
+def _scan(result: TrackResult, name: str) -> np.ndarray:
+    track = result.track
+    if track is None or name not in track.scan_names:
+        return np.empty((0, 3), np.float32)
+    return track.scans[track.scan_names.index(name)]
+
+
+def _fused(result: TrackResult, scan: str) -> list[Cloud]:
+    """All its completed scans, by their poses, in the frame of one."""
+    poses = result.poses()
+    if poses is None or len(result.scans) < 2 or len(poses) != len(result.scans):
+        return []
+    T_middle_scan = to_middle(poses)
+    T_scan_middle = T_middle_scan[result.scans.index(scan)].inverse()
+    fused = fuse_scans([_scan(result, name) for name in result.scans], T_middle_scan)
+    return [Cloud("fused by us", thin(T_scan_middle.apply_numpy(fused), _POINTS))]

@@ -1,0 +1,206 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A drive made ready to be drawn: frames and points thinned, each point with the vehicle it is on.
+
+The drawing frame is the level world (`drives/placing.py`): z up, metres, right-handed.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import Float, Int
+
+from wildshape.drives.finished import FinishedDrive, FoundVehicle
+from wildshape.drives.source import Drive
+from wildshape.geometry.box import box_axes
+from wildshape.records import Box, Points
+from wildshape.report.page.html import quantise
+from wildshape.report.scene import thin
+
+# Told apart on a dark ground, the first six by colour-blind readers, too (Okabe & Ito 2008).
+PALETTE = (
+    "#e69f00",
+    "#56b4e9",
+    "#2fc58f",
+    "#f0e442",
+    "#ff7a45",
+    "#e48ac0",
+    "#6f9bff",
+    "#a6e05a",
+    "#b99cff",
+    "#ff8f8f",
+)
+_AROUND_M, _FOOT_M = 0.15, 0.15  # a box that is a little small; the ground under it
+NOBODY = -1
+
+
+@dataclass(frozen=True)
+class SceneConfig:
+    """How much of a drive is drawn: a page of it stays below 25 MB.
+
+    Attributes:
+        frames: at most so many, evenly spread.
+        points: of all frames drawn.
+        points_a_scan: at most.
+        points_a_vehicle: at most, of those in a scan.
+        points_a_shape: at most, of a complete one.
+        range_m: farther points are left out.
+        cell_m: of the rest one point in each cell of this size is drawn.
+    """
+
+    frames: int = 120
+    points: int = 1_200_000
+    points_a_scan: int = 14_000
+    points_a_vehicle: int = 400
+    points_a_shape: int = 1500
+    range_m: float = 80.0
+    cell_m: float = 0.2
+
+
+@dataclass(frozen=True)
+class DrawnScan:
+    """Points of one scan.
+
+    Attributes:
+        frame: of the drive.
+        points: `(n, 3)` sensor frame, metres; those on no vehicle first, shuffled, so that the
+            first of them are a thinner scan.
+        owners: number of the vehicle that each is on, or `NOBODY`.
+    """
+
+    frame: int
+    points: Points
+    owners: Int[np.ndarray, "n"]
+
+
+_DEFAULT = SceneConfig()
+
+
+def drawn_scans(
+    found: FinishedDrive, drive: Drive | None, config: SceneConfig = _DEFAULT
+) -> list[DrawnScan]:
+    """The scans that are drawn, read one by one; without the recording they have no points."""
+    step = -(-len(found) // config.frames) or 1
+    frames = range(0, len(found), step)
+    most = min(config.points_a_scan, config.points // max(1, len(frames)))
+    boxes = boxes_by_frame(found)
+    none = np.empty((0, 3), np.float32)
+    scans = ((frame, none if drive is None else drive.scan(frame)) for frame in frames)
+    return [thinned(frame, scan, boxes.get(frame, {}), most, config) for frame, scan in scans]
+
+
+def boxes_by_frame(found: FinishedDrive) -> dict[int, dict[int, Box]]:
+    """By frame and number of the vehicle."""
+    boxes: dict[int, dict[int, Box]] = {}
+    for number, one in enumerate(found.vehicles):
+        for frame, box in zip(one.frames, one.boxes):
+            boxes.setdefault(frame, {})[number] = box
+    return boxes
+
+
+def thinned(
+    frame: int, scan: Points, boxes: dict[int, Box], most: int, config: SceneConfig = _DEFAULT
+) -> DrawnScan:
+    """A scan of at most `most` points, and those on vehicles."""
+    near = scan[(scan[:, :2] ** 2).sum(1) < config.range_m**2]
+    owners = owners_of(near, boxes)
+    rest = near[owners == NOBODY]
+    rest = thin(rest[_one_a_cell(rest, config.cell_m)], most)
+    rest = rest[np.random.default_rng(0).permutation(len(rest))]
+    parts = [thin(near[owners == number], config.points_a_vehicle) for number in boxes]
+    counts = [len(part) for part in parts]
+    return DrawnScan(
+        frame,
+        np.concatenate([rest, *parts]),
+        np.repeat([NOBODY, *boxes], [len(rest), *counts]).astype(np.int64),
+    )
+
+
+def owners_of(points: Points, boxes: dict[int, Box]) -> Int[np.ndarray, "n"]:
+    """Which box each point is in, by the box's number; all in one sensor frame."""
+    owners = np.full(len(points), NOBODY)
+    along, across = np.ascontiguousarray(points[:, :2].T)
+    for number, box in boxes.items():
+        half, (x, y, _) = np.asarray(box.size) / 2, box.centre
+        reach = np.float32(np.linalg.norm(half) + _AROUND_M)
+        close = np.flatnonzero(
+            (abs(along - np.float32(x)) < reach) & (abs(across - np.float32(y)) < reach)
+        )
+        own = (points[close] - np.asarray(box.centre)) @ box_axes(box.quaternion_wxyz)
+        inside = (np.abs(own) < half + _AROUND_M).all(1) & (own[:, 2] > _FOOT_M - half[2])
+        owners[close[inside]] = number
+    return owners
+
+
+def _one_a_cell(points: Points, cell_m: float) -> Int[np.ndarray, "m"]:
+    """Rows of one point a cell, the first of each."""
+    cells = np.floor(points / cell_m).astype(np.int64) + 2**20
+    keys = (cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2]
+    return np.sort(np.unique(keys, return_index=True)[1])
+
+
+def placed(found: FinishedDrive, one: FoundVehicle) -> Float[np.ndarray, "f 4"]:
+    """Centre x, y, z and yaw in the drawing frame, of each of its frames."""
+    rows = [
+        (*T.translation.tolist(), float(torch.atan2(T.rotation[1, 0], T.rotation[0, 0])))
+        for T in found.placed(one)
+    ]
+    return np.array(rows)
+
+
+def scene_data(
+    found: FinishedDrive, scans: Sequence[DrawnScan], config: SceneConfig = _DEFAULT
+) -> dict[str, Any]:
+    """The scene as JSON values, for the script of the page."""
+    frames = [scan.frame for scan in scans]
+    return {
+        "name": found.name,
+        "ground": found.ground_m,
+        "palette": PALETTE,
+        "total": len(found),
+        "frames": [_frame(found, scan) for scan in scans],
+        "vehicles": [_vehicle(found, one, frames, config) for one in found.vehicles],
+        "way": found.T_level_sensor.translation.numpy().round(3).tolist(),
+    }
+
+
+def _frame(found: FinishedDrive, scan: DrawnScan) -> dict[str, Any]:
+    pose = found.T_level_sensor[scan.frame].matrix[:3].numpy()
+    mine = scan.owners[scan.owners != NOBODY] % len(PALETTE)
+    return {
+        "frame": scan.frame,
+        "time": round(found.seconds[scan.frame], 3),
+        "pose": pose.round(6).tolist(),
+        "owners": mine.tolist(),
+        **_packed(scan.points),
+    }
+
+
+def _vehicle(
+    found: FinishedDrive, one: FoundVehicle, frames: Sequence[int], config: SceneConfig
+) -> dict[str, Any]:
+    places = dict(zip(one.frames, placed(found, one).round(3).tolist()))
+    points = dict(zip(one.frames, one.points))
+    speeds = np.linalg.norm(found.velocities(one), axis=1)
+    speed = dict(zip(one.frames, speeds.round(1).tolist()))
+    return {
+        "name": one.name,
+        "size": [round(side, 3) for side in one.size],
+        "moving": one.moving,
+        "confidence": round(one.confidence, 3),
+        "places": [places.get(frame) for frame in frames],
+        "points": [points.get(frame, 0) for frame in frames],
+        "speeds": [speed.get(frame, 0.0) for frame in frames],
+        "shape": _packed(thin(found.shape(one), config.points_a_shape)),
+    }
+
+
+def _packed(points: Points) -> dict[str, Any]:
+    if not len(points):
+        return {"count": 0, "low": [0, 0, 0], "step": [1, 1, 1], "points": ""}
+    low, high = points.min(0).astype(np.float64), points.max(0).astype(np.float64)
+    packed, step = quantise(points, low, np.maximum(high, low + 1e-3))
+    return {"count": len(points), "low": low.tolist(), "step": step, "points": packed}

@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A drive's page: points where they were measured; played and clicked in a browser."""
+
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+from tests.drives.finished_drive import CARS, FRAMES, HEIGHT, finished_drive
+from tests.refusal import refused
+from tests.report.chromium import CHROMIUM, browser, colourful, eventually, moved
+
+from wildshape.report.drive.page import report_from_drive, write_drive_report
+from wildshape.report.drive.scene import NOBODY, SceneConfig, drawn_scans, scene_data
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    return finished_drive(tmp_path_factory.mktemp("drive"))
+
+
+def test_points_belong_to_the_vehicles_they_were_measured_on(found):
+    scans = drawn_scans(found, found.open_source())
+    assert [scan.frame for scan in scans] == list(range(FRAMES))
+    for scan in scans:
+        assert (scan.points[scan.owners == NOBODY][:, 2] < 0.16 - HEIGHT).all()
+        for number, places in enumerate(CARS.values()):
+            own = scan.points[scan.owners == number]
+            assert len(own) > 100
+            x, y, _ = places[scan.frame]
+            assert np.abs(own[:, :2].mean(0) - (x - scan.frame, y)).max() < 0.4
+
+
+def test_a_long_drive_is_drawn_within_its_limits(found):
+    config = SceneConfig(frames=3, points=600, points_a_vehicle=20, points_a_shape=30)
+    scans = drawn_scans(found, found.open_source(), config)
+    assert [scan.frame for scan in scans] == [0, 2, 4]
+    assert all((scan.owners == NOBODY).sum() == 200 for scan in scans)
+    assert all((scan.owners != NOBODY).sum() == 40 for scan in scans)
+    data = scene_data(found, scans, config)
+    assert [one["shape"]["count"] for one in data["vehicles"]] == [30, 30]
+    standing, coming = data["vehicles"]
+    assert coming["places"][2] == pytest.approx([26.8, -2.0, 0.75 - HEIGHT, 3.0], abs=2e-3)
+    assert (standing["speeds"][1], coming["speeds"][1]) == (0.0, 8.0)
+
+
+def test_each_vehicle_s_scans_are_fused_where_it_is_completed(found):
+    report = report_from_drive(found.out)
+    assert [shown.name for shown in report.objects] == list(CARS)
+    assert [row[1] for row in report.index[0].rows] == ["standing", "moving"]
+    assert "a strange thing" in report.notes
+    assert ("completion", "2.5 s") in report.cost
+    for shown in report.objects:
+        assert shown.box is not None
+        for cloud in shown.clouds:
+            reach = np.abs(cloud.points - np.asarray(shown.box.centre)).max(0)
+            assert (reach < (2.6, 1.5, 0.8)).all(), cloud.label
+
+
+def test_without_the_recording_the_vehicles_are_drawn_alone(found, tmp_path):
+    out = shutil.copytree(found.out, tmp_path / "found")
+    said = json.loads((out / "wildshape.json").read_text())
+    said["settings"]["source"] = str(tmp_path / "gone")
+    (out / "wildshape.json").write_text(json.dumps(said))
+    report = report_from_drive(out)
+    assert any("no scans are drawn" in note for note in report.notes)
+    assert len(report.objects) == len(CARS)
+    assert report_from_drive(out, found.source).notes == report.notes[1:]
+    refused(report_from_drive, out, tmp_path / "nowhere", match="nowhere")
+    (tmp_path / "few").mkdir()
+    shutil.copy(found.source / "000000.npy", tmp_path / "few")
+    refused(report_from_drive, out, tmp_path / "few", match="1 scans")
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="did not run: no chromium on PATH")
+def test_the_scene_plays_and_a_click_on_a_vehicle_opens_it(found, tmp_path):
+    write_drive_report(found.out)
+    with browser(tmp_path / "profile") as page:
+        page.open((found.out / "report.html").as_uri())
+        page.wait("document.querySelector('#drive_now')?.textContent.includes('of 6')")
+        place = page.ask(
+            "(({x, y, width, height}) => ({x, y, width, height}))"
+            "(document.querySelector('#drive_canvas').getBoundingClientRect())"
+        )
+        clip = {**place, "scale": 1}
+        eventually(lambda: page.shot(clip=clip), lambda p: colourful(p) > 400, "nothing is drawn")
+        before = page.shot(clip=clip)
+        page.ask("[...document.querySelectorAll('#drive_views button')][0].click()")
+        eventually(lambda: page.shot(clip=clip), lambda p: moved(p, before) > 0.01, "not above")
+        labels = "[...document.querySelectorAll('#drive_labels span')]"
+        label = f"{labels}.find(one => one.textContent === '<7>')"
+        page.wait(f"!!{label}")
+        x, y = map(float, re.findall(r"([\d.]+)px", page.ask(f"{label}.style.transform"))[:2])
+        mouse = {"x": place["x"] + x, "y": place["y"] + y, "button": "left", "clickCount": 1}
+        page.call("Input.dispatchMouseEvent", type="mousePressed", **mouse)
+        page.call("Input.dispatchMouseEvent", type="mouseReleased", **mouse)
+        page.wait("document.querySelector('#drive_card h3')?.textContent === '<7>'")
+        assert "8.0 m/s" in page.ask("document.querySelector('#drive_card').textContent")
+        assert page.ask("document.querySelector('#name').textContent") == "<7>"
+        page.ask("document.querySelectorAll('tr[data-object]')[0].click()")
+        page.wait("document.querySelector('#drive_card h3').textContent === '0003'")
+        page.ask("document.querySelector('#drive_play').click()")
+        page.wait(
+            "document.querySelector('#drive_now').textContent.includes('frame 5 of 6, 0.5 s')"
+        )
+        assert page.complaints() == []
+        assert [url for url in page.loads() if not url.startswith(("file:", "data:"))] == []
