@@ -201,8 +201,8 @@ class Completion:
     Attributes:
         points: `(m, 3)` float32, the complete shape.
         pose: `T_sensor_canonical`.
-        box: around `points` and what the scan saw beside them; x, the heading, is the canonical
-            frame's.
+        box: around the body that `points` and the scan show, without mirrors; x, the heading, is
+            the canonical frame's.
         confidence: 0 to 1.
         branch: the pose branch that spoke.
         cost: its label-free cost, metres (METHOD 6).

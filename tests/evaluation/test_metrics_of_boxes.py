@@ -19,6 +19,9 @@ from wildshape.geometry.box import FittedBox
 from wildshape.geometry.transforms.rotation import random_rotation, rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.boxes import carried
+from wildshape.simulate.raycast import Scene
+from wildshape.simulate.shapes.solid import box, ellipsoid, union
+from wildshape.simulate.truth import visible_surface
 
 SHAPE = np.array([[x, y, z] for x in (-2, 2) for y in (-1, 1) for z in (0, 1)], np.float32)
 TRUTH = true_box(SHAPE)
@@ -57,6 +60,17 @@ def test_scores_by_hand_wherever_the_object_is(seed, shift, degrees, iou, headin
     assert score.heading_deg == pytest.approx(heading, abs=1e-3)
 
 
+def test_the_true_box_of_a_vehicle_is_that_of_its_body():
+    car = box((-2.0, -0.9, 0.0), (2.0, 0.9, 1.5))
+    mirrors = [ellipsoid((0.6, side * 0.98, 1.0), (0.07, 0.11, 0.08)) for side in (-1, 1)]
+    whole = union([car, *mirrors])
+    shape = visible_surface(whole, Scene([whole]), 8192, 0.0, np.random.default_rng(0))
+    assert true_box(shape).size[1] > 2.1
+    torch.testing.assert_close(
+        true_box(shape, body=True).size, torch.tensor((4.0, 1.8, 1.5)).double(), atol=0.02, rtol=0
+    )
+
+
 def scored(box):
     error = CompletionError(0.1, 0.1)
     return CompletionScore("a", "0", error, None, "shape", 1, 1, 0.05, box=box)
@@ -78,7 +92,7 @@ class Boxing:
 
     def __init__(self, track, shift=0.0):
         assert track.shape is not None
-        self.poses, self.box = poses_of(track), true_box(track.shape)
+        self.poses, self.box = poses_of(track), true_box(track.shape, body=True)
         self.shift = torch.tensor((shift, 0.0, 0.0), dtype=torch.float64)
 
     def complete(self, points, sensor):

@@ -112,12 +112,13 @@ def _subsample(track: Track, max_scans: int | None) -> Track:
 def _truth(track: Track, count: int) -> Truth | None:
     if track.T_sensor_object is None or not track.scans:
         return None
+    body = track.sensor.kind == "lidar"
     if track.shape is not None:
-        shape = _thin(track.shape, count)
-        return Truth("shape", shape, None, hull_area(shape), true_box(track.shape))
+        shape, box = _thin(track.shape, count), true_box(track.shape, body=body)
+        return Truth("shape", shape, None, hull_area(shape), box)
     whole = shape_mirrored(track)
     mirrored, partial = _thin(whole, count), _thin(shape_partial(track), count)
-    return Truth("mirrored", mirrored, partial, hull_area(mirrored), true_box(whole))
+    return Truth("mirrored", mirrored, partial, hull_area(mirrored), true_box(whole, body=body))
 
 
 def _thin(points: Points, count: int) -> Points:

@@ -17,6 +17,7 @@ from wildshape.ops.nearest import nearest_both, nearest_distance
 from wildshape.records import Box, Points
 
 ACCURATE_DEG = 30.0
+_MIRROR = 0.006  # share of the surface at either side that a mirror takes at most
 
 
 @dataclass(frozen=True)
@@ -133,10 +134,18 @@ class BoxScore:
         return min(self.heading_deg, 180 - self.heading_deg)
 
 
-def true_box(shape: Points) -> FittedBox:
-    """The tight box of a true shape, object frame, its axes those of that frame."""
+def true_box(shape: Points, *, body: bool = False) -> FittedBox:
+    """The tight box of a true shape, object frame, its axes those of that frame.
+
+    Args:
+        shape: spread evenly over the surface.
+        body: of a vehicle as data sets label it, without its mirrors.
+    """
     points = torch.from_numpy(shape).double()
     low, high = points.amin(0), points.amax(0)
+    if body:
+        share = torch.tensor((_MIRROR, 1 - _MIRROR), dtype=torch.float64)
+        low[1], high[1] = points[:, 1].quantile(share)
     return FittedBox((low + high) / 2, high - low, torch.eye(3, dtype=torch.float64))
 
 

@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The box of a completed shape, in the frame of the scan.
 
-A decoder draws towards what is usual and rounds off what sticks out. The scans saw it: a box that
-leaves their points outside is too small. So each side lies where the shape ends, or further out
-where the scans say so.
+Labels are of the body: mirrors, aerials and stray points stick out of it. They are few, on the
+shape and in a scan, and do not count at the ends and sides. A decoder draws towards what is usual:
+where more of a scan than that lies outside of the shape, the box ends where the scan does.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import torch
 from jaxtyping import Float
@@ -28,12 +29,13 @@ def box_seen(
     scan: Points,
     *,
     mirror: bool,
+    body: bool = True,
     config: BoxConfig = _DEFAULT,
 ) -> Box:
     """The box of the shape of one scan; see `fit_to_scans`."""
     T = T_sensor_canonical.to(torch.float64)
     seen = T.inverse().apply(torch.from_numpy(scan).double())
-    return carried(fit_to_scans(shape, [seen], mirror=mirror, config=config), T)
+    return carried(fit_to_scans(shape, [seen], mirror=mirror, body=body, config=config), T)
 
 
 def fit_to_scans(
@@ -41,6 +43,7 @@ def fit_to_scans(
     seen: Sequence[Tensor],
     *,
     mirror: bool,
+    body: bool = True,
     config: BoxConfig = _DEFAULT,
 ) -> FittedBox:
     """The box around a shape and what scans saw of it, in the canonical frame.
@@ -51,13 +54,15 @@ def fit_to_scans(
     Args:
         shape: canonical frame.
         seen: points `(n, 3)` of each scan in that frame. Those far outside the shape's own box are
-            strays. Of every eight scans the one that reaches furthest is not believed.
+            strays. Of every four scans the one that reaches furthest is not believed.
         mirror: the object is symmetric in the plane y = 0.
+        body: what little sticks out does not count, as of a vehicle; of an aeroplane wings do.
         config: what is not believed.
     """
     exact = shape.double()
     axes = _level(exact, config) if mirror else fit_box(exact).rotation
-    low, high = _ends(_rows(exact, axes), config.strays)
+    config = config if body else replace(config, shape_share=0.0, seen_share=0.0)
+    low, high = _ends(_rows(exact, axes), config)
     reach = config.reach * (high - low).norm()
     lows, highs = [low], [high]
     for points in seen:
@@ -66,8 +71,9 @@ def fit_to_scans(
             rows[1].abs_()
         near = rows[:, ((rows > (low - reach)[:, None]) & (rows < (high + reach)[:, None])).all(0)]
         if near.shape[1]:
-            highs.append(near.amax(1))
-            lows.append(_reflected(near.amin(1), highs[-1]) if mirror else near.amin(1))
+            begins, ends = _without_outermost(near, int(config.seen_share * near.shape[1]))
+            highs.append(ends)
+            lows.append(_reflected(begins, ends) if mirror else begins)
     rank = min(len(seen) // config.scans_a_witness, len(lows) - 1)
     low = torch.minimum(low, torch.stack(lows).sort(0).values[rank])
     high = torch.maximum(high, torch.stack(highs).sort(0).values[-1 - rank])
@@ -107,11 +113,19 @@ def _rows(points: Float[Tensor, "n 3"], axes: Float[Tensor, "3 3"]) -> Float[Ten
     return axes.mT @ points.T.contiguous()
 
 
-def _ends(rows: Float[Tensor, "3 n"], strays: int) -> tuple[Tensor, Tensor]:
-    """Where a shape begins and ends, without its outermost points: a stray and its reflection."""
-    count = min(strays + 1, rows.shape[1])
-    low = rows.topk(count, dim=1, largest=False).values[:, -1]
-    return low, rows.topk(count, dim=1).values[:, -1]
+def _ends(rows: Float[Tensor, "3 n"], config: BoxConfig) -> tuple[Tensor, Tensor]:
+    """Where a shape begins and ends; beside it more stands out than above it."""
+    count = max(int(config.shape_share * rows.shape[1]), config.strays)
+    low, high = _without_outermost(rows, count)
+    bottom, top = _without_outermost(rows[2:], config.strays)
+    return torch.cat((low[:2], bottom)), torch.cat((high[:2], top))
+
+
+def _without_outermost(rows: Float[Tensor, "k n"], count: int) -> tuple[Tensor, Tensor]:
+    """Where each row begins and ends without its `count` outermost values at either end."""
+    kept = min(count + 1, rows.shape[1])
+    low = rows.topk(kept, dim=1, largest=False).values[:, -1]
+    return low, rows.topk(kept, dim=1).values[:, -1]
 
 
 def _reflected(low: Float[Tensor, "3"], high: Float[Tensor, "3"]) -> Float[Tensor, "3"]:

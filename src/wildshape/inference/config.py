@@ -179,7 +179,10 @@ class BoxConfig:
     """How a box is laid around a shape (`boxes.py`).
 
     Attributes:
-        strays: outermost points of the shape that do not count.
+        shape_share: share of the shape's points that do not count at each end and side.
+        seen_share: the same of a scan's points.
+        strays: the shape's highest and lowest points that do not count; at least as many do not at
+            its ends and sides.
         reach: share of the box's diagonal by which a scan may reach beyond the shape and is
             believed.
         scans_a_witness: of so many scans the one that reaches furthest is not believed.
@@ -187,9 +190,11 @@ class BoxConfig:
         step_deg: of that turn.
     """
 
+    shape_share: float = 0.01
+    seen_share: float = 0.03
     strays: int = 2
     reach: float = 0.08
-    scans_a_witness: int = 8
+    scans_a_witness: int = 4
     level_deg: float = 4.0
     step_deg: float = 0.25
 

@@ -266,7 +266,9 @@ class Predictor:
         return Completion(
             points=filled(points, scan, exact, self.config.refine) if self.refines else points,
             pose=T_sensor_can.to(torch.float64),
-            box=box_seen(shape, T_sensor_can, seen, mirror=mirror, config=self.config.box),
+            box=box_seen(
+                shape, T_sensor_can, seen, mirror=mirror, body=not exact, config=self.config.box
+            ),
             confidence=confidence,
             branch=int(found.branch[i]),
             cost=cost,

@@ -80,7 +80,8 @@ def complete_together(
         shape / unit, _seen(clouds, fit.T_sensor_object, mirror, config.track), config.track
     )
     fit = fit._replace(T_sensor_object=_scaled(fit.T_sensor_object, unit))
-    fitted = _box(shape, scans, fit.T_sensor_object, config.box, mirror=mirror)
+    body = settings.sensor == "lidar"
+    fitted = _box(shape, scans, fit.T_sensor_object, config.box, mirror=mirror, body=body)
     whole = (
         torch.from_numpy(denser(shape.numpy(), config.refine.partner)) if settings.facing else shape
     )
@@ -120,11 +121,12 @@ def _box(
     config: BoxConfig,
     *,
     mirror: bool,
+    body: bool,
 ) -> FittedBox:
     """One box for all scans of the track, object frame."""
     T_object_sensor = T_sensor_object.inverse()
     seen = [T_object_sensor[i].apply(torch.from_numpy(s).double()) for i, s in enumerate(scans)]
-    return fit_to_scans(shape, seen, mirror=mirror, config=config)
+    return fit_to_scans(shape, seen, mirror=mirror, body=body, config=config)
 
 
 def _mean_shape(
