@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Damage to the headers of scans: PLY, PCD, numpy, LAS."""
+"""Damage to the headers of scans: PLY, PCD, numpy, LAS, ROS."""
 
+import re
 import struct
 from functools import cache
 from random import Random
@@ -204,6 +205,15 @@ def _value(rng: Random, code: str) -> bytes:
     size = struct.calcsize("<" + code)
     near = rng.randrange(40) if rng.random() < 0.4 else rng.choice(INTEGERS)
     return (near % (1 << 8 * size)).to_bytes(size, "little")
+
+
+def change_cloud(rng: Random, data: bytes) -> bytes:
+    """A number behind the frame's name in a ROS message: sizes, fields, steps of its points."""
+    names = [found.end() for found in re.finditer(b"lidar", data)]
+    if not names:
+        return replace_word(rng, data)
+    at, new = rng.choice(names) + rng.randrange(160), packed(rng)
+    return data[:at] + new + data[at + len(new) :]
 
 
 @cache

@@ -2,6 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """All readers that are attacked."""
 
-from tests.fuzz import drives, results, scans, weights
+from tests.fuzz import drives, recordings, results, scans, weights
 
-TARGETS = (*scans.TARGETS, *drives.TARGETS, *results.TARGETS, *weights.TARGETS)
+TARGETS = (
+    *scans.TARGETS,
+    *drives.TARGETS,
+    *recordings.TARGETS,
+    *results.TARGETS,
+    *weights.TARGETS,
+)

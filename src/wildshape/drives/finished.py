@@ -10,6 +10,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detections import pose_of
 from wildshape.io.boxes.table import BoxRow, read_box_table
-from wildshape.io.guard import read_json, reading, record_of
+from wildshape.io.guard import read_json, read_record, reading
 from wildshape.io.output import MARKER
 from wildshape.io.poses import read_poses, read_tum
 from wildshape.io.scans.points import read_points
@@ -174,10 +175,12 @@ def read_finished(out: Path | str) -> FinishedDrive:
     if not is_drive(out):
         raise BadInputError(f"{out}: holds no finished drive; run `wildshape drive` with --out.")
     names, times, scanned = _read_frames(out / FRAMES)
-    path = out / "stages" / "mounting.json"
-    mounting = record_of(Mounting, read_json(path, "the sensor's mounting"), {})
+    mounting = read_record(out / "stages" / "mounting.json", "the sensor's mounting", Mounting)
     T_level_sensor = level_poses(read_poses(out / TRAJECTORY, len(names)), mounting)
     ticks, _ = read_tum(out / TUM)
+    for path, at in ((out / FRAMES, times or ()), (out / TUM, ticks)):
+        if not all(before < after < math.inf for before, after in pairwise(at)):
+            raise BadInputError(f"{path}: its times do not rise; write it anew.")
     rows: dict[str, list[BoxRow]] = defaultdict(list)
     for row in read_box_table(out / BOXES):
         if not 0 <= row.frame < len(names):
@@ -192,8 +195,17 @@ def read_finished(out: Path | str) -> FinishedDrive:
         T_level_sensor=T_level_sensor,
         ground_m=mounting.height_m,
         vehicles=tuple(_vehicle(rows[name], T_level_sensor) for name in sorted(rows)),
-        record=read_json(out / MARKER, "what a command says of itself"),
+        record=_read_record(out / MARKER),
     )
+
+
+def _read_record(path: Path) -> dict[str, Any]:
+    with reading(path, "what `wildshape drive` says of itself"):
+        record = read_json(path, "what `wildshape drive` says of itself")
+        source, topic = (record["settings"].get(name) for name in ("source", "topic"))
+        if not isinstance(source, str) or not isinstance(topic, str | None):
+            raise ValueError(f"source {source!r}, topic {topic!r}")
+        return record
 
 
 def _read_frames(

@@ -61,7 +61,7 @@ from wildshape.inference.folders.complete_folder import OBJECTS
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import write_json
 from wildshape.io.boxes.table import write_box_table
-from wildshape.io.guard import read_json, record_of
+from wildshape.io.guard import read_record
 from wildshape.io.output import begin, finished, keep_apart
 from wildshape.io.poses import read_poses
 from wildshape.parallel.processes import in_order
@@ -187,7 +187,7 @@ class _Run:
             if not path.is_file():
                 write_json(path, asdict(find_mounting(self.drive, self.config.mounting)))
             at(1)
-            return record_of(Mounting, read_json(path, "the sensor's mounting"), {})
+            return read_record(path, "the sensor's mounting", Mounting)
 
     def trajectory(self, mounting: Mounting) -> SE3:
         path = self.out / TRAJECTORY

@@ -12,7 +12,7 @@ from jaxtyping import Int
 from wildshape.drives.segmentation import read_cut
 from wildshape.drives.source import Drive
 from wildshape.io.atomic import write_json
-from wildshape.io.guard import read_json, record_of
+from wildshape.io.guard import read_json, reading, record_of
 from wildshape.records import Points, Track
 
 
@@ -96,4 +96,5 @@ def read_sightings(path: Path) -> list[Sightings]:
     Raises:
         BadInputError: missing or damaged.
     """
-    return [record_of(Sightings, one, {}) for one in read_json(path, "the objects of a drive")]
+    with reading(path, "the objects of a drive"):
+        return [record_of(Sightings, one, {}) for one in read_json(path, "the objects", list)]

@@ -192,6 +192,16 @@ def lines_of(file: IO[AnyStr], path: Path, longest: int = _LONGEST) -> Iterator[
             yield line
 
 
+def read_record(path: Path, expected: str, kind: type[Record]) -> Record:
+    """The record that a JSON file holds; `expected`: what that is, for the error.
+
+    Raises:
+        BadInputError: missing, damaged, or another record.
+    """
+    with reading(path, expected):
+        return record_of(kind, read_json(path, expected), {})
+
+
 def record_of(kind: type[Record], values: object, bounds: Bounds, at: str = "") -> Record:
     """The record that JSON values describe.
 

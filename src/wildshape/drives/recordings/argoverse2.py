@@ -7,6 +7,7 @@ from pathlib import Path
 
 from wildshape.datasets.argoverse2.log import read_city_poses, read_sensor_pose, read_sweep
 from wildshape.drives.source import Drive
+from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.records import Turn
 
@@ -43,7 +44,10 @@ def open_log(path: Path) -> Drive:
         BadInputError: a file is missing or corrupt.
         MissingExtraError: pyarrow is not installed.
     """
-    files = sorted((path / _SWEEPS).glob("*.feather"))
+    found = (path / _SWEEPS).glob("*.feather")
+    files = sorted((file for file in found if file.stem.isdecimal()), key=lambda f: int(f.stem))
+    if not files:
+        raise BadInputError(f"{path / _SWEEPS}: holds no sweeps; copy the log again.")
     stamps = [int(file.stem) for file in files]
     T_ego_sensor = read_sensor_pose(path, "both")
     T_city_ego = read_city_poses(path)

@@ -12,6 +12,7 @@ import numpy as np
 from wildshape.datasets.waymo.reader import Frame, frames, tables_of
 from wildshape.datasets.waymo.tables import WITHOUT_LABELS, read_calibration, read_vehicle_poses
 from wildshape.drives.source import Drive
+from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import stack
 from wildshape.records import Turn
 
@@ -72,6 +73,8 @@ def open_segment(path: Path) -> Drive:
     T_vehicle_sensor = read_calibration(tables["lidar_calibration"]).T_vehicle_sensor
     T_world_vehicle = read_vehicle_poses(tables["vehicle_pose"])
     times = tuple(T_world_vehicle)
+    if not times:
+        raise BadInputError(f"{tables['vehicle_pose']}: holds no poses; copy it again.")
     return Drive.of(
         name=path.name,
         scan_names=[str(time) for time in times],

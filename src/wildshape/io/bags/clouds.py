@@ -40,6 +40,8 @@ def points_of(data: bytes, *, cdr: bool) -> Float[np.ndarray, "n 3"]:
     """
     types = message_types(cdr)
     cloud = types.deserialize_cdr(data, CLOUD) if cdr else types.deserialize_ros1(data, CLOUD)
+    if cloud.height > 1 and cloud.row_step < cloud.width * cloud.point_step:
+        raise ValueError(f"rows of {cloud.width} points in {cloud.row_step} bytes")
     rows = np.ndarray(
         (cloud.height, cloud.width),
         _point(cloud),

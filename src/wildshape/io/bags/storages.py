@@ -12,7 +12,7 @@ import struct
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import IO, Any, ClassVar, NamedTuple
@@ -87,13 +87,21 @@ class Sqlite(Storage):
                 rows = _all_but_last_readable(rows)
             for row, topic, logged, data in rows:
                 if self.has_cloud(names[topic]):
-                    yield Message(names[topic], logged, (row, 0), _unpacked(data), True)
+                    yield Message(names[topic], logged, (row, 0), self._message(data), True)
 
     def data(self, key: Key) -> bytes:
         """See `Storage`."""
         with closing(self._open()) as database:
             found = database.execute("SELECT data FROM messages WHERE id = ?", key[:1]).fetchone()
-            return _unpacked(found[0])
+            return self._message(found[0])
+
+    def _message(self, data: bytes) -> bytes:
+        """Of a bag whose messages are packed, and any other as it is."""
+        if not data.startswith(_ZSTD):
+            return data
+        zstandard = load_library("zstandard", "compressed bags need zstandard", INSTALL)
+        size = zstandard.frame_content_size(data)
+        return _unpacked(self.path, "zstd", data, size if size >= 0 else _LARGEST_MESSAGE)
 
     def _open(self) -> sqlite3.Connection:
         address = self.path.resolve().as_uri() + "?mode=ro&immutable=1"
@@ -114,15 +122,40 @@ def _all_but_last_readable(rows: Iterator[Any]) -> Iterator[Any]:
 
 
 _ZSTD = b"\x28\xb5\x2f\xfd"
-_LARGEST = 1 << 30
+_LARGEST_MESSAGE = 32_000_000  # bytes, where a message does not say
 
 
-def _unpacked(data: bytes) -> bytes:
-    """A message of a bag whose messages are compressed, and any other as it is."""
-    if not data.startswith(_ZSTD):
-        return data
-    zstandard = load_library("zstandard", "compressed bags need zstandard", INSTALL)
-    return zstandard.ZstdDecompressor().decompress(data, max_output_size=_LARGEST)
+def _unpacked(path: Path, kind: str, data: bytes, size: int) -> bytes:
+    """What was packed, `size` bytes of it at most.
+
+    Raises:
+        BadInputError: it says that it is far more than a scan can be packed to.
+        MissingExtraError: a library is not installed.
+    """
+    check_unpacked(path, size, len(data))
+    match kind:
+        case "" | "none":
+            return data
+        case "bz2":
+            return bz2.BZ2Decompressor().decompress(data, size)
+        case "lz4":
+            lz4 = load_library("lz4.frame", "bags packed with LZ4 need lz4", INSTALL)
+            return lz4.LZ4FrameDecompressor().decompress(data, size)
+        case "zstd":
+            zstandard = load_library("zstandard", "compressed bags need zstandard", INSTALL)
+            return zstandard.ZstdDecompressor().stream_reader(data).read(size)
+    raise ValueError(f"packed as {kind!r}, not as bz2, lz4 or zstd")
+
+
+class _Bounded:
+    """A file of which never more is asked for than it holds."""
+
+    def __init__(self, file: IO[bytes], size: int) -> None:
+        self.file, self.size = file, size
+
+    def read(self, count: int) -> bytes:
+        """So many bytes, or those that are left."""
+        return self.file.read(min(count, max(self.size - self.file.tell(), 0)))
 
 
 class Mcap(Storage):
@@ -134,7 +167,8 @@ class Mcap(Storage):
         schemas: dict[int, str] = {}
         channels: dict[int, Any] = {}
         with self.path.open("rb") as file:
-            records = reader.StreamReader(file, emit_chunks=True).records
+            bounded = _Bounded(file, self.path.stat().st_size)
+            records = reader.StreamReader(bounded, emit_chunks=True).records
             begin = 8  # behind the magic
             for record in records:
                 for place, part in enumerate(self._parts(record)):
@@ -155,16 +189,18 @@ class Mcap(Storage):
         reader = load_library("mcap.stream_reader", "MCAP needs mcap", INSTALL)
         with self.path.open("rb") as file:
             file.seek(key[0])
-            record = next(reader.StreamReader(file, skip_magic=True, emit_chunks=True).records)
+            bounded = _Bounded(file, self.path.stat().st_size)
+            record = next(reader.StreamReader(bounded, skip_magic=True, emit_chunks=True).records)
             return self._parts(record)[key[1]].data
 
     def _parts(self, record: Any) -> list[Any]:
         """The records of a chunk; any other record alone."""
         if type(record).__name__ != "Chunk":
             return [record]
-        check_unpacked(self.path, record.uncompressed_size, len(record.data))
+        size = record.uncompressed_size
+        data = _unpacked(self.path, record.compression, record.data, size)
         reader = load_library("mcap.stream_reader", "MCAP needs mcap", INSTALL)
-        return reader.breakup_chunk(record)
+        return reader.breakup_chunk(replace(record, compression="", data=data))
 
 
 class Ros1(Storage):
@@ -188,7 +224,7 @@ class Ros1(Storage):
                 if header["op"] == _BAG:
                     is_whole = 0 < _number(header["index_pos"]) <= size
                 elif header["op"] == _CHUNK:
-                    yield from self._in_chunk(begin, _chunk(header, data), names)
+                    yield from self._in_chunk(begin, self._chunk(header, data), names)
                 elif header["op"] == _CONNECTION:
                     self._connect(header, data, names)
         if not is_whole:
@@ -211,7 +247,11 @@ class Ros1(Storage):
         with self.path.open("rb") as file:
             file.seek(key[0])
             header, data = _record(file, self.path.stat().st_size)
-        return _parsed(_chunk(header, data), key[1])[1]
+        return _parsed(self._chunk(header, data), key[1])[1]
+
+    def _chunk(self, header: dict[str, bytes], data: bytes) -> bytes:
+        """The records of a chunk."""
+        return _unpacked(self.path, header["compression"].decode(), data, _number(header["size"]))
 
     def _connect(self, header: dict[str, bytes], data: bytes, names: dict[bytes, str]) -> None:
         name = header["topic"].decode()
@@ -270,20 +310,6 @@ def _fields(data: bytes) -> dict[str, bytes]:
         found[name.decode()] = value
         at += 4 + length
     return found
-
-
-def _chunk(header: dict[str, bytes], data: bytes) -> bytes:
-    """The records of a chunk, unpacked."""
-    size = _number(header["size"])
-    match header["compression"]:
-        case b"none":
-            return data
-        case b"bz2":
-            return bz2.BZ2Decompressor().decompress(data, size)
-        case b"lz4":
-            lz4 = load_library("lz4.frame", "bags packed with LZ4 need lz4", INSTALL)
-            return lz4.LZ4FrameDecompressor().decompress(data, size)
-    raise ValueError(f"a chunk is packed as {header['compression']!r}, not as none, bz2 or lz4")
 
 
 STORAGES: dict[str, type[Storage]] = {".db3": Sqlite, ".mcap": Mcap, ".bag": Ros1}
