@@ -185,6 +185,10 @@ def read_finished(out: Path | str) -> FinishedDrive:
     for row in read_box_table(out / BOXES):
         if not 0 <= row.frame < len(names):
             raise BadInputError(f"{out / BOXES}: frame {row.frame} of {len(names)}; write it anew.")
+        if any(row.frame <= one.frame for one in rows[row.track][-1:]):
+            raise BadInputError(
+                f"{out / BOXES}: the frames of track '{row.track}' do not rise; write it anew."
+            )
         rows[row.track].append(row)
     return FinishedDrive(
         out=out,

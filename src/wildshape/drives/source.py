@@ -4,6 +4,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -55,9 +56,15 @@ class Drive:
         """A drive whose ticks come from the scans' times, or from their names if these count.
 
         Raises:
-            BadInputError: names that count do not rise.
+            BadInputError: times, or names that count, do not rise.
         """
         names = tuple(scan_names)
+        for row, (before, after) in enumerate(pairwise(times or ()), 2):
+            if not after > before:
+                raise BadInputError(
+                    f"{name}: time {row} ({after:.10g}) is not after the one before it; sort the"
+                    " scans in the order in which they were taken."
+                )
         ticks, missing = _ticks(names, times)
         return cls(
             name=name,

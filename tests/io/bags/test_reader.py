@@ -3,7 +3,9 @@
 """Recordings of ROS: every scan comes back exactly; what is cut off is read up to there."""
 
 import pickle
+from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,12 +14,14 @@ from tests.refusal import refused
 from wildshape.cli.main import main
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.errors import MissingExtraError
+from wildshape.io.bags.clouds import message_types, points_of
 from wildshape.io.bags.reader import open_bag
+from wildshape.io.bags.storages import CLOUD, unpacked
 
 pytest.importorskip("rosbags")
 pytest.importorskip("mcap")
 
-from tests.io.bags.write import KINDS, Fields, write_bag
+from tests.io.bags.write import KINDS, Fields, cloud, write_bag
 
 TOPIC = "/velodyne_points"
 every_kind = pytest.mark.parametrize("kind", KINDS)
@@ -151,3 +155,20 @@ def test_the_command_line_lists_the_topics(written, tmp_path, capsys):
     with pytest.raises(SystemExit, match="2"):
         main(["drive", str(path), "--out", str(tmp_path / "out")])
     assert "choose one of its topics with --topic: /back, /front" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", ["lz4", "zstd", "bz2"])
+def test_no_more_is_unpacked_than_a_recording_says(kind, tmp_path):
+    module = {"lz4": "lz4.frame", "zstd": "zstandard", "bz2": "bz2"}[kind]
+    zeros = bytes(8_000_000)
+    packed = pytest.importorskip(module).compress(zeros)
+    assert unpacked(tmp_path, kind, packed, 1000) == zeros[:1000]
+    refused(unpacked, tmp_path, kind, packed, 1 << 32, match="unpack to 4294967296, which no scan")
+
+
+def test_rows_of_a_cloud_do_not_overlap():
+    types = message_types(True)
+    said: Any = types.deserialize_cdr(cloud(*scans(1), 1), CLOUD)
+    many: Any = replace(said, height=10_000_000, row_step=0)
+    with pytest.raises(ValueError, match="rows of"):
+        points_of(bytes(types.serialize_cdr(many, CLOUD)), cdr=True)

@@ -112,7 +112,10 @@ def _drive(
 ) -> Drive:
     if times is not None:
         times = _times_of(files, times)
-        _check_times(times, len(files), path)
+        if len(times) != len(files):
+            raise BadInputError(
+                f"{path}: {len(times)} times for {len(files)} scans; give a line a scan."
+            )
     return Drive.of(
         name=path.name or path.resolve().name,
         scan_names=[file.stem for file in files],
@@ -169,14 +172,3 @@ def _times_of(files: list[Path], times: list[float]) -> list[float]:
         return times
     numbers = [int(name) for name in names]
     return [times[number] for number in numbers] if max(numbers) < len(times) else times
-
-
-def _check_times(times: list[float], count: int, path: Path) -> None:
-    if len(times) != count:
-        raise BadInputError(f"{path}: {len(times)} times for {count} scans; give a line a scan.")
-    for row, (before, after) in enumerate(pairwise(times), 2):
-        if not after > before:
-            raise BadInputError(
-                f"{path}: time {row} ({after:.10g}) is not after the one before it; sort the scans"
-                " in the order in which they were taken."
-            )

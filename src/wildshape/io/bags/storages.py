@@ -101,7 +101,7 @@ class Sqlite(Storage):
             return data
         zstandard = load_library("zstandard", "compressed bags need zstandard", INSTALL)
         size = zstandard.frame_content_size(data)
-        return _unpacked(self.path, "zstd", data, size if size >= 0 else _LARGEST_MESSAGE)
+        return unpacked(self.path, "zstd", data, size if size >= 0 else _LARGEST_MESSAGE)
 
     def _open(self) -> sqlite3.Connection:
         address = self.path.resolve().as_uri() + "?mode=ro&immutable=1"
@@ -125,7 +125,7 @@ _ZSTD = b"\x28\xb5\x2f\xfd"
 _LARGEST_MESSAGE = 32_000_000  # bytes, where a message does not say
 
 
-def _unpacked(path: Path, kind: str, data: bytes, size: int) -> bytes:
+def unpacked(path: Path, kind: str, data: bytes, size: int) -> bytes:
     """What was packed, `size` bytes of it at most.
 
     Raises:
@@ -198,7 +198,7 @@ class Mcap(Storage):
         if type(record).__name__ != "Chunk":
             return [record]
         size = record.uncompressed_size
-        data = _unpacked(self.path, record.compression, record.data, size)
+        data = unpacked(self.path, record.compression, record.data, size)
         reader = load_library("mcap.stream_reader", "MCAP needs mcap", INSTALL)
         return reader.breakup_chunk(replace(record, compression="", data=data))
 
@@ -251,7 +251,7 @@ class Ros1(Storage):
 
     def _chunk(self, header: dict[str, bytes], data: bytes) -> bytes:
         """The records of a chunk."""
-        return _unpacked(self.path, header["compression"].decode(), data, _number(header["size"]))
+        return unpacked(self.path, header["compression"].decode(), data, _number(header["size"]))
 
     def _connect(self, header: dict[str, bytes], data: bytes, names: dict[bytes, str]) -> None:
         name = header["topic"].decode()
