@@ -168,7 +168,7 @@ def test_no_more_is_unpacked_than_a_recording_says(kind, tmp_path):
 
 def test_rows_of_a_cloud_do_not_overlap():
     types = message_types(True)
-    said: Any = types.deserialize_cdr(cloud(*scans(1), 1), CLOUD)
+    said: Any = types.deserialize_cdr(cloud(scans(1)[0], 1), CLOUD)
     many: Any = replace(said, height=10_000_000, row_step=0)
     with pytest.raises(ValueError, match="rows of"):
         points_of(bytes(types.serialize_cdr(many, CLOUD)), cdr=True)
