@@ -18,6 +18,7 @@ from jaxtyping import Float
 from wildshape.geometry.box import SIGNS, box_axes
 from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.geometry.transforms.twist import Twist
 
 if TYPE_CHECKING:
     import laspy
@@ -87,6 +88,13 @@ class Turn:
 
     points: Points
     seconds: Float[np.ndarray, "_"] | None = None
+
+    def carried(self, motion: Twist) -> Points:
+        """The points where they would be seen from the sensor's place at the scan's time.
+
+        As they are where their times are unknown.
+        """
+        return self.points if self.seconds is None else motion.carry(self.points, self.seconds)
 
 
 @dataclass(frozen=True)

@@ -120,7 +120,7 @@ class FinishedDrive:
         return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
 
     def open_source(self, moved: Path | None = None) -> Drive:
-        """The recording, to read its scans again; `moved`: where it is now.
+        """The recording, to read its scans again as they were cut; `moved`: where it is now.
 
         Raises:
             BadInputError: it is not there, or has another number of scans.
@@ -132,7 +132,7 @@ class FinishedDrive:
                 f"{source}: {len(drive)} scans, and {self.out} was made of {len(self)}; name the"
                 " recording it was made of."
             )
-        return drive
+        return drive.moved_by(self.T_level_sensor)
 
     def shape(self, vehicle: FoundVehicle) -> Points:
         """`(n, 3)` complete shape, metres, in its box's frame: x forward, origin in the middle.

@@ -162,7 +162,7 @@ class _Run:
     def perform(self) -> DriveResult:
         mounting = self.mounting()
         T_world_sensor = self.trajectory(mounting)
-        self.cut(mounting)
+        self.cut(mounting, T_world_sensor)
         T_level_sensor = level_poses(T_world_sensor, mounting)
         objects = self.tracks(T_level_sensor)
         self.complete("completion", objects, mounting)
@@ -197,14 +197,14 @@ class _Run:
                 write_trajectories(self.out, self.drive, found)
             return read_poses(path, len(self.drive))
 
-    def cut(self, mounting: Mounting) -> None:
-        cutter = self.cutter(mounting)
+    def cut(self, mounting: Mounting, T_world_sensor: SE3) -> None:
+        cutter = self.cutter(self.drive.moved_by(T_world_sensor), mounting)
         self.spread("clusters", cutter, cutter.missing(), len(self.drive))
         if self.detections is not None:
             check_cut(self.detections, read_cuts(self.cuts, len(self.drive)))
 
-    def cutter(self, mounting: Mounting) -> Cutter:
-        known = self.drive, mounting, self.cuts, self.config
+    def cutter(self, drive: Drive, mounting: Mounting) -> Cutter:
+        known = drive, mounting, self.cuts, self.config
         return Cutter(*known) if self.detections is None else BoxCutter(*known, self.detections)
 
     @property

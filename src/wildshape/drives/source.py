@@ -92,9 +92,7 @@ class Drive:
         Points are as they were measured where the motion or their times are not known.
         """
         turn = self.turn(frame)
-        if self.motion is None or turn.seconds is None:
-            return turn.points
-        return self.motion[frame].carry(turn.points, turn.seconds)
+        return turn.points if self.motion is None else turn.carried(self.motion[frame])
 
     def moved_by(self, T_world_sensor: SE3) -> "Drive":
         """The drive with its scans corrected for the sensor's motion during each turn.
@@ -103,7 +101,7 @@ class Drive:
             T_world_sensor: of every frame.
         """
         if self.times is None or len(self) < 2:
-            return self
+            return self  # how long a scan takes is not known
         return replace(self, motion=tuple(_motion(T_world_sensor, self.times)))
 
 

@@ -72,6 +72,35 @@ def test_points_without_a_return_are_left_out_and_counted(written, kind):
     assert drive.warnings == ("5 points without a return were left out",)
 
 
+CLOCKS = {
+    "t": ("u4", 1e9, 0.0),  # Ouster
+    "offset_time": ("u4", 1e6, 0.0),
+    "time": ("f4", 1.0, 0.0),  # Velodyne
+    "timestamp": ("f8", 1.0, 1e9),  # Hesai: the stamp's clock
+    "gps_time": ("f8", 1e9, 4e5),  # another clock: its first point is the scan's time
+}
+
+
+@pytest.mark.parametrize("name", CLOCKS)
+def test_times_of_points_are_seconds_since_the_scan_s_time(written, name):
+    kind, unit, start = CLOCKS[name]
+    since = np.linspace(0.0, 0.1, 2000)
+    recorded = [(start + since + frame / 10 * (start == 1e9)) * unit for frame in range(2)]
+    drive = open_drive(
+        written("mcap", {TOPIC: scans(2)}, Fields(clock=(name, kind)), times=recorded)
+    )
+    for frame in range(2):
+        turn = drive.turn(frame)
+        assert turn.seconds == pytest.approx(since, abs=2e-6)
+        assert np.array_equal(turn.points, scans()[frame])
+
+
+def test_times_that_tell_of_no_turn_are_left_alone(written):
+    never = [np.zeros(2000), np.linspace(0, 2e9, 2000), np.full(2000, np.nan)]
+    drive = open_drive(written("bag", {TOPIC: scans(3)}, Fields(clock=("t", "f8")), times=never))
+    assert [drive.turn(frame).seconds for frame in range(3)] == [None] * 3
+
+
 @every_kind
 def test_an_empty_scan_is_a_scan(written, kind):
     one, other = scans(2)

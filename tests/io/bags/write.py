@@ -19,34 +19,41 @@ _ROS1, _ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMB
 
 @dataclass(frozen=True)
 class Fields:
-    """How x, y and z lie in a point."""
+    """How x, y, z and the time lie in a point."""
 
     kind: str = "f4"
     big: bool = False
     rows: int = 1
     names: str = "xyz"
+    clock: tuple[str, str] | None = None
 
 
 PLAIN = Fields()
-_NUMBERS = {"f4": 7, "f8": 8, "i2": 3}
+_NUMBERS = {"f4": 7, "f8": 8, "i2": 3, "u4": 6}
 
 
-def cloud(points, stamped, fields=PLAIN, *, ros1=False):
+def cloud(points, stamped, fields=PLAIN, times=None, *, ros1=False):
     """A message: a ring number, y, z, x and a time a point; rows are padded with four bytes."""
     order = ">" if fields.big else "<"
     y, z, x = (fields.names[i] for i in (1, 2, 0))
     layout = [("ring", order + "u2"), *((n, order + fields.kind) for n in (y, z, x))]
-    point = np.dtype([*layout, ("time", order + "f4")])
+    clock, kind = fields.clock or ("unused", "f4")
+    point = np.dtype([*layout, (clock, order + kind)])
     rows = np.zeros((fields.rows, len(points) // fields.rows), point)
     for name, axis in zip(fields.names, points.T):
         rows[name] = axis.reshape(rows.shape)
+    if times is not None:
+        rows[clock] = times.reshape(rows.shape)
     step, bytes_ = rows.itemsize, [row.tobytes() + b"\xff" * 4 for row in rows]
     types = (_ROS1 if ros1 else _ROS2).types
     assert point.fields is not None
     offsets = {str(name): entry[1] for name, entry in point.fields.items()}
+    known = [(name, fields.kind) for name in fields.names] + (
+        [fields.clock] if fields.clock else []
+    )
     described: Any = [
-        types["sensor_msgs/msg/PointField"](name, offsets[name], _NUMBERS[fields.kind], 1)
-        for name in fields.names
+        types["sensor_msgs/msg/PointField"](name, offsets[name], _NUMBERS[kind], 1)
+        for name, kind in known
     ]
     time = types["builtin_interfaces/msg/Time"](*divmod(stamped, 10**9))
     header = types["std_msgs/msg/Header"](*((7,) if ros1 else ()), time, "lidar")
@@ -58,12 +65,13 @@ def cloud(points, stamped, fields=PLAIN, *, ros1=False):
     return (_ROS1.serialize_ros1 if ros1 else _ROS2.serialize_cdr)(message, CLOUD)
 
 
-def write_bag(path, kind, scans, fields=PLAIN, stamps=None, packed=False, extra=()):
+def write_bag(path, kind, scans, fields=PLAIN, stamps=None, times=None, packed=False, extra=()):
     """A recording of scans, 0.1 s apart; its file.
 
     Args:
         scans: of each topic.
         stamps: of each scan, nanoseconds.
+        times: of each scan's points, as they are recorded.
         extra: topics of text.
     """
     if kind == "bag":
@@ -85,6 +93,7 @@ def write_bag(path, kind, scans, fields=PLAIN, stamps=None, packed=False, extra=
             for frame, points in enumerate(frames):
                 at = 10**18 + frame * TENTH
                 stamped = at if stamps is None else stamps[frame]
-                data = cloud(points, stamped, fields, ros1=kind == "bag")
+                taken = None if times is None else times[frame]
+                data = cloud(points, stamped, fields, taken, ros1=kind == "bag")
                 writer.write(topics[topic], at, data)
     return path

@@ -69,6 +69,9 @@ class Twist:
         return moved.astype(points.dtype)
 
 
+STANDING = Twist((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
 def _turned(
     turn: Float[np.ndarray, "3"],
     points: Float[np.ndarray, "n 3"],

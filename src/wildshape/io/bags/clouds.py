@@ -1,16 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The points of a `sensor_msgs/PointCloud2`."""
+"""The points of a `sensor_msgs/PointCloud2`, and when each was taken."""
 
 import struct
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Num
 
 from wildshape.errors import load_library
 from wildshape.io.bags.storages import CLOUD, INSTALL
+from wildshape.io.scans.point_times import TIME_FIELDS
 
 # sensor_msgs/PointField: the numbers of its datatypes.
 _DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
@@ -27,8 +28,20 @@ def stamp(data: bytes, *, cdr: bool) -> int:
     return seconds * 10**9 + nanoseconds
 
 
-def points_of(data: bytes, *, cdr: bool) -> Float[np.ndarray, "n 3"]:
-    """All points of a message, in metres as recorded, those without a return included.
+class Cloud(NamedTuple):
+    """The points of a message.
+
+    Attributes:
+        points: metres as recorded, those without a return included.
+        clock: `(n,)` when each was taken, in the unit of its field; None without such a field.
+    """
+
+    points: Float[np.ndarray, "n 3"]
+    clock: Num[np.ndarray, "n"] | None
+
+
+def cloud_of(data: bytes, *, cdr: bool) -> Cloud:
+    """All points of a message.
 
     Args:
         data: serialized.
@@ -48,7 +61,9 @@ def points_of(data: bytes, *, cdr: bool) -> Float[np.ndarray, "n 3"]:
         buffer=np.ascontiguousarray(cloud.data),
         strides=(cloud.row_step, cloud.point_step),
     )
-    return np.stack([rows[name].ravel() for name in "xyz"], 1, dtype=_precision(rows.dtype))
+    points = np.stack([rows[name].ravel() for name in "xyz"], 1, dtype=_precision(rows.dtype))
+    clock = next((name for name in rows.dtype.names or () if name in TIME_FIELDS), None)
+    return Cloud(points, None if clock is None else rows[clock].ravel())
 
 
 def _precision(point: np.dtype) -> np.dtype:
@@ -57,16 +72,17 @@ def _precision(point: np.dtype) -> np.dtype:
 
 
 def _point(cloud: Any) -> np.dtype:
-    """Where x, y and z are in the bytes of a point."""
+    """Where x, y, z and the time are in the bytes of a point."""
     order = ">" if cloud.is_bigendian else "<"
     fields = {field.name: field for field in cloud.fields}
     if not {"x", "y", "z"} <= fields.keys():
         raise ValueError(f"its points have the fields {', '.join(fields)}, but no x, y, z")
+    names = [*"xyz", *[name for name in TIME_FIELDS if name in fields][:1]]
     return np.dtype(
         {
-            "names": list("xyz"),
-            "formats": [order + _DATATYPES[fields[name].datatype] for name in "xyz"],
-            "offsets": [fields[name].offset for name in "xyz"],
+            "names": names,
+            "formats": [order + _DATATYPES[fields[name].datatype] for name in names],
+            "offsets": [fields[name].offset for name in names],
             "itemsize": cloud.point_step,
         }
     )

@@ -11,10 +11,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from wildshape.errors import BadInputError, MissingExtraError
-from wildshape.io.bags.clouds import message_types, points_of, stamp
+from wildshape.io.bags.clouds import cloud_of, message_types, stamp
 from wildshape.io.bags.storages import CLOUD, STORAGES, Key, Message
 from wildshape.io.guard import first_line, reading
-from wildshape.io.scans.points import check_near, drop_nonfinite
+from wildshape.io.scans.point_times import seconds_since
+from wildshape.io.scans.points import check_near
 from wildshape.records import Turn
 
 
@@ -46,7 +47,7 @@ class Bag:
     scans: tuple[_Scan, ...]
 
     def __call__(self, frame: int) -> Turn:
-        """The points of a scan that have a return, sensor frame, metres.
+        """The points of a scan that have a return, and when each was taken.
 
         Raises:
             BadInputError: damaged, or without fields x, y and z.
@@ -54,9 +55,11 @@ class Bag:
         scan = self.scans[frame]
         with reading(scan.file, f"a point cloud as scan {frame} of {self.topic}"):
             data = STORAGES[scan.file.suffix](scan.file).data(scan.key)
-            points = points_of(data, cdr=scan.cdr)
+            points, clock = cloud_of(data, cdr=scan.cdr)
             check_near(points, f"{scan.file}, scan {frame}")
-            return Turn(drop_nonfinite(points[_returned(points)]).points)
+            kept = _returned(points)
+            known = None if clock is None else seconds_since(clock[kept], self.times[frame])
+            return Turn(points[kept].astype(np.float32), known)
 
 
 def bag_files(path: Path) -> list[Path]:
@@ -115,7 +118,7 @@ def _listed(message: Message, file: Path) -> _Scan:
     """A scan's place, and how many of its points are no measurement."""
     dropped = 0
     with suppress(BadInputError), reading(file, "a point cloud"):  # reading the scan says why
-        points = points_of(message.data, cdr=message.cdr)
+        points = cloud_of(message.data, cdr=message.cdr).points
         dropped = len(points) - int(_returned(points).sum())
     stamped = stamp(message.data, cdr=message.cdr)
     return _Scan(stamped, message.logged, file, message.key, message.cdr, dropped)
@@ -123,7 +126,8 @@ def _listed(message: Message, file: Path) -> _Scan:
 
 def _returned(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
     """Which points were measured: drivers write NaN or the sensor's own place for no return."""
-    return np.isfinite(points).all(1) & (points != 0).any(1)
+    sized = np.abs(points) <= np.finfo(np.float32).max
+    return sized.all(1) & (points != 0).any(1)
 
 
 def _chosen(path: Path, topic: str | None, topics: dict[str, str], damaged: list[str]) -> str:

@@ -1,0 +1,49 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""When the points of a turn were taken, whatever unit and clock their field has.
+
+Drivers agree on neither: Ouster's `t` and Livox's `offset_time` are nanoseconds since the scan's
+stamp, Velodyne's `time` seconds since it, Hesai's and RoboSense's `timestamp` seconds of the day's
+clock.
+"""
+
+import numpy as np
+from jaxtyping import Float, Num
+
+TIME_FIELDS = ("t", "time", "timestamp", "offset_time", "time_offset", "time_stamp", "gps_time")
+"""Names of the fields that hold it, the likeliest first."""
+
+_UNITS = (1.0, 1e-3, 1e-6, 1e-9)
+_SHORTEST_TURN_S, _LONGEST_TURN_S = 0.005, 1.0
+_FEWEST = 100
+
+
+def seconds_since(
+    values: Num[np.ndarray, "n"], scan_time: float | None
+) -> Float[np.ndarray, "n"] | None:
+    """Seconds since the scan's time; None where the values tell of no turn.
+
+    The unit is the one in which a turn lasts 5 ms to 1 s. Values near 0 are counted from the scan's
+    time, values near that time are on its clock; of another clock, the first is the scan's time.
+
+    Args:
+        values: of each point, as recorded.
+        scan_time: seconds, if known.
+    """
+    if len(values) < _FEWEST:
+        return None
+    first, last = values.min(), values.max()
+    span = float(last) - float(first)
+    for unit in _UNITS:
+        if _SHORTEST_TURN_S <= span * unit <= _LONGEST_TURN_S:
+            return (values - first) * unit + _first_seconds(float(first) * unit, scan_time)
+    return None
+
+
+def _first_seconds(first: float, scan_time: float | None) -> float:
+    """When the first point was taken, since the scan's time."""
+    if abs(first) <= _LONGEST_TURN_S:
+        return first
+    if scan_time is not None and abs(first - scan_time) <= _LONGEST_TURN_S:
+        return first - scan_time
+    return 0.0

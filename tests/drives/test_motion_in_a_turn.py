@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Scans whose points have times are corrected for the sensor's motion during the turn."""
+
+import numpy as np
+import pytest
+
+from wildshape.drives.config import DriveConfig
+from wildshape.drives.mounting import find_mounting
+from wildshape.drives.source import Drive
+from wildshape.drives.trajectory import find_trajectory
+from wildshape.records import Turn
+from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
+
+pytest.importorskip("kiss_icp")
+pytest.importorskip("pypatchworkpp")
+
+CONFIG = DriveConfig()
+SCANS = 6
+
+
+@pytest.fixture(scope="module")
+def simulated():
+    """Scans as measured from a fast vehicle, and as seen from one place a scan."""
+    street = WholeDrive(StreetConfig(scans=SCANS, sensor="hdl32", speed=15.0), 3)
+    scans = [street.scan(frame) for frame in range(SCANS)]
+    return scans, [seen_from_one_place(scan, street) for scan in scans]
+
+
+def seen_from_one_place(scan, street):
+    columns, column = np.unique(scan.times, return_inverse=True)
+    T = np.linalg.inv(scan.T_world_sensor) @ street.sensor_pose(scan.time + columns)
+    return np.einsum("nij,nj->ni", T[column, :3, :3], scan.points) + T[column, :3, 3]
+
+
+def drive_of(scans, *, timed):
+    turns = [Turn(scan.points, scan.times if timed else None) for scan in scans]
+    names = [f"{frame:06d}" for frame in range(len(scans))]
+    return Drive.of("street", names, turns.__getitem__, [scan.time for scan in scans])
+
+
+def followed(scans, *, timed):
+    """The drive, corrected as far as it can be, and how far each step is off, metres."""
+    drive = drive_of(scans, timed=timed)
+    found = find_trajectory(drive, find_mounting(drive, CONFIG.mounting), CONFIG)
+    true = np.stack([scan.T_world_sensor for scan in scans])
+    steps = np.linalg.inv(true[:-1]) @ true[1:]
+    walked = (found[slice(0, -1)].inverse() @ found[slice(1, None)]).matrix.numpy()
+    return drive.moved_by(found), np.linalg.norm((walked - steps)[:, :3, 3], axis=1).mean()
+
+
+def test_points_are_where_one_place_sees_them_and_the_way_is_truer(simulated):
+    measured, compensated = simulated
+    corrected, off = followed(measured, timed=True)
+    as_it_is, off_without = followed(measured, timed=False)
+    for frame, true in enumerate(compensated):
+        assert np.linalg.norm(corrected.scan(frame) - true, axis=1).mean() < 0.03
+        assert np.linalg.norm(as_it_is.scan(frame) - true, axis=1).mean() > 0.2
+    assert off < 0.9 * off_without
