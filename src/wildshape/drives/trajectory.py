@@ -88,7 +88,7 @@ def _follow(
 def _seconds(drive: Drive, frame: int) -> float:
     """Since the frame before; scans, where no times are known."""
     at = drive.times or drive.ticks
-    return at[frame] - at[frame - 1]
+    return float(at[frame] - at[frame - 1])
 
 
 def _steps_differ(drive: Drive, frame: int) -> bool:
