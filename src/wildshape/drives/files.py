@@ -8,7 +8,9 @@ from pathlib import Path
 
 from wildshape.drives.completion import CATEGORY
 from wildshape.drives.finished import FinishedDrive, FoundVehicle
-from wildshape.drives.outputs import MESHES
+from wildshape.drives.outputs import MCAP, MESHES, RRD
+from wildshape.drives.playback.mcap import check_mcap, write_mcap
+from wildshape.drives.playback.rerun import load_rerun, write_rerun
 from wildshape.geometry.meshing import closed_mesh
 from wildshape.inference.folders.box_files import BoxFiles
 from wildshape.io.boxes.detections import Detection, number_of
@@ -24,10 +26,14 @@ class DriveFiles:
     Attributes:
         boxes: all boxes in formats of data sets, below `boxes/`.
         mesh: a closed mesh of each vehicle, in this format, below `meshes/`.
+        mcap: `drive.mcap`, for Foxglove.
+        rerun: `drive.rrd`, for Rerun.
     """
 
     boxes: BoxFiles | None = None
     mesh: MeshFormat | None = None
+    mcap: bool = False
+    rerun: bool = False
 
     def check(self) -> None:
         """Refuse before any work is done what could not be written after it.
@@ -38,6 +44,10 @@ class DriveFiles:
         """
         if self.boxes is not None:
             self.boxes.check()
+        if self.mcap:
+            check_mcap()
+        if self.rerun:
+            load_rerun()
 
     def write(self, found: FinishedDrive) -> None:
         """Write what is asked for into the drive's folder."""
@@ -46,6 +56,10 @@ class DriveFiles:
         if self.mesh is not None:
             for one in found.vehicles:
                 _write_mesh(found, one, self.mesh)
+        if self.mcap:
+            write_mcap(found, found.out / MCAP)
+        if self.rerun:
+            write_rerun(found, found.out / RRD)
 
 
 def detections_of(found: FinishedDrive) -> Iterator[Detection]:

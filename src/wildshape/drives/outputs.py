@@ -26,7 +26,7 @@ from wildshape.io.tracks import write_track
 from wildshape.records import Box
 
 TRAJECTORY, TUM, FRAMES, BOXES = "trajectory.txt", "trajectory.tum", "frames.csv", "boxes.csv"
-SHAPES, MESHES = "shapes", "meshes"
+SHAPES, MESHES, MCAP, RRD = "shapes", "meshes", "drive.mcap", "drive.rrd"
 
 
 @dataclass(frozen=True)

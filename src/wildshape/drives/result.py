@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from wildshape.drives.outputs import BOXES, FRAMES, MESHES, SHAPES, TRAJECTORY, TUM
+from wildshape.drives.outputs import BOXES, FRAMES, MCAP, MESHES, RRD, SHAPES, TRAJECTORY, TUM
 from wildshape.inference.folders.box_files import BOX_FILES
 from wildshape.io.guard import reading
 from wildshape.io.output import MARKER
@@ -26,6 +26,8 @@ FILES = (
     f"{SHAPES}/*.ply",
     *(f"{MESHES}/*.{kind}" for kind in MESH_FORMATS),
     *BOX_FILES,
+    MCAP,
+    RRD,
     REPORT,
     "stages/**/*",
 )

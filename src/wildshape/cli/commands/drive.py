@@ -86,6 +86,12 @@ class Settings:
     ] = None
     mesh: Annotated[bool, arg(help="also write a closed mesh of each vehicle")] = False
     mesh_format: Annotated[Literal["ply", "obj", "glb"], arg(help="of the meshes")] = "ply"
+    mcap: Annotated[
+        bool, arg(help="also write DIR/drive.mcap, to play in Foxglove (extra `mcap`)")
+    ] = False
+    rerun: Annotated[
+        bool, arg(help="also write DIR/drive.rrd, to play in Rerun (extra `rerun`)")
+    ] = False
     detections: Annotated[
         Path | None,
         option(
@@ -151,7 +157,8 @@ def _report(out: Path) -> None:
 def _files(settings: Settings) -> "DriveFiles":
     from wildshape.drives.files import DriveFiles
 
-    return DriveFiles(_box_files(settings), settings.mesh_format if settings.mesh else None)
+    mesh = settings.mesh_format if settings.mesh else None
+    return DriveFiles(_box_files(settings), mesh, mcap=settings.mcap, rerun=settings.rerun)
 
 
 def _box_files(settings: Settings) -> "BoxFiles | None":

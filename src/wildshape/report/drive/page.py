@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from wildshape.drives.finished import FinishedDrive, FoundVehicle, read_finished
+from wildshape.drives.playback.moments import readable_source
 from wildshape.drives.result import REPORT
 from wildshape.drives.source import Drive
-from wildshape.errors import BadInputError
 from wildshape.inference.registration import fuse_scans, to_middle
 from wildshape.io.progress import counted, duration
 from wildshape.records import as_text
@@ -51,7 +51,7 @@ def report_from_drive(out: Path, moved: Path | None = None) -> Report:
         BadInputError: no finished drive, or a damaged one; `moved` is another recording.
     """
     found = read_finished(out)
-    return drive_report(found, _source(found, moved))
+    return drive_report(found, found.open_source(moved) if moved else readable_source(found))
 
 
 def write_drive_report(out: Path) -> None:
@@ -61,16 +61,6 @@ def write_drive_report(out: Path) -> None:
         BadInputError: no finished drive, or a damaged one.
     """
     write_report(report_from_drive(out), out / REPORT)
-
-
-def _source(found: FinishedDrive, moved: Path | None) -> Drive | None:
-    """The recording; None where it has gone, and nobody said where to."""
-    try:
-        return found.open_source(moved)
-    except BadInputError:
-        if moved is not None:
-            raise
-        return None
 
 
 def drive_report(found: FinishedDrive, drive: Drive | None) -> Report:

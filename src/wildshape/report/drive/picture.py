@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from wildshape.drives.finished import FinishedDrive, FoundVehicle
+from wildshape.drives.playback.moments import PALETTE
 from wildshape.drives.source import Drive
 from wildshape.io.atomic import atomic_write
 from wildshape.report.drive.scene import (
     NOBODY,
-    PALETTE,
     DrawnScan,
     boxes_by_frame,
     drawn_scans,

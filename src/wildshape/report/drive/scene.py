@@ -14,25 +14,13 @@ import torch
 from jaxtyping import Float, Int
 
 from wildshape.drives.finished import FinishedDrive, FoundVehicle
+from wildshape.drives.playback.moments import PALETTE
 from wildshape.drives.source import Drive
 from wildshape.geometry.box import box_axes
 from wildshape.records import Box, Points
 from wildshape.report.page.html import quantise
 from wildshape.report.scene import thin
 
-# Told apart on a dark ground, the first six by colour-blind readers, too (Okabe & Ito 2008).
-PALETTE = (
-    "#e69f00",
-    "#56b4e9",
-    "#2fc58f",
-    "#f0e442",
-    "#ff7a45",
-    "#e48ac0",
-    "#6f9bff",
-    "#a6e05a",
-    "#b99cff",
-    "#ff8f8f",
-)
 _AROUND_M, _FOOT_M = 0.15, 0.15  # a box that is a little small; the ground under it
 NOBODY = -1
 

@@ -1,0 +1,6 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A finished drive as a recording for other viewers: MCAP for Foxglove, RRD for Rerun.
+
+What is where at which time says `moments.py`; a module a format. Start there.
+"""

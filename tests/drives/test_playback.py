@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings of a drive for other viewers, read back by the formats' own libraries."""
+
+import shutil
+import sys
+from collections import defaultdict
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+from rerun.chunk import RrdReader
+from tests.drives.finished_drive import CARS, FRAMES, HEIGHT, SIZE, finished_drive
+
+from wildshape.drives.files import DriveFiles
+from wildshape.drives.finished import read_finished
+from wildshape.errors import MissingExtraError
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    drive = finished_drive(tmp_path_factory.mktemp("drive"))
+    table = drive.out / "boxes.csv"  # the car that comes is not seen in the last frame
+    lines = table.read_text().splitlines()
+    table.write_text("\n".join(line for line in lines if not line.startswith("5,0.5,<7>")) + "\n")
+    drive = read_finished(drive.out)
+    DriveFiles(mcap=True, rerun=True).write(drive)
+    return drive
+
+
+@pytest.fixture(scope="module")
+def messages(found):
+    """(log time, message) by topic."""
+    by_topic = defaultdict(list)
+    with (found.out / "drive.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        for _, channel, message, decoded in reader.iter_decoded_messages():
+            by_topic[channel.topic].append((message.log_time, decoded))
+    return by_topic
+
+
+def cloud(message):
+    """Columns by name, as the message says where they lie."""
+    kinds = {1: "u1", 7: "<f4"}
+    fields = {one.name: (kinds[one.type], one.offset) for one in message.fields}
+    formats, offsets = zip(*fields.values())
+    layout: Any = {"names": list(fields), "formats": formats, "offsets": offsets}
+    return np.frombuffer(message.data, np.dtype({**layout, "itemsize": message.point_stride}))
+
+
+def test_mcap_holds_every_frame_on_every_topic(messages):
+    assert {topic: len(found) for topic, found in messages.items()} == {
+        "/tf": FRAMES,
+        "/boxes": FRAMES,
+        "/shapes": FRAMES,
+        "/scan": FRAMES,
+        "/trajectory": 1,
+    }
+    assert [time for time, _ in messages["/scan"]] == [10**8 * frame for frame in range(FRAMES)]
+    (_, way), *_ = messages["/trajectory"]
+    assert [pose.position.x for pose in way.poses] == pytest.approx(range(FRAMES))
+    for frame, (_, moved) in enumerate(messages["/tf"]):
+        assert (moved.parent_frame_id, moved.child_frame_id) == ("world", "sensor")
+        assert (moved.translation.x, moved.rotation.w) == pytest.approx((frame, 1))
+
+
+def test_mcap_boxes_and_shapes_stand_where_the_cars_are(messages):
+    for frame, (_, update) in enumerate(messages["/boxes"]):
+        there = list(CARS)[: 1 if frame == 5 else 2]
+        assert [entity.id for entity in update.entities] == there
+        assert len(update.deletions) == 1
+        for entity in update.entities:
+            x, y, yaw = CARS[entity.id][frame]
+            (cube,) = entity.cubes
+            assert (cube.size.x, cube.size.y, cube.size.z) == pytest.approx(SIZE)
+            place, turn = cube.pose.position, cube.pose.orientation
+            assert (place.x, place.y, place.z) == pytest.approx((x, y, SIZE[2] / 2 - HEIGHT))
+            assert np.cos(2 * np.arctan2(turn.z, turn.w) - yaw) == pytest.approx(1)
+            assert entity.texts[0].text == entity.id
+        shapes = cloud(messages["/shapes"][frame][1])
+        places = np.array([CARS[name][frame][:2] for name in there])
+        points = np.column_stack((shapes["x"], shapes["y"]))
+        away = np.linalg.norm(points[:, None] - places, axis=2).min(1)
+        assert away.max() < 2.5
+        assert len(np.unique(shapes[["red", "green", "blue"]])) == len(there)
+        scan = cloud(messages["/scan"][frame][1])
+        assert scan["z"].min() == np.float32(-HEIGHT)
+
+
+def test_rerun_holds_boxes_shapes_scans_and_the_way(found):
+    rows = defaultdict(int)
+    for chunk in RrdReader(str(found.out / "drive.rrd")).stream():
+        if not chunk.entity_path.startswith("/__"):
+            for name in chunk.to_record_batch().schema.names:
+                rows[chunk.entity_path, name] += chunk.num_rows
+    paths = {path for path, _ in rows}
+    assert {"/world/way", "/world/sensor", "/world/sensor/scan"} <= paths
+    assert rows["/world/sensor/scan", "Points3D:positions"] == FRAMES
+    for name, escaped, seen in (("0003", "0003", FRAMES), ("<7>", r"\<7\>", FRAMES - 1)):
+        assert rows[f"/world/vehicles/{escaped}", "Transform3D:translation"] == seen, name
+        assert rows[f"/world/vehicles/{escaped}/box", "Boxes3D:half_sizes"] == 1
+        assert rows[f"/world/vehicles/{escaped}/shape", "Points3D:positions"] == 1
+    assert rows[r"/world/vehicles/\<7\>", "Clear:is_recursive"] == 1
+
+
+@pytest.mark.parametrize(
+    ("module", "extra"), [("mcap_protobuf.writer", "mcap"), ("rerun", "rerun")]
+)
+def test_a_library_that_is_absent_is_named_before_any_work(monkeypatch, module, extra):
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(MissingExtraError, match=rf"wildshape\[{extra}\]"):
+        DriveFiles(mcap=extra == "mcap", rerun=extra == "rerun").check()
+
+
+def test_without_the_recording_there_are_no_scans(found, tmp_path):
+    kept = shutil.move(found.source, tmp_path / "moved")
+    DriveFiles(mcap=True).write(found)
+    shutil.move(kept, found.source)
+    with (found.out / "drive.mcap").open("rb") as file:
+        topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}
+    assert topics == {"/tf", "/boxes", "/shapes", "/trajectory"}
