@@ -24,20 +24,26 @@ def footprint(box: Place, size: Sequence[float]) -> Float[np.ndarray, "4 2"]:
     return half @ np.array(((c, s), (-s, c))) + np.array(box[:2])
 
 
+def shared_ground(
+    box: Place, size: Sequence[float], other: Place, other_size: Sequence[float]
+) -> float:
+    """Square metres that two boxes share in bird's eye view; see `footprint`."""
+    return _area(_clipped(footprint(box, size), footprint(other, other_size)))
+
+
 def footprint_overlap(
     box: Place, size: Sequence[float], other: Place, other_size: Sequence[float]
 ) -> float:
     """The ground that two boxes share, as a part of the smaller one's; see `footprint`."""
-    shared = _clipped(footprint(box, size), footprint(other, other_size))
     smaller = min(size[0] * size[1], other_size[0] * other_size[1])
-    return _area(shared) / smaller if smaller > 0 else 0.0
+    return shared_ground(box, size, other, other_size) / smaller if smaller > 0 else 0.0
 
 
 def footprint_iou(
     box: Place, size: Sequence[float], other: Place, other_size: Sequence[float]
 ) -> float:
     """Intersection over union in bird's eye view, 0 to 1; see `footprint`."""
-    shared = _area(_clipped(footprint(box, size), footprint(other, other_size)))
+    shared = shared_ground(box, size, other, other_size)
     union = size[0] * size[1] + other_size[0] * other_size[1] - shared
     return shared / union if union > 0 else 0.0
 

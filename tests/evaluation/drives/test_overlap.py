@@ -27,7 +27,7 @@ CAR = UprightBox(10.0, 5.0, 0.0, 4.0, 2.0, 1.5, 0.0)
         (CAR._replace(yaw=math.pi / 2), 4 / 12, 4 / 12, 4 / 8),
         (CAR._replace(z=0.75), 1, 1 / 3, 1),
         (CAR._replace(z=2.0), 1, 0, 1),
-        (CAR._replace(length=8), 8 / 16, 8 / 16, 1),
+        (CAR._replace(length=8.0), 8 / 16, 8 / 16, 1),
         (CAR._replace(x=14.5), 0, 0, 0),
     ],
 )

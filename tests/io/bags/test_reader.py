@@ -14,7 +14,7 @@ from tests.refusal import refused
 from wildshape.cli.main import main
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.errors import MissingExtraError
-from wildshape.io.bags.clouds import message_types, points_of
+from wildshape.io.bags.clouds import cloud_of, message_types
 from wildshape.io.bags.reader import open_bag
 from wildshape.io.bags.storages import CLOUD, unpacked
 
@@ -200,4 +200,4 @@ def test_rows_of_a_cloud_do_not_overlap():
     said: Any = types.deserialize_cdr(cloud(scans(1)[0], 1), CLOUD)
     many: Any = replace(said, height=10_000_000, row_step=0)
     with pytest.raises(ValueError, match="rows of"):
-        points_of(bytes(types.serialize_cdr(many, CLOUD)), cdr=True)
+        cloud_of(bytes(types.serialize_cdr(many, CLOUD)), cdr=True)

@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import torch
 from jaxtyping import Float
 
-from wildshape.geometry.box import FittedBox, shared_volume
-from wildshape.geometry.transforms.rotation import rotation_z
+from wildshape.geometry.footprint import Place, shared_ground
 
 
 class UprightBox(NamedTuple):
@@ -73,16 +71,11 @@ def shared_area(a: UprightBox, b: UprightBox) -> float:
     reach = (math.hypot(a.length, a.width) + math.hypot(b.length, b.width)) / 2
     if math.hypot(a.x - b.x, a.y - b.y) >= reach:
         return 0.0
-    return shared_volume(_slab(a), _slab(b))
+    return shared_ground(_place(a), (a.length, a.width), _place(b), (b.length, b.width))
 
 
-def _slab(box: UprightBox) -> FittedBox:
-    """The footprint as a box that is a metre high."""
-    return FittedBox(
-        torch.tensor((box.x, box.y, 0.0), dtype=torch.float64),
-        torch.tensor((box.length, box.width, 1.0), dtype=torch.float64),
-        rotation_z(torch.tensor(box.yaw, dtype=torch.float64)),
-    )
+def _place(box: UprightBox) -> Place:
+    return np.array((box.x, box.y, box.z, box.yaw))
 
 
 def _space(a: UprightBox, b: UprightBox, area: float) -> float:
