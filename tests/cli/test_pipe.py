@@ -16,6 +16,7 @@ import trimesh
 from wildshape.cli.main import main
 from wildshape.io.scans.points import read_points
 from wildshape.io.scans.writers import ply_bytes
+from wildshape.report.results import TrackResult
 
 
 @pytest.fixture
@@ -78,6 +79,19 @@ def test_every_way_to_the_same_shape(pipe, scan_file, tmp_path):
     assert said["scan"] == "stdin"
     assert np.shape(said["T_sensor_canonical"]) == (4, 4)
     assert {"box", "confidence", "warning"} <= set(said)
+
+
+def test_shapes_are_written_as_pcd_too(pipe, scan_file, tmp_path):
+    order = ("complete", scan_file, "--out")
+    for kind in ("ply", "pcd"):
+        pipe(b"", *order, tmp_path / kind, "--cloud-format", kind)
+    (ply,), (pcd,) = (tmp_path.glob(f"{kind}/*/completed/*.*") for kind in ("ply", "pcd"))
+    assert (ply.suffix, pcd.suffix, pcd.stem) == (".ply", ".pcd", ply.stem)
+    np.testing.assert_array_equal(read_points(pcd), read_points(ply))
+    found = TrackResult(pcd.parents[1], {}, None)
+    assert found.completed_scans() == [pcd.stem]
+    np.testing.assert_array_equal(found.completed(pcd.stem), read_points(ply))
+    assert pipe(b"", *order, "-", "--cloud-format", "pcd") == pcd.read_bytes()
 
 
 def kitti(points):

@@ -15,6 +15,7 @@ from wildshape.io.guard import reading
 from wildshape.io.inputs import TrackSource, open_tracks
 from wildshape.io.poses import read_poses
 from wildshape.io.scans.points import METRES, SENSOR_METRES, Coordinates, read_points
+from wildshape.io.scans.writers import CLOUD_FORMATS
 from wildshape.records import Box, Points, Track
 
 MARKER, OBJECTS, METRICS, SCORES = "wildshape.json", "objects.json", "metrics.json", "scores.json"
@@ -54,12 +55,16 @@ class TrackResult:
 
     def completed(self, scan: str) -> Points | None:
         """The completed shape, in that scan's sensor frame, metres."""
-        path = self.folder / "completed" / f"{scan}.ply"
-        return read_points(path) if path.exists() else None
+        for kind in CLOUD_FORMATS:
+            path = self.folder / "completed" / f"{scan}.{kind}"
+            if path.exists():
+                return read_points(path)
+        return None
 
     def completed_scans(self) -> list[str]:
         """Names of the scans that have a completed shape."""
-        return sorted(path.stem for path in (self.folder / "completed").glob("*.ply"))
+        folder = self.folder / "completed"
+        return sorted(path.stem for kind in CLOUD_FORMATS for path in folder.glob(f"*.{kind}"))
 
     def poses(self) -> SE3 | None:
         """`T_sensor_canonical`, one a scan of objects.json (or of the track); None without."""

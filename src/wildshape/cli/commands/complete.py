@@ -14,7 +14,7 @@ from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
     from wildshape.inference.folders.complete_folder import FolderOptions
-    from wildshape.io.scans.writers import MeshFiles
+    from wildshape.io.scans.writers import CloudFormat, MeshFiles
     from wildshape.records import Completion, Track
 
 EXAMPLES = (
@@ -48,13 +48,15 @@ class Settings:
     DIR/TRACK/mesh/SCAN.ply, too; with --boxes json,kitti,nuscenes,argoverse2 all boxes in these
     formats below DIR/boxes. An interrupted run goes on where it stopped when repeated.
 
-    In pipes, `wildshape complete - < scan.ply > shape.ply`: nothing but the shape (PLY; with --mesh
-    a mesh, with --json an object with box, pose and points) goes to stdout.
+    In pipes, `wildshape complete - < scan.ply > shape.ply`: nothing but the shape (PLY or
+    --cloud-format; with --mesh a mesh, with --json an object with box, pose and points) goes to
+    stdout.
     """
 
     input: Input
     out: Out = None
     scans: Scans = DEFAULT_SCANS
+    cloud_format: Annotated[Literal["ply", "pcd"], arg(help="of the shapes")] = "ply"
     mesh: Annotated[bool, arg(help="also write a closed mesh of each shape")] = False
     mesh_format: Annotated[Literal["ply", "obj", "glb"], arg(help="of the meshes")] = "ply"
     mesh_colours: Annotated[
@@ -110,7 +112,9 @@ def _options(settings: Settings) -> "FolderOptions":
 
     wanted = bool(settings.boxes or settings.calibration)
     boxes = BoxFiles(settings.boxes, settings.calibration) if wanted else None
-    return replace(settings.scans.of_folder(), mesh=_mesh(settings), boxes=boxes)
+    return replace(
+        settings.scans.of_folder(), clouds=settings.cloud_format, mesh=_mesh(settings), boxes=boxes
+    )
 
 
 def _mesh(settings: Settings) -> "MeshFiles | None":
@@ -143,7 +147,7 @@ def _to_stdout(settings: Settings) -> None:
     if settings.scans.json:
         answer("", _as_json(track.scan_names[0], done), as_json=True)
     else:
-        write_stdout(_as_file(done, track, mesh))
+        write_stdout(_as_file(done, track, mesh, settings.cloud_format))
 
 
 def _one_scan(settings: Settings) -> "Track":
@@ -173,9 +177,11 @@ def _as_json(name: str, done: "Completion") -> dict[str, object]:
     return {**describe(name, done), "T_sensor_canonical": pose, "points": points}
 
 
-def _as_file(done: "Completion", track: "Track", mesh: "MeshFiles | None") -> bytes:
-    from wildshape.io.scans.writers import mesh_bytes, ply_bytes
+def _as_file(
+    done: "Completion", track: "Track", mesh: "MeshFiles | None", clouds: "CloudFormat"
+) -> bytes:
+    from wildshape.io.scans.writers import cloud_bytes, mesh_bytes
 
     if mesh is None:
-        return ply_bytes(done.points)
+        return cloud_bytes(done.points, clouds)
     return mesh_bytes(done.mesh(track.scans[0] if mesh.coloured else None), mesh.kind)

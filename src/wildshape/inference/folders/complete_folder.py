@@ -25,14 +25,21 @@ from wildshape.io.output import Output, begin, file_name, keep_apart
 from wildshape.io.poses import times_of, write_poses, write_trajectory, write_tum
 from wildshape.io.progress import SILENT, Progress, counted, duration
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates, write_ply
-from wildshape.io.scans.writers import MESH_FORMATS, MeshFiles, write_mesh
+from wildshape.io.scans.writers import (
+    CLOUD_FORMATS,
+    MESH_FORMATS,
+    CloudFormat,
+    MeshFiles,
+    write_cloud,
+    write_mesh,
+)
 from wildshape.method.checkpoint import fingerprint
 from wildshape.records import Completion, Track
 
 OBJECTS, POSES, COMPLETED = "objects.json", "poses.txt", "completed"
 MIDDLE, MESH, TUM, TRAJECTORY = "T_middle_scan.txt", "mesh", "trajectory.tum", "trajectory.json"
 FILES = (
-    f"*/{COMPLETED}/*.ply",
+    *(f"*/{COMPLETED}/*.{kind}" for kind in CLOUD_FORMATS),
     *(f"*/{MESH}/*.{kind}" for kind in MESH_FORMATS),
     f"*/{POSES}",
     f"*/{MIDDLE}",
@@ -54,6 +61,7 @@ class FolderOptions:
         device: `auto`, `cpu` or `cuda`.
         coordinates: of the files that are read.
         track: use all scans of a track together.
+        clouds: format of the shapes.
         mesh: also write a closed mesh of each shape, in this way.
         boxes: also write all boxes, in these files.
         overwrite: replace an earlier output.
@@ -63,6 +71,7 @@ class FolderOptions:
     device: str = "auto"
     coordinates: Coordinates = SENSOR_METRES
     track: bool = False
+    clouds: CloudFormat = "ply"
     mesh: MeshFiles | None = None
     boxes: BoxFiles | None = None
     overwrite: bool = False
@@ -72,10 +81,11 @@ class FolderOptions:
         found = {"input": str(source.resolve()), **asdict(self.coordinates)}
         found["model"] = fingerprint(self.model)
         uses = {"uses": "track"} if self.track else {}
+        clouds = {} if self.clouds == "ply" else {"clouds": self.clouds}
         mesh = {"mesh": self.mesh.kind} if self.mesh else {}
         colours = {"mesh_colours": "confidence"} if self.mesh and self.mesh.coloured else {}
         boxes = self.boxes.identity() if self.boxes else {}
-        return {**found, **uses, **mesh, **colours, **boxes}
+        return {**found, **uses, **clouds, **mesh, **colours, **boxes}
 
 
 _DEFAULT = FolderOptions()
@@ -256,7 +266,7 @@ def _write_track(
     for done in predictor.complete_checked(track.scans, track.sensor, track=options.track):
         name = file_name(track.scan_names[len(found)])
         if not registers:
-            write_ply(folder / COMPLETED / f"{name}.ply", done.points)
+            write_cloud(folder / COMPLETED / f"{name}.{options.clouds}", done.points)
         if options.mesh is not None:
             scan = track.scans[len(found)] if options.mesh.coloured else None
             write_mesh(folder / MESH / f"{name}.{options.mesh.kind}", done.mesh(scan))

@@ -27,6 +27,8 @@ FRAME = (
 
 _IF_KNOWN = ("sequence", "time_ns", "points", "velocity")
 
+_MOST_DIGITS = 18  # of a number that data sets hold
+
 
 @dataclass(frozen=True)
 class Detection:
@@ -77,7 +79,8 @@ def moved(box: Box, T_target_sensor: SE3) -> Box:
 
 def number_of(scan: str, place: int) -> int:
     """What a scan's name counts, or else its place in the track."""
-    return int(scan) if scan.isascii() and scan.isdigit() else place
+    counts = scan.isascii() and scan.isdigit() and len(scan) <= _MOST_DIGITS
+    return int(scan) if counts else place
 
 
 def read_detections(out: Path) -> list[Detection]:

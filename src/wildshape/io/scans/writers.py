@@ -5,6 +5,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Literal, cast, get_args
 
@@ -18,6 +19,9 @@ from wildshape.io.atomic import atomic_write
 if TYPE_CHECKING:
     import trimesh
 
+CloudFormat = Literal["ply", "pcd"]
+CLOUD_FORMATS: tuple[CloudFormat, ...] = get_args(CloudFormat)
+"""Of completed shapes."""
 MeshFormat = Literal["ply", "obj", "glb"]
 MESH_FORMATS: tuple[MeshFormat, ...] = get_args(MeshFormat)
 _COLOURS = ("red", "green", "blue")
@@ -37,6 +41,20 @@ def ply_bytes(
         lines.append(f"property {'uchar' if name in _COLOURS else 'float'} {name}")
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}", *lines]
     return ("\n".join([*header, "end_header"]) + "\n").encode() + rows.tobytes()
+
+
+def _pcd_bytes(points: Float[np.ndarray, "n 3"]) -> bytes:
+    """A binary PCD file: float32 x y z."""
+    from pypcd4.pypcd4 import Encoding, PointCloud
+
+    rows, file = np.ascontiguousarray(points, np.float32), BytesIO()
+    PointCloud.from_xyz_points(rows).save(file, Encoding.BINARY)
+    return file.getvalue()
+
+
+def cloud_bytes(points: Float[np.ndarray, "n 3"], kind: CloudFormat) -> bytes:
+    """Points as a file's content."""
+    return ply_bytes(points) if kind == "ply" else _pcd_bytes(points)
 
 
 def write_ply(
@@ -60,11 +78,7 @@ def _ply(file: BinaryIO, points: Float[np.ndarray, "n 3"]) -> None:
 
 
 def _pcd(file: BinaryIO, points: Float[np.ndarray, "n 3"]) -> None:
-    """Binary, float32 x y z."""
-    from pypcd4.pypcd4 import Encoding, PointCloud
-
-    rows = np.ascontiguousarray(points, np.float32)
-    PointCloud.from_xyz_points(rows).save(file, Encoding.BINARY)
+    file.write(_pcd_bytes(points))
 
 
 def _text(file: BinaryIO, points: Float[np.ndarray, "n 3"]) -> None:

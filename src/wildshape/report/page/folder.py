@@ -16,7 +16,6 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.registration import to_middle
 from wildshape.io.guard import reading
-from wildshape.io.scans.points import read_points
 from wildshape.records import Track, as_text
 from wildshape.report.content import Cloud, Figure, Report, ReportObject, Table, track_object
 from wildshape.report.page.curves import training_curves
@@ -198,11 +197,11 @@ def _completed_only(result: TrackResult) -> ReportObject:
     if not completed:
         return ReportObject(result.folder.name, missing, scans=scans_of(result))
     scan = completed[len(completed) // 2]
-    entry = result.entry(scan)
+    shape, entry = result.completed(scan), result.entry(scan)
     return ReportObject(
         name=result.folder.name,
         subtitle=f"scan {scan}; {missing}",
-        clouds=(Cloud("completed", read_points(result.folder / "completed" / f"{scan}.ply")),),
+        clouds=() if shape is None else (Cloud("completed", shape),),
         box=box_of(entry),
         details=_details(entry),
         scans=scans_of(result),
