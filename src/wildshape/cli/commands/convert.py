@@ -74,6 +74,8 @@ class Settings:
         pixels: edge of its images (shapenet-views).
         max_depth: farther pixels are left out, metres (rgbd, bop).
         edge: so many pixels at a mask's border are left out (rgbd, bop).
+        rays: keep the rays around each scan that did not hit its object, too (docs/formats.md); a
+            scan takes about six times the room.
         workers: processes; by default one a core.
         ray: spread the work over the Ray cluster at this address; `auto` finds the one that this
             machine belongs to, `local` starts one. OUT must lie where all its machines see it.
@@ -112,6 +114,7 @@ class Settings:
     pixels: Count = None
     max_depth: Metres = None
     edge: Count = None
+    rays: bool = False
     workers: Count = None
     ray: Annotated[str | None, option(metavar="ADDRESS")] = None
     overwrite: Overwrite = False

@@ -29,8 +29,9 @@ from wildshape.datasets.tracks.labelled_boxes import (
 from wildshape.datasets.tracks.parts import found_in, part_name
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
+from wildshape.geometry.projection.sight_lines import FullScan
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.records import Points, Sensor, Track
+from wildshape.records import Sensor, Track
 
 VLP32C = Sensor(kind="lidar", resolution_deg=(0.2, 0.33))
 VEHICLES = (
@@ -56,6 +57,7 @@ class Argoverse2:
         selection: which objects and scans; its categories are the data set's, default `VEHICLES`.
         crop: how much around the labelled box belongs to the object.
         lidar: whose points are taken; see `read_sensor_pose` for the frame of the scans.
+        rays: with each scan keep the rays of its frame that passed the object by, too.
         rejected: see `Source`.
     """
 
@@ -63,6 +65,7 @@ class Argoverse2:
     selection: Selection = Selection()
     crop: Crop = Crop()
     lidar: Lidar = "both"
+    rays: bool = False
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
 
     def parts(self) -> list[str]:
@@ -84,7 +87,7 @@ class Argoverse2:
         log = root if (root / LABELS).is_file() else root / part
         boxes = read_boxes(log)
         wanted = self._wanted(boxes)
-        gathering = Gathering(self.selection, VLP32C, self.rejected)
+        gathering = Gathering(self.selection, VLP32C, self.rejected, rays=self.rays)
         T_sensor_ego = read_sensor_pose(log, self.lidar).inverse()
         frames = _Frames(log, T_sensor_ego, read_city_poses(log), boxes, self.lidar)
         for number, stamp in enumerate(np.unique(boxes.timestamps[wanted]).tolist()):
@@ -127,13 +130,19 @@ class _Frames:
             place=(T_city_ego @ T_ego_object).translation.numpy(),
         )
 
-    def scan(self, stamp: int) -> Points | None:
+    def scan(self, stamp: int) -> FullScan | None:
         """The sweep of a frame in the sensor's frame; None if it has no file."""
         path = self.log / _SWEEPS / f"{stamp}.feather"
         if not path.is_file():
             return None
         points, lasers = read_sweep(path)
-        return self.T_sensor_ego.apply_numpy(points[taken_by(self.lidar, lasers)])
+        taken = taken_by(self.lidar, lasers)
+        cloud = self.T_sensor_ego.apply_numpy(points[taken])
+        if self.lidar != "both":
+            return FullScan(cloud)
+        starts = (self.T_sensor_ego @ read_sensor_pose(self.log, one) for one in ("up", "down"))
+        up, down = (T.translation.numpy().astype(np.float32) for T in starts)
+        return FullScan(cloud, np.where(taken_by("up", lasers[taken])[:, None], up, down))
 
     def _city_pose(self, stamp: int) -> SE3:
         if stamp not in self.T_city_ego:

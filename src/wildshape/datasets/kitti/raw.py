@@ -45,12 +45,14 @@ class KittiRaw:
         selection: which objects and scans; its categories are `objectType`s, by default `VEHICLES`.
             Whether an object moves is told by the drive's GPS/IMU records, read if it is asked.
         crop: how much around the labelled box belongs to the object.
+        rays: with each scan keep the rays of its frame that passed the object by, too.
         rejected: see `Source`.
     """
 
     root: Path
     selection: Selection = Selection()
     crop: Crop = Crop()
+    rays: bool = False
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
 
     def parts(self) -> list[str]:
@@ -77,7 +79,7 @@ class KittiRaw:
 
     def _drive_tracks(self, drive: Path) -> Iterator[Track]:
         tracklets = read_tracklets(drive / _TRACKLETS)
-        gathering = Gathering(self.selection, HDL64E, self.rejected)
+        gathering = Gathering(self.selection, HDL64E, self.rejected, rays=self.rays)
         files = scan_files(drive)
         world = {} if self.selection.motion == "any" else drive_poses(drive)
         labelled: dict[int, dict[str, Tracklet]] = defaultdict(dict)

@@ -40,12 +40,14 @@ class KittiTracking:
         selection: which objects and scans; categories are the labels' types, by default `VEHICLES`.
             Whether an object moves is known where `oxts` lies beside the labels.
         crop: how much around the labelled box belongs to the object.
+        rays: with each scan keep the rays of its frame that passed the object by, too.
         rejected: see `Source`.
     """
 
     root: Path
     selection: Selection = Selection()
     crop: Crop = Crop()
+    rays: bool = False
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
 
     def parts(self) -> list[str]:
@@ -69,7 +71,7 @@ class KittiTracking:
         sequence = _open(self._training(), part)
         frames = self._wanted(sequence.labels)
         last = {box.track: box.frame for boxes in frames.values() for box in boxes}
-        gathering = Gathering(self.selection, HDL64E, self.rejected)
+        gathering = Gathering(self.selection, HDL64E, self.rejected, rays=self.rays)
         for frame, boxes in frames.items():
             # The last frame is known: an object may be unlabelled for a while and come back.
             objects = [sequence.object(box, last[box.track]) for box in boxes]

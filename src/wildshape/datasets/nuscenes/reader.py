@@ -51,6 +51,7 @@ class NuScenes:
         sweeps: also take the 20 Hz sweeps between the 2 Hz key frames; boxes are interpolated.
         lidar: channel of the LiDAR; default: the first of `CHANNELS` that there is.
         cache: where the index of the tables is kept; default `table_index.cache_folder()`.
+        rays: with each scan keep the rays of its frame that passed the object by, too.
         rejected: see `Source`.
     """
 
@@ -60,6 +61,7 @@ class NuScenes:
     sweeps: bool = False
     lidar: str = ""
     cache: Path | None = None
+    rays: bool = False
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
 
     def parts(self) -> list[str]:
@@ -95,7 +97,7 @@ class NuScenes:
             self.rejected[f"scene: none of its {channel} files is here"] += 1
             return
         sensor = HDL32E if channel == CHANNELS[0] else Sensor("lidar")
-        gathering = Gathering(self.selection, sensor, self.rejected)
+        gathering = Gathering(self.selection, sensor, self.rejected, rays=self.rays)
         wanted = self._wanted(scene)
         for number, frame in enumerate(scene.frames):
             objects = [

@@ -25,7 +25,9 @@ from wildshape.datasets.tracks.labelled_boxes import Crop, rows_in_box
 from wildshape.datasets.tracks.parts import found_in, part_name
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
-from wildshape.records import Points, Sensor, Track
+from wildshape.geometry.projection.sight_lines import FullScan, sight_lines
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.records import Points, Sensor, SightLines, Track
 
 PANDAR64_SENSOR = Sensor(kind="lidar", resolution_deg=(0.2, 0.167))
 VEHICLES = (
@@ -52,12 +54,14 @@ class PandaSet:
         root: a scene, the folder of the scenes, or the folder above.
         selection: which objects and scans; its categories are the data set's, default `VEHICLES`.
         crop: how much around the labelled cuboid belongs to the object.
+        rays: with each scan keep the rays of its frame that passed the object by, too.
         rejected: see `Source`.
     """
 
     root: Path
     selection: Selection = Selection()
     crop: Crop = Crop()
+    rays: bool = False
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
 
     def parts(self) -> list[str]:
@@ -79,7 +83,7 @@ class PandaSet:
         scene = root if _is_scene(root) else root / part
         labels = sorted((scene / CUBOIDS).glob(f"*{_FILE}"))
         drive = read_drive(scene, 1 + max(map(_number, labels), default=-1))
-        gathering = Gathering(self.selection, PANDAR64_SENSOR, self.rejected)
+        gathering = Gathering(self.selection, PANDAR64_SENSOR, self.rejected, rays=self.rays)
         left_out: dict[str, str] = {}
         for path in labels:
             cuboids = read_cuboids(path)
@@ -129,7 +133,14 @@ class PandaSet:
                 T_sensor_world.apply_numpy(cloud[inside]),
                 T_sensor_world @ T_world_object,
                 T_world_object.translation.numpy(),
+                rays=partial(_rays, cloud, inside, T_sensor_world),
+                label_size_m=(length, width, height),
             )
+
+
+def _rays(cloud: Points, rows: np.ndarray, T_sensor_world: SE3) -> SightLines | None:
+    """The rays that passed an object by, seen from where the sensor was then."""
+    return sight_lines(FullScan(T_sensor_world.apply_numpy(cloud)), rows)
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,14 @@ The object frame is the model's own.
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from wildshape.datasets.rgbd.bop_scene import Frame, Scene, Thing, model_shape, open_scene
 from wildshape.datasets.rgbd.depth_image import read_png
-from wildshape.datasets.rgbd.reader import Cut, cut_out
+from wildshape.datasets.rgbd.reader import Cut, cut_out, rays_beside
 from wildshape.datasets.tracks.gathering import Gathering
 from wildshape.datasets.tracks.parts import found_in
 from wildshape.datasets.tracks.selection import Selection
@@ -40,6 +41,7 @@ class Bop:
         shape_points: of a true shape.
         longest: most scans of a track, and most frames in which an object may be unseen before its
             track ends: memory stays flat however long a scene is.
+        rays: with each scan keep the rays of its frame that passed the object by, too.
         rejected: see `Source`.
     """
 
@@ -49,6 +51,7 @@ class Bop:
     shapes: bool = True
     shape_points: int = 8192
     longest: int = 300
+    rays: bool = False
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
 
     def parts(self) -> list[str]:
@@ -78,7 +81,7 @@ class Bop:
         """
         scene = open_scene(Path(self.root) / part)
         gathering = Gathering(
-            self.selection, Sensor("camera", intrinsics=scene.camera), self.rejected
+            self.selection, Sensor("camera", intrinsics=scene.camera), self.rejected, rays=self.rays
         )
         offers: Counter[tuple[int, int]] = Counter()
         most = self.longest * self.selection.every
@@ -127,7 +130,8 @@ class Bop:
         if frame.T_camera_world is not None:
             T_world_object = frame.T_camera_world.inverse() @ thing.T_camera_object
             place = T_world_object.translation.numpy()
-        to.add(name, frame.stem, points, thing.T_camera_object, place)
+        rays = partial(rays_beside, depth, mask, camera)
+        to.add(name, frame.stem, points, thing.T_camera_object, place, rays=rays)
 
     def _shaped(self, tracks: Iterator[Track], scene: Scene) -> Iterator[Track]:
         for track in tracks:

@@ -27,7 +27,8 @@ from wildshape.datasets.tracks.gathering import Gathering
 from wildshape.datasets.tracks.parts import found_in
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
-from wildshape.records import Intrinsics, Points, Sensor, Track
+from wildshape.geometry.projection.sight_lines import FullScan, sight_lines
+from wildshape.records import Intrinsics, Points, Sensor, SightLines, Track
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,7 @@ class Rgbd:
         gap: an object that is not seen for more than so many frames begins a new track, and so
             does one at `longest` scans: memory stays flat however long a sequence is.
         longest: most scans of a track.
+        rays: with each scan keep the rays of its frame that passed the object by, too.
         rejected: see `Source`.
     """
 
@@ -68,6 +70,7 @@ class Rgbd:
     cut: Cut = Cut()
     gap: int = 100
     longest: int = 300
+    rays: bool = False
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
 
     def parts(self) -> list[str]:
@@ -94,9 +97,8 @@ class Rgbd:
             BadInputError: camera.json, a depth image, a mask or poses.txt is missing or damaged.
         """
         sequence = open_sequence(Path(self.root) / part)
-        gathering = Gathering(
-            self.selection, Sensor("camera", intrinsics=sequence.camera), self.rejected
-        )
+        sensor = Sensor("camera", intrinsics=sequence.camera)
+        gathering = Gathering(self.selection, sensor, self.rejected, rays=self.rays)
         names = _Names(sequence.name, self.gap, self.longest * self.selection.every)
         for frame, path in enumerate(sequence.depth):
             self._add_frame(sequence, frame, path, gathering, names)
@@ -124,7 +126,9 @@ class Rgbd:
             return
         for instance, mask in chosen.items():
             points = cut_out(depth, mask, sequence.camera, self.cut)
-            to.add(names.now(instance), path.stem, points, place=sequence.place(frame, points))
+            place = sequence.place(frame, points)
+            rays = partial(rays_beside, depth, mask, sequence.camera)
+            to.add(names.now(instance), path.stem, points, place=place, rays=rays)
 
     def _wanted(
         self, sequence: Sequence, path: Path
@@ -164,6 +168,17 @@ def cut_out(
         return points
     chosen = np.random.default_rng(0).choice(len(points), cut.most_points, replace=False)
     return points[np.sort(chosen)]
+
+
+def rays_beside(
+    depth: Float[np.ndarray, "h w"], mask: Bool[np.ndarray, "h w"], camera: Intrinsics
+) -> SightLines | None:
+    """The rays of the pixels around a mask, camera frame; infinite where there is no depth."""
+    seen = np.isfinite(depth) & (depth > 0)
+    lost = back_project(np.where(seen | mask, 0.0, 1.0), camera)
+    lost = lost / np.linalg.norm(lost, axis=1, keepdims=True)
+    rows = np.flatnonzero(mask[seen])
+    return sight_lines(FullScan(back_project(depth, camera), lost=lost), rows)
 
 
 class _Names:

@@ -14,6 +14,8 @@ from functools import partial
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from wildshape.datasets.kitti.raw import HDL64E
 from wildshape.datasets.semantic_kitti.labels import (
     LABELS_CURE,
@@ -28,6 +30,7 @@ from wildshape.datasets.tracks.gathering import Gathering
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.datasets.tracks.stationary import stand
 from wildshape.errors import BadInputError
+from wildshape.geometry.projection.sight_lines import FullScan, sight_lines
 from wildshape.records import Track
 
 Split = Literal["train", "test", "all"]
@@ -61,6 +64,7 @@ class SemanticKitti:
         gap: an object not seen well for more frames than this comes back as another track; None:
             it stays one object over the whole sequence, as it is labelled.
         longest_m: as `LONGEST_M`, of the categories that it does not name, metres.
+        rays: with each scan keep the rays of its frame that passed the object by, too.
         rejected: see `Source`.
     """
 
@@ -70,6 +74,7 @@ class SemanticKitti:
     labels: str = "labels"
     gap: int | None = None
     longest_m: float = 20.0
+    rays: bool = False
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
 
     def parts(self) -> list[str]:
@@ -109,7 +114,8 @@ class SemanticKitti:
         sequence = open_sequence(folder, part, self.labels, kinds)
         schedule = self._schedule(count_points(sequence.files, kinds))
         # What moved is known by class; places would tell nothing more.
-        gathering = Gathering(replace(self.selection, motion="any"), HDL64E, self.rejected)
+        selection = replace(self.selection, motion="any")
+        gathering = Gathering(selection, HDL64E, self.rejected, rays=self.rays)
         for frame, visits in sorted(schedule.items()):
             self._cut(sequence, frame, visits, gathering)
             yield from self._finished(gathering, frame)
@@ -131,7 +137,8 @@ class SemanticKitti:
     def _cut(self, sequence: Sequence, frame: int, visits: list[Visit], to: Gathering) -> None:
         # The object's last frame is known: that it may be handed out after, and not before.
         wanted = [v for v in visits if to.wants(frame=v.frames[-1], **sequence.words(v))]
-        found = to.read(partial(sequence.labelled_points, frame), len(wanted))
+        read = partial(sequence.labelled_points, frame, whole=self.rays)
+        found = to.read(read, len(wanted))
         if found is None:
             return
         labels, points = found
@@ -139,7 +146,9 @@ class SemanticKitti:
             poses = sequence.T_velo_world
             pose = None if poses is None or sequence.kind(visit).moved else poses[frame]
             name = sequence.words(visit)["name"]
-            to.add(name, sequence.scan_file(frame).stem, points[labels == visit.label], pose)
+            rows = np.flatnonzero(labels == visit.label)
+            rays = partial(sight_lines, FullScan(points), rows)
+            to.add(name, sequence.scan_file(frame).stem, points[rows], pose, rays=rays)
 
     def _finished(self, gathering: Gathering, frame: int) -> Iterator[Track]:
         """Tracks that end at a frame; those of stationary objects in the object's own frame."""

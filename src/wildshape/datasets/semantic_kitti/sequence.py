@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict
 
+import numpy as np
+
 from wildshape.datasets.kitti.calibration import read_calibration, read_odometry, rigid
 from wildshape.datasets.semantic_kitti.labels import (
     LABELS_CURE,
@@ -70,8 +72,8 @@ class Sequence:
         """The velodyne file of a frame, which may be missing."""
         return self.folder / _SCANS / f"{self.files[frame].stem}.bin"
 
-    def labelled_points(self, frame: int) -> tuple[Labels, Points] | None:
-        """Label and position of the points that lie on objects of the kinds asked for.
+    def labelled_points(self, frame: int, *, whole: bool = False) -> tuple[Labels, Points] | None:
+        """Label and position of the points on objects of the kinds asked for, or of all points.
 
         None where the frame has no scan.
 
@@ -88,7 +90,7 @@ class Sequence:
                 f"{path}: {len(raw)} points, but {self.files[frame]} has {len(labels)} "
                 "labels; they are not of the same frame, download both again."
             )
-        index = on_objects(labels, self.kinds)
+        index = np.arange(len(raw)) if whole else on_objects(labels, self.kinds)
         points = raw[index]
         kept = measured(points)
         return labels[index[kept]], points[kept]

@@ -11,7 +11,7 @@ import numpy as np
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3, stack
-from wildshape.records import Points, Sensor, Track
+from wildshape.records import Points, Sensor, SightLines, Track
 
 Scan = TypeVar("Scan")
 
@@ -69,6 +69,8 @@ class _Object:
     names: list[str] = field(default_factory=list)
     poses: list[SE3] = field(default_factory=list)
     places: list[np.ndarray] = field(default_factory=list)
+    rays: list[SightLines | None] = field(default_factory=list)
+    label_size_m: tuple[float, float, float] | None = None
 
 
 class Gathering:
@@ -78,12 +80,21 @@ class Gathering:
         selection: which objects and scans.
         sensor: that took the scans.
         rejected: how much was left out, by reason (see `Source`).
+        rays: whether the rays that passed the objects by are kept.
         damage: frames that could not be read.
     """
 
-    def __init__(self, selection: Selection, sensor: Sensor, rejected: dict[str, int]) -> None:
+    def __init__(
+        self,
+        selection: Selection,
+        sensor: Sensor,
+        rejected: dict[str, int],
+        *,
+        rays: bool = False,
+    ) -> None:
         """Nothing yet; what is left out is added to `rejected`."""
         self.selection, self.sensor, self.rejected = selection, sensor, rejected
+        self.rays = rays
         self._objects: dict[str, _Object] = {}
         self.damage = Damage(rejected)
 
@@ -126,6 +137,9 @@ class Gathering:
         points: Points,
         T_sensor_object: SE3 | None = None,
         place: np.ndarray | None = None,
+        *,
+        rays: Callable[[], SightLines | None] = lambda: None,
+        label_size_m: tuple[float, float, float] | None = None,
     ) -> None:
         """Add one scan of an object that `wants` was asked about, or count why not.
 
@@ -135,6 +149,8 @@ class Gathering:
             points: on the object, sensor frame, metres.
             T_sensor_object: truth, one pose; for all scans of an object or for none.
             place: `(3,)` where the object stands in a frame that does not move, metres.
+            rays: gives those that passed the object by; asked for only where they are kept.
+            label_size_m: truth, length, width and height of the labelled box.
         """
         self.damage.read += 1
         objection = self.selection.objection_to_scan(points)
@@ -146,6 +162,8 @@ class Gathering:
         seen.names.append(scan_name)
         if T_sensor_object is not None:
             seen.poses.append(T_sensor_object)
+        seen.rays.append(rays() if self.rays else None)
+        seen.label_size_m = label_size_m
         if place is not None:
             seen.places.append(np.asarray(place, np.float64))
 
@@ -181,4 +199,6 @@ class Gathering:
             category=seen.category,
             source=seen.source,
             T_sensor_object=stack(seen.poses) if seen.poses else None,
+            rays=tuple(seen.rays),
+            label_size_m=seen.label_size_m,
         )

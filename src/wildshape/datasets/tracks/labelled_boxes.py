@@ -4,12 +4,14 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from wildshape.datasets.tracks.gathering import Gathering
 from wildshape.errors import BadInputError
+from wildshape.geometry.projection.sight_lines import FullScan, sight_lines
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 
@@ -58,7 +60,7 @@ class LabelledObject:
 def crop_objects(
     objects: Iterable[LabelledObject],
     scan_name: str,
-    read: Callable[[], Points | None],
+    read: Callable[[], Points | FullScan | None],
     crop: Crop,
     to: Gathering,
 ) -> None:
@@ -67,7 +69,8 @@ def crop_objects(
     Args:
         objects: in the frame.
         scan_name: of the frame.
-        read: `(s, 3)` the whole scan, sensor frame, metres; None where the frame has no file.
+        read: the whole scan, sensor frame, metres, or its points `(s, 3)` alone; None where the
+            frame has no file.
         crop: see there.
         to: gathers the tracks; counts a scan that is missing or damaged.
     """
@@ -76,12 +79,21 @@ def crop_objects(
         for one in objects
         if to.wants(one.name, one.last_frame, category=one.category, source=one.source)
     ]
-    cloud = to.read(read, len(wanted))
-    if cloud is None:
+    found = to.read(read, len(wanted))
+    if found is None:
         return
+    full = found if isinstance(found, FullScan) else FullScan(found)
     for one in wanted:
-        points = points_in_box(cloud, one.T_sensor_object, one.size, crop)
-        to.add(one.name, scan_name, points, one.T_sensor_object, one.place)
+        rows = rows_in_box(full.points, one.T_sensor_object, one.size, crop)
+        to.add(
+            one.name,
+            scan_name,
+            full.points[rows],
+            one.T_sensor_object,
+            one.place,
+            rays=partial(sight_lines, full, rows),
+            label_size_m=one.size,
+        )
 
 
 def described(data_set: str, size: tuple[float, float, float]) -> str:

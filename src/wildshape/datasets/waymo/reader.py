@@ -8,6 +8,7 @@ Scans are what the TOP LiDAR saw, first return, in its own frame at the frame's 
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -33,9 +34,11 @@ from wildshape.datasets.waymo.tables import (
     read_vehicle_poses,
 )
 from wildshape.errors import BadInputError
+from wildshape.geometry.projection.sight_lines import FullScan
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor, Track
 
+_FAR_M = 900.0
 TOP = Sensor(kind="lidar", resolution_deg=(0.136, 0.31))
 _LAYOUT = f"<root>/<split>/{{{','.join(COMPONENTS)}}}/<segment>.parquet"
 
@@ -49,12 +52,14 @@ class Waymo:
         selection: which objects and scans; categories are `vehicle` (the default), `pedestrian`,
             `sign`, `cyclist`.
         crop: how much around the labelled box belongs to the object.
+        rays: with each scan keep the rays of its frame that passed the object by, too.
         rejected: see `Source`.
     """
 
     root: Path
     selection: Selection = Selection()
     crop: Crop = Crop()
+    rays: bool = False
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
 
     def parts(self) -> list[str]:
@@ -75,13 +80,14 @@ class Waymo:
         """
         tables = tables_of(Path(self.root), part)
         boxes = self._wanted(read_boxes(tables["lidar_box"]))
-        gathering = Gathering(self.selection, TOP, self.rejected)
+        gathering = Gathering(self.selection, TOP, self.rejected, rays=self.rays)
         unseen = set(boxes)
         for number, frame in enumerate(frames(tables, boxes)):
             unseen.remove(frame.microseconds)
             objects = [frame.object(box, part, number) for box in frame.boxes]
             name = str(frame.microseconds)
-            crop_objects(objects, name, frame.points, self.crop, gathering)
+            read = partial(frame.scan, lost=self.rays)
+            crop_objects(objects, name, read, self.crop, gathering)
         for time in unseen:
             gathering.reject("scan: the frame has no range image of TOP", len(boxes[time]))
         yield from gathering.finished()
@@ -119,11 +125,23 @@ class Frame:
             place=(self.T_world_vehicle @ box.T_vehicle_object).translation.numpy(),
         )
 
+    def scan(self, *, lost: bool = False) -> FullScan:
+        """All points in the sensor's frame at the frame's time; if asked, what was lost, too."""
+        points, ranges = self.points(), self.image[..., 0]
+        if not lost:
+            return FullScan(points)
+        # So far away that where the sensor stood meanwhile does not turn them.
+        ends = self._points(np.where((ranges > 0) & (ranges < np.inf), 0.0, _FAR_M))
+        return FullScan(points, lost=ends / np.linalg.norm(ends, axis=1, keepdims=True))
+
     def points(self) -> Points:
         """All points `(n, 3)` in the sensor's frame at the frame's time, metres."""
+        return self._points(self.image[..., 0])
+
+    def _points(self, ranges: np.ndarray) -> Points:
         T_vehicle_sensor = self.calibration.T_vehicle_sensor
-        inclinations = self.calibration.inclinations(len(self.image))
-        seen, points = points_of_pixels(self.image[..., 0], inclinations, T_vehicle_sensor)
+        inclinations = self.calibration.inclinations(len(ranges))
+        seen, points = points_of_pixels(ranges, inclinations, T_vehicle_sensor)
         poses = self.pixel_poses[seen]
         moved = at_frame_time(points, poses, T_vehicle_sensor, self.T_world_vehicle)
         return moved[measured(moved)].astype(np.float32)

@@ -133,6 +133,42 @@ class NearestRays(NamedTuple):
     beyond: Float[np.ndarray, "n"]
 
 
+@dataclass(frozen=True)
+class FullScan:
+    """All that a frame's sensor says, sensor frame, metres.
+
+    Attributes:
+        points: `(s, 3)` its returns.
+        origins: `(s, 3)` where the ray of each began, where several sensors are merged.
+        lost: `(k, 3)` unit directions of rays of which the sensor's grid says that nothing came
+            back; only of a single sensor.
+    """
+
+    points: np.ndarray
+    origins: np.ndarray | None = None
+    lost: np.ndarray | None = None
+
+
+def sight_lines(
+    full: FullScan, rows: Int[np.ndarray, "k"], most: int = MOST_RAYS
+) -> SightLines | None:
+    """The rays of a frame beside those of one object, at most `most`; see `rays_near`.
+
+    Args:
+        full: the frame.
+        rows: of the object's own returns; none for none.
+        most: rays returned at most.
+    """
+    if not len(rows):
+        return None
+    count, lost = len(full.points), full.lost
+    ends = full.points if lost is None else np.concatenate((full.points, lost))
+    near = rays_near(ends, rows, most)
+    rays = SightLines.of_returns(ends[near], None if full.origins is None else full.origins[near])
+    rays.ranges[near >= count] = np.inf
+    return rays
+
+
 def rays_near(
     frame: Float[np.ndarray, "s 3"], rows: Int[np.ndarray, "k"], most: int = MOST_RAYS
 ) -> Int[np.ndarray, "m"]:
