@@ -9,7 +9,6 @@ from tests.refusal import refused
 
 from wildshape.geometry.projection.sight_lines import SightLines, nearest_rays, rays_near
 from wildshape.geometry.transforms.rotation import rotation_z
-from wildshape.geometry.transforms.se3 import SE3
 
 
 def some_rays(count: int, seed: int = 0, origins: np.ndarray | None = None) -> SightLines:
@@ -51,10 +50,13 @@ def test_of_several_sensors_the_one_that_saw_past_a_point_is_believed() -> None:
 def test_rays_move_with_what_they_are_held_against() -> None:
     rays = some_rays(100)
     points = np.array((10.0, 0.0, 0.0)) + np.random.default_rng(1).normal(0, 1, (50, 3))
-    T = SE3(rotation_z(torch.tensor(2.0).double()), torch.tensor([3.0, -4.0, 1.0]).double())
-    here, there = nearest_rays(points, rays), nearest_rays(T.apply_numpy(points), rays.moved(T))
-    assert (here.ray == there.ray).all()
-    assert np.allclose(here.beyond, there.beyond, atol=1e-3, equal_nan=True)
+    turn = rotation_z(torch.tensor(2.0)).double().numpy()
+    for shift in (np.zeros(3), np.array((3.0, -4.0, 1.0))):
+        moved = rays.moved(turn, shift)
+        assert (moved.origins is None) == (not shift.any())
+        here, there = nearest_rays(points, rays), nearest_rays(points @ turn.T + shift, moved)
+        assert (here.ray == there.ray).all()
+        assert np.allclose(here.beyond, there.beyond, atol=1e-3, equal_nan=True)
 
 
 def test_rays_are_kept_around_the_object_and_not_elsewhere() -> None:

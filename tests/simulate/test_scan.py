@@ -45,7 +45,7 @@ def test_beam_tables_are_the_makers() -> None:
 def test_rings_of_a_scan_are_the_beam_table(lidar: SpinningLidar) -> None:
     car = _car()
     noisy = Returns(0.02, 0.1, 0.5, ground=False)
-    points, _ = scan(
+    points, *_ = scan(
         Scene([car]), car, lidar, _pose(6, 4, 2.5, car), noisy, np.random.default_rng(0)
     )
     off = np.abs(_elevation(points)[:, None] - np.array(lidar.elevation_deg)).min(1)
@@ -71,7 +71,7 @@ def test_rays_of_the_window_miss_nothing(yaw: float) -> None:
 def test_clean_hits_lie_on_the_surface_and_noise_along_the_ray() -> None:
     car = _car()
     T = _pose(7, 3, 2.8, car)
-    clean, count = scan(Scene([car]), car, HDL64, T, _CLEAN, np.random.default_rng(0))
+    clean, count, *_ = scan(Scene([car]), car, HDL64, T, _CLEAN, np.random.default_rng(0))
     assert count == len(clean) > 1000
     mesh = trimesh.Trimesh(car.vertices, car.faces, process=False)
     on_object = clean[::23] @ T[:3, :3].T + T[:3, 3]
@@ -84,7 +84,7 @@ def test_noise_has_the_stated_sigma_along_the_ray() -> None:
     T = np.eye(4)
     T[:3, 3] = -8.0, 0.0, 0.0
     noisy = Returns(0.02, 0.0, 1.0, ground=False)
-    points, _ = scan(Scene([wall]), wall, HDL64, T, noisy, np.random.default_rng(0))
+    points, *_ = scan(Scene([wall]), wall, HDL64, T, noisy, np.random.default_rng(0))
     range_m = np.linalg.norm(points, axis=1)
     depth_error = (points[:, 0] - 7.9) * range_m / points[:, 0]
     assert depth_error.std() == pytest.approx(0.02, rel=0.05)
@@ -110,7 +110,7 @@ def test_ground_option_adds_a_low_rim_only() -> None:
     car = _car()
     T = _pose(6, 4, 2.5, car)
     with_ground = Returns(0.0, 0.0, 1.0, ground=True)
-    points, on_car = scan(Scene([car]), car, HDL64, T, with_ground, np.random.default_rng(0))
+    points, on_car, *_ = scan(Scene([car]), car, HDL64, T, with_ground, np.random.default_rng(0))
     assert len(points) > on_car > 100
     on_object = points @ T[:3, :3].T + T[:3, 3]
     low = on_object[on_object[:, 2] < car.bounds[0, 2] + 1e-3]

@@ -35,6 +35,7 @@ class SimulationConfig:
         whole_pass: share of the LiDAR tracks that are spread over as much of a pass as there is,
             every k-th scan; the others are every scan of a short stretch, as a sensor that loses
             its object early leaves it.
+        rays: that passed the object by, kept with each scan at most (LiDAR).
     """
 
     tracks: int = 100
@@ -52,6 +53,7 @@ class SimulationConfig:
     near_m: float = 4.0
     far_m: float = 30.0
     whole_pass: float = 2 / 3
+    rays: int = 0
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated.

@@ -64,6 +64,7 @@ def _record(raw: RawTrack, config: SimulationConfig, index: int) -> Track:
         source=f"simulated {config.sensor} {raw.kind}",
         T_sensor_object=SE3(torch.from_numpy(rotation), torch.from_numpy(translation)).inverse(),
         shape=raw.shape,
+        rays=raw.rays,
     )
 
 

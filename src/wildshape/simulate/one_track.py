@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from wildshape.errors import BadInputError
+from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.simulate.config import SimulationConfig
 from wildshape.simulate.occluder import occluders
 from wildshape.simulate.raycast import Scene
-from wildshape.simulate.scan import Returns, scan
+from wildshape.simulate.scan import Returns, Turn, passing_rays, scan
 from wildshape.simulate.sensor import DepthCamera, SpinningLidar
 from wildshape.simulate.shapes.meshes import read_mesh
 from wildshape.simulate.shapes.solid import Solid
@@ -35,12 +36,14 @@ class RawTrack:
         T_object_sensor: `(v, 4, 4)` float64.
         shape: `(g, 3)` float32, object frame.
         kind: what the object is.
+        rays: of each scan, if they are asked for.
     """
 
     scans: list[np.ndarray]
     T_object_sensor: np.ndarray
     shape: np.ndarray
     kind: str
+    rays: tuple[SightLines | None, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,8 @@ class Job:
         returns = Returns(config.noise, config.loss, glass, config.ground)
         if isinstance(config.device, DepthCamera):
             return _camera_track(target, config, config.device, scans, returns, rng)
-        return _lidar_track(target, config, config.device, scans, returns, rng)
+        chance = np.random.default_rng([self.seed, index, 1]) if config.rays else None
+        return _lidar_track(target, config, config.device, scans, returns, rng, chance)
 
     def _target(self, index: int, rng: np.random.Generator) -> Solid:
         lidar = self.config.is_lidar
@@ -90,11 +94,13 @@ def _lidar_track(
     scans: int,
     returns: Returns,
     rng: np.random.Generator,
+    of_rays: np.random.Generator | None,
 ) -> RawTrack:
     """Drive past an object, again if need be, until enough usable scans are together.
 
     The truth shape is what can be seen from a point's own height or higher: a LiDAR on a road
-    sees every wall down to the ground, but no car's underside.
+    sees every wall down to the ground, but no car's underside. `of_rays` is the source of chance
+    of the rays that passed by, if they are wanted: the scans stay as they are.
     """
     occluded = bool(rng.random() < config.occlusion)
     alone = Scene([target])
@@ -107,16 +113,24 @@ def _lidar_track(
         scene = alone
         if occluded and len(poses):
             scene = Scene([target, *occluders(target, poses[:scans, :3, 3], rng)])
-        usable: list[tuple[np.ndarray, np.ndarray]] = []
+        usable: list[tuple[Turn, np.ndarray]] = []
         for left, T_object_sensor in zip(range(len(poses), 0, -1), poses):
             if len(usable) + left < scans:
                 break
-            points, on_target = scan(scene, target, lidar, T_object_sensor, returns, rng)
-            if on_target >= config.min_points:
-                usable.append((points, T_object_sensor))
+            turn = scan(scene, target, lidar, T_object_sensor, returns, rng)
+            if turn.on_target >= config.min_points:
+                usable.append((turn, T_object_sensor))
             if len(usable) == scans:
-                clouds, used = zip(*usable)
-                return RawTrack(list(clouds), np.stack(used), shape, target.kind)
+                clouds, used = [turn.points for turn, _ in usable], np.stack([T for _, T in usable])
+                passed = (
+                    ()
+                    if of_rays is None
+                    else tuple(
+                        passing_rays(scene, target, lidar, T, returns, turn, config.rays, of_rays)
+                        for turn, T in usable
+                    )
+                )
+                return RawTrack(clouds, used, shape, target.kind, passed)
     raise BadInputError(
         f"the object {target.kind or 'given'} gives no {scans} scans of >= {config.min_points} "
         f"points to {lidar.name} within {config.far_m:g} m: it is too small, not in metres, or "

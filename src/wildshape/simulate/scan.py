@@ -3,9 +3,11 @@
 """One turn of a spinning LiDAR over one object: the rays, and what comes back."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from wildshape.geometry.projection.sight_lines import FullScan, SightLines, sight_lines
 from wildshape.simulate.raycast import Hits, Scene
 from wildshape.simulate.sensor import SpinningLidar
 from wildshape.simulate.shapes.solid import Solid
@@ -31,6 +33,23 @@ class Returns:
     ground: bool
     rim_m: float = 0.3
     grazing: float = 0.12
+
+
+class Turn(NamedTuple):
+    """What one turn over an object gives.
+
+    Attributes:
+        points: `(n, 3)` float32, metres, sensor frame.
+        on_target: how many of them lie on the object; the others lie on the ground.
+        phase_deg: azimuth of the turn's first firing.
+        lost: `(k, 3)` float32 unit directions, sensor frame, of pulses that met the object and did
+            not come back.
+    """
+
+    points: np.ndarray
+    on_target: int
+    phase_deg: float
+    lost: np.ndarray
 
 
 def window(T_object_sensor: np.ndarray, half: np.ndarray) -> tuple[float, ...]:
@@ -98,8 +117,8 @@ def scan(
     T_object_sensor: np.ndarray,
     returns: Returns,
     rng: np.random.Generator,
-) -> tuple[np.ndarray, int]:
-    """One scan of the object, `(n, 3)` float32, metres, sensor frame.
+) -> Turn:
+    """One scan of the object.
 
     Args:
         scene: the target as solid 0, anything after it only blocks the view.
@@ -108,10 +127,7 @@ def scan(
         T_object_sensor: `(4, 4)` where it stands.
         returns: how pulses are lost.
         rng: the only source of chance.
-
-    Returns:
-        The points, and how many of them lie on the object (the others on the ground).
-    """  # fmt: skip
+    """
     half = target.bounds[1]
     grown = half + ((returns.rim_m, returns.rim_m, 0.0) if returns.ground else 0.0)
     phase = float(rng.uniform(0, sensor.azimuth_step_deg))
@@ -119,6 +135,7 @@ def scan(
     origin = T_object_sensor[:3, 3]
     hits = scene.cast(np.broadcast_to(origin, toward.shape), toward)
     kept = _returned(hits, target, sensor, returns, rng)
+    missed = toward[(hits.solid == 0) & ~kept]
     distance = hits.distance.astype(np.float64)
     on_target = int(kept.sum())
     if returns.ground:
@@ -129,7 +146,54 @@ def scan(
     reach = distance[kept]
     reach = reach + returns.noise_m * rng.standard_normal(len(reach))
     on_ray = toward[kept] * reach[:, None]
-    return np.einsum("ji,nj->ni", T_object_sensor[:3, :3], on_ray).astype(np.float32), on_target
+    R = T_object_sensor[:3, :3]
+    return Turn(_turned(on_ray, R), on_target, phase, _turned(missed, R))
+
+
+def _turned(vectors: np.ndarray, R_object_sensor: np.ndarray) -> np.ndarray:
+    """From the object's axes to the sensor's, float32."""
+    return np.einsum("ji,nj->ni", R_object_sensor, vectors).astype(np.float32)
+
+
+def passing_rays(
+    scene: Scene,
+    target: Solid,
+    sensor: SpinningLidar,
+    T_object_sensor: np.ndarray,
+    returns: Returns,
+    turn: Turn,
+    most: int,
+    rng: np.random.Generator,
+) -> SightLines | None:
+    """The rays of the same turn that passed the object by, or did not come back from it.
+
+    The ground goes on for ever; behind the object there is nothing else than what blocks the view
+    of it.
+
+    Args:
+        scene: see `scan`.
+        target: see `scan`.
+        sensor: see `scan`.
+        T_object_sensor: see `scan`.
+        returns: see `scan`.
+        turn: what `scan` made of it.
+        most: rays returned at most.
+        rng: the only source of chance.
+    """
+    half = target.bounds[1]
+    R, origin = T_object_sensor[:3, :3], T_object_sensor[:3, 3]
+    toward = rays(sensor, window(T_object_sensor, half + _AROUND_M), turn.phase_deg, R)
+    hits = scene.cast(np.broadcast_to(origin, toward.shape), toward)
+    with np.errstate(divide="ignore"):
+        ground = np.where(toward[:, 2] < 0, (-half[2] - origin[2]) / toward[:, 2], np.inf)
+    reach = np.minimum(hits.distance, ground)
+    by = (hits.solid != 0) | (ground < hits.distance)
+    back = by & (reach < sensor.max_range_m) & (rng.random(len(reach)) >= returns.dropout)
+    noisy = reach[back] + returns.noise_m * rng.standard_normal(int(back.sum()))
+    ends = _turned(toward[back] * noisy[:, None], R)
+    lost = np.concatenate((turn.lost, _turned(toward[by & ~back], R)))
+    full = FullScan(np.concatenate((turn.points, ends)), lost=lost)
+    return sight_lines(full, np.arange(len(turn.points)), most)
 
 
 def _returned(
@@ -153,6 +217,9 @@ def _ground(
     at = origin[:2] + reach[:, None] * toward[:, :2]
     near = (np.abs(at) <= half[:2] + rim_m).all(1)
     return np.where(near & (reach < hits.distance), reach, 0.0)
+
+
+_AROUND_M = 2.0  # wider than what is kept
 
 
 def _box_edges(steps: int = 9) -> np.ndarray:

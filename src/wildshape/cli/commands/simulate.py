@@ -25,7 +25,7 @@ Meshes = Annotated[
     option(metavar="DIR", help="your own meshes (x forward, z up) instead of our shapes"),
 ]
 
-OF_TRACKS = ("tracks", "category", "occlusion", "ground", "layout", "workers")
+OF_TRACKS = ("tracks", "category", "occlusion", "ground", "rays", "layout", "workers")
 OF_DRIVES = ("speed", "compensated", "point_times")
 
 
@@ -44,6 +44,7 @@ class Settings:
         category: of our procedural shapes; airplane and chair need the depth camera.
         occlusion: probability that something stands in the way in a LiDAR track.
         ground: leave ground returns at the rim of the object in.
+        rays: keep the rays around each scan that did not hit the object, too (LiDAR).
         workers: processes; by default one a core.
         drive: full scans of a street with traffic, their boxes and the sensor's way.
         speed: of a drive, mean, metres a second; else drawn from 4 to 10; 0 stands still.
@@ -60,6 +61,7 @@ class Settings:
     category: Literal["car", "airplane", "chair"] = "car"
     occlusion: Annotated[float, arg(metavar="P")] = 0.3
     ground: bool = False
+    rays: bool = False
     layout: Layout = "packed"
     workers: Annotated[int | None, option(metavar="N")] = None
     drive: bool = False
@@ -143,6 +145,7 @@ def _drive(settings: Settings) -> None:
 def _tracks(settings: Settings) -> None:
     from wildshape.cli.terminal import TERMINAL, answer
     from wildshape.errors import BadInputError
+    from wildshape.geometry.projection.sight_lines import MOST_RAYS
     from wildshape.io.progress import counted, duration
     from wildshape.io.write_tracks import write_tracks
     from wildshape.simulate.generate import SimulationConfig, simulate_tracks
@@ -158,6 +161,7 @@ def _tracks(settings: Settings) -> None:
         meshes=settings.meshes,
         occlusion=settings.occlusion,
         ground=settings.ground,
+        rays=MOST_RAYS if settings.rays else 0,
     )
     identity = {**asdict(config), "seed": settings.seed}
     written = write_tracks(

@@ -15,7 +15,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.transforms.se3 import SE3
 
 MOST_RAYS = 2048
 """Rays that are kept with a scan at most."""
@@ -105,12 +104,17 @@ class SightLines:
         origins = None if self.origins is None else self.origins[rows]
         return SightLines(self.directions[rows], self.ranges[rows], origins)
 
-    def moved(self, T_a_sensor: SE3) -> "SightLines":
-        """The same in another frame; from a turn alone no origins come."""
-        turned = self.directions @ T_a_sensor.rotation.numpy().T.astype(np.float32)
-        if self.origins is None and not T_a_sensor.translation.any():
+    def moved(
+        self, rotation: Float[np.ndarray, "3 3"], translation: Float[np.ndarray, "3"]
+    ) -> "SightLines":
+        """The same in another frame a, by both parts of `T_a_sensor`; a turn alone adds no origins.
+
+        Plain arrays: what only simulates does without torch.
+        """
+        turned = self.directions @ rotation.T
+        if self.origins is None and not translation.any():
             return replace(self, directions=turned)
-        return replace(self, directions=turned, origins=T_a_sensor.apply_numpy(self.starts))
+        return replace(self, directions=turned, origins=self.starts @ rotation.T + translation)
 
 
 def _as_floats(name: str, value: object) -> Float[np.ndarray, "..."]:
@@ -193,7 +197,12 @@ def rays_near(
     inside[ahead[((angles >= low) & (angles <= high)).all(1)]] = True
     inside[rows] = False
     found = np.flatnonzero(inside & (frame != 0).any(1))
-    return found if len(found) <= most else found[np.arange(most) * len(found) // most]
+    return thinned(found, most)
+
+
+def thinned(rows: Int[np.ndarray, "k"], most: int) -> Int[np.ndarray, "m"]:
+    """Every so many-th, so that at most `most` are left."""
+    return rows if len(rows) <= most else rows[np.arange(most) * len(rows) // most]
 
 
 def _facing(points: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "3 3"]:
