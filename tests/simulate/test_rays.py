@@ -1,0 +1,28 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Rays of simulated frames: true of the object, and nothing else than the scans had changes."""
+
+import numpy as np
+
+from wildshape.geometry.projection.sight_lines import SightLines, nearest_rays
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+
+
+def test_no_ray_that_came_back_passed_through_the_object() -> None:
+    plain = SimulationConfig(tracks=1, scans=4, occlusion=0.999)
+    config = SimulationConfig(tracks=1, scans=4, occlusion=0.999, rays=2048)
+    (before,), (track,) = (list(simulate_tracks(one, 7, workers=1)) for one in (plain, config))
+    assert before.rays == ()
+    assert all(map(np.array_equal, before.scans, track.scans))
+    assert track.T_sensor_object is not None
+    assert track.shape is not None
+    larger = track.shape * np.float32(1.3)
+    for i, (scan, rays) in enumerate(zip(track.scans, track.rays)):
+        assert rays is not None
+        assert 100 < len(rays.returned) < len(rays) <= 2048
+        every = SightLines.joined((SightLines.of_returns(scan), rays.returned))
+        free = [
+            (nearest_rays(track.T_sensor_object[i].apply_numpy(shape), every).beyond > 0.2).mean()
+            for shape in (track.shape, larger)
+        ]
+        assert free[0] < 0.02 < 0.1 < free[1]
