@@ -24,8 +24,8 @@ import tyro
 from safetensors import safe_open
 
 from wildshape.evaluation.cases import turn_track
-from wildshape.evaluation.confidence import RiskCoverage, rank_correlation, risk_coverage
 from wildshape.evaluation.metrics import completion_error
+from wildshape.evaluation.risk_coverage import RiskCoverage, rank_correlation, risk_coverage
 from wildshape.geometry.transforms.se3 import stack
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import write_json

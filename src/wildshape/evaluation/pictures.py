@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float
 
-from wildshape.evaluation.confidence import risk_coverage
 from wildshape.evaluation.examples import Example
 from wildshape.evaluation.metrics import ACCURATE_DEG
 from wildshape.evaluation.results import MethodScores, Results
+from wildshape.evaluation.risk_coverage import risk_coverage
 from wildshape.evaluation.summary import stated
 from wildshape.records import Points
 

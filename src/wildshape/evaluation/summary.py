@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from wildshape.evaluation.confidence import RiskCoverage, rank_correlation, risk_coverage
 from wildshape.evaluation.metrics import ACCURATE_DEG
 from wildshape.evaluation.results import CompletionScore, MethodScores, Results, Skipped
+from wildshape.evaluation.risk_coverage import RiskCoverage, rank_correlation, risk_coverage
 from wildshape.io.atomic import write_json
 
 FORMAT = 1

@@ -27,8 +27,8 @@ from wildshape.training.batches.views import ViewSampler
 from wildshape.training.config import Recipe
 from wildshape.training.objectives import WeaklySupervised
 from wildshape.training.runtime.cuda_graph import Captured
-from wildshape.training.runtime.processes import Processes, join
 from wildshape.training.runtime.running_mean import Meter
+from wildshape.training.runtime.torchrun import Processes, join
 from wildshape.training.self_training.objective import SelfTaught
 from wildshape.training.self_training.pseudo_labels import fused_targets
 from wildshape.training.self_training.targets import load_targets, save_targets, true_targets

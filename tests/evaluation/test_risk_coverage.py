@@ -10,9 +10,9 @@ import pytest
 from scipy.stats import spearmanr
 from tests.cars import drive_by
 
-from wildshape.evaluation.confidence import rank_correlation, risk_coverage
 from wildshape.evaluation.pictures import draw_confidence, write_figures
 from wildshape.evaluation.protocol import Spoken, run
+from wildshape.evaluation.risk_coverage import rank_correlation, risk_coverage
 from wildshape.evaluation.summary import figures_of, write_metrics
 
 TRACKS = [drive_by(name=f"drive {i}", scans=5, seed=i) for i in range(2)]
