@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The rays of a frame around an object: which to keep, and what they say of a shape (METHOD 13).
+"""The rays of a frame around an object: which to keep, and what they say of a shape.
 
 A ray that ended before a point hides it. A ray that went on says that nothing stands there. Both
 are asked of the ray that passes nearest, the object's own returns among them, so that the border
