@@ -46,8 +46,8 @@ Sources = Annotated[
         metavar="SOURCE",
         help="folder of full scans, sorted by name (with times.txt or poses.txt if there are),"
         " recording of ROS with PointCloud2 (folder of ROS 2 with .db3 or .mcap, or .bag of ROS 1),"
-        " or folder of KITTI, nuScenes, Argoverse 2, Waymo or PandaSet (all its drives, or one:"
-        " nuscenes/scene-0061)",
+        " packets of Velodyne or Ouster (.pcap), or folder of KITTI, nuScenes, Argoverse 2, Waymo"
+        " or PandaSet (all its drives, or one: nuscenes/scene-0061)",
     ),
 ]
 

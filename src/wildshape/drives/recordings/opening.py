@@ -22,6 +22,7 @@ from wildshape.drives.recordings.folders import (
     open_sequence,
 )
 from wildshape.drives.recordings.nuscenes import find_scenes, open_scene
+from wildshape.drives.recordings.packets import find_packets, open_packet_file
 from wildshape.drives.recordings.pandaset import find_pandaset, open_pandaset
 from wildshape.drives.recordings.ros import find_bag, open_recording
 from wildshape.drives.recordings.waymo import find_segments, open_segment
@@ -48,6 +49,7 @@ class _Layout(NamedTuple):
 
 _POSES = "its own poses are used in place of odometry, its labels are not"
 _LAYOUTS = (
+    _Layout("packets of Velodyne or Ouster", find_packets, open_packet_file),
     _Layout(f"Argoverse 2: {_POSES}", find_logs, open_log),
     _Layout(f"PandaSet: {_POSES}", find_pandaset, open_pandaset),
     _Layout(f"the Waymo Open Dataset: {_POSES}", find_segments, open_segment),
@@ -86,7 +88,7 @@ def find_drives(path: Path) -> Found:
 
 
 def open_drive(path: Path | str, topic: str | None = None) -> Drive:
-    """A folder of full scans, a drive of a published data set, or a recording of ROS.
+    """A folder of full scans, a drive of a published data set, or a recording of ROS or of packets.
 
     Args:
         path: of the drive (docs/drive.md); one of several in a data set's folder has its name

@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Ouster's packets, decoded by its own SDK."""
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool
+
+from wildshape.errors import load_library
+from wildshape.io.guard import reading
+from wildshape.records import Turn
+
+_INSTALL = "pip install 'wildshape[ouster]'"
+_WHOLE = 0.9  # of a turn's columns that it must have
+_S_PER_NS = 1e-9
+
+
+@dataclass(frozen=True)
+class OusterTurns:
+    """The turns of a recording, in time order.
+
+    Attributes:
+        path: of the packets.
+        described: what the sensor says of itself, JSON.
+        times: of each turn's first column, on the sensor's clock, seconds.
+        warnings: what is odd about it, a sentence each.
+    """
+
+    path: Path
+    described: Path
+    times: tuple[float, ...]
+    warnings: tuple[str, ...]
+    numbers: tuple[int, ...] = field(repr=False)
+
+    def __call__(self, number: int) -> Turn:
+        """The points of a turn that have a return, and when each was taken.
+
+        Raises:
+            Exception: damaged.
+        """
+        source, places = _opened(self.path, self.described)
+        frame = source[self.numbers[number]][0]
+        returned = (frame.field("RANGE") > 0) & _columns(frame)
+        since = (frame.timestamp - frame.timestamp[_columns(frame)].min()) * _S_PER_NS
+        seconds = np.broadcast_to(since, returned.shape)
+        return Turn(places(frame)[returned].astype(np.float32), seconds[returned])
+
+
+def open_ouster(path: Path, described: Path) -> OusterTurns:
+    """List the turns of a recording.
+
+    Raises:
+        BadInputError: no such recording.
+        MissingExtraError: ouster-sdk is not installed.
+    """
+    _library("pcap")
+    with reading(path, f"Ouster's packets of the sensor of {described.name}"):
+        source, _ = _opened(path, described)
+        times, numbers = [], []
+        for number, (frame, *_) in enumerate(source):
+            there = _columns(frame)
+            if there.mean() >= _WHOLE:
+                times.append(float(frame.timestamp[there].min()) * _S_PER_NS)
+                numbers.append(number)
+        left = len(source) - len(numbers)
+    told = (f"{left} turns lack packets and were left out",) if left else ()
+    return OusterTurns(path, described, tuple(times), told, tuple(numbers))
+
+
+def _columns(frame: Any) -> Bool[np.ndarray, "w"]:
+    """Those whose packets are there."""
+    return (frame.status & 1) > 0
+
+
+@lru_cache(maxsize=1)
+def _opened(path: Path, described: Path) -> tuple[Any, Any]:
+    """The frames of a recording, and what gives their points."""
+    source = _library("pcap").PcapFrameSetSource(str(path), meta=[str(described)], index=True)
+    return source, _library("core").XYZLut(source.sensor_info[0])
+
+
+def _library(part: str) -> Any:
+    return load_library(f"ouster.sdk.{part}", "packets of Ouster need ouster-sdk", _INSTALL)

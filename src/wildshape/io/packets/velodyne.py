@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Velodyne's packets, decoded by velodyne-decoder.
+
+A turn ends where the beam looks back: what is ahead is seen at one time.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+import numpy as np
+
+from wildshape.errors import load_library
+from wildshape.io.guard import first_line
+from wildshape.records import Turn
+
+_INSTALL = "pip install 'wildshape[pcap]'"
+_AZIMUTH = slice(2, 4)  # of a packet's first block, hundredths of a degree, clockwise from ahead
+_BACK, _ROUND = 18000, 36000
+_UDP_HEADER = 8  # bytes
+_WHOLE = 0.9  # of a turn's packets that the first and the last turn must have
+
+_Sensor = tuple[int, str] | None  # model and calibration of a sensor that sends them
+
+
+class _Packet(NamedTuple):
+    """A packet of points.
+
+    Attributes:
+        begin: where its record begins in the file.
+        stamp: when it was recorded, seconds.
+        data: as the sensor sent it.
+    """
+
+    begin: int
+    stamp: float
+    data: bytes
+
+
+@dataclass
+class _Turn:
+    """Where a turn is: its first packet, how many there are, and when the last was recorded."""
+
+    begin: int
+    packets: int = 0
+    stamp: float = 0.0
+
+
+@dataclass(frozen=True)
+class VelodyneTurns:
+    """The turns of a recording, in time order.
+
+    Attributes:
+        path: of the file.
+        times: of each turn's last packet, seconds.
+        warnings: what is odd about it, a sentence each.
+    """
+
+    path: Path
+    times: tuple[float, ...]
+    warnings: tuple[str, ...]
+    turns: tuple[_Turn, ...] = field(repr=False)
+    sensor: _Sensor = None
+
+    def __call__(self, number: int) -> Turn:
+        """The points of a turn that have a return, and when each was taken.
+
+        Raises:
+            Exception: damaged.
+        """
+        decoder, turn = _decoder(), self.turns[number]
+        with self.path.open("rb") as file:
+            found = islice(_packets(file, turn.begin), turn.packets)
+            packets = [decoder.VelodynePacket(one.stamp, one.data) for one in found]
+        scans = decoder.ScanDecoder(_config(self.sensor))
+        _, rows = scans.decode(decoder.PacketVector(packets))
+        return Turn(np.ascontiguousarray(rows[:, :3]), rows[:, 4].astype(np.float64))
+
+
+def open_velodyne(path: Path) -> VelodyneTurns:
+    """List the turns of a recording, up to where it is cut off.
+
+    Raises:
+        MissingExtraError: velodyne-decoder is not installed.
+    """
+    _decoder()
+    turns: list[_Turn] = []
+    warnings = []
+    last = 0
+    try:
+        with path.open("rb") as file:
+            for packet in _packets(file):
+                since_back = (int.from_bytes(packet.data[_AZIMUTH], "little") - _BACK) % _ROUND
+                if since_back < last or not turns:
+                    turns.append(_Turn(packet.begin))
+                last = since_back
+                turns[-1].packets += 1
+                turns[-1].stamp = packet.stamp
+    except Exception as error:  # noqa: BLE001 - whatever it is, the packets before it are good
+        warnings.append(f"{path.name} is cut off or damaged ({first_line(error)})")
+    whole = tuple(_whole(turns))
+    times = tuple(turn.stamp for turn in whole)
+    return VelodyneTurns(path, times, tuple(warnings), whole, _described(path) if whole else None)
+
+
+def _whole(turns: list[_Turn]) -> list[_Turn]:
+    """All but a first or last that is not a whole turn."""
+    least = _WHOLE * float(np.median([turn.packets for turn in turns] or [0]))
+    ends = (0, len(turns) - 1)
+    return [turn for place, turn in enumerate(turns) if place not in ends or turn.packets >= least]
+
+
+def _packets(file: IO[bytes], begin: int | None = None) -> Iterator[_Packet]:
+    """The packets of points, from a record on; others are passed over.
+
+    Raises:
+        Exception: no recording, or it is cut off here.
+    """
+    from dpkt import pcap
+
+    records = pcap.UniversalReader(file)
+    size = _decoder().PACKET_SIZE
+    if begin is not None:
+        file.seek(begin)
+    begin = file.tell()
+    for stamp, record in records:
+        found = _datagram(record)
+        if found is not None and len(found.data) < found.ulen - _UDP_HEADER:
+            raise EOFError("it ends in the middle of a packet")
+        if found is not None and len(found.data) == size:
+            yield _Packet(begin, float(stamp), found.data)
+        begin = file.tell()
+
+
+def _datagram(record: bytes) -> Any:
+    """What UDP carried; None for other packets."""
+    from dpkt import ethernet, udp
+
+    found: Any = ethernet.Ethernet(record)
+    while not isinstance(found, bytes | udp.UDP):
+        found = found.data
+    return None if isinstance(found, bytes) else found
+
+
+def _described(path: Path) -> _Sensor:
+    """An HDL-64E, which sends its own calibration; all others tell their model in each packet.
+
+    The decoder looks for a calibration in .pcap alone.
+    """
+    if path.suffix.lower() != ".pcap":
+        return None
+    model, calibration = _decoder().hdl64e.detect_hdl64e(path)
+    return None if model is None else (int(model), calibration.to_string())
+
+
+def _config(sensor: _Sensor) -> Any:
+    decoder = _decoder()
+    if sensor is None:
+        return decoder.Config()
+    model, calibration = sensor
+    read = decoder.Calibration.from_string(calibration)
+    return decoder.Config(model=decoder.Model(model), calibration=read)
+
+
+def _decoder() -> Any:
+    return load_library("velodyne_decoder", "packets of Velodyne need velodyne-decoder", _INSTALL)

@@ -1,0 +1,100 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings of packets: every turn comes back; what is cut off is read up to there."""
+
+import pickle
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+from tests.refusal import refused
+
+from wildshape.drives.recordings.opening import find_drives, open_drive
+from wildshape.errors import MissingExtraError
+from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
+
+pytest.importorskip("velodyne_decoder")
+
+from tests.io.packets.write import PACKETS, PERIOD, points_of, seen_by, write_velodyne
+
+
+@pytest.fixture(scope="module")
+def turns():
+    """What a VLP-16 sees of a full scan, turned a little each time."""
+    scan = WholeDrive(StreetConfig(scans=1, sensor="hdl32"), 1).scan(0).points.astype(np.float64)
+    return [np.roll(seen_by(scan), 5 * number, axis=0) for number in range(3)]
+
+
+@pytest.mark.parametrize("suffix", [".pcap", ".pcapng"])
+def test_every_turn_of_a_velodyne_comes_back_in_time(turns, tmp_path, suffix):
+    path = write_velodyne(tmp_path / f"street{suffix}", turns)
+    assert find_drives(path) == ("packets of Velodyne or Ouster", [path])
+    drive = pickle.loads(pickle.dumps(open_drive(path)))
+    assert (drive.name, len(drive), drive.ticks, drive.warnings) == ("street", 3, (0, 1, 2), ())
+    assert np.diff(drive.times) == pytest.approx(PERIOD, abs=1e-3)
+    for frame in (2, 0, 1):  # in any order
+        turn, true = drive.turn(frame), points_of(turns[frame])
+        assert len(turn.points) == pytest.approx(len(true), rel=0.01)
+        off, _ = KDTree(true).query(turn.points)
+        # The decoder knows where in the head each laser sits, and how the head turns meanwhile.
+        away = np.linalg.norm(turn.points, axis=1)
+        assert (off < 0.02 + 0.004 * away).mean() > 0.99
+        assert turn.seconds is not None
+        assert -PERIOD <= turn.seconds.min() < turn.seconds.max() < 0.0015
+        # The beam turns clockwise, from behind.
+        around = np.arctan2(-turn.points[:, 1], turn.points[:, 0])
+        assert np.corrcoef(around, turn.seconds)[0, 1] > 0.99
+
+
+def test_turns_that_are_not_whole_are_left_out(turns, tmp_path):
+    path = write_velodyne(tmp_path / "street.pcap", turns, turn_back=PACKETS // 2)
+    assert len(open_drive(path)) == 2
+    path = write_velodyne(tmp_path / "other.pcap", [*turns, turns[0][:20]])
+    assert len(open_drive(path)) == 3
+
+
+def test_a_cut_recording_is_read_up_to_there(turns, tmp_path):
+    path = write_velodyne(tmp_path / "street.pcap", turns)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) * 5 // 6])
+    drive = open_drive(path)
+    assert len(drive) == 2
+    assert drive.warnings == (
+        "street.pcap is cut off or damaged (it ends in the middle of a packet)",
+    )
+
+
+def test_what_holds_no_turn_is_refused(turns, tmp_path, monkeypatch):
+    path = tmp_path / "street.pcap"
+    path.write_bytes(b"nothing of the kind" * 100)
+    refused(open_drive, path, match=r"damaged .*; no whole turn of a Velodyne; .* street.json")
+    refused(open_drive, write_velodyne(path, []), match="no whole turn of a Velodyne")
+    refused(open_drive, path, "/topic", match="has no topics")
+    path.with_suffix(".json").write_text("{}")
+    monkeypatch.setitem(__import__("sys").modules, "ouster.sdk.pcap", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'wildshape\[ouster\]'"):
+        open_drive(path)
+
+
+def test_an_ouster_s_turns_come_back(tmp_path):
+    pcap, core = pytest.importorskip("ouster.sdk.pcap"), pytest.importorskip("ouster.sdk.core")
+    info = core.SensorInfo.from_default(core.LidarMode._512x10)
+    info.config.udp_port_lidar, info.config.udp_port_imu, info.fw_rev = 7502, 7503, "v2.5.3"
+    (tmp_path / "street.json").write_text(info.to_json_string())
+    rng, packets, seen = np.random.default_rng(0), [], []
+    for number in range(3):
+        frame = core.LidarFrame(info)
+        ranges = frame.field("RANGE")
+        ranges[:] = rng.integers(2000, 50000, ranges.shape) * (rng.random(ranges.shape) < 0.5)
+        seen.append(core.XYZLut(info)(frame)[ranges > 0])
+        frame.frame_id, frame.status[:] = number + 1, 1
+        frame.measurement_id[:] = np.arange(frame.w)
+        frame.timestamp[:] = 10**15 + number * 10**8 + np.arange(frame.w) * 10**8 // frame.w
+        packets += core.frame_to_packets(frame, core.PacketFormat(info), info.init_id, info.sn)
+    pcap.record(iter(packets), str(tmp_path / "street.pcap"))
+    drive = pickle.loads(pickle.dumps(open_drive(tmp_path / "street.pcap")))
+    assert drive.times == pytest.approx([1e6, 1e6 + 0.1, 1e6 + 0.2])
+    for frame in (2, 0, 1):
+        turn = drive.turn(frame)
+        assert np.allclose(turn.points, seen[frame], atol=1e-3)
+        assert 0 <= turn.seconds.min() < turn.seconds.max() < 0.1
