@@ -20,7 +20,7 @@ def seen_by(points):
     # A turn begins where the beam looks back.
     around = np.rad2deg(-np.arctan2(points[:, 1], points[:, 0])) % 360
     laser = np.abs(up[:, None] - _ELEVATIONS).argmin(1)
-    near = np.abs(up - _ELEVATIONS[laser]) < 0.3
+    near = np.abs(up - _ELEVATIONS[laser]) < 0.5
     ranges = np.zeros((PACKETS * BLOCKS, LASERS), np.uint16)
     column = np.rint(((around - 180) % 360) / _STEP_DEG).astype(int) % len(ranges)
     kept = near & (away < 100)
