@@ -46,8 +46,9 @@ def cloud(message):
     kinds = {1: "u1", 7: "<f4"}
     fields = {one.name: (kinds[one.type], one.offset) for one in message.fields}
     formats, offsets = zip(*fields.values())
-    layout: Any = {"names": list(fields), "formats": formats, "offsets": offsets}
-    return np.frombuffer(message.data, np.dtype({**layout, "itemsize": message.point_stride}))
+    step = message.point_stride
+    layout: Any = {"names": [*fields], "formats": formats, "offsets": offsets, "itemsize": step}
+    return np.frombuffer(message.data, np.dtype(layout))
 
 
 def test_mcap_holds_every_frame_on_every_topic(messages):

@@ -173,7 +173,7 @@ class _Messages:
             for i, name in enumerate(("red", "green", "blue")):
                 rows[name] = colours[:, i]
         kinds = {"<f4": "FLOAT32", "u1": "UINT8"}
-        fields = rows.dtype.fields or {}
+        fields: Any = rows.dtype.fields
         return _new(
             "PointCloud",
             timestamp=self.stamp(),

@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The README's first picture: a simulated drive from above, its vehicles found and completed.
+
+python experiments/drive_picture.py docs/drive.webp
+"""
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+import wildshape
+from wildshape.drives.finished import FinishedDrive, FoundVehicle, read_finished
+from wildshape.drives.recordings.opening import open_drive
+from wildshape.report.drive.picture import write_drive_picture
+from wildshape.simulate.street.drive_folder import write_drive
+from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Draw a drive that no training has seen.
+
+    Attributes:
+        out: .webp or .png.
+        scans: of the drive, ten a second.
+        seed: of the street.
+        found: a folder that `wildshape drive` wrote, in place of a simulated drive.
+        shown: vehicles drawn below.
+    """
+
+    out: Annotated[Path, tyro.conf.Positional]
+    scans: int = 100
+    seed: int = 3
+    found: Path | None = None
+    shown: int = 5
+
+
+def main(settings: Settings) -> None:
+    if settings.found is not None:
+        draw(settings, settings.found)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        street, out = Path(folder) / "street", Path(folder) / "found"
+        write_drive(WholeDrive(StreetConfig(scans=settings.scans), settings.seed), street)
+        wildshape.drive(street / "velodyne" / "0000", out, workers=2)
+        draw(settings, out)
+
+
+def draw(settings: Settings, out: Path) -> None:
+    found = read_finished(out)
+    shown = nearest(found)[: settings.shown]
+    write_drive_picture(found, open_drive(found.source), settings.out, shown)
+
+
+def nearest(found: FinishedDrive) -> list[FoundVehicle]:
+    """Those that came nearest first."""
+    return sorted(found.vehicles, key=lambda one: one.nearest_m)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Settings))
