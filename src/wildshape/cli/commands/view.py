@@ -19,12 +19,17 @@ from wildshape.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
     from wildshape.inference.predictor import Predictor
+    from wildshape.report.viewer.drive_page import DrivePage
+    from wildshape.report.viewer.page import Page
     from wildshape.report.viewer.sources import Source
 
 EXAMPLES = (
     "wildshape view completed",
     "wildshape view mytracks --no-open",
+    "wildshape view found",
 )
 
 Shown = Annotated[
@@ -32,7 +37,8 @@ Shown = Annotated[
     Positional,
     arg(
         metavar="INPUT",
-        help="the --out of complete, register or evaluate; or a scan, a TRACK, a DATASET, a store",
+        help="the --out of drive, complete, register or evaluate; or a scan, a TRACK, a DATASET,"
+        " a store",
     ),
 ]
 Inputs = Annotated[
@@ -79,17 +85,33 @@ def run(settings: Settings) -> None:
     import webbrowser
 
     from wildshape.cli.terminal import answer, say
-    from wildshape.report.viewer.page import run_until_interrupted, serving
+    from wildshape.report.viewer.page import run_until_interrupted
 
-    with serving(source_of(settings), settings.port, settings.allow_host) as page:
+    page_of, tracks = _page(settings)
+    with page_of as page:
         text = f"showing {settings.input} at {page.url} (this machine only); Ctrl-C ends it"
-        answer(text, {"url": page.url, "tracks": len(page.source.labels)}, as_json=settings.json)
+        answer(text, {"url": page.url, "tracks": tracks}, as_json=settings.json)
         if settings.open or (_display() and not settings.no_open):
             webbrowser.open(page.url)
         try:
             run_until_interrupted(page)
         except KeyboardInterrupt:
             say("closed")
+
+
+def _page(
+    settings: Settings,
+) -> "tuple[AbstractContextManager[Page] | AbstractContextManager[DrivePage], int]":
+    """What to serve, and how many tracks or vehicles that are."""
+    from wildshape.drives.finished import is_drive, read_finished
+    from wildshape.report.viewer.drive_page import serving_drive
+    from wildshape.report.viewer.page import serving
+
+    if is_drive(settings.input):
+        found = read_finished(settings.input)
+        return serving_drive(found, settings.port, settings.allow_host), len(found.vehicles)
+    source = source_of(settings)
+    return serving(source, settings.port, settings.allow_host), len(source.labels)
 
 
 def source_of(settings: Settings) -> "Source":

@@ -22,7 +22,7 @@ def details(stage: Stage, wish: Wish, status: str = "") -> str:
     parts = [
         f"<b style='overflow-wrap:anywhere'>{escape(track.name)}</b>",
         f"<div style='opacity:.65;overflow-wrap:anywhere'>{escape(about)}</div>" if about else "",
-        *(_row(label, value) for label, value in _rows(stage, wish)),
+        *(row(label, value) for label, value in _rows(stage, wish)),
         _small(f"Completed shape: {LEGENDS[wish.colouring]}."),
         _small(_warning(stage.completions.get(wish.scan)), "color:#d55e00"),
         _small(status),
@@ -71,7 +71,8 @@ def _true_rows(stage: Stage, wish: Wish) -> list[tuple[str, str]]:
     return rows
 
 
-def _row(label: str, value: str) -> str:
+def row(label: str, value: str) -> str:
+    """A line of the panel; `value` is HTML."""
     return f"{_ROW}{escape(label)}</span><span style='text-align:right'>{value}</span></div>"
 
 

@@ -7,10 +7,10 @@ import io
 import logging
 import threading
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
 
 from wildshape.errors import BadInputError, MissingExtraError
 from wildshape.io.progress import counted
@@ -25,6 +25,22 @@ if TYPE_CHECKING:
 
 HOST = "127.0.0.1"
 _PLAY_SECONDS, _SPEAK_SECONDS, _STOP_SECONDS = 0.12, 0.5, 5.0
+
+
+@runtime_checkable
+class Shown(Protocol):
+    """A page that is served."""
+
+    def play(self) -> None:
+        """Go on by a scan, where that is asked for."""
+        ...
+
+    def close(self) -> None:
+        """Nothing more is sent."""
+        ...
+
+
+Built = TypeVar("Built", bound=Shown)
 
 
 class Page:
@@ -136,8 +152,9 @@ class Page:
                 self.panel.text.content = f"<div style='padding:.8em'>{escape(text)}</div>"
 
 
-@contextmanager
-def serving(source: Source, port: int = 0, allowed: Sequence[str] = ()) -> Iterator[Page]:
+def serving(
+    source: Source, port: int = 0, allowed: Sequence[str] = ()
+) -> AbstractContextManager[Page]:
     """The page for as long as the block runs.
 
     Args:
@@ -149,6 +166,19 @@ def serving(source: Source, port: int = 0, allowed: Sequence[str] = ()) -> Itera
         BadInputError: an allowed name is none.
         MissingExtraError: viser is not installed, or cannot be told whom to answer.
     """
+    return hosting(source.title, lambda server: Page(server, source), port, allowed)
+
+
+@contextmanager
+def hosting(
+    title: str,
+    build: Callable[["ViserServer"], Built],
+    port: int,
+    allowed: Sequence[str],
+    *,
+    dark: bool = False,
+) -> Iterator[Built]:
+    """A server of this machine and the page built on it; the rest is as of `serving`."""
     others = set(threading.enumerate())
     server = _server(port, checked_hosts(allowed))
     own = set(threading.enumerate()) - others
@@ -158,11 +188,12 @@ def serving(source: Source, port: int = 0, allowed: Sequence[str] = ()) -> Itera
             control_width="large",
             show_logo=False,
             show_share_button=False,
+            dark_mode=dark,
         )
         server.gui.main_panel.dock_right()
-        server.gui.set_panel_label(f"Wildshape: {source.title}")
+        server.gui.set_panel_label(f"Wildshape: {title}")
         server.scene.set_up_direction("+z")
-        page = Page(server, source)
+        page = build(server)
         yield page
     finally:
         if page is not None:
@@ -173,7 +204,7 @@ def serving(source: Source, port: int = 0, allowed: Sequence[str] = ()) -> Itera
                 thread.join(_STOP_SECONDS)
 
 
-def run_until_interrupted(page: Page) -> None:
+def run_until_interrupted(page: Shown) -> None:
     """Serve, and turn the pages of what is played; Ctrl-C raises KeyboardInterrupt."""
     while True:
         time.sleep(_PLAY_SECONDS)

@@ -1,0 +1,276 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The page of a drive: its scene over time, and every vehicle with its shape when it is clicked."""
+
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wildshape.drives.finished import FinishedDrive, FoundVehicle
+from wildshape.drives.playback.moments import colour_of, readable_source
+from wildshape.io.boxes.detections import pose_of
+from wildshape.records import Box, Points
+from wildshape.report.drive.scene import NOBODY, SceneConfig, boxes_by_frame, thinned
+from wildshape.report.results import Inputs, box_of, read_result
+from wildshape.report.scene import box_segments, thin
+from wildshape.report.viewer.details import row
+from wildshape.report.viewer.page import HOST, hosting
+from wildshape.report.viewer.placing import as_node
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+NOTHING = "none"
+LAYERS = {
+    "scan": "scan",
+    "shapes": "completed shapes",
+    "boxes": "boxes",
+    "names": "names",
+    "ways": "ways",
+}
+_CONFIG = SceneConfig()
+_DOT_M, _SHAPE_DOT_M, _CHOSEN_DOT_M, _MEASURED_DOT_M = 0.06, 0.05, 0.035, 0.02
+_MEASURED = 5000  # points drawn of all that a vehicle's scans measured
+_WHITE = (255, 255, 255)
+
+
+def serving_drive(
+    found: FinishedDrive, port: int = 0, allowed: Sequence[str] = ()
+) -> AbstractContextManager["DrivePage"]:
+    """The page of a drive for as long as the block runs; arguments and errors as of `serving`."""
+    return hosting(found.name, lambda server: DrivePage(server, found), port, allowed, dark=True)
+
+
+class DrivePage:
+    """What is on the page now. Controls call it from several threads: a lock keeps the order."""
+
+    def __init__(self, server: "ViserServer", found: FinishedDrive) -> None:
+        """Lay the page out, standing at the first frame."""
+        self.server, self.found = server, found
+        self.drive = readable_source(found)
+        self.lock = threading.RLock()
+        self.boxes = boxes_by_frame(found)
+        self.names = tuple(one.name for one in found.vehicles)
+        self.places = [dict(zip(one.frames, found.placed(one))) for one in found.vehicles]
+        self.shown: int | None = None
+        self.extra: list[Any] = []
+        self.closed = False
+        self._controls()
+        self._scene()
+        self.whole()
+        self.refresh()
+
+    @property
+    def url(self) -> str:
+        """Its address."""
+        return f"http://{HOST}:{self.server.get_port()}"
+
+    @property
+    def frame(self) -> int:
+        """The frame shown."""
+        return int(self.time.value)
+
+    @property
+    def chosen(self) -> int | None:
+        """Number of the vehicle chosen."""
+        name = self.picker.value
+        return None if name == NOTHING else self.names.index(name)
+
+    def play(self) -> None:
+        """Go on by a frame, where that is asked for."""
+        with self.lock:
+            if self.playing.value and self.time.max > 0:
+                self.time.value = (self.frame + 1) % (int(self.time.max) + 1)
+
+    def close(self) -> None:
+        """Nothing more is sent."""
+        with self.lock:
+            self.closed = True
+
+    def refresh(self) -> None:
+        """Show what the panel asks for."""
+        with self.lock:
+            if self.closed:
+                return
+            with self.server.atomic():
+                self._show_scan()
+                self._show_vehicles()
+                for handle in self.ways:
+                    handle.visible = self.layers["ways"].value
+            self.text.content = self._details()
+
+    def choose(self) -> None:
+        """Show the vehicle that is picked, with all its scans, from near; or the whole scene."""
+        with self.lock:
+            number = self.chosen
+            for handle in self.extra:
+                handle.remove()
+            self.extra = []
+            if number is None:
+                self.whole()
+            else:
+                self._show_closely(number)
+            self.refresh()
+
+    def whole(self) -> None:
+        """The camera over the whole way."""
+        way = self.found.T_level_sensor.translation.numpy()
+        middle = way.mean(0)
+        size = max(40.0, float(np.ptp(way, axis=0).max()))
+        self._aim(middle, middle + np.array((-0.8, -0.25, 0.75)) * size)
+
+    def _controls(self) -> None:
+        gui, last = self.server.gui, len(self.found) - 1
+        self.time = gui.add_slider(
+            "frame", min=0, max=last, step=1, initial_value=0, disabled=last == 0
+        )
+        self.playing = gui.add_checkbox("play", initial_value=False)
+        self.picker = gui.add_dropdown("vehicle", (NOTHING, *self.names))
+        with gui.add_folder("Show"):
+            self.layers = {name: gui.add_checkbox(text, True) for name, text in LAYERS.items()}
+        self.text = gui.add_html("")
+        self.picker.on_update(lambda _: self.choose())
+        for control in (self.time, *self.layers.values()):
+            control.on_update(lambda _: self.refresh())
+
+    def _scene(self) -> None:
+        """Everything but the scan is sent once, and afterwards only moved, shown and hidden."""
+        scene = self.server.scene
+        self.sensor: Any = scene.add_frame("/sensor", axes_length=2.0, axes_radius=0.05)
+        self.scan: Any = None
+        way = self.found.T_level_sensor.translation.numpy() - (0, 0, self.found.ground_m)
+        self.ways = [self._line("/way", way, _WHITE)]
+        self.nodes = [self._vehicle(number, one) for number, one in enumerate(self.found.vehicles)]
+
+    def _vehicle(self, number: int, one: FoundVehicle) -> dict[str, Any]:
+        scene, at, colour = self.server.scene, f"/vehicles/{number}", colour_of(number)
+        if one.moving:
+            places = np.array([T.translation.tolist() for T in self.places[number].values()])
+            self.ways.append(self._line(f"/ways/{number}", places, colour))
+        parts: dict[str, Any] = {"place": scene.add_frame(at, show_axes=False)}
+        shape = thin(self.found.shape(one), _CONFIG.points_a_shape)
+        parts["shapes"] = self._dots(f"{at}/shape", shape, colour, _SHAPE_DOT_M)
+        parts["boxes"] = scene.add_line_segments(
+            f"{at}/edges",
+            box_segments(Box((0.0, 0.0, 0.0), one.size, (1.0, 0.0, 0.0, 0.0))),
+            colour,
+            thickness=2.0,
+            thickness_units="screen",
+        )
+        top = (0.0, 0.0, one.size[2] / 2 + 0.5)
+        parts["names"] = scene.add_label(f"{at}/name", one.name, position=top)
+        body = scene.add_box(f"{at}/body", colour, dimensions=one.size, opacity=0.08)
+        body.on_click(lambda _: setattr(self.picker, "value", one.name))
+        return {**parts, "body": body}
+
+    def _show_scan(self) -> None:
+        self.sensor.wxyz, self.sensor.position = as_node(self.found.T_level_sensor[self.frame])
+        if self.drive is not None and self.shown != self.frame:
+            points, colours = self._drawn(self.frame)
+            self.scan = self._dots("/sensor/scan", points, colours, _DOT_M)
+            self.shown = self.frame
+        if self.scan is not None:
+            self.scan.visible = self.layers["scan"].value
+
+    def _drawn(self, frame: int) -> tuple[Points, np.ndarray]:
+        """Points of a scan; those on vehicles have the vehicle's colour, brighter."""
+        assert self.drive is not None
+        scan, boxes = self.drive.scan(frame), self.boxes.get(frame, {})
+        drawn = thinned(frame, scan, boxes, _CONFIG.points_a_scan)
+        height = drawn.points[:, 2] + self.found.ground_m
+        grey = (70 + 130 * np.clip(height / 4, 0, 1))[:, None]
+        bright = [0.45 * np.array(colour_of(number)) + 140 for number in range(len(self.names))]
+        own = np.array([*bright, np.zeros(3)])[drawn.owners]
+        return drawn.points, np.where((drawn.owners == NOBODY)[:, None], grey, own).astype(np.uint8)
+
+    def _show_vehicles(self) -> None:
+        for number, node in enumerate(self.nodes):
+            T = self.places[number].get(self.frame)
+            node["place"].visible = T is not None
+            if T is not None:
+                node["place"].wxyz, node["place"].position = as_node(T)
+            for name in ("shapes", "boxes", "names"):
+                closely = name == "shapes" and number == self.chosen
+                node[name].visible = self.layers[name].value and not closely
+
+    def _show_closely(self, number: int) -> None:
+        """All of the vehicle's shape, and what its completed scans measured, at its place."""
+        one = self.found.vehicles[number]
+        if self.frame not in one.frames:
+            self.time.value = one.fullest
+        at = f"/vehicles/{number}"
+        shape = self.found.shape(one)
+        self.extra = [
+            self._dots(f"{at}/whole", shape, colour_of(number), _CHOSEN_DOT_M),
+            self._dots(f"{at}/measured", measured(self.found, one), _WHITE, _MEASURED_DOT_M),
+        ]
+        T = self.places[number][self.frame]
+        middle, size = T.translation.numpy(), max(one.size)
+        towards = self.found.T_level_sensor[self.frame].translation.numpy() - middle
+        towards[2] = 0.6 * np.linalg.norm(towards)
+        self._aim(middle, middle + 1.9 * size * towards / max(np.linalg.norm(towards), 1e-6))
+
+    def _aim(self, target: np.ndarray, place: np.ndarray) -> None:
+        """The camera of new pages and those open."""
+        clients = [client.camera for client in self.server.get_clients().values()]
+        for camera in (self.server.initial_camera, *clients):
+            camera.position, camera.look_at = tuple(place.tolist()), tuple(target.tolist())
+
+    def _dots(self, name: str, points: Points, colours: Any, size: float) -> Any:
+        cloud = np.ascontiguousarray(points, np.float32)
+        return self.server.scene.add_point_cloud(
+            name,
+            cloud,
+            colours,
+            point_size=size,
+            point_shape="circle",
+            point_shading="flat",
+            precision="float32",
+        )
+
+    def _line(self, name: str, places: np.ndarray, colour: tuple[int, int, int]) -> Any:
+        segments = np.stack((places[:-1], places[1:]), axis=1).astype(np.float32)
+        if not len(segments):
+            segments = np.zeros((1, 2, 3), np.float32)
+        scene = self.server.scene
+        return scene.add_line_segments(
+            name, segments, colour, thickness=2.0, thickness_units="screen"
+        )
+
+    def _details(self) -> str:
+        """A piece of HTML; every name is escaped."""
+        parts = list(self._rows())
+        inside = "".join(row(label, escape(value)) for label, value in parts)
+        return f"<div style='font-size:.85em;line-height:1.5;padding:0 .8em .5em'>{inside}</div>"
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        found, frame, number = self.found, self.frame, self.chosen
+        yield "time", f"{found.seconds[frame]:.1f} s"
+        yield "scan", found.scan_names[frame]
+        yield "vehicles", f"{len(self.boxes.get(frame, {}))} here, {len(self.names)} in all"
+        if self.drive is None:
+            yield "scans", "cannot be read"
+        if number is None:
+            yield "shape", "click a vehicle"
+            return
+        one = found.vehicles[number]
+        yield "vehicle", one.name
+        yield "box", " x ".join(f"{side:.2f}" for side in one.size) + " m"
+        yield "confidence", f"{one.confidence:.2f}"
+        yield "seen", f"{'moving' if one.moving else 'standing'}, {len(one.frames)} frames"
+
+
+def measured(found: FinishedDrive, one: FoundVehicle) -> Points:
+    """What a vehicle's completed scans measured, laid over each other in the frame of its box."""
+    result = read_result(found.out / "objects" / one.name, Inputs(found.out / "tracks"))
+    clouds = [np.empty((0, 3), np.float32)]
+    for name in result.scans:
+        box = box_of(result.entry(name))
+        if result.track is not None and box is not None and name in result.track.scan_names:
+            scan = result.track.scans[result.track.scan_names.index(name)]
+            clouds.append(pose_of(box).inverse().apply_numpy(scan))
+    return thin(np.concatenate(clouds), _MEASURED)

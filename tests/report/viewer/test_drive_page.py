@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The viewer of a drive: the scene at a time, and the vehicle that is chosen."""
+
+import json
+from urllib.request import urlopen
+
+import numpy as np
+import pytest
+from tests.drives.finished_drive import CARS, HEIGHT, SIZE, finished_drive
+
+pytest.importorskip("viser", reason="did not run: viser is not installed (extra view)")
+from wildshape.cli.main import main
+from wildshape.report.viewer import page as pages
+from wildshape.report.viewer.drive_page import NOTHING, measured, serving_drive
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")  # viser's
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    return finished_drive(tmp_path_factory.mktemp("drive"))
+
+
+def test_vehicles_stand_at_their_places_and_the_chosen_one_shows_its_shape(found):
+    with serving_drive(found) as page:
+        page.time.value = 4
+        page.refresh()
+        for node, (x, y, _) in zip(page.nodes, (places[4] for places in CARS.values())):
+            assert node["place"].visible
+            at = (x, y, SIZE[2] / 2 - HEIGHT)
+            assert np.asarray(node["place"].position) == pytest.approx(at, abs=1e-4)
+        assert np.asarray(page.sensor.position) == pytest.approx((4, 0, 0))
+        assert len(page.scan.points) > 1000
+        page.layers["boxes"].value = False
+        page.refresh()
+        assert not page.nodes[0]["boxes"].visible
+        page.picker.value = "<7>"
+        page.choose()
+        whole, around = page.extra
+        assert len(whole.points) == 800
+        assert (np.abs(around.points).max(0) <= np.array(SIZE) / 2 + 0.01).all()
+        assert "&lt;7&gt;" in page.text.content
+        assert np.linalg.norm(page.server.initial_camera.look_at - [26.8, -2, -0.95]) < 0.01
+        page.picker.value = NOTHING
+        page.choose()
+        assert page.extra == []
+
+
+def test_scans_of_a_vehicle_are_laid_over_each_other_in_its_box(found):
+    points = measured(found, found.vehicles[1])
+    assert len(points) == 2 * 200
+    assert (np.abs(points).max(0) <= np.array(SIZE) / 2 + 0.01).all()
+
+
+def test_the_command_serves_a_drive_s_folder(found, monkeypatch, capsys):
+    def once(page):
+        with urlopen(page.url) as answer:
+            assert answer.status == 200
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pages, "run_until_interrupted", once)
+    main(["view", str(found.out), "--no-open", "--port", "0", "--json"])
+    assert json.loads(capsys.readouterr().out)["tracks"] == len(CARS)
