@@ -1,13 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Rays around an object, against a plain search over all of them."""
+"""Rays around an object, and what they say of points, against a plain search."""
 
 import numpy as np
-import pytest
 import torch
 from tests.refusal import refused
 
-from wildshape.geometry.projection.sight_lines import SightLines, nearest_rays, rays_near
+from wildshape.geometry.projection.sight_lines import SightLines, rays_near, standing
 from wildshape.geometry.transforms.rotation import rotation_z
 
 
@@ -19,44 +18,60 @@ def some_rays(count: int, seed: int = 0, origins: np.ndarray | None = None) -> S
     return SightLines(directions, ranges, origins)
 
 
-def test_the_nearest_ray_is_that_of_a_search_over_all() -> None:
-    rays = some_rays(200)
-    points = np.array((10.0, 0.0, 0.0)) + np.random.default_rng(1).normal(0, 1, (300, 3))
-    found = nearest_rays(points, rays, within_m=0.15)
-    for point, ray, beyond in zip(points, *found):
+def plainly(points, scan, rays, beyond_m=0.1, within_m=0.15, nearest=3):
+    """`standing`, point by point and ray by ray; one sensor."""
+    own = SightLines.of_returns(scan)
+    came = rays.returned
+    every = SightLines.joined((own, came))
+    free, hidden = [], []
+    for point in points:
         away = np.linalg.norm(point)
-        # Of unit vectors the nearest has the largest product.
-        best = int((rays.directions @ point).argmax())
-        apart = away * np.linalg.norm(rays.directions[best] - point / away)
-        assert ray == (best if apart <= 0.15 else -1)
-        if ray >= 0:
-            assert beyond == pytest.approx(rays.ranges[ray] - away)
-        else:
-            assert np.isnan(beyond)
+        apart = away * np.linalg.norm(every.directions - point / away, axis=1)
+        near = [ray for ray in np.argsort(apart)[:nearest] if apart[ray] <= within_m]
+        passed = [every.ranges[ray] - away for ray in near]
+        others = all(ray >= len(own) for ray in near)
+        free.append(len(near) > 0 and min(passed) > beyond_m)
+        hidden.append(len(near) > 0 and others and max(passed) < -beyond_m)
+    return np.array(free), np.array(hidden)
 
 
-def test_of_several_sensors_the_one_that_saw_past_a_point_is_believed() -> None:
+def some_points(count: int, seed: int, spread: float = 1.0) -> np.ndarray:
+    return np.array((10.0, 0.0, 0.0)) + np.random.default_rng(seed).normal(0, spread, (count, 3))
+
+
+def test_standing_is_what_the_nearest_rays_say_one_by_one() -> None:
+    rays, scan, points = some_rays(400), some_points(50, 2, 0.5), some_points(300, 1)
+    found, (free, hidden) = standing(points, scan, rays), plainly(points, scan, rays)
+    assert 10 < free.sum() < 200
+    assert 10 < hidden.sum() < 200
+    assert (found.free == free).all()
+    assert (found.hidden == hidden).all()
+    nothing = rays.part(np.zeros(0, int))
+    assert (standing(points, scan, nothing).free == plainly(points, scan, nothing)[0]).all()
+
+
+def test_what_one_of_several_sensors_saw_through_is_free() -> None:
     """One sees the point hidden behind something, the other sees past it."""
-    point = np.array([[10.0, 0.0, 0.0]])
+    point, scan = np.array([[10.0, 0.0, 0.0]]), np.array([[10.0, 4.0, 0.0]])
     starts = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]], np.float32)
     ends = starts + np.array((0.4, 1.6))[:, None] * (point - starts)
     for order in ([0, 1], [1, 0]):
-        rays = SightLines.of_returns(ends[order], starts[order])
-        found = nearest_rays(point, rays)
-        assert order[found.ray[0]] == 1
-        assert found.beyond[0] == pytest.approx(0.6 * np.linalg.norm(point[0] - starts[1]))
+        found = standing(point, scan, SightLines.of_returns(ends[order], starts[order]))
+        assert found.free.all()
+        assert not found.hidden.any()
+    assert standing(point, scan, SightLines.of_returns(ends[:1])).hidden.all()
 
 
 def test_rays_move_with_what_they_are_held_against() -> None:
-    rays = some_rays(100)
-    points = np.array((10.0, 0.0, 0.0)) + np.random.default_rng(1).normal(0, 1, (50, 3))
+    rays, scan, points = some_rays(400), some_points(50, 2, 0.5), some_points(300, 1)
     turn = rotation_z(torch.tensor(2.0)).double().numpy()
+    here = standing(points, scan, rays)
     for shift in (np.zeros(3), np.array((3.0, -4.0, 1.0))):
         moved = rays.moved(turn, shift)
         assert (moved.origins is None) == (not shift.any())
-        here, there = nearest_rays(points, rays), nearest_rays(points @ turn.T + shift, moved)
-        assert (here.ray == there.ray).all()
-        assert np.allclose(here.beyond, there.beyond, atol=1e-3, equal_nan=True)
+        there = standing(points @ turn.T + shift, scan @ turn.T + shift, moved)
+        assert (here.free == there.free).mean() > 0.98  # rounding of origins turns a few
+        assert (here.hidden == there.hidden).mean() > 0.98
 
 
 def test_rays_are_kept_around_the_object_and_not_elsewhere() -> None:

@@ -2,9 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rays of a frame around an object: which to keep, and what they say of a shape.
 
-A ray that ended before a point hides it. A ray that went on says that nothing stands there. Both
-are asked of the ray that passes nearest, the object's own returns among them, so that the border
-between what was hit and what was missed lies in the middle between two rays.
+A ray that ended before a point hides it. A ray that went on says that nothing stands there.
 """
 
 from collections.abc import Sequence
@@ -12,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from wildshape.errors import BadInputError
 
@@ -124,17 +122,16 @@ def _as_floats(name: str, value: object) -> Float[np.ndarray, "..."]:
         raise BadInputError(f"rays: {name} are no array of numbers.") from error
 
 
-class NearestRays(NamedTuple):
-    """Of each point the ray that passes nearest.
+class Standing(NamedTuple):
+    """What the rays say of each point of a shape.
 
     Attributes:
-        ray: its number; -1 where none passes near.
-        beyond: how far behind the point it ended, metres; negative where it ended before the point,
-            infinite where nothing came back, NaN where no ray passes near.
+        free: rays passed it, so that nothing can stand there.
+        hidden: something nearer than it, no part of the object, ended the rays.
     """
 
-    ray: Int[np.ndarray, "n"]
-    beyond: Float[np.ndarray, "n"]
+    free: Bool[np.ndarray, "n"]
+    hidden: Bool[np.ndarray, "n"]
 
 
 @dataclass(frozen=True)
@@ -221,45 +218,66 @@ def _angles(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:
     return np.stack((np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))), axis=1)
 
 
-def nearest_rays(
-    points: Float[np.ndarray, "n 3"], rays: SightLines, *, within_m: float = 0.15
-) -> NearestRays:
-    """Of each point the ray that passes nearest, and how far behind the point it ended.
+def standing(
+    points: Float[np.ndarray, "n 3"],
+    scan: Float[np.ndarray, "s 3"],
+    rays: SightLines,
+    *,
+    beyond_m: float = 0.1,
+    within_m: float = 0.15,
+    nearest: int = 3,
+) -> Standing:
+    """Which points of a shape stand where rays passed freely, and which are hidden.
 
-    Where several sensors are merged, each says its own, and of a point the one that saw farthest
-    past it is believed: what one of them saw through is free.
+    The rays that pass a point nearest are asked, the object's own returns among them, and they
+    must agree: at a silhouette, and over a flat roof, one ray alone passes what the next one hits.
+    Rays of which nothing came back say nothing: dark paint and glass swallow them, too. Where
+    several sensors are merged, what one of them saw through is free.
 
     Args:
-        points: of a shape, the rays' frame, metres.
-        rays: those that hit the object among them (`SightLines.of_returns`).
+        points: of a shape, sensor frame, metres.
+        scan: the object's own returns, the same frame.
+        rays: those that did not hit it.
+        beyond_m: a ray passed a point, or ended before it, by at least this.
         within_m: rays that pass farther away say nothing of a point.
+        nearest: how many rays must agree, as far as so many pass near.
     """
-    ray, beyond = np.full(len(points), -1), np.full(len(points), np.nan)
-    for origin, rows in _by_origin(rays):
-        place = _from_one_place(points - origin, rays.part(rows), within_m)
-        farther = (place.ray >= 0) & ~(place.beyond <= beyond)
-        ray[farther] = rows[place.ray[farther]]
-        beyond[farther] = place.beyond[farther]
-    return NearestRays(ray, beyond)
+    free, hidden = np.zeros(len(points), bool), np.zeros(len(points), bool)
+    for origin, rows in _by_origin(rays.returned):
+        own = SightLines.of_returns(scan - origin.astype(scan.dtype))
+        others = rays.returned.part(rows)
+        directions = np.concatenate((own.directions, others.directions))
+        ranges = np.concatenate((own.ranges, others.ranges))
+        ray, beyond = _nearest(points - origin, directions, ranges, within_m, nearest)
+        known = np.isfinite(beyond).any(1)
+        free |= known & (np.where(np.isfinite(beyond), beyond, np.inf).min(1) > beyond_m)
+        before = (beyond < -beyond_m) & (ray >= len(own))
+        hidden |= known & (before | ~np.isfinite(beyond)).all(1)
+    return Standing(free, hidden & ~free)
 
 
 def _by_origin(rays: SightLines) -> list[tuple[Float[np.ndarray, "3"], Int[np.ndarray, "k"]]]:
     """Each place from which rays start, and the rows of its rays."""
     if rays.origins is None:
-        return [(np.zeros(3), np.arange(len(rays)))] if len(rays) else []
+        return [(np.zeros(3), np.arange(len(rays)))]
     places, which = np.unique(np.round(rays.origins, 2), axis=0, return_inverse=True)
     which = which.reshape(-1)
     return [(place, np.flatnonzero(which == i)) for i, place in enumerate(places)]
 
 
-def _from_one_place(
-    points: Float[np.ndarray, "n 3"], rays: SightLines, within_m: float
-) -> NearestRays:
+def _nearest(
+    points: Float[np.ndarray, "n 3"],
+    directions: Float[np.ndarray, "m 3"],
+    ranges: Float[np.ndarray, "m"],
+    within_m: float,
+    count: int,
+) -> tuple[Int[np.ndarray, "n k"], Float[np.ndarray, "n k"]]:
+    """The rays nearest to each point, and how far behind it they ended; NaN of those not near."""
     from scipy.spatial import KDTree
 
-    away = np.maximum(np.linalg.norm(points, axis=1), 1e-9)
-    tree = KDTree(rays.directions, balanced_tree=False)
-    apart, ray = tree.query(points / away[:, None])
-    near = np.asarray(apart) * away <= within_m
-    beyond = rays.ranges[ray].astype(np.float64) - away
-    return NearestRays(np.where(near, ray, -1), np.where(near, beyond, np.nan))
+    away = np.maximum(np.linalg.norm(points, axis=1), 1e-9)[:, None]
+    tree = KDTree(directions, balanced_tree=False)
+    found = tree.query(points / away, k=min(count, len(ranges)))
+    apart, ray = (np.asarray(part).reshape(len(points), -1) for part in found)
+    beyond = ranges[ray].astype(np.float64) - away
+    return ray, np.where(apart * away <= within_m, beyond, np.nan)
