@@ -71,7 +71,7 @@ def _vehicle_sized(
 ) -> Iterator[Rows]:
     """Clusters of the size of vehicles; those too large are cut apart with the finer reaches."""
     for part in connected(scan.scaled[rows], reaches[0], config.thin):
-        members = rows[part]
+        members = _without_overhang(scan, rows[part], config)
         if len(members) < config.fewest_points or not _stands(scan.heights[members], config):
             continue
         length, width = extents(scan.points[members])
@@ -80,6 +80,18 @@ def _vehicle_sized(
                 yield members
         elif len(reaches) > 1:
             yield from _vehicle_sized(scan, members, reaches[1:], config)
+
+
+def _without_overhang(scan: _Above, rows: Rows, config: ClusterConfig) -> Rows:
+    """A cluster without what is high and reaches out beyond what is below: a tree over a car."""
+    low = scan.heights[rows] < config.overhang_m
+    if low.all() or low.sum() < config.fewest_points:
+        return rows
+    flat = scan.points[rows, :2].astype(np.float64)
+    axes = _axes(flat[low])
+    below, above = flat[low] @ axes, flat[~low] @ axes
+    beyond = np.maximum(above - below.max(0), below.min(0) - above).max(1)
+    return rows[low] if (beyond > config.beyond_m).mean() > config.beyond else rows
 
 
 def connected(points: Float[np.ndarray, "n 3"], reach: float, thin: float = 0.25) -> list[Rows]:
@@ -110,10 +122,16 @@ def _stands(heights: Float[np.ndarray, "k"], config: ClusterConfig) -> bool:
 
 def extents(points: Points) -> tuple[float, float]:
     """Length and width of the upright rectangle of least area, of 2 degrees' steps, metres."""
-    angles = np.deg2rad(np.arange(0.0, 90.0, 2.0))
-    flat = points[:: 1 + len(points) // _SIZED_BY, :2].astype(np.float64)
-    along = flat @ np.stack((np.cos(angles), np.sin(angles)))
-    across = flat @ np.stack((-np.sin(angles), np.cos(angles)))
-    sides = np.stack((np.ptp(along, axis=0), np.ptp(across, axis=0)))
-    width, length = np.sort(sides[:, sides.prod(0).argmin()])
+    flat = points[:, :2].astype(np.float64)
+    width, length = np.sort(np.ptp(flat @ _axes(flat), axis=0))
     return float(length), float(width)
+
+
+def _axes(flat: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "2 2"]:
+    """Of the rectangle of least area around points seen from above, of 2 degrees' steps."""
+    some = flat[:: 1 + len(flat) // _SIZED_BY]
+    angles = np.deg2rad(np.arange(0.0, 90.0, 2.0))
+    along = some @ np.stack((np.cos(angles), np.sin(angles)))
+    across = some @ np.stack((-np.sin(angles), np.cos(angles)))
+    best = angles[(np.ptp(along, axis=0) * np.ptp(across, axis=0)).argmin()]
+    return np.array(((np.cos(best), -np.sin(best)), (np.sin(best), np.cos(best))))

@@ -81,28 +81,34 @@ class ClusterConfig:
         reach_per_m: it grows by so much a metre of range, as beams spread.
         upright: heights count by this factor: beams are farther apart upwards than sideways.
         finer: clusters too large for a vehicle are cut apart with the reach times each of these.
+        overhang_m: above the ground; what is higher and reaches out over the rest is no part of it.
+        beyond_m: so far.
+        beyond: with this share of its points.
         thin: points are thinned to this share of the reach before it is measured.
         fewest_points: of a cluster; 16 are the least that can be completed.
         lowest_top_m: above the ground; lower things are no vehicles.
         highest_bottom_m: above the ground; higher things do not stand on it.
         shortest_m: a car's width, half hidden.
-        longest_m: a truck.
+        longest_m: a bus.
         widest_m: a truck with its mirrors.
     """
 
     range_m: float = 60.0
     lowest_m: float = 0.1
     highest_m: float = 3.5
-    reach_m: float = 0.35
-    reach_per_m: float = 0.012
+    reach_m: float = 0.3
+    reach_per_m: float = 0.01
     upright: float = 0.5
     finer: tuple[float, ...] = (0.6, 0.4)
+    overhang_m: float = 2.0
+    beyond_m: float = 0.3
+    beyond: float = 0.15
     thin: float = 0.25
     fewest_points: int = 30
     lowest_top_m: float = 0.6
     highest_bottom_m: float = 1.0
     shortest_m: float = 1.0
-    longest_m: float = 12.0
+    longest_m: float = 18.0
     widest_m: float = 3.5
 
 
@@ -159,7 +165,7 @@ class CompletionConfig:
 
     looks: int = 3
     worst_cost_m: float = 0.2
-    least_nats: float = -2.25
+    least_nats: float = -4.0
     worst_nats: float = -6.0
     scans: int = 16
     ticks: int = 4
@@ -243,6 +249,38 @@ class ClaimConfig:
 
 
 @dataclass(frozen=True)
+class CarveConfig:
+    """Where rays say that a vehicle ends (`carving.py`).
+
+    Attributes:
+        slab_m: a box is looked at in slabs of this thickness, from each end inwards.
+        reach_m: so far inwards.
+        low_m: above the box's floor; lower rays pass under a vehicle.
+        high_m: above the box's floor; higher ones pass over a bonnet.
+        strip_m: rays are counted in this depth behind the side that the sensor sees: less is a
+            corner's rounding, of more nothing is seen.
+        behind_m: a ray passes where it goes on so far.
+        fewest_rays: through an empty slab.
+        corner_m: a vehicle reaches so far beyond where a side seen begins to turn.
+        far_corner_m: the same where the end itself looks away from the sensor.
+        most_m: no end is moved farther: some vehicles have pointed ends.
+        strays: share of a vehicle's points that may be left outside.
+    """
+
+    slab_m: float = 0.05
+    reach_m: float = 0.6
+    low_m: float = 0.3
+    high_m: float = 1.0
+    strip_m: tuple[float, float] = (0.15, 0.6)
+    behind_m: float = 0.3
+    fewest_rays: int = 3
+    corner_m: float = 0.1
+    far_corner_m: float = 0.25
+    most_m: float = 0.25
+    strays: float = 0.002
+
+
+@dataclass(frozen=True)
 class BoxConfig:
     """How boxes are smoothed in time (`boxes.py`).
 
@@ -275,4 +313,5 @@ class DriveConfig:
     vehicles: VehicleConfig = field(default_factory=VehicleConfig)
     merging: MergeConfig = field(default_factory=MergeConfig)
     claims: ClaimConfig = field(default_factory=ClaimConfig)
+    carving: CarveConfig = field(default_factory=CarveConfig)
     boxes: BoxConfig = field(default_factory=BoxConfig)

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from wildshape.drives.boxes import Way
 from wildshape.drives.completion import CATEGORY
 from wildshape.drives.placing import Completed, box_in_scan
@@ -81,19 +83,21 @@ def copy_object(folder: Path, target: Path) -> None:
     write_text(target / OBJECTS, (folder / OBJECTS).read_text("utf-8"))
 
 
-def write_shape(path: Path, folder: Path) -> None:
+def write_shape(path: Path, folder: Path, ahead_m: float = 0.0) -> None:
     """A vehicle's complete shape in the frame of its box: x forward, origin in the middle.
 
     Args:
         path: file to write.
         folder: of the completed object; all its scans have one shape.
+        ahead_m: how far the box's middle was moved forward since.
     """
     if path.is_file():
         return
     said = read_json(folder / OBJECTS, "what complete writes")
     first = next(detections_of(said, 0))
     points = read_points(folder / COMPLETED / f"{first.scan}.ply")
-    write_ply(path, pose_of(first.box).inverse().apply_numpy(points))
+    placed = pose_of(first.box).inverse().apply_numpy(points)
+    write_ply(path, placed - np.array((ahead_m, 0.0, 0.0), placed.dtype))
 
 
 def boxes_of(vehicle: Vehicle, T_level_sensor: SE3) -> list[tuple[int, Box]]:

@@ -34,6 +34,7 @@ class Completed:
         size: `(3,)` length, width, height, metres.
         cost_m: label-free cost, the middle one of its scans, the fuller the heavier.
         confidence: of the completions, 0 to 1.
+        ahead_m: how far the boxes' middle was moved forward from that of the completed shape.
     """
 
     seen: Sightings
@@ -42,6 +43,7 @@ class Completed:
     size: tuple[float, float, float]
     cost_m: float
     confidence: float
+    ahead_m: float = 0.0
 
     @property
     def fullest(self) -> int:

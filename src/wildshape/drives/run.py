@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from wildshape.drives.boxes import smooth
+from wildshape.drives.carving import carve
 from wildshape.drives.claims import claim
 from wildshape.drives.clock import Clock, Watch, silent
 from wildshape.drives.completion import Completer
@@ -296,6 +297,7 @@ class _Run:
                 claimed = claim(found, self.cuts, T_level_sensor, ticks, self.config)
                 found, said = claimed.vehicles, without_parts(said, claimed.parts)
             self.write_judged(objects, said)
+            found = carve(found, self.drive.scan, T_level_sensor, self.config.carving)
             at(1)
             return [
                 Vehicle(one, smooth(one, ticks, self.config.boxes), kept[one.seen.name])

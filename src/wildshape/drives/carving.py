@@ -1,0 +1,166 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What rays say of how long a vehicle is: where they pass through, nothing stands.
+
+A network ends a vehicle where most end that look like it. Where a scan shows a long side of a
+vehicle and what is beyond its corner, an end of the box that lies further out is drawn inwards.
+Widths stay: mirrors are wider than what is behind them.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from wildshape.drives.config import CarveConfig
+from wildshape.drives.placing import Completed
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.records import Points
+
+Box = Float[np.ndarray, "4"]
+Size = tuple[float, float, float]
+_SIGNS = (1, -1)  # of x at the front and at the rear
+
+
+@dataclass
+class _Slabs:
+    """What was counted in slabs of a box, from its front and from its rear inwards.
+
+    Attributes:
+        passed: `(2, bins)` rays that go through beside a side that the sensor sees.
+        own: `(2, bins)` points, all over the box.
+        faced: `(2,)` scans whose sensor sees the end itself.
+        points: of all scans in the box.
+    """
+
+    passed: Float[np.ndarray, "2 bins"]
+    own: Float[np.ndarray, "2 bins"]
+    faced: Float[np.ndarray, "2"]
+    points: int = 0
+
+    @classmethod
+    def empty(cls, config: CarveConfig) -> "_Slabs":
+        bins = round(config.reach_m / config.slab_m)
+        return cls(np.zeros((2, bins)), np.zeros((2, bins)), np.zeros(2))
+
+
+def carve(
+    vehicles: Sequence[Completed],
+    read: Callable[[int], Points],
+    T_level_sensor: SE3,
+    config: CarveConfig,
+) -> list[Completed]:
+    """The same vehicles in boxes no longer than rays leave room for.
+
+    Args:
+        vehicles: completed.
+        read: the whole scan of a frame, sensor frame, metres.
+        T_level_sensor: of every frame.
+        config: see there.
+    """
+    slabs = [_Slabs.empty(config) for _ in vehicles]
+    present: dict[int, list[tuple[int, Box]]] = {}
+    for i, one in enumerate(vehicles):
+        for frame, box in zip(one.frames, one.boxes):
+            present.setdefault(frame, []).append((i, box))
+    for frame, boxes in sorted(present.items()):
+        scan = T_level_sensor[frame].apply_numpy(read(frame)).astype(np.float64)
+        sensor = T_level_sensor[frame].translation.numpy()
+        for i, box in boxes:
+            _count(slabs[i], scan, sensor, box, vehicles[i].size, config)
+    return [_cut(one, counted, config) for one, counted in zip(vehicles, slabs)]
+
+
+def _count(
+    slabs: _Slabs,
+    scan: Points,
+    sensor: Float[np.ndarray, "3"],
+    box: Box,
+    size: Size,
+    config: CarveConfig,
+) -> None:
+    """Add what one scan says of one box; all in the level world."""
+    points = _in_box(scan[_towards(scan, sensor, box, size)], box)
+    origin = _in_box(sensor[None], box)[0]
+    floor = -size[2] / 2 + config.low_m
+    inside = np.all(np.abs(points) < np.array(size) / 2, axis=1) & (points[:, 2] > floor)
+    slabs.points += int(inside.sum())
+    reached = _passing(points, origin, size, config)
+    bins = slabs.own.shape[1]
+    for end, sign in enumerate(_SIGNS):
+        depth = (size[0] / 2 - sign * points[inside, 0]) / config.slab_m
+        slabs.own[end] += np.bincount(depth[depth < bins].astype(int), minlength=bins)
+        slabs.faced[end] += sign * origin[0] > size[0] / 2
+        through = (size[0] / 2 - sign * reached) / config.slab_m
+        middles = np.arange(bins) + 0.5
+        within = (through.min(0) < middles[:, None]) & (middles[:, None] < through.max(0))
+        slabs.passed[end] += within.sum(1)
+
+
+def _towards(
+    scan: Points, sensor: Float[np.ndarray, "3"], box: Box, size: Size
+) -> Bool[np.ndarray, "n"]:
+    """Which rays go where a box is, seen from above, and reach it."""
+    ahead, off = box[:2] - sensor[:2], scan[:, :2] - sensor[:2]
+    away, radius = float(np.hypot(*ahead)), float(np.hypot(*size[:2])) / 2
+    along = off @ ahead
+    across = np.abs(ahead[0] * off[:, 1] - ahead[1] * off[:, 0])
+    return (along > away * (away - radius)) & (across * max(away, radius) < along * radius)
+
+
+def _passing(
+    points: Float[np.ndarray, "n 3"],
+    origin: Float[np.ndarray, "3"],
+    size: Size,
+    config: CarveConfig,
+) -> Float[np.ndarray, "2 p"]:
+    """Where rays come into the strip behind the long side that is seen, and leave it: their x.
+
+    Without those that end before they leave; none where the sensor sees no long side.
+    """
+    if abs(origin[1]) < size[1] / 2:
+        return np.empty((2, 0))
+    facing, floor = np.sign(origin[1]), -size[2] / 2
+    strip = sorted(facing * (size[1] / 2 - depth) for depth in config.strip_m)
+    rays = points - origin
+    first = np.zeros(len(rays))
+    last = 1.0 - config.behind_m / np.linalg.norm(rays, axis=1)
+    for axis, (low, high) in ((1, strip), (2, (floor + config.low_m, floor + config.high_m))):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = np.stack([(wall - origin[axis]) / rays[:, axis] for wall in (low, high)])
+        first, last = np.maximum(first, ends.min(0)), np.minimum(last, ends.max(0))
+    kept = first < last
+    return origin[0] + np.stack((first, last))[:, kept] * rays[kept, 0]
+
+
+def _cut(one: Completed, slabs: _Slabs, config: CarveConfig) -> Completed:
+    """A box whose ends are drawn inwards as far as rays went through and no own points are."""
+    inwards = []
+    for end in range(len(_SIGNS)):
+        free = _until(slabs.passed[end] >= config.fewest_rays)
+        bare = _until(np.cumsum(slabs.own[end]) <= config.strays * slabs.points + 1)
+        corner = config.corner_m if slabs.faced[end] else config.far_corner_m
+        room = min(free * config.slab_m - corner, bare * config.slab_m)
+        inwards.append(min(max(room, 0.0), config.most_m))
+    front, rear = inwards
+    boxes = one.boxes.copy()
+    along = np.stack((np.cos(boxes[:, 3]), np.sin(boxes[:, 3])), axis=1)
+    ahead = (rear - front) / 2
+    boxes[:, :2] += ahead * along
+    length, width, height = one.size
+    size = (length - front - rear, width, height)
+    return replace(one, boxes=boxes, size=size, ahead_m=ahead)
+
+
+def _until(flags: Bool[np.ndarray, "bins"]) -> int:
+    """How many come before the first that is not so."""
+    return int(np.argmin(np.append(flags, False)))
+
+
+def _in_box(points: Points, box: Box) -> Float[np.ndarray, "n 3"]:
+    """Points of the level world in the frame of a box: x ahead, y left, origin in its middle."""
+    off = points - box[:3]
+    c, s = np.cos(box[3]), np.sin(box[3])
+    turned = (c * off[:, 0] + s * off[:, 1], c * off[:, 1] - s * off[:, 0], off[:, 2])
+    return np.stack(turned, axis=1)
