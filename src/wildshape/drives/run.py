@@ -321,7 +321,9 @@ class _Run:
                 seen = one.completed.seen
                 write_vehicle_track(self.out / "tracks", seen, self.cuts, self.drive)
                 copy_object(self.folder(seen), self.out / "objects" / one.name)
-                write_shape(self.out / SHAPES / f"{one.name}.ply", self.folder(seen))
+                write_shape(
+                    self.out / SHAPES / f"{one.name}.ply", self.folder(seen), one.completed.ahead_m
+                )
                 rows += rows_of(one, boxes_of(one, T_level_sensor), self.drive)
                 at(number)
             write_box_table(self.out / BOXES, rows)
