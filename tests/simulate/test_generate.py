@@ -67,6 +67,20 @@ def test_the_same_seed_makes_the_same_bytes_with_any_workers() -> None:
     assert alone[0] != _bytes(_tracks(config, seed=4)[0])
 
 
+def test_half_of_the_varied_scans_are_cut_off_above_the_ground() -> None:
+    config = SimulationConfig(tracks=6, scans=8, occlusion=0.0, shape_points=512, varied=True)
+    lowest = []
+    for track in _tracks(config):
+        assert track.T_sensor_object is not None
+        assert track.shape is not None
+        floor = track.shape[:, 2].min()
+        for i, scan in enumerate(track.scans):
+            z = track.T_sensor_object[i].inverse().apply_numpy(scan)[:, 2]
+            lowest.append(np.sort(z)[3] - floor)
+    share = np.mean(np.array(lowest) > 0.12)
+    assert 0.2 < share < 0.7
+
+
 def test_occluders_reduce_points() -> None:
     def points(occlusion: float) -> list[int]:
         config = SimulationConfig(tracks=12, scans=4, occlusion=occlusion, shape_points=64)

@@ -36,6 +36,8 @@ class SimulationConfig:
             every k-th scan; the others are every scan of a short stretch, as a sensor that loses
             its object early leaves it.
         rays: that passed the object by, kept with each scan at most (LiDAR).
+        varied: for training: vehicles of more sizes and rounder, sensors that differ from track to
+            track, and scans cut off above the ground, as crops of real ones are (LiDAR).
     """
 
     tracks: int = 100
@@ -54,6 +56,7 @@ class SimulationConfig:
     far_m: float = 30.0
     whole_pass: float = 2 / 3
     rays: int = 0
+    varied: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated.

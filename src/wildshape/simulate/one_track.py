@@ -20,9 +20,11 @@ from wildshape.simulate.sensor import DepthCamera, SpinningLidar
 from wildshape.simulate.shapes.meshes import read_mesh
 from wildshape.simulate.shapes.solid import Solid
 from wildshape.simulate.shapes.unit_shapes import airplane, chair
-from wildshape.simulate.shapes.vehicle import random_vehicle
+from wildshape.simulate.shapes.variety import varied
+from wildshape.simulate.shapes.vehicle import random_vehicle, varied_vehicle
 from wildshape.simulate.trajectory import drive_by
 from wildshape.simulate.truth import visible_surface
+from wildshape.simulate.varied_scans import cut_above_ground, varied_returns
 
 _ATTEMPTS = 60
 
@@ -74,6 +76,8 @@ class Job:
             scans = int(rng.integers(max(scans // 2, 1), scans * 5 // 3 + 1))
         glass = float(rng.uniform(0.02, 0.3))
         returns = Returns(config.noise, config.loss, glass, config.ground)
+        if config.varied:
+            returns = varied_returns(returns, rng)
         if isinstance(config.device, DepthCamera):
             return _camera_track(target, config, config.device, scans, returns, rng)
         chance = np.random.default_rng([self.seed, index, 1]) if config.rays else None
@@ -82,8 +86,10 @@ class Job:
     def _target(self, index: int, rng: np.random.Generator) -> Solid:
         lidar = self.config.is_lidar
         if self.meshes:
-            return read_mesh(self.meshes[index % len(self.meshes)], metres=lidar)
-        makers = {"car": random_vehicle, "airplane": airplane, "chair": chair}
+            mesh = read_mesh(self.meshes[index % len(self.meshes)], metres=lidar)
+            return varied(mesh, rng) if self.config.varied else mesh
+        car = varied_vehicle if self.config.varied else random_vehicle
+        makers = {"car": car, "airplane": airplane, "chair": chair}
         return makers[self.config.category](rng).centred(None if lidar else 1.0)
 
 
@@ -118,6 +124,8 @@ def _lidar_track(
             if len(usable) + left < scans:
                 break
             turn = scan(scene, target, lidar, T_object_sensor, returns, rng)
+            if config.varied:
+                turn = cut_above_ground(turn, T_object_sensor, target, rng)
             if turn.on_target >= config.min_points:
                 usable.append((turn, T_object_sensor))
             if len(usable) == scans:

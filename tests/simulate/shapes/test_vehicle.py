@@ -10,9 +10,17 @@ import trimesh
 
 from wildshape.simulate.shapes.solid import Solid
 from wildshape.simulate.shapes.unit_shapes import airplane, chair
-from wildshape.simulate.shapes.vehicle import KINDS, random_vehicle, vehicle
+from wildshape.simulate.shapes.variety import varied
+from wildshape.simulate.shapes.vehicle import KINDS, random_vehicle, varied_vehicle, vehicle
 
-_LONGEST = {"sedan": 5.2, "hatchback": 4.5, "van": 5.7, "pickup": 5.7, "truck": 9.1}
+_LONGEST = {
+    "sedan": 5.2,
+    "hatchback": 4.5,
+    "van": 5.7,
+    "pickup": 5.7,
+    "truck": 9.1,
+    "transporter": 7.1,
+}
 
 
 def _assert_closed(solid: Solid) -> None:
@@ -49,6 +57,30 @@ def test_unit_shapes_are_closed_and_unit(
     low, high = solid.bounds
     np.testing.assert_allclose(low + high, 0, atol=1e-9)
     assert np.linalg.norm(high - low) == pytest.approx(1.0)
+
+
+def test_varied_vehicles_are_of_all_sizes_on_the_road() -> None:
+    rng = np.random.default_rng(1)
+    solids = [varied_vehicle(rng) for _ in range(120)]
+    for solid in solids:
+        assert solid.bounds.sum(0) == pytest.approx(0, abs=1e-9)
+    sizes = np.array([np.ptp(solid.bounds, axis=0) for solid in solids])
+    cars = sizes[[s.kind in ("sedan", "hatchback") for s in solids]]
+    assert 3.39 < cars[:, 0].min() < 3.7
+    assert 5.0 < cars[:, 0].max() <= 5.8
+    vans = sizes[[s.kind in ("van", "transporter") for s in solids]]
+    assert vans[:, 0].max() > 6
+    assert vans[:, 2].max() > 2.5
+
+
+def test_varied_vehicles_are_rounder() -> None:
+    def near_the_box(solid: Solid) -> float:
+        half, points = solid.bounds[1], np.abs(solid.centred().vertices)
+        return float(((half - points)[:, :2].min(1) < 0.1).mean())
+
+    solids = [vehicle("sedan", np.random.default_rng(seed)).centred() for seed in range(20)]
+    rounder = [varied(solid, np.random.default_rng(seed)) for seed, solid in enumerate(solids)]
+    assert np.mean([*map(near_the_box, rounder)]) < 0.8 * np.mean([*map(near_the_box, solids)])
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -25,7 +25,7 @@ Meshes = Annotated[
     option(metavar="DIR", help="your own meshes (x forward, z up) instead of our shapes"),
 ]
 
-OF_TRACKS = ("tracks", "category", "occlusion", "ground", "rays", "layout", "workers")
+OF_TRACKS = ("tracks", "category", "occlusion", "ground", "rays", "varied", "layout", "workers")
 OF_DRIVES = ("speed", "compensated", "point_times")
 
 
@@ -45,6 +45,8 @@ class Settings:
         occlusion: probability that something stands in the way in a LiDAR track.
         ground: leave ground returns at the rim of the object in.
         rays: keep the rays around each scan that did not hit the object, too (LiDAR).
+        varied: to train for real scans: more sizes, rounder forms, sensors that differ, and scans
+            cut off above the ground.
         workers: processes; by default one a core.
         drive: full scans of a street with traffic, their boxes and the sensor's way.
         speed: of a drive, mean, metres a second; else drawn from 4 to 10; 0 stands still.
@@ -62,6 +64,7 @@ class Settings:
     occlusion: Annotated[float, arg(metavar="P")] = 0.3
     ground: bool = False
     rays: bool = False
+    varied: bool = False
     layout: Layout = "packed"
     workers: Annotated[int | None, option(metavar="N")] = None
     drive: bool = False
@@ -162,6 +165,7 @@ def _tracks(settings: Settings) -> None:
         occlusion=settings.occlusion,
         ground=settings.ground,
         rays=MOST_RAYS if settings.rays else 0,
+        varied=settings.varied,
     )
     identity = {**asdict(config), "seed": settings.seed}
     written = write_tracks(

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wildshape.simulate.shapes.solid import Solid, box, cylinder, ellipsoid, loft, union
+from wildshape.simulate.shapes.variety import varied
 
 _RANGES: dict[str, dict[str, tuple[float, float]]] = {
     # Shares of the length from the front for bonnet front, cowl, roof front, roof rear, deck.
@@ -39,9 +40,15 @@ _RANGES: dict[str, dict[str, tuple[float, float]]] = {
         "cowl": (0.02, 0.05), "roof0": (0.07, 0.10), "roof1": (0.24, 0.27), "deck": (0.25, 0.28),
         "hood": (0.42, 0.5), "belt": (0.46, 0.52), "trunk": (0.42, 0.5), "tumble": (0.05, 0.1),
     },
+    "transporter": {
+        "length": (5.3, 7.0), "width": (1.9, 2.1), "height": (2.3, 2.9),
+        "cowl": (0.09, 0.15), "roof0": (0.20, 0.26), "roof1": (0.96, 0.975), "deck": (0.985, 0.99),
+        "hood": (0.40, 0.48), "belt": (0.46, 0.52), "trunk": (0.42, 0.5), "tumble": (0.04, 0.12),
+    },
 }  # fmt: skip
 KINDS = tuple(_RANGES)
-_SHARES = (0.34, 0.34, 0.14, 0.10, 0.08)
+_SHARES = (0.34, 0.34, 0.14, 0.10, 0.08, 0.0)
+_VARIED_SHARES = (0.26, 0.34, 0.15, 0.09, 0.08, 0.08)
 
 
 @dataclass(frozen=True)
@@ -85,6 +92,11 @@ def random_vehicle(rng: np.random.Generator) -> Solid:
     return vehicle(str(rng.choice(KINDS, p=_SHARES)), rng)
 
 
+def varied_vehicle(rng: np.random.Generator) -> Solid:
+    """A car of a random kind, more vans and transporters among them, its size and form varied."""
+    return varied(vehicle(str(rng.choice(KINDS, p=_VARIED_SHARES)), rng), rng)
+
+
 def _draw(kind: str, rng: np.random.Generator) -> _Body:
     r = {name: float(rng.uniform(*span)) for name, span in _RANGES[kind].items()}
     length, height = r["length"], r["height"]
@@ -108,7 +120,7 @@ def _draw(kind: str, rng: np.random.Generator) -> _Body:
     if kind == "truck":
         front = float(rng.uniform(0.12, 0.16)) * length
     corner = float(rng.uniform(0.15, 0.38) if kind != "truck" else rng.uniform(0.05, 0.15))
-    panel = kind == "truck" or (kind == "van" and rng.random() < 0.4)
+    panel = kind in ("truck", "transporter") or (kind == "van" and rng.random() < 0.4)
     return _Body(
         kind, length, r["width"], height, top, belt, float(rng.uniform(0.18, 0.26)),
         r["tumble"], (front, rear), radius,
