@@ -6,11 +6,21 @@ import json
 import math
 import shutil
 from collections import Counter
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.drives.detector_files import TRACKED, UNTRACKED, kitti_tracking, openpcdet, table
+from tests.drives.detector_files import (
+    TRACKED,
+    UNTRACKED,
+    kitti_objects,
+    kitti_tracking,
+    mmdetection3d,
+    openpcdet,
+    our_nuscenes,
+    table,
+)
 from tests.refusal import refused
 
 import wildshape
@@ -109,6 +119,33 @@ def test_each_cluster_is_the_points_of_one_true_vehicle(street, write, tmp_path)
         whose = [owner_of(street, frame, part) for part in found.clusters() if len(part) >= FULL]
         assert len(set(whose)) == len(whose)
         assert full_vehicles(street, frame) <= set(whose)
+
+
+@pytest.mark.parametrize("write", [kitti_objects, our_nuscenes, openpcdet, mmdetection3d])
+def test_scores_leave_out_what_the_detector_doubts(street, write, tmp_path):
+    given = replace(write(street, tmp_path), least_score=0.45)  # of our writer's 0.5
+    every = find_detections(given, street.drive)
+    assert {box.score for row in every.frames for box in row} <= {0.5, 0.7, 0.9}
+    refused(
+        find_detections,
+        replace(given, least_score=0.95),
+        street.drive,
+        match=r"vehicle that scores 0\.95",
+    )
+
+
+def test_a_lower_score_is_counted_and_a_needless_calibration_named(street, tmp_path):
+    given = openpcdet(street, tmp_path)
+    said = json.loads(given.path.read_text())
+    said[0]["score"][0] = 0.1
+    given.path.write_text(json.dumps(said))
+    calibration = street.root / "calib" / "0000.txt"
+    told = replace(given, least_score=0.3, calibration=calibration)
+    warnings = find_detections(told, street.drive).warnings
+    assert warnings[:2] == (
+        "0000.txt is not used: only KITTI's boxes need it",
+        "1 detections score less than 0.3 and are left out",
+    )
 
 
 def test_given_tracks_are_kept(street, tmp_path):

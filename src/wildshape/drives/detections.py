@@ -25,7 +25,7 @@ from wildshape.inference.folders.box_files import read_camera
 from wildshape.io.boxes.detections import number_of, pose_of
 from wildshape.io.boxes.detector import DetectorBox
 from wildshape.io.boxes.kitti import camera_at_the_lidar
-from wildshape.io.boxes.read_detector import fingerprint, read_detector_boxes
+from wildshape.io.boxes.read_detector import fingerprint, read_detector_boxes, takes_calibration
 from wildshape.io.output import file_name
 from wildshape.records import Box, Points
 
@@ -47,10 +47,12 @@ class DetectionFile:
         path: of a file, or a folder of them (docs/drive.md).
         calibration: KITTI's `.txt`, for labels of KITTI; without, their camera is taken to be at
             the LiDAR's place and to look along its x.
+        least_score: boxes of a lower score are left out; those without one are kept.
     """
 
     path: Path
     calibration: Path | None = None
+    least_score: float | None = None
 
     def identity(self) -> dict[str, Any]:
         """What decides what is found with them.
@@ -59,7 +61,9 @@ class DetectionFile:
             BadInputError: a file cannot be read.
         """
         calibration = self.calibration and fingerprint(self.calibration)
-        return {"detections": fingerprint(self.path), "detections_calibration": calibration}
+        scored = {} if self.least_score is None else {"detections_least_score": self.least_score}
+        given = {"detections": fingerprint(self.path), "detections_calibration": calibration}
+        return {**given, **scored}
 
     def boxes(self) -> list[DetectorBox]:
         """All of them.
@@ -69,6 +73,12 @@ class DetectionFile:
         """
         camera = read_camera(self.calibration) if self.calibration else camera_at_the_lidar()
         return read_detector_boxes(self.path, camera.T_rect_sensor)
+
+    def is_sure(self, box: DetectorBox) -> bool:
+        """Whether a box's score is high enough."""
+        if self.least_score is None or box.score is None:
+            return True
+        return box.score >= self.least_score
 
 
 @dataclass(frozen=True)
@@ -100,12 +110,16 @@ def find_detections(file: DetectionFile, drive: Drive) -> Detections:
         BadInputError: a file cannot be read; no box is of a vehicle and of a scan of the drive; a
             track has two boxes in one frame.
     """
-    boxes = file.boxes()
+    given = file.boxes()
+    boxes = [box for box in given if file.is_sure(box)]
     vehicles = [box for box in boxes if _is_vehicle(box.category)]
     others = Counter(box.category for box in boxes if not _is_vehicle(box.category))
     listed = ", ".join(f"{count} {kind}" for kind, count in others.most_common())
     if not vehicles:
-        raise BadInputError(f"{file.path}: no box of a vehicle among {listed or 'none at all'}.")
+        least = "" if file.least_score is None else f" that scores {file.least_score:g}"
+        raise BadInputError(
+            f"{file.path}: no box of a vehicle{least} among {listed or 'none at all'}."
+        )
     frames = _by_frame(vehicles, drive)
     placed = sum(map(len, frames))
     if not placed:
@@ -114,6 +128,11 @@ def find_detections(file: DetectionFile, drive: Drive) -> Detections:
             f" for example '{drive.scan_names[0]}'; name them alike."
         )
     warnings = []
+    if file.calibration is not None and not takes_calibration(file.path):
+        warnings.append(f"{file.calibration.name} is not used: only KITTI's boxes need it")
+    if len(boxes) < len(given):
+        left = len(given) - len(boxes)
+        warnings.append(f"{left} detections score less than {file.least_score:g} and are left out")
     if others:
         warnings.append(f"detections that are no vehicles are left out: {listed}")
     if placed < len(vehicles):
@@ -175,11 +194,18 @@ class BoxCutter(Cutter):
     def cut(self, frame: int) -> CutScan:
         """What is in the boxes of one frame."""
         boxes = self.detections.frames[frame]
-        return cut_boxes(self.drive.scan(frame), boxes, self.mounting, self.config)
+        turn = self.drive.turn(frame)
+        scan = self.drive.corrected(frame, turn)
+        return cut_boxes(scan, boxes, self.mounting, self.config, as_measured=turn.points)
 
 
 def cut_boxes(
-    scan: Points, boxes: tuple[DetectorBox, ...], mounting: Mounting, config: DriveConfig
+    scan: Points,
+    boxes: tuple[DetectorBox, ...],
+    mounting: Mounting,
+    config: DriveConfig,
+    *,
+    as_measured: Points | None = None,
 ) -> CutScan:
     """The points in each box that are not ground.
 
@@ -188,10 +214,12 @@ def cut_boxes(
         boxes: in it.
         mounting: of the sensor.
         config: see there.
+        as_measured: the scan that the detector saw, if this one was corrected for motion.
     """
     heights = height_above_ground(mounting.level(scan), mounting.height_m, config.ground)
-    above = scan[np.nan_to_num(heights, nan=0.0) > config.clusters.lowest_m]
-    rows = points_in_boxes(above, [one.box for one in boxes], config.detections)
+    stands = np.nan_to_num(heights, nan=0.0) > config.clusters.lowest_m
+    above, seen = scan[stands], (scan if as_measured is None else as_measured)[stands]
+    rows = points_in_boxes(seen, [one.box for one in boxes], config.detections)
     full = [
         (one, own) for one, own in zip(boxes, rows) if own.sum() >= config.detections.fewest_points
     ]

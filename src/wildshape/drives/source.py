@@ -91,7 +91,10 @@ class Drive:
 
         Points are as they were measured where the motion or their times are not known.
         """
-        turn = self.turn(frame)
+        return self.corrected(frame, self.turn(frame))
+
+    def corrected(self, frame: int, turn: Turn) -> Points:
+        """The same of a frame that was read."""
         return turn.points if self.motion is None else turn.carried(self.motion[frame])
 
     def moved_by(self, T_world_sensor: SE3) -> "Drive":

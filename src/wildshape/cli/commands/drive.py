@@ -101,6 +101,10 @@ class Settings:
             " OpenPCDet or mmdetection3d as .json, or a boxes.csv; their tracks are kept",
         ),
     ] = None
+    min_score: Annotated[
+        float | None,
+        option(metavar="S", help="of detections; boxes of a lower score are left out"),
+    ] = None
     no_report: Annotated[FlagCreatePairsOff[bool], arg(help="write no report.html")] = False
     overwrite: Overwrite = False
     json: AsJson = False
@@ -166,7 +170,9 @@ def _box_files(settings: Settings) -> "BoxFiles | None":
     from wildshape.inference.folders.box_files import BoxFiles
 
     files = BoxFiles(settings.boxes, settings.calibration)
-    if settings.detections is not None and not files.uses_calibration:
+    given = settings.calibration
+    kitti = given is not None and given.suffix.lower() == ".txt"
+    if settings.detections is not None and kitti and not files.uses_calibration:
         files = BoxFiles(settings.boxes)
     return files if files.formats or files.calibration else None
 
@@ -175,12 +181,14 @@ def _detections(settings: Settings, drives: int) -> "DetectionFile | None":
     from wildshape.drives.detections import DetectionFile
 
     if settings.detections is None:
+        if settings.min_score is not None:
+            raise BadInputError("--min-score is of detections; name them with --detections.")
         return None
     if drives > 1:
         raise BadInputError(f"--detections {settings.detections}: give one drive with them.")
     known = settings.calibration
     kitti = known if known is not None and known.suffix.lower() == ".txt" else None
-    return DetectionFile(settings.detections, kitti)
+    return DetectionFile(settings.detections, kitti, settings.min_score)
 
 
 def _workers(settings: Settings) -> int:

@@ -18,12 +18,14 @@ class DetectorBox:
         category: as the file has it, for example `Car`; empty if unknown.
         track: which object it is, if known.
         box: in the scan's sensor frame, metres.
+        score: the detector's own, if it gives one.
     """
 
     scan: str | int
     category: str
     track: str | None
     box: Box
+    score: float | None = None
 
 
 def checked(box: Box) -> Box:

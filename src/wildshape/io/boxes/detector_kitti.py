@@ -21,6 +21,7 @@ from wildshape.io.guard import reading
 from wildshape.records import Box
 
 _IGNORED = "DontCare"
+_SCORE = 15  # its place in a line of the object benchmark
 _OBJECT, _TRACKING = (15, 16), (17, 18)  # fields of a line, without and with a score
 
 
@@ -59,7 +60,8 @@ def _boxes(lines: list[str], stem: str, T_sensor_rect: SE3) -> Iterator[Detector
 def _given(words: list[str], scan: str, track: str | None, T_sensor_rect: SE3) -> DetectorBox:
     height, width, length, x, y, z, turn = map(float, words[8:15])
     upright = Box((x, y - height / 2, z), (length, width, height), _quaternion(turn))
-    return DetectorBox(scan, words[0], track, moved(checked(upright), T_sensor_rect))
+    score = float(words[_SCORE]) if len(words) > _SCORE else None
+    return DetectorBox(scan, words[0], track, moved(checked(upright), T_sensor_rect), score)
 
 
 def _quaternion(turn: float) -> tuple[float, float, float, float]:

@@ -45,17 +45,23 @@ def _nuscenes(row: dict[str, Any], scan: str) -> DetectorBox:
         category=str(row[f"{kind}_name"]),
         track=None if track is None else str(track),
         box=checked(Box((x, y, z), (length, width, height), (qw, qx, qy, qz))),
+        score=_number(row.get(f"{kind}_score")),
     )
+
+
+def _number(score: Any) -> float | None:
+    return None if score is None else float(score)
 
 
 def _scan(said: dict[str, Any], place: int) -> Iterator[DetectorBox]:
     """One scan of OpenPCDet or mmdetection3d; without a `frame_id` it is known by its place."""
     scan = str(said["frame_id"]) if "frame_id" in said else place
     boxes = _floor_boxes(said) if "bboxes_3d" in said else said["boxes_lidar"]
-    for box, name in zip(boxes, _names(said), strict=True):
+    scores = said.get("score", said.get("scores_3d")) or [None] * len(boxes)
+    for box, name, score in zip(boxes, _names(said), scores, strict=True):
         x, y, z, length, width, height, yaw = map(float, box[:7])
         given = upright_box((x, y, z), (length, width, height), yaw)
-        yield DetectorBox(scan, name, None, given)
+        yield DetectorBox(scan, name, None, given, _number(score))
 
 
 def _floor_boxes(said: dict[str, Any]) -> list[list[Any]]:

@@ -30,6 +30,15 @@ def read_detector_boxes(path: Path, T_rect_sensor: SE3) -> list[DetectorBox]:
     return [box for file in _files(path) for box in _read(file, T_rect_sensor)]
 
 
+def takes_calibration(path: Path) -> bool:
+    """Whether a file, or one of a folder, is of KITTI, whose boxes are in a camera's frame.
+
+    Raises:
+        BadInputError: no such file or folder.
+    """
+    return any(file.suffix.lower() == ".txt" for file in _files(path))
+
+
 def fingerprint(path: Path) -> str:
     """What tells a file, or the files in a folder, from others."""
     digest = hashlib.sha256()
@@ -79,6 +88,7 @@ def _table(path: Path) -> list[DetectorBox]:
                 box=upright_box(
                     (row.x, row.y, row.z), (row.length, row.width, row.height), row.yaw
                 ),
+                score=row.confidence,
             )
             for row in rows
         ]
