@@ -7,9 +7,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
-import numpy as np
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from wildshape.geometry.ground import skirt
@@ -26,8 +27,8 @@ from wildshape.inference.confidence import (
     reasons_of_scan,
     warning_of,
 )
-from wildshape.inference.config import InferenceConfig, RefineConfig
-from wildshape.inference.refine import filled, refine
+from wildshape.inference.config import InferenceConfig
+from wildshape.inference.refine import Refined, denser, refine, with_scan
 from wildshape.inference.registration import fuse_scans, inlier_ratio, to_middle
 from wildshape.inference.tracks.complete_track import complete_together
 from wildshape.io.scans.points import LEAST_POINTS
@@ -225,8 +226,9 @@ class Predictor:
             again = self._found([seen[int(row)] for row in rows])
             found = found.replaced(rows, again)
             seen = self._off_their_ground(scans, found)
+        posed = self._refined([sorted_points(one) for one in seen], found) if self.refines else _Posed.of(found)
         clouds = zip(scans, seen)
-        return [self._completion(*both, i, found, sensor) for i, both in enumerate(clouds)]
+        return [self._completion(*both, i, found, posed, sensor) for i, both in enumerate(clouds)]
 
     def _found(self, scans: list[Points]) -> Found:
         """What the network says of scans, on the host."""
@@ -245,11 +247,27 @@ class Predictor:
             for scan, shape, rotation, translation in zip(scans, *found[:3])
         ]
 
+    def _refined(self, seen: list[Points], found: Found) -> "_Posed":
+        """Shapes and poses fitted to the scans (`refine.py`), and twice as many points of each."""
+        host = (part.to(self.device) for part in found[:3])
+        up = None if self.up is None else torch.tensor(self.up, dtype=torch.float64).to(self.device)
+        mirror, config = self.settings.network.mirror, self.config.refine
+        done = refine(seen, *host, mirror=mirror, up=up, config=config)
+        done = Refined(*(part.cpu() for part in done))
+        T_sensor_canonical = SE3(done.rotation, done.translation)
+        posed = T_sensor_canonical.to(torch.float32).apply(done.shapes)
+        return _Posed(done.shapes, T_sensor_canonical, denser(posed, done.partner))
+
     def _completion(
-        self, scan: Points, seen: Points, i: int, found: Found, sensor: Sensor | None
+        self,
+        scan: Points,
+        seen: Points,
+        i: int,
+        found: Found,
+        posed: "_Posed",
+        sensor: Sensor | None,
     ) -> Completion:
         """Scan `i` of those found; `seen`: without ground."""
-        shape, T_sensor_can = found.shapes[i], SE3(found.rotation[i], found.translation[i])
         mirror, cost = self.settings.network.mirror, float(found.cost[i])
         rule = self.config.reasons
         features = features_of(scan, cost, found.features[i])
@@ -257,14 +275,11 @@ class Predictor:
         confidence = 0.0 if warning else confidence_of(features, self.settings)
         reasons = reasons_of_scan(scan, sensor, self.settings, rule)
         reasons += reasons_of_result(cost, confidence, self.settings, rule)
-        if self.refines:
-            shape, T_sensor_can = _refined(
-                seen, shape, T_sensor_can, self.config.refine, mirror=mirror, up=self.up
-            )
-        points = T_sensor_can.to(torch.float32).apply(shape).numpy()
-        exact = self.settings.sensor == "camera"
+        shape, T_sensor_can, points = posed.shapes[i], posed.T_sensor_canonical[i], posed.points[i]
+        exact = self.refines and self.settings.sensor == "camera"
+        whole = points.numpy()
         return Completion(
-            points=filled(points, scan, exact, self.config.refine) if self.refines else points,
+            points=with_scan(whole, len(shape), scan) if exact else whole,
             pose=T_sensor_can.to(torch.float64),
             box=box_seen(
                 shape, T_sensor_can, seen, mirror=mirror, body=not exact, config=self.config.box
@@ -287,25 +302,26 @@ class Predictor:
         return kept if len(kept) >= LEAST_POINTS else scan
 
 
+class _Posed(NamedTuple):
+    """What is made of a batch of scans.
+
+    Attributes:
+        shapes: the network's points, canonical frame.
+        T_sensor_canonical: their poses.
+        points: of the complete shapes, sensor frames, those of `shapes` first.
+    """
+
+    shapes: Float[Tensor, "B P 3"]
+    T_sensor_canonical: SE3
+    points: Float[Tensor, "B Q 3"]
+
+    @classmethod
+    def of(cls, found: Found) -> "_Posed":
+        """As the network says."""
+        T_sensor_canonical = SE3(found.rotation, found.translation)
+        return cls(found.shapes, T_sensor_canonical, T_sensor_canonical.apply(found.shapes))
+
+
 def _checked(scans: Sequence[object], first: int = 0) -> list[Points]:
     """Scans handed in from Python; errors count them from `first`."""
     return [as_points(scan, f"scan {i}") for i, scan in enumerate(scans, first)]
-
-
-def _refined(
-    scan: Points,
-    shape: Tensor,
-    T_sensor_canonical: SE3,
-    config: RefineConfig,
-    *,
-    mirror: bool,
-    up: tuple[float, float, float] | None,
-) -> tuple[Tensor, SE3]:
-    """Shape and pose fitted to the scan (`refine.py`)."""
-    pose = (T_sensor_canonical.rotation.numpy(), T_sensor_canonical.translation.numpy())
-    level = None if up is None else np.array(up)
-    found = refine(
-        sorted_points(scan), shape.numpy(), *pose, mirror=mirror, up=level, config=config
-    )
-    rotation, translation = torch.from_numpy(found.rotation), torch.from_numpy(found.translation)
-    return torch.from_numpy(found.shape), SE3(rotation, translation)

@@ -1,235 +1,189 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""A completion held against its scan once more: pose and size fitted, the seen side drawn to it.
+"""Completions held against their scans once more: poses and sizes fitted, seen sides drawn to them.
 
 Beyond the paper (METHOD 11, test-time refinement). The network knows an object's pose to a few
 degrees and its size to a few percent, and draws shapes towards what is usual; the scan in hand
-knows better where it saw something. Nine numbers (rotation, translation and a stretch along the
-canonical axes) are fitted by Gauss-Newton, each scan point to the plane of the shape around it; the
-network's answer is the prior, and that a LiDAR is held level, to a degree, where it nearly is. One
-side of a car tells its heading to a fraction of a degree, but its pitch and roll to one or two.
+knows better where it saw something. All scans of a batch are refined together, by the same lines
+on a CPU and on a GPU.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+import torch
+from jaxtyping import Float, Int64
+from torch import Tensor
 
-from wildshape.geometry.box import extent, unit_of
+from wildshape.geometry.box import unit_of
+from wildshape.geometry.sampling import voxel_thin
+from wildshape.geometry.surface import gathered, planes
 from wildshape.inference.config import RefineConfig
+from wildshape.inference.gauss_newton import Clouds, Surface, fit_to_scans
+from wildshape.ops.nearest import nearest, nearest_k
+from wildshape.records import Points
 
-if TYPE_CHECKING:
-    from scipy.spatial import KDTree
-
-_SMALLEST_M = 1e-6
+_SMALLEST_M, _FAR = 1e-6, 2.5
 _DEFAULT = RefineConfig()
-
-Cloud = Float[np.ndarray, "_ 3"]
 
 
 class Refined(NamedTuple):
-    """A shape and its pose.
+    """Shapes and their poses.
 
     Attributes:
-        shape: canonical frame, metres.
+        shapes: canonical frame, metres.
         rotation: of `T_scan_canonical`.
         translation: of the same, metres.
+        partner: of each point, the one between which and it another is put (`denser`).
     """
 
-    shape: Cloud
-    rotation: Float[np.ndarray, "3 3"]
-    translation: Float[np.ndarray, "3"]
-
-
-class _Planes(NamedTuple):
-    """The plane of the shape around each scan point: `(n, 3)` places and unit normals."""
-
-    at: np.ndarray
-    normal: np.ndarray
+    shapes: Float[Tensor, "B P 3"]
+    rotation: Float[Tensor, "B 3 3"]
+    translation: Float[Tensor, "B 3"]
+    partner: Int64[Tensor, "B P"]
 
 
 def refine(
-    scan: Cloud,
-    shape: Cloud,
-    rotation: Float[np.ndarray, "3 3"],
-    translation: Float[np.ndarray, "3"],
+    scans: Sequence[Points],
+    shapes: Float[Tensor, "B P 3"],
+    rotation: Float[Tensor, "B 3 3"],
+    translation: Float[Tensor, "B 3"],
     *,
     mirror: bool,
-    up: Float[np.ndarray, "3"] | None = None,
+    up: Float[Tensor, "3"] | None = None,
     config: RefineConfig = _DEFAULT,
 ) -> Refined:
-    """Pose and shape after a look at the scan they came from.
+    """Poses and shapes after a look at the scans they came from.
 
     Args:
-        scan: at least a handful of points, metres.
-        shape: canonical frame.
+        scans: at least a handful of points each, metres.
+        shapes: canonical frame, one a scan.
         rotation: of `T_scan_canonical`, good to some ten degrees.
         translation: of the same, good to some decimetres.
         mirror: what was seen of one side of y = 0 is known of the other.
-        up: canonical direction that the scan's z axis points in, if it was taken level; what is
+        up: canonical direction that the scans' z axes point in, if they were taken level; what is
             far from it (`tilted_deg`) is taken for tilted and left so.
-        config: how it is fitted.
+        config: how they are fitted.
     """
-    exact = shape.astype(np.float64)
-    unit = unit_of(extent(exact))
-    order = np.random.default_rng(0).permutation(len(scan))
-    points = scan[order[: config.scan_points]].astype(np.float64)
-    start = Refined(exact / unit, rotation, translation / unit)
-    fitted = _fitted(points / unit, start, up, config)
-    seen = (points / unit - fitted.translation) @ fitted.rotation
-    drawn = drawn_to_scan(fitted.shape, seen, mirror=mirror, config=config)
-    moved = fitted.translation * unit
-    return Refined((drawn * unit).astype(shape.dtype), fitted.rotation, moved)
+    unit = _units(shapes)
+    exact = shapes.double() / unit
+    own = exact[:, : exact.shape[1] // 2] if mirror and is_mirrored(exact) else exact
+    surface, partner = _surface(own, exact, config)
+    clouds = _some_of_each(scans, config.scan_points, exact.device)
+    clouds = clouds._replace(points=clouds.points.double() / unit)
+    start = rotation.double(), translation.double() / unit[:, 0]
+    fit = fit_to_scans(clouds, surface, *start, up, config)
+    seen = _thinned(clouds._replace(points=fit.seen(clouds.points)), config.voxel_m, mirror)
+    drawn = drawn_to(own * fit.stretch[:, None], seen, config)
+    whole = drawn if own is exact else mirrored(drawn)
+    moved = fit.translation * unit[:, 0]
+    return Refined((whole * unit).to(shapes.dtype), fit.rotation, moved, partner)
 
 
-def _fitted(points: Cloud, found: Refined, up: np.ndarray | None, config: RefineConfig) -> Refined:
-    """The nine numbers fitted."""
-    from scipy.spatial import KDTree
-
-    tree = KDTree(found.shape, balanced_tree=False)
-    before = _off(tree, (points - found.translation) @ found.rotation, config.kernel_m)
-    motion, planes = np.zeros(9), _Planes(points, points)
-    R, t = (part.astype(np.float64) for part in found[1:])
-    for step in range(config.iterations):
-        stretch = np.exp(motion[6:])
-        local = (points - t) @ R
-        if step in config.matched_at:
-            planes = _planes(tree, local / stretch, config.plane_points)
-        A, b = _fit(local, planes, stretch, motion, config)
-        if up is not None:
-            tilt = _level(R[2], up, config)
-            A[:3, :3] += tilt[0]
-            b[:3] += tilt[1]
-        change = -np.linalg.solve(A, b)
-        motion += change
-        R = R @ _turn(change[:3]).T
-        t = t - R @ change[3:6]
-    stretch = np.exp(motion[6:])
-    level_rad = np.radians(config.level_deg)
-    askew = up is not None and float(np.linalg.norm(found.rotation[2] - up)) > level_rad
-    allowed = before * (config.level_may_cost if askew else 1.0)
-    if _off(tree, (points - t) @ R / stretch, config.kernel_m) > allowed:
-        return found
-    return Refined(found.shape * stretch, R, t)
+def _units(shapes: Float[Tensor, "B P 3"]) -> Float[Tensor, "B 1 1"]:
+    """`unit_of` each shape."""
+    extents = (shapes.amax(1) - shapes.amin(1)).double().norm(dim=-1)
+    units = [unit_of(extent) for extent in extents.tolist()]
+    return torch.tensor(units, dtype=torch.float64, device=shapes.device)[:, None, None]
 
 
-def _off(tree: "KDTree", points: Cloud, most_m: float) -> float:
-    """Mean distance of points to a shape, each at most so many metres."""
-    return float(np.minimum(tree.query(points)[0], most_m).mean())
+def is_mirrored(shapes: Float[Tensor, "B P 3"]) -> bool:
+    """Whether the second half of the points is the reflection of the first in y = 0."""
+    half = shapes.shape[1] // 2
+    return torch.equal(shapes[:, half:], _reflected(shapes[:, :half]))
 
 
-def _planes(tree: "KDTree", points: Cloud, count: int) -> _Planes:
-    """Planes through `count` of the shape's points around each point, unstretched frame."""
-    _, index = tree.query(points, k=count)
-    around = tree.data[index]
-    middle = around.mean(axis=1)
-    off = around - middle[:, None]
-    _, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", off, off))
-    return _Planes(middle, axes[:, :, 0])
+def mirrored(shapes: Float[Tensor, "B P 3"]) -> Float[Tensor, "B Q 3"]:
+    """The points, then their reflections in y = 0."""
+    return torch.cat((shapes, _reflected(shapes)), dim=1)
 
 
-def _fit(
-    local: Cloud,
-    planes: _Planes,
-    stretch: np.ndarray,
-    motion: np.ndarray,
-    config: RefineConfig,
-) -> tuple[np.ndarray, np.ndarray]:
-    """A and b of a Gauss-Newton step, A x = -b, of the nine numbers.
-
-    `motion` is how far they are from the prior.
-    """
-    at, normal = planes.at * stretch, planes.normal / stretch
-    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-    off = local - at
-    residual = (off * normal).sum(axis=1)
-    kernel = (1 + (off**2).sum(axis=1) / config.kernel_m**2) ** -2  # Geman-McClure
-    weight = kernel * config.effective_points / len(local) / config.error_m**2
-    rows = np.concatenate((np.cross(local, normal), normal, -normal * at), axis=1)
-    prior = (np.radians(config.prior_deg), config.prior_m, config.prior_stretch)
-    trust = np.repeat(prior, 3) ** -2
-    A = (rows * weight[:, None]).T @ rows + np.diag(trust)
-    b = rows.T @ (weight * residual) + trust * motion
-    return A, b
+def _reflected(points: Float[Tensor, "*batch 3"]) -> Float[Tensor, "*batch 3"]:
+    return points * points.new_tensor((1.0, -1.0, 1.0))
 
 
-def _level(now: np.ndarray, up: np.ndarray, config: RefineConfig) -> tuple[np.ndarray, np.ndarray]:
-    """What a level sensor adds for the rotation: `now` is its z axis, canonical frame."""
-    off = now - up
-    level, tilted = np.radians((config.level_deg, config.tilted_deg))
-    weight = level**-2 * (1 + off @ off / tilted**2) ** -2  # Geman-McClure
-    across = -_cross(now)  # of a turn by w, `now` becomes `now` + w x `now`
-    return weight * across.T @ across, weight * across.T @ off
+def _surface(
+    own: Float[Tensor, "B n 3"], whole: Float[Tensor, "B P 3"], config: RefineConfig
+) -> tuple[Surface, Int64[Tensor, "B P"]]:
+    """The planes of shapes, and each point's partner; `own` may be half of them (`mirrored`)."""
+    count = max(config.plane_points, config.partner + 1)
+    around = nearest_k(own.float(), whole.float(), count).index
+    middle, normal = planes(whole, around[..., : config.plane_points])
+    partner = around[..., config.partner]
+    if own is not whole:
+        middle, normal = mirrored(middle), mirrored(normal)
+        size = whole.shape[1]
+        partner = torch.cat((partner, (partner + size // 2) % size), dim=1)
+    return Surface(whole.float(), middle, normal), partner
 
 
-def _turn(w: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    """The rotation by |w| radians about w (Rodrigues)."""
-    angle = float(np.linalg.norm(w))
-    if angle < 1e-12:
-        return np.eye(3)
-    cross = _cross(w / angle)
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+def _some_of_each(scans: Sequence[Points], count: int, device: torch.device) -> Clouds:
+    """At most so many points of each scan, chosen by a fixed seed."""
+    rows = [np.random.default_rng(0).permutation(len(scan))[:count] for scan in scans]
+    return padded([torch.from_numpy(scan[row]) for scan, row in zip(scans, rows)], device)
 
 
-def _cross(w: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    """The matrix of w x."""
-    x, y, z = w
-    return np.array(((0, -z, y), (z, 0, -x), (-y, x, 0)))
+def padded(clouds: Sequence[Tensor], device: torch.device | str = "cpu") -> Clouds:
+    """Clouds of different sizes as one."""
+    points = torch.nn.utils.rnn.pad_sequence(list(clouds), batch_first=True)
+    return Clouds(points.to(device), torch.tensor([len(one) for one in clouds], device=device))
 
 
-def drawn_to_scan(
-    shape: Cloud, seen: Cloud, *, mirror: bool, config: RefineConfig = _DEFAULT
-) -> Cloud:
-    """The shape's points drawn to the mean of what was seen around them; the others stay.
+def _thinned(seen: Clouds, voxel_m: float, mirror: bool) -> Clouds:
+    """Scans of even density, with their reflections in y = 0 if the objects are symmetric."""
+    thin = []
+    for points, size in zip(seen.points.float().cpu(), seen.sizes.tolist()):
+        real = points[:size]
+        both = torch.cat((real, _reflected(real))) if mirror else real
+        thin.append(torch.from_numpy(voxel_thin(both.numpy(), voxel_m)))
+    return padded(thin, seen.points.device)
+
+
+def drawn_to(
+    shapes: Float[Tensor, "B P 3"], seen: Clouds, config: RefineConfig = _DEFAULT
+) -> Float[Tensor, "B P 3"]:
+    """The shapes' points drawn to the mean of what was seen around them; the others stay.
 
     Args:
-        shape: canonical frame.
-        seen: the scan, the same frame.
-        mirror: draw to its reflection in y = 0 too.
+        shapes: canonical frame.
+        seen: points of even density, the same frame.
         config: how far, and how stiffly.
     """
-    from scipy.spatial import KDTree
-
-    from wildshape.geometry.sampling import voxel_thin
-
-    both = np.concatenate((seen, seen * (1, -1, 1))) if mirror else seen
-    thin = voxel_thin(both.astype(np.float32), config.voxel_m).astype(np.float64)
-    most = min(config.drawn_by, len(thin))
-    apart, index = KDTree(thin).query(shape, k=most, distance_upper_bound=2.5 * config.reach_m)
-    apart, index = apart.reshape(-1, most), index.reshape(-1, most)
-    weight = np.exp(-((apart / config.reach_m) ** 2))  # beyond the bound: 0
-    near = thin[np.minimum(index, len(thin) - 1)]
-    total = weight.sum(axis=1, keepdims=True) + config.stiffness
-    return ((weight[..., None] * near).sum(axis=1) + config.stiffness * shape) / total
+    most = _FAR * config.reach_m
+    found = nearest_k(
+        shapes.float(), seen.points.float(), config.drawn_by, None, seen.sizes, most=most
+    )
+    weight = (-found.distance_squared.to(shapes.dtype) / config.reach_m**2).exp()  # of none: 0
+    near = gathered(seen.points.to(shapes.dtype), found.index)
+    total = weight.sum(-1, keepdim=True) + config.stiffness
+    return ((weight[..., None] * near).sum(2) + config.stiffness * shapes) / total
 
 
-def denser(points: Cloud, partner: int = _DEFAULT.partner) -> Cloud:
-    """The points, then as many more: the middle between each one and its `partner`th neighbour."""
-    from scipy.spatial import KDTree
-
-    near = KDTree(points).query(points, k=partner + 1)[1]
-    middles = (points + points[np.asarray(near)[:, -1]]) / 2
-    return np.concatenate((points, middles)).astype(points.dtype)
+def partners(points: Float[Tensor, "B P 3"], count: int = _DEFAULT.partner) -> Tensor:
+    """`(B, P)`: the place of each point's `count`th neighbour."""
+    return nearest_k(points.float(), points.float(), count + 1).index[..., count]
 
 
-def filled(points: Cloud, scan: Cloud, exact: bool, config: RefineConfig = _DEFAULT) -> Cloud:
-    """A refined shape's points and as many more (`denser`), sensor frame; the given ones first.
+def denser(points: Float[Tensor, "B P 3"], partner: Int64[Tensor, "B P"]) -> Tensor:
+    """`(B, 2 P, 3)`: the points, then the middles between each one and its partner."""
+    return torch.cat((points, (points + gathered(points, partner)) / 2), dim=1)
+
+
+def with_scan(whole: Points, own: int, scan: Points) -> Points:
+    """A shape of which the scan's own points take the place of some: for scans without noise.
+
+    Where the scan, dense and exact as a depth camera's, saw something, its points, as far apart as
+    the shape's, stand in for those that were added (`denser`).
 
     Args:
-        points: of the shape.
-        scan: it was refined against, the same frame.
-        exact: the scan is dense and has hardly any noise, as a depth camera's: where it saw
-            something, its own points, as far apart as the shape's, stand in for those added.
-        config: `partner`.
+        whole: sensor frame; the shape's own points, then those added.
+        own: how many are the shape's own.
+        scan: the same frame.
     """
-    from scipy.spatial import KDTree
-
-    from wildshape.geometry.sampling import voxel_thin
-
-    more = denser(points, config.partner)
-    if not exact:
-        return more
-    gap = max(float(np.median(np.asarray(KDTree(more).query(more, k=2)[0])[:, 1])), _SMALLEST_M)
-    added = more[len(points) :]
-    unseen = added[KDTree(scan).query(added)[0] > gap]
-    return np.concatenate((points, unseen, voxel_thin(scan, gap))).astype(points.dtype)
+    points = torch.from_numpy(whole)[None]
+    apart = nearest_k(points, points, 2).distance_squared[0, :, 1].sqrt()
+    gap = max(float(apart.median()), _SMALLEST_M)
+    to_scan = nearest(points[:, own:], torch.from_numpy(scan)[None]).distance_squared[0].sqrt()
+    unseen = whole[own:][(to_scan > gap).numpy()]
+    return np.concatenate((whole[:own], unseen, voxel_thin(scan, gap))).astype(whole.dtype)

@@ -10,15 +10,19 @@ import torch
 
 from wildshape.errors import BadInputError, lacks_memory
 
-_ABI = 2
+_ABI = 3
 _PATH = Path(__file__).parent / "native" / "libwildshape_ops.so"
 
-_P, _I64, _INT = ctypes.c_void_p, ctypes.c_int64, ctypes.c_int
+_P, _I64, _INT, _F32 = ctypes.c_void_p, ctypes.c_int64, ctypes.c_int, ctypes.c_float
 _SIGNATURES = {
     "wildshape_abi": ([], _INT),
     "wildshape_level": ([], _INT),
     "wildshape_nearest": (
         [_P, _I64, _P, _P, _I64, _P, _I64, _I64, _I64, _P, _P, _P, _P, _INT, _INT],
+        _INT,
+    ),
+    "wildshape_nearest_k": (
+        [_P, _P, _P, _P, _P, _P, _I64, _I64, _I64, _I64, _F32, _P, _P, _INT, _INT],
         _INT,
     ),
     "wildshape_nearest_gradient": (

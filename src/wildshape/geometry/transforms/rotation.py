@@ -34,6 +34,22 @@ def rotation_z(angle: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch 3 3"]:
     return torch.stack(rows, dim=-1).reshape(*angle.shape, 3, 3)
 
 
+def cross_matrix(vector: Float[Tensor, "*batch 3"]) -> Float[Tensor, "*batch 3 3"]:
+    """The matrix that takes the cross product with a vector: `cross_matrix(w) @ x = w x x`."""
+    x, y, z = vector.unbind(-1)
+    zero = torch.zeros_like(x)
+    return torch.stack((zero, -z, y, z, zero, -x, -y, x, zero), dim=-1).unflatten(-1, (3, 3))
+
+
+def rotation_from_vector(vector: Float[Tensor, "*batch 3"]) -> Float[Tensor, "*batch 3 3"]:
+    """The turn about a vector by its length in radians (Rodrigues)."""
+    angle = vector.norm(dim=-1)[..., None, None]
+    cross = cross_matrix(vector)
+    eye = torch.eye(3, dtype=vector.dtype, device=vector.device)
+    half = torch.sinc(angle / (2 * torch.pi))  # of it: (1 - cos a) / a^2 without cancellation
+    return eye + torch.sinc(angle / torch.pi) * cross + half.square() / 2 * cross @ cross
+
+
 def rotation_from_quaternion(wxyz: Float[Tensor, "*batch 4"]) -> Float[Tensor, "*batch 3 3"]:
     """Rotation matrix of a quaternion in w, x, y, z order; it is normalised first."""
     w, x, y, z = torch.nn.functional.normalize(wxyz, dim=-1, eps=_EPS).unbind(-1)

@@ -21,7 +21,7 @@ from wildshape.inference.boxes import carried, fit_to_scans
 from wildshape.inference.choose_hypothesis import network_input
 from wildshape.inference.confidence import judged_again
 from wildshape.inference.config import BoxConfig, InferenceConfig, TrackConfig
-from wildshape.inference.refine import denser
+from wildshape.inference.refine import denser, partners
 from wildshape.inference.tracks.heading_vote import (
     half_turn,
     likeness_of_next,
@@ -82,9 +82,7 @@ def complete_together(
     fit = fit._replace(T_sensor_object=_scaled(fit.T_sensor_object, unit))
     body = settings.sensor == "lidar"
     fitted = _box(shape, scans, fit.T_sensor_object, config.box, mirror=mirror, body=body)
-    whole = (
-        torch.from_numpy(denser(shape.numpy(), config.refine.partner)) if settings.facing else shape
-    )
+    whole = _denser(shape, config) if settings.facing else shape
     cost = track_cost(shape, fit.T_sensor_object, scans, settings)
     mean = float(np.mean([item.confidence for item in done]))
     trust = [0.0 if item.warning else mean for item in done]
@@ -101,6 +99,10 @@ def complete_together(
         )
         for i, item in enumerate(done)
     ]
+
+
+def _denser(shape: Float[Tensor, "P 3"], config: InferenceConfig) -> Float[Tensor, "Q 3"]:
+    return denser(shape[None], partners(shape[None], config.refine.partner))[0]
 
 
 def _in_units(scans: list[Points], T_sensor_object: SE3, unit: float) -> tuple[list[Points], SE3]:

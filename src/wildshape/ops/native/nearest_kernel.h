@@ -14,64 +14,7 @@
  * another block attained it too, all that are in reach are.
  */
 
-#define ROWS (BLOCK / LANES)
-#define LENGTH(dx, dy, dz) FMA(dz, dz, FMA(dy, dy, MUL(dx, dx)))
-#define GAP(low, high, from, to) MAX(MAX(SUB(low, to), SUB(from, high)), SET1(0.0f))
-
-typedef struct {
-    VECTOR x[ROWS], y[ROWS], z[ROWS], best[ROWS], block[ROWS], tied[ROWS];
-} NAME(tile);
-
-/* Squared distance of a tile's box to each block's box. */
-TARGET static inline void NAME(bounds)(const cloud *queries, int64_t tile, const cloud *targets,
-                                       float *bound)
-{
-    VECTOR low[3], high[3];
-    for (int c = 0; c < 3; c++) {
-        low[c] = SET1(queries->low[c][tile]);
-        high[c] = SET1(queries->high[c][tile]);
-    }
-    for (int64_t k = 0; k < targets->blocks; k += LANES) {
-        VECTOR gap[3];
-        for (int c = 0; c < 3; c++)
-            gap[c] = GAP(LOAD(targets->low[c] + k), LOAD(targets->high[c] + k), low[c], high[c]);
-        STORE(bound + k, LENGTH(gap[0], gap[1], gap[2]));
-    }
-}
-
-/* The block of the smallest bound. */
-TARGET static inline int64_t NAME(nearest_block)(const float *bound, int64_t blocks)
-{
-    float starts[LANES] ALIGNED;
-    VECTOR least = SET1(INFINITY), start = SET1(0.0f);
-    for (int64_t k = 0; k < blocks; k += LANES) {
-        VECTOR here = LOAD(bound + k);
-        start = PICK(LESS(here, least), SET1((float)k), start);
-        least = MIN(here, least);
-    }
-    float lowest = -HIGHEST(SUB(SET1(0.0f), least));
-    int lane = __builtin_ctz(BITS(SAME(least, SET1(lowest))));
-    STORE(starts, start);
-    return (int64_t)starts[lane] + lane;
-}
-
-/* Whether a block's box is in reach of any query. */
-TARGET static inline int NAME(in_reach)(const NAME(tile) *q, const cloud *targets, int64_t b)
-{
-    VECTOR low[3], high[3];
-    unsigned any = 0;
-    for (int c = 0; c < 3; c++) {
-        low[c] = SET1(targets->low[c][b]);
-        high[c] = SET1(targets->high[c][b]);
-    }
-    for (int r = 0; r < ROWS; r++) {
-        VECTOR gx = GAP(low[0], high[0], q->x[r], q->x[r]);
-        VECTOR gy = GAP(low[1], high[1], q->y[r], q->y[r]);
-        VECTOR gz = GAP(low[2], high[2], q->z[r], q->z[r]);
-        any |= BITS(AT_MOST(LENGTH(gx, gy, gz), q->best[r]));
-    }
-    return any != 0;
-}
+#include "tile.h"
 
 /* Search one block. */
 TARGET static inline void NAME(visit)(NAME(tile) *q, const cloud *targets, int64_t b)
@@ -101,17 +44,13 @@ TARGET static inline void NAME(visit)(NAME(tile) *q, const cloud *targets, int64
 TARGET static inline void NAME(visit_near)(NAME(tile) *q, const cloud *targets, int64_t start,
                                            const float *bound, int64_t seed)
 {
-    VECTOR most = q->best[0];
-    for (int r = 1; r < ROWS; r++)
-        most = MAX(q->best[r], most);
-    const float limit = HIGHEST(most);
-    unsigned near = BITS(AT_MOST(LOAD(bound + start), SET1(limit < FLT_MAX ? limit : FLT_MAX)));
+    unsigned near = BITS(AT_MOST(LOAD(bound + start), SET1(NAME(farthest)(q))));
     unsigned left = 0;
     if (seed >= start && seed < start + LANES)
         near &= ~(1u << (seed - start));
     for (; near; near &= near - 1) {
         const int bit = __builtin_ctz(near);
-        left |= (unsigned)NAME(in_reach)(q, targets, start + bit) << bit;
+        left |= (unsigned)(NAME(in_reach)(q, targets, start + bit) != 0) << bit;
     }
     for (; left; left &= left - 1)
         NAME(visit)(q, targets, start + __builtin_ctz(left));
@@ -145,14 +84,7 @@ TARGET static void NAME(search)(const cloud *queries, int64_t tile, const cloud 
     const float *qx = queries->axes[0] + tile * BLOCK, *qy = queries->axes[1] + tile * BLOCK;
     const float *qz = queries->axes[2] + tile * BLOCK;
     const int64_t blocks = targets->blocks;
-    NAME(tile) q;
-    for (int r = 0; r < ROWS; r++) {
-        q.x[r] = LOAD(qx + r * LANES);
-        q.y[r] = LOAD(qy + r * LANES);
-        q.z[r] = LOAD(qz + r * LANES);
-        q.best[r] = SET1(INFINITY);
-        q.block[r] = q.tied[r] = SET1(0.0f);
-    }
+    NAME(tile) q = NAME(tile_of)(queries, tile);
     NAME(bounds)(queries, tile, targets, bound);
     const int64_t seed = NAME(nearest_block)(bound, blocks);
     NAME(visit)(&q, targets, seed);
@@ -175,26 +107,3 @@ TARGET static void NAME(search)(const cloud *queries, int64_t tile, const cloud 
         index[to] = best[k] < INFINITY ? first : 0;
     }
 }
-
-#undef LENGTH
-#undef GAP
-#undef NAME
-#undef TARGET
-#undef VECTOR
-#undef MASK
-#undef LANES
-#undef ROWS
-#undef LOAD
-#undef STORE
-#undef SET1
-#undef SUB
-#undef MUL
-#undef FMA
-#undef MIN
-#undef MAX
-#undef HIGHEST
-#undef LESS
-#undef AT_MOST
-#undef SAME
-#undef PICK
-#undef BITS

@@ -6,6 +6,7 @@
 `reference` for types other than float32. `WILDSHAPE_NEAREST=torch|native` forces one on the CPU.
 """
 
+import math
 import os
 from importlib.util import find_spec
 from typing import Literal, get_args
@@ -16,11 +17,26 @@ from torch import Tensor
 
 from wildshape.errors import BadInputError
 from wildshape.ops.library import library
+from wildshape.ops.nearest.nearest_k import check_k, nearest_k_native, nearest_k_torch
 from wildshape.ops.nearest.nearest_native import NativeDistance, nearest_both_native, nearest_native
 from wildshape.ops.nearest.nearest_torch import nearest_blocked, nearest_reference
-from wildshape.ops.nearest.neighbours import Neighbours, check_clouds, check_neighbours
+from wildshape.ops.nearest.neighbours import (
+    Neighbourhoods,
+    Neighbours,
+    check_clouds,
+    check_neighbours,
+)
 
-__all__ = ["Backend", "Neighbours", "backend", "nearest", "nearest_both", "nearest_distance"]
+__all__ = [
+    "Backend",
+    "Neighbourhoods",
+    "Neighbours",
+    "backend",
+    "nearest",
+    "nearest_both",
+    "nearest_distance",
+    "nearest_k",
+]
 
 Backend = Literal["native", "triton", "torch", "reference"]
 _VARIABLE = "WILDSHAPE_NEAREST"
@@ -74,6 +90,37 @@ def nearest_both(
     if _backend_for(a, b) == "native":
         return nearest_both_native(a, b, a_sizes, b_sizes)
     return nearest(a, b, a_sizes, b_sizes), nearest(b, a, b_sizes, a_sizes)
+
+
+def nearest_k(
+    query: Float[Tensor, "B N 3"],
+    target: Float[Tensor, "B M 3"],
+    k: int,
+    query_sizes: Int64[Tensor, "B"] | None = None,
+    target_sizes: Int64[Tensor, "B"] | None = None,
+    *,
+    groups: tuple[Int64[Tensor, "B N"], Int64[Tensor, "B M"]] | None = None,
+    most: float = math.inf,
+) -> Neighbourhoods:
+    """The k nearest targets of each query, no gradient; of equal ones the smaller index first.
+
+    Args:
+        query: `(B, N, 3)` points.
+        target: `(B, M, 3)` points in the same frame, unit, type and device.
+        k: how many; on the CPU best below 32.
+        query_sizes: `(B,)` points in use a row, the rest is padding; all if None.
+        target_sizes: the same for the targets.
+        groups: of queries and targets: those of a query's own group are left out.
+        most: targets farther away are not found.
+
+    Raises:
+        BadInputError: shapes that do not fit.
+    """
+    query, target = _at_least_float32(query.detach()), _at_least_float32(target.detach())
+    check_k(query, target, k, groups)
+    native = _backend_for(query, target) == "native"
+    search = nearest_k_native if native else nearest_k_torch
+    return search(query, target, k, query_sizes, target_sizes, groups, most)
 
 
 def nearest_distance(

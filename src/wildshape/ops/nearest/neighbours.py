@@ -26,6 +26,20 @@ class Neighbours:
     index: Int64[Tensor, "B N"]
 
 
+@dataclass(frozen=True)
+class Neighbourhoods:
+    """The k nearest targets of each query, the nearest first.
+
+    Attributes:
+        distance_squared: `(B, N, k)`, the square of the query's unit; `inf` where there are no more
+            targets, 0 for padding queries.
+        index: `(B, N, k)` into the row's targets; 0 where there is none.
+    """
+
+    distance_squared: Float[Tensor, "B N k"]
+    index: Int64[Tensor, "B N k"]
+
+
 def check_clouds(
     query: Tensor, target: Tensor, query_sizes: Tensor | None, target_sizes: Tensor | None
 ) -> None:

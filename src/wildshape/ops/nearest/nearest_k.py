@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The k nearest neighbours: compiled C on the CPU where there is any, else plain torch."""
+
+import math
+
+import torch
+from jaxtyping import Float, Int64
+from torch import Tensor
+
+from wildshape.errors import BadInputError
+from wildshape.ops.library import check_memory, library
+from wildshape.ops.nearest.neighbours import Neighbourhoods, check_clouds
+
+_CHUNK_ELEMENTS = 1 << 22
+_WIDEST = -1
+
+
+def nearest_k_native(
+    query: Float[Tensor, "B N 3"],
+    target: Float[Tensor, "B M 3"],
+    k: int,
+    query_sizes: Int64[Tensor, "B"] | None = None,
+    target_sizes: Int64[Tensor, "B"] | None = None,
+    groups: tuple[Int64[Tensor, "B N"], Int64[Tensor, "B M"]] | None = None,
+    most: float = math.inf,
+    level: int = _WIDEST,
+) -> Neighbourhoods:
+    """Blocks of targets out of reach are left out; `level` as in `nearest_native`.
+
+    Raises:
+        MemoryError: no room for one cloud's points a thread.
+    """
+    check_clouds(query, target, query_sizes, target_sizes)
+    check_memory("nearest_k", query, torch.float32)
+    check_memory("nearest_k", target, torch.float32)
+    loaded = library()
+    if loaded is None:
+        raise RuntimeError("the native library is not built; use the torch backend.")
+    shape = (*query.shape[:2], k)
+    found = Neighbourhoods(torch.empty(shape), torch.empty(shape, dtype=torch.int64))
+    by_query, by_target = (None, None) if groups is None else groups
+    given = (query, query_sizes, by_query, target, target_sizes, by_target)
+    held = [None if part is None else part.contiguous() for part in given]
+    failed = loaded.wildshape_nearest_k(
+        *(None if part is None else part.data_ptr() for part in held),
+        len(query),
+        query.shape[1],
+        target.shape[1],
+        k,
+        most * most,
+        found.distance_squared.data_ptr(),
+        found.index.data_ptr(),
+        torch.get_num_threads(),
+        level,
+    )
+    if failed:
+        raise MemoryError(f"no room to search {query.shape[1]} and {target.shape[1]} points.")
+    return found
+
+
+def nearest_k_torch(
+    query: Float[Tensor, "B N 3"],
+    target: Float[Tensor, "B M 3"],
+    k: int,
+    query_sizes: Int64[Tensor, "B"] | None = None,
+    target_sizes: Int64[Tensor, "B"] | None = None,
+    groups: tuple[Int64[Tensor, "B N"], Int64[Tensor, "B M"]] | None = None,
+    most: float = math.inf,
+) -> Neighbourhoods:
+    """All pairs, some queries at a time, in any floating type and on any device."""
+    check_clouds(query, target, query_sizes, target_sizes)
+    (B, N), M = query.shape[:2], target.shape[1]
+    squared = query.new_full((B, N, k), math.inf)
+    index = torch.zeros(B, N, k, dtype=torch.int64, device=query.device)
+    gone = ~target.isfinite().all(-1)
+    if target_sizes is not None:
+        gone = gone | _beyond(target, target_sizes)
+    step = max(1, _CHUNK_ELEMENTS // max(B * M, 1))
+    for start in range(0, N if M else 0, step):
+        part = slice(start, start + step)
+        d2 = (query[:, part, None] - target[:, None]).square().sum(-1)
+        left_out = gone[:, None] | ~(d2 <= most * most)
+        if groups is not None:
+            left_out = left_out | (groups[0][:, part, None] == groups[1][:, None])
+        least = d2.masked_fill(left_out, math.inf).topk(min(k, M), largest=False)
+        squared[:, part, : least.values.shape[-1]] = least.values
+        index[:, part, : least.values.shape[-1]] = least.indices
+    index = index.masked_fill(squared.isinf(), 0)
+    if query_sizes is None:
+        return Neighbourhoods(squared, index)
+    beyond = _beyond(query, query_sizes)[..., None]
+    return Neighbourhoods(squared.masked_fill(beyond, 0.0), index.masked_fill(beyond, 0))
+
+
+def _beyond(points: Tensor, sizes: Int64[Tensor, "B"]) -> Tensor:
+    """`(B, n)`: which places lie past each row's size."""
+    return torch.arange(points.shape[1], device=points.device) >= sizes.to(points.device)[:, None]
+
+
+def check_k(
+    query: Tensor,
+    target: Tensor,
+    k: int,
+    groups: tuple[Tensor, Tensor] | None,
+) -> None:
+    """Refuse what would be read past its end.
+
+    Raises:
+        BadInputError: k below 1, or groups that are not one whole number a point.
+    """
+    if k < 1:
+        raise BadInputError(f"nearest_k: expected at least 1 neighbour, found {k}.")
+    if groups is None:
+        return
+    for group, points in zip(groups, (query, target)):
+        if group.shape != points.shape[:2] or group.dtype != torch.int64:
+            raise BadInputError(
+                f"nearest_k: expected {tuple(points.shape[:2])} int64 groups, found"
+                f" {tuple(group.shape)} of {group.dtype}."
+            )
