@@ -3,15 +3,26 @@
 """Refinement against the scan: nearer in pose and size, never further, the same at every size."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
+import torch
 from scipy.spatial import KDTree
 from tests.cars import car_surface, drive_by, poses_of
 
+from wildshape.geometry.sampling import voxel_thin
+from wildshape.geometry.surface import mirrored
 from wildshape.inference.config import InferenceConfig, RefineConfig
 from wildshape.inference.predictor import load
-from wildshape.inference.refine import denser, drawn_to_scan, filled, refine
+from wildshape.inference.refine import (
+    denser,
+    drawn_to,
+    padded,
+    partners,
+    refine,
+    with_scan,
+)
 
 SHAPE = car_surface(4000, seed=5)[0].astype(np.float32)
 STRETCH = np.array((1.07, 0.96, 1.05), np.float32)
@@ -25,6 +36,22 @@ def turn(axis, degrees):
     x, y, z = axis
     cross = np.array(((0, -z, y), (z, 0, -x), (-y, x, 0)))
     return np.eye(3) + np.sin(a) * cross + (1 - np.cos(a)) * cross @ cross
+
+
+class One(NamedTuple):
+    """A refined shape and its pose."""
+
+    shape: np.ndarray
+    rotation: np.ndarray
+    translation: np.ndarray
+
+
+def refined(scan, shape, R, t, *, up=None, **options) -> One:
+    """`refine` of a single scan."""
+    level = None if up is None else torch.from_numpy(up)
+    given = (torch.from_numpy(np.ascontiguousarray(part))[None] for part in (shape, R, t))
+    done = refine([scan], *given, up=level, **options)
+    return One(*(part[0].numpy() for part in done[:3]))
 
 
 def spoilt(i, degrees=3.0, metres=0.08):
@@ -47,7 +74,7 @@ def test_pose_and_size_come_nearer():
     before, after = [], []
     for i, scan in enumerate(TRACK.scans):
         R, t = spoilt(i)
-        found = refine(scan, SHAPE / STRETCH, R, t, mirror=True)
+        found = refined(scan, SHAPE / STRETCH, R, t, mirror=True)
         size = np.ptp(found.shape, axis=0) / np.ptp(SHAPE, axis=0)
         before.append((*pose_errors(i, R, t), np.abs(np.log(STRETCH)).mean()))
         after.append(
@@ -62,7 +89,7 @@ def test_pose_and_size_come_nearer():
 
 def test_a_perfect_answer_stays():
     T = poses_of(TRACK)[4]
-    found = refine(TRACK.scans[4], SHAPE, T.rotation.numpy(), T.translation.numpy(), mirror=True)
+    found = refined(TRACK.scans[4], SHAPE, T.rotation.numpy(), T.translation.numpy(), mirror=True)
     rotation, translation = pose_errors(4, found.rotation, found.translation)
     assert rotation < 0.3
     assert translation < 0.03
@@ -73,7 +100,7 @@ def test_a_perfect_answer_stays():
 
 def test_nothing_moves_where_the_scan_is_elsewhere():
     R, t = spoilt(0)
-    found = refine(TRACK.scans[0] + np.float32(40.0), SHAPE, R, t, mirror=True)
+    found = refined(TRACK.scans[0] + np.float32(40.0), SHAPE, R, t, mirror=True)
     np.testing.assert_allclose(found.rotation, R, atol=1e-3)
     np.testing.assert_allclose(found.translation, t, atol=1e-3)
     np.testing.assert_allclose(found.shape, SHAPE, atol=1e-2)
@@ -86,7 +113,7 @@ def test_a_level_sensor_tells_pitch_and_roll():
     def tilts(**level):
         few = (scan[:: len(scan) // 20] for scan in SCANS)
         given = ((scan, SHAPE / STRETCH, *spoilt(i)) for i, scan in enumerate(few))
-        found = [refine(*one, mirror=True, **level) for one in given]
+        found = [refined(*one, mirror=True, **level) for one in given]
         return np.degrees([np.arccos(np.clip(one.rotation[2, 2], -1, 1)) for one in found])
 
     assert tilts(up=up).mean() < 0.85 * tilts().mean()
@@ -98,7 +125,7 @@ def test_up_is_said_of_the_canonical_frame():
     lean = turn((0, 1, 0), 2.0)
     T = poses_of(TRACK)[4]
     R, t = T.rotation.numpy() @ lean, T.translation.numpy()
-    found = refine(SCANS[4], SHAPE @ lean, R, t, mirror=True, up=lean[2])
+    found = refined(SCANS[4], SHAPE @ lean, R, t, mirror=True, up=lean[2])
     assert np.degrees(np.arccos(found.rotation[2] @ lean[2])) < 0.2
 
 
@@ -107,7 +134,7 @@ def test_a_sensor_held_askew_is_left_as_it_is():
     up, R, t = np.array((0.0, 0.0, 1.0)), *spoilt(3)
     askew = turn((1, 2, 0), 30.0)
     turned = (SCANS[3] @ askew.T.astype(np.float32), SHAPE, askew @ R, askew @ t)
-    free, held = refine(*turned, mirror=True), refine(*turned, mirror=True, up=up)
+    free, held = refined(*turned, mirror=True), refined(*turned, mirror=True, up=up)
     cosine = (np.trace(free.rotation.T @ held.rotation) - 1) / 2
     assert np.degrees(np.arccos(np.clip(cosine, -1, 1))) < 0.1
 
@@ -119,17 +146,44 @@ def test_small_objects_are_refined_as_large_ones(scale):
     R, t = spoilt(3)
     base = 4.0 / diagonal  # below the five metres from which lengths are fixed
     large, small = (
-        refine(TRACK.scans[3] * s, SHAPE * s, R, t * s, mirror=True) for s in (base, base * scale)
+        refined(TRACK.scans[3] * s, SHAPE * s, R, t * s, mirror=True) for s in (base, base * scale)
     )
     np.testing.assert_allclose(small.rotation, large.rotation, atol=1e-4)
     np.testing.assert_allclose(small.translation, large.translation * scale, atol=1e-4 * scale)
     np.testing.assert_allclose(small.shape, large.shape * scale, atol=1e-3 * scale)
 
 
+def test_a_batch_gives_what_each_scan_gives_alone():
+    """Scans of many and of few points, beside each other or not."""
+    starts = [spoilt(i) for i in range(4)]
+    scans = [SCANS[0], SCANS[1][::9], SCANS[2], SCANS[3][::30]]
+    shapes = torch.from_numpy(np.stack([SHAPE / STRETCH] * 4))
+    R, t = (torch.from_numpy(np.stack(part)) for part in zip(*starts))
+    together = refine(scans, shapes, R, t, mirror=True)
+    for i, scan in enumerate(scans):
+        alone = refined(scan, SHAPE / STRETCH, *starts[i], mirror=True)
+        np.testing.assert_allclose(together.shapes[i], alone.shape, atol=1e-5)
+        np.testing.assert_allclose(together.rotation[i], alone.rotation, atol=1e-6)
+
+
+def test_half_of_a_mirrored_shape_tells_the_whole():
+    """Points that are each other's reflections are worked on once; shuffled, they are not."""
+    half = torch.from_numpy(SHAPE[SHAPE[:, 1] > 0] / STRETCH)[None]
+    whole, order = mirrored(half)[0].numpy(), np.random.default_rng(0).permutation(2 * len(half[0]))
+    start = spoilt(2)
+    by_half = refined(SCANS[2], whole, *start, mirror=True)
+    by_whole = refined(SCANS[2], whole[order], *start, mirror=True)
+    np.testing.assert_allclose(by_half.rotation, by_whole.rotation, atol=1e-4)
+    off = np.linalg.norm(by_half.shape[order] - by_whole.shape, axis=1)
+    assert np.quantile(off, 0.99) < 2e-3  # voxels on the mirror plane belong to one side
+
+
 @pytest.mark.parametrize("mirror", [False, True])
 def test_only_what_was_seen_is_drawn(mirror):
     seen = SHAPE[SHAPE[:, 1] > 0.84] + np.array((0.0, 0.06, 0.0), np.float32)
-    drawn = drawn_to_scan(SHAPE.astype(float), seen.astype(float), mirror=mirror)
+    both = np.concatenate((seen, seen * np.array((1, -1, 1), np.float32))) if mirror else seen
+    thin = padded([torch.from_numpy(voxel_thin(both, RefineConfig().voxel_m))])
+    drawn = drawn_to(torch.from_numpy(SHAPE.astype(float))[None], thin)[0].numpy()
     moved = np.linalg.norm(drawn - SHAPE, axis=1)
     left, right = SHAPE[:, 1] > 0.84, SHAPE[:, 1] < -0.84
     middle = np.abs(SHAPE[:, 1]) < 0.3
@@ -141,8 +195,13 @@ def test_only_what_was_seen_is_drawn(mirror):
         assert moved[right].max() < 1e-9
 
 
+def twice_as_many(points):
+    given = torch.from_numpy(points)[None]
+    return denser(given, partners(given))[0].numpy()
+
+
 def test_denser_fills_gaps_and_keeps_the_points():
-    dense = denser(SHAPE)
+    dense = twice_as_many(SHAPE)
     assert dense.shape == (2 * len(SHAPE), 3)
     assert dense.dtype == SHAPE.dtype
     np.testing.assert_array_equal(dense[: len(SHAPE)], SHAPE)
@@ -158,9 +217,9 @@ def test_an_exact_scan_takes_the_place_of_points_put_between():
     """The network's own points stay first; what the scan saw is nearer, the rest is as it was."""
     shape = SHAPE[::4] + np.array((0.0, 0.0, 0.04), dtype=np.float32)
     seen = SHAPE[SHAPE[:, 0] > 0]
-    whole, plain = filled(shape, seen, True), filled(shape, seen, False)
+    plain = twice_as_many(shape)
+    whole = with_scan(plain, len(shape), seen)
     np.testing.assert_array_equal(whole[: len(shape)], shape)
-    np.testing.assert_array_equal(plain, denser(shape))
     truth = KDTree(whole)
     assert truth.query(seen)[0].mean() < 0.7 * KDTree(plain).query(seen)[0].mean()
     behind = plain[plain[:, 0] < -0.5]

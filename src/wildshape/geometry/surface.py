@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Planes through neighbourhoods of points, many at once, on any device."""
+"""Clouds as surfaces: their reflections, and the planes of neighbourhoods, many at once."""
 
 import math
 
@@ -17,6 +17,22 @@ def gathered(points: Float[Tensor, "B P 3"], index: Int64[Tensor, "B *n"]) -> Te
     return points.gather(1, flat).view(*index.shape, 3)
 
 
+def is_mirrored(shapes: Float[Tensor, "B P 3"]) -> bool:
+    """Whether the second half of the points is the reflection of the first in y = 0."""
+    half = shapes.shape[1] // 2
+    return torch.equal(shapes[:, half:], reflected(shapes[:, :half]))
+
+
+def mirrored(shapes: Float[Tensor, "B P 3"]) -> Float[Tensor, "B Q 3"]:
+    """The points, then their reflections in y = 0."""
+    return torch.cat((shapes, reflected(shapes)), dim=1)
+
+
+def reflected(points: Float[Tensor, "*batch 3"]) -> Float[Tensor, "*batch 3"]:
+    """Points or directions, reflected in y = 0."""
+    return points * points.new_tensor((1.0, -1.0, 1.0))
+
+
 def planes(
     points: Float[Tensor, "B P 3"], around: Int64[Tensor, "B n k"]
 ) -> tuple[Float[Tensor, "B n 3"], Float[Tensor, "B n 3"]]:
@@ -31,7 +47,8 @@ def planes(
     off = [axis - mean[..., None] for axis, mean in zip(axes, middle)]
     pairs = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
     moments = torch.stack([(off[i] * off[j]).sum(-1) for i, j in pairs])
-    return torch.stack(middle, dim=-1), thinnest_axis(moments)
+    normal = thinnest_axis(moments.double()).to(points.dtype)
+    return torch.stack(middle, dim=-1), normal
 
 
 def gathered_axis(values: Float[Tensor, "B P"], around: Int64[Tensor, "B n k"]) -> Tensor:
@@ -46,7 +63,7 @@ def thinnest_axis(moments: Float[Tensor, "6 *batch"]) -> Float[Tensor, "*batch 3
     of their three cross products. Where two eigenvalues are equal any such vector is given.
 
     Args:
-        moments: xx, xy, xz, yy, yz, zz of each matrix; best in float64.
+        moments: xx, xy, xz, yy, yz, zz of each matrix; in float64, for products are subtracted.
     """
     middle = (moments[0] + moments[3] + moments[5]) / 3
     a, d, f = (moments[i] - middle for i in (0, 3, 5))

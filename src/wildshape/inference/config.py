@@ -81,7 +81,8 @@ class JointIcpConfig:
         widest_m: width of the robust kernel at first.
         narrower: it narrows by this factor a round.
         narrowest_m: at last.
-        normal_m: radius of the neighbourhood that a normal is taken from.
+        normal_of: points of all scans together that normals are taken from.
+        normal_points: of them, around each point.
         holding: how much a point is held in every direction, against sliding; of its normal's 1.
         step: share of a Gauss-Newton step that is taken.
         ridge: damping of a step, a share of the points' weight; a scan of few sides is not moved
@@ -94,13 +95,14 @@ class JointIcpConfig:
     widest_m: float = 0.5
     narrower: float = 0.75
     narrowest_m: float = 0.06
-    normal_m: float = 0.35
+    normal_of: int = 1024
+    normal_points: int = 32
     holding: float = 0.1
     step: float = 0.8
     ridge: float = 1e-3
 
 
-_FINE = JointIcpConfig(rounds=15, points=512, most=4096, normal_m=0.3, holding=0.02)
+_FINE = JointIcpConfig(rounds=15, points=512, most=4096, holding=0.02)
 
 
 @dataclass(frozen=True)
@@ -159,6 +161,7 @@ class TrackConfig:
         voxel_m: the fused scans are thinned to this.
         reach_m: how far around a point of the shape the fused scans are looked for.
         stiffness: weight of the point itself against what was seen around it.
+        drawn_by: most of the fused points that draw one of the shape.
     """
 
     vote: HeadingVoteConfig = field(default_factory=HeadingVoteConfig)
@@ -172,6 +175,7 @@ class TrackConfig:
     voxel_m: float = 0.08
     reach_m: float = 0.12
     stiffness: float = 0.2
+    drawn_by: int = 8
 
 
 @dataclass(frozen=True)

@@ -226,7 +226,11 @@ class Predictor:
             again = self._found([seen[int(row)] for row in rows])
             found = found.replaced(rows, again)
             seen = self._off_their_ground(scans, found)
-        posed = self._refined([sorted_points(one) for one in seen], found) if self.refines else _Posed.of(found)
+        posed = (
+            self._refined([sorted_points(one) for one in seen], found)
+            if self.refines
+            else _Posed.of(found)
+        )
         clouds = zip(scans, seen)
         return [self._completion(*both, i, found, posed, sensor) for i, both in enumerate(clouds)]
 
@@ -249,10 +253,11 @@ class Predictor:
 
     def _refined(self, seen: list[Points], found: Found) -> "_Posed":
         """Shapes and poses fitted to the scans (`refine.py`), and twice as many points of each."""
-        host = (part.to(self.device) for part in found[:3])
+        on_device = (part.to(self.device) for part in found[:3])
         up = None if self.up is None else torch.tensor(self.up, dtype=torch.float64).to(self.device)
         mirror, config = self.settings.network.mirror, self.config.refine
-        done = refine(seen, *host, mirror=mirror, up=up, config=config)
+        ordered = [sorted_points(one) for one in seen]
+        done = refine(ordered, *on_device, mirror=mirror, up=up, config=config)
         done = Refined(*(part.cpu() for part in done))
         T_sensor_canonical = SE3(done.rotation, done.translation)
         posed = T_sensor_canonical.to(torch.float32).apply(done.shapes)

@@ -18,8 +18,8 @@ from torch import Tensor
 
 from wildshape.geometry.box import unit_of
 from wildshape.geometry.sampling import voxel_thin
-from wildshape.geometry.surface import gathered, planes
-from wildshape.inference.config import RefineConfig
+from wildshape.geometry.surface import gathered, is_mirrored, mirrored, planes, reflected
+from wildshape.inference.config import RefineConfig, TrackConfig
 from wildshape.inference.gauss_newton import Clouds, Surface, fit_to_scans
 from wildshape.ops.nearest import nearest, nearest_k
 from wildshape.records import Points
@@ -88,21 +88,6 @@ def _units(shapes: Float[Tensor, "B P 3"]) -> Float[Tensor, "B 1 1"]:
     return torch.tensor(units, dtype=torch.float64, device=shapes.device)[:, None, None]
 
 
-def is_mirrored(shapes: Float[Tensor, "B P 3"]) -> bool:
-    """Whether the second half of the points is the reflection of the first in y = 0."""
-    half = shapes.shape[1] // 2
-    return torch.equal(shapes[:, half:], _reflected(shapes[:, :half]))
-
-
-def mirrored(shapes: Float[Tensor, "B P 3"]) -> Float[Tensor, "B Q 3"]:
-    """The points, then their reflections in y = 0."""
-    return torch.cat((shapes, _reflected(shapes)), dim=1)
-
-
-def _reflected(points: Float[Tensor, "*batch 3"]) -> Float[Tensor, "*batch 3"]:
-    return points * points.new_tensor((1.0, -1.0, 1.0))
-
-
 def _surface(
     own: Float[Tensor, "B n 3"], whole: Float[Tensor, "B P 3"], config: RefineConfig
 ) -> tuple[Surface, Int64[Tensor, "B P"]]:
@@ -135,13 +120,13 @@ def _thinned(seen: Clouds, voxel_m: float, mirror: bool) -> Clouds:
     thin = []
     for points, size in zip(seen.points.float().cpu(), seen.sizes.tolist()):
         real = points[:size]
-        both = torch.cat((real, _reflected(real))) if mirror else real
+        both = torch.cat((real, reflected(real))) if mirror else real
         thin.append(torch.from_numpy(voxel_thin(both.numpy(), voxel_m)))
     return padded(thin, seen.points.device)
 
 
 def drawn_to(
-    shapes: Float[Tensor, "B P 3"], seen: Clouds, config: RefineConfig = _DEFAULT
+    shapes: Float[Tensor, "B P 3"], seen: Clouds, config: RefineConfig | TrackConfig = _DEFAULT
 ) -> Float[Tensor, "B P 3"]:
     """The shapes' points drawn to the mean of what was seen around them; the others stay.
 

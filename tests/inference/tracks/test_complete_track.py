@@ -15,6 +15,7 @@ from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
 from wildshape.inference.predictor import Predictor
+from wildshape.inference.refine import drawn_to, padded
 from wildshape.inference.tracks import complete_track as whole
 from wildshape.inference.tracks.heading_vote import (
     continuous_signs,
@@ -173,7 +174,7 @@ def test_drawn_to_what_was_seen_and_nowhere_else():
     flat = torch.stack((x.flatten(), y.flatten(), torch.zeros(676).double()), dim=1)
     seen = flat[flat[:, 0] > 0].float()
     lifted = flat + torch.tensor((0.0, 0.0, 0.08)).double()
-    drawn = whole.drawn_to(lifted, seen)
+    drawn = drawn_to(lifted[None], padded([seen]))[0]
     near, far = flat[:, 0] > 0.2, flat[:, 0] < -0.5
     assert float(drawn[near, 2].abs().max()) < 0.03
     torch.testing.assert_close(drawn[far], lifted[far], atol=1e-3, rtol=0)

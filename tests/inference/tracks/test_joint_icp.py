@@ -11,7 +11,6 @@ from tests.cars import drive_by, poses_of
 from tests.inference.tracks.spoilt import relative, spoilt
 
 from wildshape.inference.config import TrackConfig
-from wildshape.inference.tracks import joint_icp as joint
 from wildshape.inference.tracks.joint_icp import refine_jointly, surface_normals
 
 BOXY = drive_by(scans=9, step=2.0, heading=0.3, side=5.0)
@@ -130,11 +129,3 @@ def test_the_normals_of_a_plane_and_a_sphere():
     sphere = 2 * torch.nn.functional.normalize(torch.randn(4000, 3, generator=generator), dim=1)
     cosine = (surface_normals(sphere) * sphere / 2).sum(1).abs()
     assert float(cosine.mean()) > 0.99
-
-
-def test_normals_do_not_depend_on_the_blocks_that_keep_memory_small(monkeypatch):
-    points = torch.from_numpy(round_car(300, np.random.default_rng(2))[0]).float()
-    whole = surface_normals(points)
-    monkeypatch.setattr(joint, "_BLOCK", 64)
-    alike = (surface_normals(points) * whole).sum(-1).abs()
-    torch.testing.assert_close(alike, torch.ones_like(alike), atol=1e-4, rtol=0)

@@ -16,12 +16,13 @@ from torch import Tensor
 
 from wildshape.geometry.box import FittedBox, unit_of
 from wildshape.geometry.sampling import voxel_thin
+from wildshape.geometry.surface import mirrored
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
 from wildshape.inference.choose_hypothesis import network_input
 from wildshape.inference.confidence import judged_again
 from wildshape.inference.config import BoxConfig, InferenceConfig, TrackConfig
-from wildshape.inference.refine import denser, partners
+from wildshape.inference.refine import denser, drawn_to, padded, partners
 from wildshape.inference.tracks.heading_vote import (
     half_turn,
     likeness_of_next,
@@ -76,9 +77,8 @@ def complete_together(
     mirror, unit = settings.network.mirror, unit_of(settings.extent_m[1])
     clouds, start = _in_units(scans, voted, unit)
     fit = refine_checked(clouds, start, mirror=mirror, config=config.track)
-    shape = unit * drawn_to(
-        shape / unit, _seen(clouds, fit.T_sensor_object, mirror, config.track), config.track
-    )
+    seen = _seen(clouds, fit.T_sensor_object, mirror, config.track)
+    shape = unit * drawn_to(shape[None] / unit, padded([seen]), config.track)[0]
     fit = fit._replace(T_sensor_object=_scaled(fit.T_sensor_object, unit))
     body = settings.sensor == "lidar"
     fitted = _box(shape, scans, fit.T_sensor_object, config.box, mirror=mirror, body=body)
@@ -210,7 +210,7 @@ def _disagreement(
         _fused(scans, T_sensor_object, part, config.most_points)
         for part in (slice(0, None, 2), slice(1, None, 2))
     ]
-    bank = _with_mirror(halves[1]) if mirror else halves[1]
+    bank = mirrored(halves[1][None])[0] if mirror else halves[1]
     found = nearest(halves[0][None], bank[None])
     return float(found.distance_squared.sqrt().clamp_max(config.vote.far_m).mean())
 
@@ -229,33 +229,10 @@ def _fused(
     return torch.cat(clouds).float()
 
 
-def _with_mirror(points: Float[Tensor, "n 3"]) -> Float[Tensor, "m 3"]:
-    return torch.cat((points, points * points.new_tensor((1.0, -1.0, 1.0))))
-
-
 def _seen(
     scans: list[Points], T_sensor_object: SE3, mirror: bool, config: TrackConfig
 ) -> Float[Tensor, "n 3"]:
     """The surface that the scans saw, reflected and thinned to an even density, object frame."""
     fused = _fused(scans, T_sensor_object, slice(None), config.most_points)
-    fused = _with_mirror(fused) if mirror else fused
+    fused = mirrored(fused[None])[0] if mirror else fused
     return torch.from_numpy(voxel_thin(fused.numpy(), config.voxel_m))
-
-
-def drawn_to(
-    shape: Float[Tensor, "P 3"], seen: Float[Tensor, "n 3"], config: TrackConfig = _DEFAULT.track
-) -> Float[Tensor, "P 3"]:
-    """The shape's points drawn to the mean of what was seen around them; the others stay.
-
-    Args:
-        shape: object frame.
-        seen: points of even density, the same frame.
-        config: how far, and how stiffly.
-    """
-    moved = []
-    for part in shape.float().split(1024):
-        apart = torch.cdist(part, seen) / config.reach_m
-        weight = torch.exp(-apart.square())
-        total = weight.sum(1, keepdim=True) + config.stiffness
-        moved.append((weight @ seen + config.stiffness * part) / total)
-    return torch.cat(moved).to(shape.dtype)

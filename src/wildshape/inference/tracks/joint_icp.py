@@ -15,12 +15,13 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from wildshape.geometry.surface import mirrored, planes
+from wildshape.geometry.transforms.rotation import rotation_from_vector
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import JointIcpConfig, TrackConfig
-from wildshape.ops.nearest import nearest
+from wildshape.ops.nearest import nearest_k
 from wildshape.records import Points
 
-_BLOCK, _AWAY_M = 2048, 1e4
 _TRACK = TrackConfig()
 
 
@@ -60,7 +61,7 @@ def refine_jointly(
     for step in range(rounds):
         moved = T_object_sensor.apply(points)
         if step % 3 == 0 or step >= rounds - 2:
-            normals = surface_normals(moved.flatten(0, 1), config.normal_m).view_as(moved)
+            normals = surface_normals(moved.flatten(0, 1), config).view_as(moved)
         width = max(config.widest_m * config.narrower**step, config.narrowest_m)
         T_object_sensor = _moved(T_object_sensor, _Surface(moved, normals), width, mirror, config)
     T_object_sensor = _as_a_whole(start, T_object_sensor, points, mirror) @ T_object_sensor
@@ -82,25 +83,15 @@ def _sampled(scans: list[Points], count: int) -> Float[np.ndarray, "V n 3"]:
 
 
 def surface_normals(
-    points: Float[Tensor, "n 3"], radius: float = _TRACK.coarse.normal_m
+    points: Float[Tensor, "n 3"], config: JointIcpConfig = _TRACK.coarse
 ) -> Float[Tensor, "n 3"]:
-    """Unit normals: the direction in which the neighbourhood, `radius` metres, is thinnest."""
-    products = (points[:, :, None] * points[:, None]).flatten(1)
-    moments = torch.cat((torch.ones_like(points[:, :1]), points, products), dim=1)
-    blocks = points.split(_BLOCK)
-    sums = torch.cat([_weight(block, points, radius) @ moments for block in blocks])
-    mean, second = sums[:, 1:4] / sums[:, :1], (sums[:, 4:] / sums[:, :1]).view(-1, 3, 3)
-    covariance = second - mean[:, :, None] * mean[:, None]
-    return torch.linalg.eigh(covariance).eigenvectors[:, :, 0]
+    """Unit normals: the direction in which the neighbourhood is thinnest.
 
-
-def _weight(
-    block: Float[Tensor, "b 3"], points: Float[Tensor, "n 3"], radius: float
-) -> Float[Tensor, "b n"]:
-    """How much each point counts in the neighbourhood of each of a block's."""
-    squared = (points.square().sum(-1), block.square().sum(-1)[:, None])
-    distance = torch.addmm(squared[1] + squared[0], block, points.T, alpha=-2)
-    return distance.div_(-(radius**2)).add_(1).relu_().square_()
+    Neighbours are taken of every so many points alone, so that they reach beyond the noise.
+    """
+    some = points[:: max(1, len(points) // config.normal_of)]
+    around = nearest_k(points[None], some[None], min(config.normal_points, len(some))).index
+    return planes(some[None], around)[1][0]
 
 
 def _moved(
@@ -124,28 +115,24 @@ def _moved(
     b = torch.einsum("vpd,vpdi,vpd->vi", weight, rows, residual)
     damping = config.ridge * kernel.sum(1)[:, None, None] + 1e-6
     motion = -config.step * torch.linalg.solve(A + damping * torch.eye(6), b)
-    turn = torch.linalg.matrix_exp(_cross_matrix(motion[:, :3]))
+    turn = rotation_from_vector(motion[:, :3])
     about = SE3(turn, centre[:, 0] + motion[:, 3:] - (turn @ centre[:, 0, :, None])[..., 0])
     return about @ T_object_sensor
-
-
-def _cross_matrix(w: Float[Tensor, "V 3"]) -> Float[Tensor, "V 3 3"]:
-    x, y, z = w.unbind(-1)
-    zero = torch.zeros_like(x)
-    return torch.stack((zero, -z, y, z, zero, -x, -y, x, zero), -1).view(-1, 3, 3)
 
 
 def _counterparts(surface: _Surface, mirror: bool) -> tuple[Tensor, Tensor]:
     """The nearest point of the other scans to each point, and its normal."""
     count, size, _ = surface.points.shape
-    bank = [part.flatten(0, 1) for part in surface]
+    points, normals = (part.flatten(0, 1) for part in surface)
+    own = torch.arange(count).repeat_interleave(size)
+    groups = own
     if mirror:
-        across = torch.tensor((1.0, -1.0, 1.0))
-        bank = [torch.cat((part, part * across)) for part in bank]
-    own = torch.arange(len(bank[0])) // size % count == torch.arange(count)[:, None]
-    others = torch.where(own[:, :, None], _AWAY_M, bank[0])
-    index = nearest(surface.points, others).index
-    return bank[0][index], bank[1][index]
+        points, normals = (mirrored(part[None])[0] for part in (points, normals))
+        groups = torch.cat((own, own))
+    query = surface.points.flatten(0, 1)[None]
+    found = nearest_k(query, points[None], 1, groups=(own[None], groups[None]))
+    index = found.index.view(count, size)
+    return points[index], normals[index]
 
 
 def _as_a_whole(start: SE3, end: SE3, points: Tensor, mirror: bool) -> SE3:

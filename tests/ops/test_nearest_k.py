@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The k nearest neighbours: every instruction set against plain torch, and that against a sort."""
+
+import math
+from functools import partial
+
+import pytest
+import torch
+from tests.ops.test_nearest import clouds, needs_library, widest
+
+from wildshape.errors import BadInputError
+from wildshape.ops.nearest import nearest, nearest_k
+from wildshape.ops.nearest.nearest_k import check_k, nearest_k_native, nearest_k_torch
+
+SHAPES = [
+    (1, 1, 1, 1),
+    (2, 3, 5, 8),
+    (3, 17, 64, 4),
+    (2, 130, 300, 16),
+    (2, 5, 0, 3),
+    (1, 40, 33, 1),
+]
+
+
+def by_sorting(query, target, k):
+    """Nothing but the definition."""
+    d2 = (query.double()[:, :, None] - target.double()[:, None]).square().sum(-1)
+    order = d2.argsort(stable=True, dim=-1)[..., :k]
+    return d2.gather(-1, order), order
+
+
+def test_plain_torch_is_a_sort():
+    query, target = clouds(2, 20, 50)
+    squared, order = by_sorting(query, target, 7)
+    found = nearest_k_torch(query, target, 7)
+    assert torch.equal(found.index, order)
+    torch.testing.assert_close(found.distance_squared.double(), squared, rtol=1e-5, atol=1e-9)
+
+
+@needs_library
+@pytest.mark.parametrize("level", [0, 1, 2])
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("grouped", [False, True])
+def test_native_is_plain_torch(level, shape, grouped):
+    if level > widest():
+        pytest.skip("instruction set absent")
+    B, N, M, k = shape
+    query, target = clouds(B, N, M, seed=N)
+    sizes = torch.arange(1, B + 1) * N // B, torch.arange(B) * M // B + 1
+    groups = (torch.arange(B * N).view(B, N) % 3, torch.arange(B * M).view(B, M) % 3)
+    options = {"groups": groups if grouped else None}
+    for most in (math.inf, 0.7):
+        search = partial(nearest_k_native, level=level)
+        own, plain = (
+            way(query, target, k, *sizes, **options, most=most) for way in (search, nearest_k_torch)
+        )
+        assert torch.equal(own.index, plain.index)
+        torch.testing.assert_close(own.distance_squared, plain.distance_squared)
+
+
+@needs_library
+def test_equal_distances_are_ordered_by_place():
+    query, target = clouds(2, 40, 60, grid=True)
+    squared, order = by_sorting(query, target, 12)
+    found = nearest_k_native(query, target, 12)
+    assert torch.equal(found.index, order)
+    assert torch.equal(found.distance_squared.double(), squared)
+
+
+def test_the_first_is_the_nearest_and_what_is_not_finite_is_nothing():
+    query, target = clouds(2, 50, 80)
+    query[0, 3], target[1, 5] = math.nan, math.inf
+    first, nearest_one = nearest_k(query, target, 3), nearest(query, target)
+    assert torch.equal(first.index[..., 0], nearest_one.index)
+    torch.testing.assert_close(first.distance_squared[..., 0], nearest_one.distance_squared)
+    assert not (first.index[1] == 5).any()
+
+
+def test_what_does_not_fit_is_refused():
+    query, target = clouds(2, 5, 6)
+    with pytest.raises(BadInputError, match="at least 1"):
+        nearest_k(query, target, 0)
+    with pytest.raises(BadInputError, match="groups"):
+        check_k(query, target, 2, (torch.zeros(2, 5), torch.zeros(2, 6)))
