@@ -49,12 +49,10 @@ def test_native_is_plain_torch(level, shape, grouped):
     query, target = clouds(B, N, M, seed=N)
     sizes = torch.arange(1, B + 1) * N // B, torch.arange(B) * M // B + 1
     groups = (torch.arange(B * N).view(B, N) % 3, torch.arange(B * M).view(B, M) % 3)
-    options = {"groups": groups if grouped else None}
+    given = (*sizes, groups if grouped else None)
     for most in (math.inf, 0.7):
         search = partial(nearest_k_native, level=level)
-        own, plain = (
-            way(query, target, k, *sizes, **options, most=most) for way in (search, nearest_k_torch)
-        )
+        own, plain = (way(query, target, k, *given, most) for way in (search, nearest_k_torch))
         assert torch.equal(own.index, plain.index)
         torch.testing.assert_close(own.distance_squared, plain.distance_squared)
 

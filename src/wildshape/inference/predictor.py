@@ -281,10 +281,10 @@ class Predictor:
         reasons = reasons_of_scan(scan, sensor, self.settings, rule)
         reasons += reasons_of_result(cost, confidence, self.settings, rule)
         shape, T_sensor_can, points = posed.shapes[i], posed.T_sensor_canonical[i], posed.points[i]
-        exact = self.refines and self.settings.sensor == "camera"
+        exact = self.settings.sensor == "camera"
         whole = points.numpy()
         return Completion(
-            points=with_scan(whole, len(shape), scan) if exact else whole,
+            points=with_scan(whole, len(shape), scan) if exact and self.refines else whole,
             pose=T_sensor_can.to(torch.float64),
             box=box_seen(
                 shape, T_sensor_can, seen, mirror=mirror, body=not exact, config=self.config.box
