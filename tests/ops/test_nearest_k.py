@@ -11,7 +11,12 @@ from tests.ops.test_nearest import clouds, needs_library, widest
 
 from wildshape.errors import BadInputError
 from wildshape.ops.nearest import nearest, nearest_k
-from wildshape.ops.nearest.nearest_k import check_k, nearest_k_native, nearest_k_torch
+from wildshape.ops.nearest.nearest_k import (
+    check_k,
+    nearest_k_native,
+    nearest_k_torch,
+    nearest_k_trees,
+)
 
 SHAPES = [
     (1, 1, 1, 1),
@@ -36,6 +41,17 @@ def test_plain_torch_is_a_sort():
     found = nearest_k_torch(query, target, 7)
     assert torch.equal(found.index, order)
     torch.testing.assert_close(found.distance_squared.double(), squared, rtol=1e-5, atol=1e-9)
+
+
+def test_trees_are_plain_torch():
+    query, target = clouds(3, 30, 50)
+    sizes = torch.tensor((30, 0, 7)), torch.tensor((3, 50, 0))
+    for most in (math.inf, 0.7):
+        own, plain = (
+            way(query, target, 4, *sizes, most=most) for way in (nearest_k_trees, nearest_k_torch)
+        )
+        assert torch.equal(own.index, plain.index)
+        torch.testing.assert_close(own.distance_squared, plain.distance_squared)
 
 
 @needs_library

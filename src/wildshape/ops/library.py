@@ -3,6 +3,7 @@
 """The compiled C kernels, if the build made them for this machine; else None, silently."""
 
 import ctypes
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import torch
 
 from wildshape.errors import BadInputError, lacks_memory
 
-_ABI = 3
+_ABI = 2
 _PATH = Path(__file__).parent / "native" / "libwildshape_ops.so"
 
 _P, _I64, _INT, _F32 = ctypes.c_void_p, ctypes.c_int64, ctypes.c_int, ctypes.c_float
@@ -21,10 +22,6 @@ _SIGNATURES = {
         [_P, _I64, _P, _P, _I64, _P, _I64, _I64, _I64, _P, _P, _P, _P, _INT, _INT],
         _INT,
     ),
-    "wildshape_nearest_k": (
-        [_P, _P, _P, _P, _P, _P, _I64, _I64, _I64, _I64, _F32, _P, _P, _INT, _INT],
-        _INT,
-    ),
     "wildshape_nearest_gradient": (
         [_P, _I64, _P, _I64, _P, _P, _P, _I64, _I64, _I64, _P, _P, _INT],
         None,
@@ -32,6 +29,8 @@ _SIGNATURES = {
     "wildshape_column_argmax": ([_P, _I64, _I64, _P, _INT], None),
     "wildshape_visible": ([_P, _P, _I64, _I64, _I64, _P, _INT], _INT),
 }
+
+_NEAREST_K = [_P, _P, _P, _P, _P, _P, _I64, _I64, _I64, _I64, _F32, _P, _P, _INT, _INT]
 
 
 @cache
@@ -51,6 +50,15 @@ def library() -> ctypes.CDLL | None:
             raise MemoryError(str(error)) from error
         return None
     return loaded if loaded.wildshape_abi() == _ABI else None
+
+
+@cache
+def nearest_k_kernel() -> Callable[..., int] | None:
+    """The kernel that was added to the others; None where they are absent or built before it."""
+    kernel = getattr(library(), "wildshape_nearest_k", None)
+    if kernel is not None:
+        kernel.argtypes, kernel.restype = _NEAREST_K, _INT
+    return kernel
 
 
 def check_memory(name: str, tensor: torch.Tensor, expected: torch.dtype) -> None:

@@ -16,8 +16,13 @@ from jaxtyping import Float, Int64
 from torch import Tensor
 
 from wildshape.errors import BadInputError
-from wildshape.ops.library import library
-from wildshape.ops.nearest.nearest_k import check_k, nearest_k_native, nearest_k_torch
+from wildshape.ops.library import library, nearest_k_kernel
+from wildshape.ops.nearest.nearest_k import (
+    check_k,
+    nearest_k_native,
+    nearest_k_torch,
+    nearest_k_trees,
+)
 from wildshape.ops.nearest.nearest_native import NativeDistance, nearest_both_native, nearest_native
 from wildshape.ops.nearest.nearest_torch import nearest_blocked, nearest_reference
 from wildshape.ops.nearest.neighbours import (
@@ -118,9 +123,13 @@ def nearest_k(
     """
     query, target = _at_least_float32(query.detach()), _at_least_float32(target.detach())
     check_k(query, target, k, groups)
-    native = _backend_for(query, target) == "native"
-    search = nearest_k_native if native else nearest_k_torch
-    return search(query, target, k, query_sizes, target_sizes, groups, most)
+    given = (query, target, k, query_sizes, target_sizes)
+    if _backend_for(query, target) == "native" and nearest_k_kernel():
+        return nearest_k_native(*given, groups, most)
+    finite = bool(query.isfinite().all()) and bool(target.isfinite().all())
+    if query.device.type == "cpu" and groups is None and finite:
+        return nearest_k_trees(*given, most)
+    return nearest_k_torch(*given, groups, most)
 
 
 def nearest_distance(

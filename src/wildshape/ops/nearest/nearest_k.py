@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The k nearest neighbours: compiled C on the CPU where there is any, else plain torch."""
+"""The k nearest neighbours: compiled C on the CPU, trees without it, plain torch elsewhere."""
 
 import math
 
@@ -9,7 +9,7 @@ from jaxtyping import Float, Int64
 from torch import Tensor
 
 from wildshape.errors import BadInputError
-from wildshape.ops.library import check_memory, library
+from wildshape.ops.library import check_memory, nearest_k_kernel
 from wildshape.ops.nearest.neighbours import Neighbourhoods, check_clouds
 
 _CHUNK_ELEMENTS = 1 << 22
@@ -34,15 +34,15 @@ def nearest_k_native(
     check_clouds(query, target, query_sizes, target_sizes)
     check_memory("nearest_k", query, torch.float32)
     check_memory("nearest_k", target, torch.float32)
-    loaded = library()
-    if loaded is None:
-        raise RuntimeError("the native library is not built; use the torch backend.")
+    kernel = nearest_k_kernel()
+    if kernel is None:
+        raise RuntimeError("the native library is not built; use another backend.")
     shape = (*query.shape[:2], k)
     found = Neighbourhoods(torch.empty(shape), torch.empty(shape, dtype=torch.int64))
     by_query, by_target = (None, None) if groups is None else groups
     given = (query, query_sizes, by_query, target, target_sizes, by_target)
     held = [None if part is None else part.contiguous() for part in given]
-    failed = loaded.wildshape_nearest_k(
+    failed = kernel(
         *(None if part is None else part.data_ptr() for part in held),
         len(query),
         query.shape[1],
@@ -57,6 +57,32 @@ def nearest_k_native(
     if failed:
         raise MemoryError(f"no room to search {query.shape[1]} and {target.shape[1]} points.")
     return found
+
+
+def nearest_k_trees(
+    query: Float[Tensor, "B N 3"],
+    target: Float[Tensor, "B M 3"],
+    k: int,
+    query_sizes: Int64[Tensor, "B"] | None = None,
+    target_sizes: Int64[Tensor, "B"] | None = None,
+    most: float = math.inf,
+) -> Neighbourhoods:
+    """By a k-d tree a cloud (scipy), on the CPU; all points finite. Ties come in any order."""
+    from scipy.spatial import KDTree
+
+    check_clouds(query, target, query_sizes, target_sizes)
+    squared = torch.zeros(*query.shape[:2], k, dtype=query.dtype)
+    index = torch.zeros(*query.shape[:2], k, dtype=torch.int64)
+    for b, (points, others) in enumerate(zip(query, target)):
+        n = len(points) if query_sizes is None else int(query_sizes[b])
+        m = len(others) if target_sizes is None else int(target_sizes[b])
+        tree = KDTree(others[:m].numpy().reshape(-1, 3), balanced_tree=False)
+        apart, place = tree.query(points[:n].numpy(), k=k)
+        found = torch.from_numpy(apart).view(n, k).to(query.dtype)
+        near = found <= most
+        squared[b, :n] = torch.where(near, found.square(), math.inf)
+        index[b, :n] = torch.where(near & found.isfinite(), torch.from_numpy(place).view(n, k), 0)
+    return Neighbourhoods(squared, index)
 
 
 def nearest_k_torch(
