@@ -3,9 +3,9 @@
 """Pose and size of completions fitted to their scans, all scans of a batch together.
 
 Nine numbers a scan (rotation, translation and a stretch along the canonical axes) by Gauss-Newton,
-each scan point to the plane of the shape around the nearest of its points; the network's answer is
-the prior, and that a LiDAR is held level, to a degree, where it nearly is. One side of a car tells
-its heading to a fraction of a degree, but its pitch and roll to one or two.
+each scan point to the plane of the shape around it; the network's answer is the prior, and that a
+LiDAR is held level, to a degree, where it nearly is. One side of a car tells its heading to a
+fraction of a degree, but its pitch and roll to one or two.
 """
 
 import math
@@ -15,10 +15,10 @@ import torch
 from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
-from wildshape.geometry.surface import gathered
+from wildshape.geometry.surface import planes
 from wildshape.geometry.transforms.rotation import cross_matrix, rotation_from_vector
 from wildshape.inference.config import RefineConfig
-from wildshape.ops.nearest import nearest
+from wildshape.ops.nearest import nearest, nearest_k
 
 _DEFAULT = RefineConfig()
 
@@ -41,14 +41,6 @@ class Clouds(NamedTuple):
         return places < self.sizes[:, None]
 
 
-class Surface(NamedTuple):
-    """Points of shapes, canonical frame, and the plane of the shape around each."""
-
-    points: Float[Tensor, "B P 3"]
-    middle: Float[Tensor, "B P 3"]
-    normal: Float[Tensor, "B P 3"]
-
-
 class Fit(NamedTuple):
     """Where the shapes lie in their scans: `T_scan_canonical`, and the stretch before it."""
 
@@ -67,7 +59,7 @@ class Fit(NamedTuple):
 
 def fit_to_scans(
     scans: Clouds,
-    surface: Surface,
+    shapes: Float[Tensor, "B P 3"],
     rotation: Float[Tensor, "B 3 3"],
     translation: Float[Tensor, "B 3"],
     up: Float[Tensor, "3"] | None = None,
@@ -77,7 +69,7 @@ def fit_to_scans(
 
     Args:
         scans: float64, sensor frames.
-        surface: of one shape a scan.
+        shapes: canonical frame, one a scan.
         rotation: to start from, of `T_scan_canonical`.
         translation: of the same.
         up: canonical direction in which the scans' z axes point if they were taken level.
@@ -85,13 +77,12 @@ def fit_to_scans(
     """
     start = Fit(rotation.double(), translation.double(), torch.ones_like(translation).double())
     found, motion = start, scans.points.new_zeros(len(scans.points), 9)
-    matched = surface.middle[:, :1], surface.normal[:, :1]
+    matched = scans.points, scans.points
     for step in range(config.iterations):
         if step in config.matched_at:
-            near = nearest(
-                found.unstretched(scans.points).float(), surface.points, scans.sizes
-            ).index
-            matched = gathered(surface.middle, near), gathered(surface.normal, near)
+            local = found.unstretched(scans.points).float()
+            around = nearest_k(local, shapes.float(), config.plane_points, scans.sizes).index
+            matched = planes(shapes, around)
         A, b = _equations(found.seen(scans.points), *matched, found.stretch, scans.counted, config)
         A, b = _with_prior(A, b, motion, config)
         if up is not None:
@@ -101,24 +92,24 @@ def fit_to_scans(
         R = found.rotation @ rotation_from_vector(change[:, :3]).mT
         t = found.translation - (R @ change[:, 3:6, None])[..., 0]
         found = Fit(R, t, motion[:, 6:].exp())
-    worse = _off(scans, surface, found, config) > _allowed(scans, surface, start, up, config)
+    worse = _off(scans, shapes, found, config) > _allowed(scans, shapes, start, up, config)
     return Fit(
         *(torch.where(worse.view(-1, *[1] * (a.ndim - 1)), b, a) for a, b in zip(found, start))
     )
 
 
-def _off(scans: Clouds, surface: Surface, fit: Fit, config: RefineConfig) -> Float[Tensor, "B"]:
+def _off(scans: Clouds, shapes: Tensor, fit: Fit, config: RefineConfig) -> Float[Tensor, "B"]:
     """Mean distance of scan points to the shape, each at most `kernel_m`."""
-    found = nearest(fit.unstretched(scans.points).float(), surface.points, scans.sizes)
+    found = nearest(fit.unstretched(scans.points).float(), shapes.float(), scans.sizes)
     apart = found.distance_squared.sqrt().clamp_max(config.kernel_m)  # of padding 0
     return apart.double().sum(1) / scans.sizes
 
 
 def _allowed(
-    scans: Clouds, surface: Surface, start: Fit, up: Tensor | None, config: RefineConfig
+    scans: Clouds, shapes: Tensor, start: Fit, up: Tensor | None, config: RefineConfig
 ) -> Float[Tensor, "B"]:
     """How far from the shape a scan may lie: no farther than before, or than a level one may."""
-    before = _off(scans, surface, start, config)
+    before = _off(scans, shapes, start, config)
     if up is None:
         return before
     askew = (start.rotation[:, 2] - up).norm(dim=-1) > math.radians(config.level_deg)

@@ -18,9 +18,9 @@ from torch import Tensor
 
 from wildshape.geometry.box import unit_of
 from wildshape.geometry.sampling import voxel_thin
-from wildshape.geometry.surface import gathered, is_mirrored, mirrored, planes, reflected
+from wildshape.geometry.surface import gathered, is_mirrored, mirrored, reflected
 from wildshape.inference.config import RefineConfig, TrackConfig
-from wildshape.inference.gauss_newton import Clouds, Surface, fit_to_scans
+from wildshape.inference.gauss_newton import Clouds, fit_to_scans
 from wildshape.ops.nearest import nearest, nearest_k
 from wildshape.records import Points
 
@@ -69,15 +69,15 @@ def refine(
     unit = _units(shapes)
     exact = shapes.double() / unit
     own = exact[:, : exact.shape[1] // 2] if mirror and is_mirrored(exact) else exact
-    surface, partner = _surface(own, exact, config)
     clouds = _some_of_each(scans, config.scan_points, exact.device)
     clouds = clouds._replace(points=clouds.points.double() / unit)
     start = rotation.double(), translation.double() / unit[:, 0]
-    fit = fit_to_scans(clouds, surface, *start, up, config)
+    fit = fit_to_scans(clouds, exact, *start, up, config)
     seen = _thinned(clouds._replace(points=fit.seen(clouds.points)), config.voxel_m, mirror)
     drawn = drawn_to(own * fit.stretch[:, None], seen, config)
     whole = drawn if own is exact else mirrored(drawn)
     moved = fit.translation * unit[:, 0]
+    partner = _partners(own, exact, config.partner)
     return Refined((whole * unit).to(shapes.dtype), fit.rotation, moved, partner)
 
 
@@ -86,21 +86,6 @@ def _units(shapes: Float[Tensor, "B P 3"]) -> Float[Tensor, "B 1 1"]:
     extents = (shapes.amax(1) - shapes.amin(1)).double().norm(dim=-1)
     units = [unit_of(extent) for extent in extents.tolist()]
     return torch.tensor(units, dtype=torch.float64, device=shapes.device)[:, None, None]
-
-
-def _surface(
-    own: Float[Tensor, "B n 3"], whole: Float[Tensor, "B P 3"], config: RefineConfig
-) -> tuple[Surface, Int64[Tensor, "B P"]]:
-    """The planes of shapes, and each point's partner; `own` may be half of them (`mirrored`)."""
-    count = max(config.plane_points, config.partner + 1)
-    around = nearest_k(own.float(), whole.float(), count).index
-    middle, normal = planes(whole, around[..., : config.plane_points])
-    partner = around[..., config.partner]
-    if own is not whole:
-        middle, normal = mirrored(middle), mirrored(normal)
-        size = whole.shape[1]
-        partner = torch.cat((partner, (partner + size // 2) % size), dim=1)
-    return Surface(whole.float(), middle, normal), partner
 
 
 def _some_of_each(scans: Sequence[Points], count: int, device: torch.device) -> Clouds:
@@ -147,7 +132,18 @@ def drawn_to(
 
 def partners(points: Float[Tensor, "B P 3"], count: int = _DEFAULT.partner) -> Tensor:
     """`(B, P)`: the place of each point's `count`th neighbour."""
-    return nearest_k(points.float(), points.float(), count + 1).index[..., count]
+    return _partners(points, points, count)
+
+
+def _partners(
+    own: Float[Tensor, "B n 3"], whole: Float[Tensor, "B P 3"], count: int
+) -> Int64[Tensor, "B P"]:
+    """The same, where `own` may be the half of the points that the others are reflections of."""
+    found = nearest_k(own.float(), whole.float(), count + 1).index[..., count]
+    size = whole.shape[1]
+    if own.shape[1] == size:
+        return found
+    return torch.cat((found, (found + size // 2) % size), dim=1)
 
 
 def denser(points: Float[Tensor, "B P 3"], partner: Int64[Tensor, "B P"]) -> Tensor:

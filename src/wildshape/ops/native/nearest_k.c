@@ -42,13 +42,26 @@ static inline int apart(const k_search *search, int32_t query, int32_t target)
 }
 
 /* Put a key among `k` in order; the largest falls out. No branch: it would be guessed wrongly. */
-static inline void insert_key(uint64_t *keys, int k, uint64_t key)
+static inline __attribute__((always_inline)) void insert_among(uint64_t *keys, int k, uint64_t key)
 {
     for (int i = k - 1; i > 0; i--) {
         const uint64_t above = keys[i - 1] > key ? keys[i - 1] : key;
         keys[i] = keys[i] < above ? keys[i] : above;
     }
     keys[0] = keys[0] < key ? keys[0] : key;
+}
+
+/* The same; known lengths are unrolled. */
+static inline void insert_key(uint64_t *keys, int k, uint64_t key)
+{
+    if (k == 8)
+        insert_among(keys, 8, key);
+    else if (k == 6)
+        insert_among(keys, 6, key);
+    else if (k == 1)
+        insert_among(keys, 1, key);
+    else
+        insert_among(keys, k, key);
 }
 
 #define KERNEL "nearest_k_kernel.h"

@@ -26,6 +26,7 @@ TARGET static inline void NAME(visit_k)(NAME(tile) *q, const cloud *queries, int
         const int64_t at = tile * BLOCK + i;
         const VECTOR x = SET1(queries->axes[0][at]), y = SET1(queries->axes[1][at]);
         const VECTOR z = SET1(queries->axes[2][at]), limit = SET1(best[i]);
+        uint64_t *own = keys + i * k;
         unsigned near = 0;
         for (int o = 0; o < BLOCK; o += LANES) {
             VECTOR dx = SUB(x, LOAD(targets->axes[0] + start + o));
@@ -38,10 +39,11 @@ TARGET static inline void NAME(visit_k)(NAME(tile) *q, const cloud *queries, int
         for (near &= real; near; near &= near - 1) {
             const int j = __builtin_ctz(near);
             const int32_t place = targets->order[start + j];
-            if (apart(search, queries->order[at], place))
-                insert_key(keys + i * k, k, key_of(squared[j], place));
+            const uint64_t key = key_of(squared[j], place);
+            if (key < own[k - 1] && apart(search, queries->order[at], place))
+                insert_key(own, k, key);
         }
-        best[i] = distance_of(keys[i * k + k - 1]);
+        best[i] = distance_of(own[k - 1]);
     }
     for (int r = 0; r < ROWS; r++)
         q->best[r] = LOAD(best + r * LANES);
