@@ -36,7 +36,7 @@ class Settings:
     scans: int = 100
     seed: int = 3
     found: Path | None = None
-    shown: int = 5
+    shown: int = 4
 
 
 def main(settings: Settings) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from wildshape.drives.finished import FinishedDrive, FoundVehicle
 from wildshape.drives.playback.moments import PALETTE
@@ -29,8 +30,9 @@ from wildshape.report.scene import thin
 
 _CARD, _TEXT, _SOFT = "#12171e", "#e9ecf0", "#a0a8b3"
 _DPI, _WIDE_IN = 110, 14.0
-_MARGIN_M, _BAR_M = 9.0, 10.0
+_MARGIN_M, _BAR_M = 6.0, 10.0
 _SCANS, _SHAPE_POINTS = 12, 2500
+_NEAR_M, _ROW = 25.0, 0.15  # of the README's picture: a row of vehicles, of the width
 
 
 def picture_from_above(found: FinishedDrive, scans: Sequence[DrawnScan]) -> bytes:
@@ -44,7 +46,7 @@ def picture_from_above(found: FinishedDrive, scans: Sequence[DrawnScan]) -> byte
 def write_drive_picture(
     found: FinishedDrive, drive: Drive, path: Path, shown: Sequence[FoundVehicle]
 ) -> None:
-    """The same with some vehicles below: a scan of each, and its completed shape.
+    """What lies near the sensor's way, and below some vehicles: a scan and the completed shape.
 
     Args:
         found: the drive.
@@ -52,25 +54,39 @@ def write_drive_picture(
         path: `.png` or `.webp`.
         shown: at most five vehicles.
     """
-    low, high = _bounds(found)
+    low, high = _bounds(found, _NEAR_M)
     ratio = (high[1] - low[1]) / (high[0] - low[0])
-    figure = _figure(ratio + 0.17)
-    foot = 0.17 / (ratio + 0.17)
+    figure = _figure(ratio + _ROW)
+    foot = _ROW / (ratio + _ROW)
     scans = drawn_scans(found, drive)
     _above(figure.add_axes((0, foot, 1, 1 - foot)), found, scans, (low, high))
+    share = 1 / max(1, len(shown))
     for place, one in enumerate(shown):
         for half, completed in enumerate((False, True)):
-            at = ((place + 0.5 * half) / len(shown), 0.0, 0.5 / len(shown), foot)
+            at = (share * (place + 0.06 + 0.44 * half), 0.0, 0.44 * share, foot)
             _vehicle(figure, at, found, drive, one, completed=completed)
+        figure.text(
+            share * (place + 0.5), 0.02, f"{_short(one)}: one scan, and completed", color=_TEXT,
+            ha="center", fontsize=11,
+        )  # fmt: skip
     with atomic_write(path) as file:
         file.write(_image(figure, path.suffix))
 
 
-def _bounds(found: FinishedDrive) -> tuple[np.ndarray, np.ndarray]:
-    """Of the ways of the sensor and the vehicles, on the ground, with a margin."""
+def _across(found: FinishedDrive) -> Float[np.ndarray, "2 2"]:
+    """From the level world's x and y to the picture's: the sensor drives from left to right."""
+    x, y, _ = (found.T_level_sensor.translation[-1] - found.T_level_sensor.translation[0]).tolist()
+    yaw = math.atan2(y, x) if math.hypot(x, y) > _MARGIN_M else 0.0
+    c, s = math.cos(yaw), math.sin(yaw)
+    return np.array(((c, s), (-s, c)))
+
+
+def _bounds(found: FinishedDrive, near_m: float = math.inf) -> tuple[np.ndarray, np.ndarray]:
+    """Of the sensor's way and of vehicles that come so near, in the picture, with a margin."""
     places = [found.T_level_sensor.translation.numpy()[:, :2]]
-    places += [placed(found, one)[:, :2] for one in found.vehicles]
-    every = np.concatenate(places)
+    near = (one for one in found.vehicles if one.nearest_m < near_m)
+    places += [placed(found, one)[[one.frames.index(one.fullest)], :2] for one in near]
+    every = np.concatenate(places) @ _across(found).T
     low, high = every.min(0) - _MARGIN_M, every.max(0) + _MARGIN_M
     short = np.maximum(0.32 * (high - low).max() - (high - low), 0) / 2
     return low - short, high + short
@@ -109,9 +125,9 @@ def _above(
     _standing(axes, found, scans)
     for number, one in enumerate(found.vehicles):
         _from_above(axes, found, one, PALETTE[number % len(PALETTE)])
-    way = found.T_level_sensor.translation.numpy()
-    axes.plot(*way[:, :2].T, color="white", linewidth=2, solid_capstyle="round", zorder=4)
-    axes.plot(*way[-1, :2], "o", color="white", markersize=6, zorder=4)
+    way = found.T_level_sensor.translation.numpy()[:, :2] @ _across(found).T
+    axes.plot(*way.T, color="white", linewidth=2, solid_capstyle="round", zorder=4)
+    axes.plot(*way[-1], "o", color="white", markersize=6, zorder=4)
     _scale_bar(axes, bounds)
 
 
@@ -122,7 +138,7 @@ def _standing(axes: Any, found: FinishedDrive, scans: Sequence[DrawnScan]) -> No
         points = T.apply_numpy(scan.points[scan.owners == NOBODY])
         height = points[:, 2] - float(T.translation[2]) + found.ground_m
         order = np.argsort(height)
-        x, y, _ = points[order].T
+        x, y = _across(found) @ points[order, :2].T
         colours = {"c": height[order], "cmap": _greys(), "vmin": 0, "vmax": 3}
         axes.scatter(x, y, **colours, s=1.3, linewidths=0, rasterized=True)
 
@@ -135,10 +151,11 @@ def _greys() -> Any:
 
 def _from_above(axes: Any, found: FinishedDrive, one: FoundVehicle, colour: str) -> None:
     """Box, shape and name where it was seen best, and its way if it moves."""
-    places = placed(found, one)
-    x, y, _, yaw = places[one.frames.index(one.fullest)]
+    across, places = _across(found), placed(found, one)
+    place = places[one.frames.index(one.fullest)]
+    (x, y), yaw = across @ place[:2], place[3]
     c, s = math.cos(yaw), math.sin(yaw)
-    turn = np.array(((c, s), (-s, c)))
+    turn = np.array(((c, s), (-s, c))) @ across.T
     length, width, _ = one.size
     outline = np.array(
         ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1), (1, -1), (1.3, 0), (1, 1))
@@ -147,11 +164,16 @@ def _from_above(axes: Any, found: FinishedDrive, one: FoundVehicle, colour: str)
     axes.scatter(*(shape @ turn + (x, y)).T, color=colour, s=0.7, linewidths=0, zorder=3)
     axes.plot(*(outline @ turn + (x, y)).T, color=colour, linewidth=1.4, zorder=5)
     axes.annotate(
-        one.name, (x, y), color=_TEXT, fontsize=8, ha="center", va="center", zorder=6,
+        _short(one), (x, y), color=_TEXT, fontsize=10, ha="center", va="center", zorder=6,
         bbox={"facecolor": _CARD, "alpha": 0.65, "pad": 1.2, "linewidth": 0},
     )  # fmt: skip
     if one.moving:
-        axes.plot(*places[:, :2].T, color=colour, linewidth=1.5, alpha=0.8, zorder=2)
+        axes.plot(*across @ places[:, :2].T, color=colour, linewidth=1.5, alpha=0.8, zorder=2)
+
+
+def _short(one: FoundVehicle) -> str:
+    """Of a name that several tracks gave, the first."""
+    return one.name.partition("-")[0]
 
 
 def _scale_bar(axes: Any, bounds: tuple[np.ndarray, np.ndarray]) -> None:
@@ -173,7 +195,7 @@ def _vehicle(
     axes = figure.add_axes(place, projection="3d", computed_zorder=False)
     half = max(one.size) / 2
     axes.set(xlim=(-half, half), ylim=(-half, half), zlim=(-half, half))
-    axes.set_box_aspect((1, 1, 1), zoom=2.1)
+    axes.set_box_aspect((1, 1, 1), zoom=1.55)
     axes.view_init(elev=20, azim=-62)
     axes.set_axis_off()
     axes.patch.set_alpha(0)
@@ -181,9 +203,7 @@ def _vehicle(
     colour = PALETTE[number % len(PALETTE)] if completed else "#ffffff"
     points = thin(found.shape(one), 3500) if completed else _seen(found, drive, one)
     x, y, z = points.T
-    axes.scatter(x, y, z, color=colour, s=3.0, linewidths=0, depthshade=completed)
-    text = f"{one.name} completed" if completed else f"{one.name}, one scan"
-    axes.text2D(0.5, 0.03, text, transform=axes.transAxes, color=_TEXT, ha="center", fontsize=9)
+    axes.scatter(x, y, z, color=colour, s=3.0, linewidths=0, depthshade=completed, clip_on=False)
 
 
 def _seen(found: FinishedDrive, drive: Drive, one: FoundVehicle) -> np.ndarray:
