@@ -22,7 +22,9 @@ def found(tmp_path_factory):
 
 
 def test_points_belong_to_the_vehicles_they_were_measured_on(found):
-    scans = drawn_scans(found, found.open_source())
+    drive = found.open_source()
+    assert drive.motion is not None  # scans are corrected as the boxes were
+    scans = drawn_scans(found, drive)
     assert [scan.frame for scan in scans] == list(range(FRAMES))
     for scan in scans:
         assert (scan.points[scan.owners == NOBODY][:, 2] < 0.16 - HEIGHT).all()
