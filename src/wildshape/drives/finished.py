@@ -161,8 +161,21 @@ class FinishedDrive:
 
 
 def is_drive(out: Path) -> bool:
-    """Whether a folder holds a finished drive."""
-    return (out / BOXES).is_file() and (out / FRAMES).is_file() and (out / MARKER).is_file()
+    """Whether a folder holds a finished drive.
+
+    Raises:
+        BadInputError: it holds several, a folder each.
+    """
+    if _finished(out):
+        return True
+    several = sorted(folder.parent for folder in out.glob(f"*/{BOXES}") if _finished(folder.parent))
+    if several:
+        raise BadInputError(f"{out}: holds drives, a folder each; name one, such as {several[0]}.")
+    return False
+
+
+def _finished(out: Path) -> bool:
+    return all((out / name).is_file() for name in (BOXES, FRAMES, MARKER))
 
 
 def read_finished(out: Path | str) -> FinishedDrive:

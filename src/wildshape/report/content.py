@@ -132,12 +132,17 @@ class Figure:
     """A finished picture, embedded as it is.
 
     Attributes:
+        image: the file's content.
         wide: across the whole page, not beside others.
+        kind: `png` or `webp`.
+        to: a page that a click on it opens, as seen from the report's folder.
     """
 
     title: str
-    png: bytes
+    image: bytes
     wide: bool = False
+    kind: str = "png"
+    to: str = ""
 
 
 @dataclass(frozen=True)

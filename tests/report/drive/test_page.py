@@ -71,6 +71,7 @@ def test_without_the_recording_the_vehicles_are_drawn_alone(found, tmp_path):
     assert len(report.objects) == len(CARS)
     assert report_from_drive(out, found.source).notes == report.notes[1:]
     refused(report_from_drive, out, tmp_path / "nowhere", match="nowhere")
+    refused(report_from_drive, tmp_path, match="name one, such as .*found")
     (tmp_path / "few").mkdir()
     shutil.copy(found.source / "000000.npy", tmp_path / "few")
     refused(report_from_drive, out, tmp_path / "few", match="1 scans")

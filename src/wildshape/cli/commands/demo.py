@@ -25,8 +25,11 @@ OwnData = Annotated[
 class Settings:
     """Simulate, train, evaluate, complete, register, fuse, and draw it all in DIR/report.html.
 
+    At last a whole simulated drive, the vehicles in it found: DIR/drive/found/report.html.
+
     Attributes:
-        seconds: for training; the rest takes about two minutes more.
+        seconds: for training; the rest takes two to three minutes more.
+        drive_scans: of the simulated drive in the end, ten a second; 0 leaves it out.
         tracks: simulated to train on.
         test_tracks: never trained on, to look at and to measure.
         preset: what is trained.
@@ -34,9 +37,10 @@ class Settings:
 
     out: OutFolder = Path("demo")
     data: OwnData = None
-    seconds: Annotated[float, arg(metavar="S")] = 165.0
+    seconds: Annotated[float, arg(metavar="S")] = 110.0
     tracks: Annotated[int, arg(metavar="N")] = 200
     test_tracks: Annotated[int, arg(metavar="N")] = 12
+    drive_scans: Annotated[int, arg(metavar="N")] = 100
     preset: Literal["small", "default", "tiny"] = "small"
     files: Files = DEFAULT_FILES
     overwrite: Overwrite = False
@@ -60,6 +64,7 @@ def run(settings: Settings) -> None:
         test_tracks=settings.test_tracks,
         preset=settings.preset,
         seconds=settings.seconds,
+        drive_scans=settings.drive_scans,
         overwrite=settings.overwrite,
     )
     found = run_demo(settings.out, options, TERMINAL, stoppable)

@@ -24,6 +24,7 @@ from wildshape.io.progress import Progress, duration
 from wildshape.io.scans.writers import write_cloud
 from wildshape.records import Completion, Track
 from wildshape.report.content import Cloud, Report, ReportObject, track_object
+from wildshape.report.demo.drive import DemoDrive
 from wildshape.report.demo.tracks import TEST, DemoData
 from wildshape.report.page.curves import training_curves
 from wildshape.report.page.html import write_report
@@ -151,6 +152,7 @@ def draw(
     results: Mapping[str, Results],
     judged: Sequence[str],
     seconds: float,
+    driven: DemoDrive,
 ) -> Path:
     """Write `report.html`; returns its path."""
     cost = _cost(out / "run" / "log.jsonl")
@@ -162,6 +164,7 @@ def draw(
                 f"Trained on {data.described} without labels, for {cost.steps} steps; everything"
                 f" below is of {data.tested}, which it has never seen.",
                 *judged,
+                driven.sentence,
             )
         ),
         cost=(
@@ -175,6 +178,7 @@ def draw(
         objects=tuple(shown),
         notes=tuple(note for note in (data.note, _NOTE) if note),
         provenance=output.record["provenance"],
+        figures=driven.figures,
     )
     write_report(report, out / "report.html")
     return out / "report.html"

@@ -12,6 +12,7 @@ from wildshape.io.progress import SILENT, Progress, duration
 from wildshape.io.store.store import open_store
 from wildshape.method.checkpoint import SHIPPED
 from wildshape.ops.device import choose_device
+from wildshape.report.demo.drive import find_vehicles
 from wildshape.report.demo.results import draw, evaluate, process, verdict
 from wildshape.report.demo.time_budget import TimeBudget
 from wildshape.report.demo.tracks import TRAIN, DemoOptions, prepare
@@ -19,7 +20,10 @@ from wildshape.training.loop import setup
 from wildshape.training.recipes import recipe_for
 from wildshape.training.train import Stopping, fit_with_progress, never_stopped
 
-FILES = ("report.html", *(f"{d}/**/*" for d in ("data", "run", "evaluation", "completed", "fused")))
+FILES = (
+    "report.html",
+    *(f"{d}/**/*" for d in ("data", "run", "evaluation", "completed", "fused", "drive")),
+)
 _DEFAULT = DemoOptions()
 
 
@@ -34,14 +38,15 @@ class Demo:
 class _Agenda:
     """Says what is being done, how long it took so far and what is left, roughly."""
 
-    def __init__(self, seconds: float, progress: Progress) -> None:
+    def __init__(self, seconds: float, scans: int, progress: Progress) -> None:
         self.began, self.progress = time.monotonic(), progress
         self.left = {
             "making tracks": 12.0,
             "training": seconds + 5,
-            "evaluating": 45.0,
-            "completing, registering and fusing unseen scans": 25.0,
-            "drawing the report": 15.0,
+            "evaluating": 25.0,
+            "completing, registering and fusing unseen scans": 15.0,
+            "finding all vehicles of a simulated drive": 1.0 * scans,
+            "drawing the report": 5.0,
         }
 
     def next(self, detail: str = "") -> None:
@@ -65,6 +70,8 @@ def run_demo(
 ) -> Demo:
     """Simulate, train, evaluate, complete, register, fuse, and draw it all in `report.html`.
 
+    At last a whole simulated drive, the vehicles in it found.
+
     Args:
         out: folder to write.
         options: what of.
@@ -75,7 +82,7 @@ def run_demo(
         BadInputError: the user's data cannot be used, or a demo is there already.
         StopRequested: `stopping` said so.
     """
-    agenda = _Agenda(options.seconds, progress)
+    agenda = _Agenda(options.seconds, options.drive_scans, progress)
     overwrite = options.overwrite or unfinished(out, "demo")
     output = begin(out, "demo", {}, FILES, overwrite=overwrite, progress=progress)
     agenda.next()
@@ -88,8 +95,10 @@ def run_demo(
     agenda.next()
     shown = process(out, models, results, progress)
     agenda.next()
+    driven = find_vehicles(out, options.drive_scans, list(models.values())[-1], progress)
+    agenda.next()
     judged = verdict(results, list(models))
-    page = draw(out, output, data, shown, results, judged, agenda.seconds)
+    page = draw(out, output, data, shown, results, judged, agenda.seconds, driven)
     output.finish(seconds=round(agenda.seconds, 1))
     return Demo(page, judged)
 

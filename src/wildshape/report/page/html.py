@@ -24,6 +24,7 @@ from wildshape.report.content import (
     Cell,
     Cloud,
     Curve,
+    Figure,
     Numbers,
     Report,
     ReportObject,
@@ -199,13 +200,17 @@ def _curves(curves: tuple[Curve, ...]) -> str:
 
 
 def _figures(report: Report) -> str:
-    images = "".join(
-        f"<figure{' class=wide' if figure.wide else ''}><figcaption>{escape(figure.title)}"
-        f'</figcaption><img alt="{escape(figure.title)}"'
-        f' src="{_embedded(figure.png, "png")}"></figure>'
-        for figure in report.figures
-    )
+    images = "".join(map(_picture, report.figures))
     return _section("Figures", f"<div class=grid>{images}</div>" if images else "")
+
+
+def _picture(figure: Figure) -> str:
+    source = _embedded(figure.image, figure.kind)
+    image = f'<img alt="{escape(figure.title)}" src="{source}">'
+    if figure.to:
+        image = f'<a href="{escape(figure.to)}">{image}</a>'
+    wide = " class=wide" if figure.wide else ""
+    return f"<figure{wide}><figcaption>{escape(figure.title)}</figcaption>{image}</figure>"
 
 
 def _findings(findings: tuple[str, ...]) -> str:
