@@ -3,11 +3,28 @@
 """A predictor as evaluation wants a method: completions and poses, nothing else."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
-from wildshape.geometry.transforms.se3 import SE3
+import numpy as np
+
+from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.predictor import Predictor
+from wildshape.inference.registration import to_middle
 from wildshape.records import Completion, Points, Sensor
+
+
+class _Answer(NamedTuple):
+    """What was answered of which scans."""
+
+    scans: list[Points]
+    sensor: Sensor
+    done: list[Completion]
+
+    def is_of(self, scans: Sequence[Points], sensor: Sensor) -> bool:
+        """Whether these are the scans."""
+        same = len(scans) == len(self.scans) and sensor == self.sensor
+        return same and all(map(np.array_equal, scans, self.scans))
 
 
 @dataclass(frozen=True)
@@ -17,10 +34,13 @@ class Learned:
     Attributes:
         predictor: does the work.
         track: use all scans of a track together; each scan still gets a shape of its own.
+
+    The last answer is kept: the protocol asks for the shapes of scans, then for their poses.
     """
 
     predictor: Predictor
     track: bool = False
+    _last: list["_Answer"] = field(default_factory=list, repr=False, compare=False)
 
     @property
     def about(self) -> str:
@@ -33,10 +53,17 @@ class Learned:
 
     def complete_many(self, scans: list[Points], sensor: Sensor) -> list[Completion]:
         """Of each scan, in order, shape, confidence and box."""
-        if self.track:
-            return self.predictor.complete_track(scans, sensor)
-        return list(self.predictor.complete_many(scans, sensor))
+        if not (self._last and self._last[0].is_of(scans, sensor)):
+            copies = [np.array(scan) for scan in scans]  # a caller may change its own
+            self._last[:] = [_Answer(copies, sensor, self._completed(scans, sensor))]
+        return self._last[0].done
 
     def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:
         """`T_middle_scan`, one a scan: takes each scan to the frame of the middle scan."""
-        return self.predictor.register_track(scans, sensor, track=self.track)
+        done = self.complete_many(list(scans), sensor)
+        return to_middle(stack([one.pose for one in done]))
+
+    def _completed(self, scans: list[Points], sensor: Sensor) -> list[Completion]:
+        if self.track:
+            return self.predictor.complete_track(scans, sensor)
+        return list(self.predictor.complete_many(scans, sensor))

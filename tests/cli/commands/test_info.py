@@ -40,15 +40,17 @@ def test_page_picture_and_numbers_are_written_and_never_over_others(
     wildshape, refused, store, tmp_path
 ):
     out = tmp_path / "info"
-    assert wildshape("info", store, "--out", out).code == 0
+    out.mkdir()
+    (out / "info.html").write_text("another's")
+    assert "--overwrite" in refused("info", store, "--out", out)
+    assert (out / "info.html").read_text() == "another's"
+    assert wildshape("info", store, "--out", out, "--overwrite").code == 0
     with Image.open(out / "info.png") as picture:
         pixels = np.asarray(picture.convert("L"))
     assert (pixels < 128).mean() > 0.02  # something is drawn
     page = (out / "info.html").read_text(encoding="utf-8")
     assert page.count("<img") >= 10
     assert json.loads((out / "info.json").read_text())["tracks"] == 6
-    assert "--overwrite" in refused("info", store, "--out", out)
-    assert wildshape("info", store, "--out", out, "--overwrite").code == 0
 
 
 def test_bad_inputs_are_one_sentence(refused, store, tmp_path):
