@@ -284,6 +284,15 @@ def test_a_moving_vehicle_is_looked_for_where_its_way_leads():
     assert found.name == "0-1"
 
 
+def test_vehicles_beside_each_other_are_not_joined_by_what_lies_between():
+    def at(x, name, length=4.0):
+        return completed([(x, 0.0, 0.0, 0.0)], name=name, size=(length, 1.8, 1.5))
+
+    first, between, second = at(0.0, "0"), at(2.3, "1"), at(5.0, "2")
+    (found,) = places().fragments([first, between, second])
+    assert found.name == "0-1"
+
+
 def test_clusters_in_the_box_of_a_vehicle_are_its_own(tmp_path):
     rng = np.random.default_rng(0)
 

@@ -222,12 +222,14 @@ class MergeConfig:
     Attributes:
         least_confidence: objects that are hardly vehicles are not asked.
         overlap: share of the smaller footprint that one object's shapes have in common.
+        apart: objects that share less than this are beside each other.
         beyond_ticks: a moving object is expected so long before and after it was seen; a standing
             one always.
     """
 
     least_confidence: float = 0.05
     overlap: float = 0.3
+    apart: float = 0.1
     beyond_ticks: int = 15
 
 

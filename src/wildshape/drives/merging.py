@@ -7,6 +7,7 @@ its way leads.
 """
 
 from dataclasses import dataclass, field
+from itertools import combinations, product
 
 import numpy as np
 
@@ -35,26 +36,40 @@ class Places:
     _ways: dict[str, Way] = field(default_factory=dict)
 
     def fragments(self, objects: list[Completed]) -> list[Sightings]:
-        """Those of several tracks, or pieces of one scan, that are one by their shapes."""
-        from scipy.sparse.csgraph import connected_components
+        """Those of several tracks, or pieces of one scan, that are one by their shapes.
 
-        shared = np.eye(max(len(objects), 1), dtype=bool)
-        for i, one in enumerate(objects):
-            for j, other in enumerate(objects[:i]):
-                shared[i, j] = self.share(one, other)
-        count, group = connected_components(shared[: len(objects), : len(objects)], directed=False)
-        groups = [[objects[i].seen for i in np.flatnonzero(group == g)] for g in range(count)]
-        return [merged(parts) for parts in groups if len(parts) > 1]
+        Those that share most are put together first. Two groups stay apart if something in one
+        was beside something in the other: a chain of fragments would join two vehicles that follow
+        each other.
+        """
+        pairs = list(combinations(range(len(objects)), 2))
+        shared = {(i, j): self.overlap(objects[i], objects[j]) for i, j in pairs}
+        group = {i: [i] for i in range(len(objects))}
+        for i, j in sorted(pairs, key=lambda pair: -shared[pair]):
+            if shared[i, j] <= self.config.overlap:
+                break
+            one, other = group[i], group[j]
+            across = [shared[min(pair), max(pair)] for pair in product(one, other)]
+            if one is not other and not any(0 <= part < self.config.apart for part in across):
+                one += other
+                group.update(dict.fromkeys(other, one))
+        groups = {id(of): sorted(of) for of in group.values()}
+        return [merged([objects[i].seen for i in of]) for of in groups.values() if len(of) > 1]
 
     def share(self, one: Completed, other: Completed) -> bool:
-        """Whether two objects share a place in most of the frames that tell.
+        """Whether two objects share a place in most of the frames that tell."""
+        return self.overlap(one, other) > self.config.overlap
 
-        These are frames in which both are expected, the nearest to those completed.
+    def overlap(self, one: Completed, other: Completed) -> float:
+        """Share of the smaller footprint in the middle one of the frames that tell.
+
+        These are frames in which both are expected, the nearest to those completed; -1 if there
+        are none.
         """
         way, beside = self._way(one), self._way(other)
         common = np.intersect1d(way.frames, beside.frames)
         if not len(common):
-            return False
+            return -1.0
         apart = _apart(common, one.frames) + _apart(common, other.frames)
         found = []
         for frame in common[np.argsort(apart, kind="stable")[:_LOOKED_AT]]:
@@ -62,7 +77,7 @@ class Places:
             there = beside.boxes[np.searchsorted(beside.frames, frame)]
             near = np.hypot(*(here[:2] - there[:2])) < (one.size[0] + other.size[0]) / 2
             found.append(near and footprint_overlap(here, one.size, there, other.size))
-        return float(np.median(found)) > self.config.overlap
+        return float(np.median(found))
 
     def _way(self, one: Completed) -> Way:
         name = one.seen.name
