@@ -167,6 +167,18 @@ def test_an_object_out_of_sight_goes_on_and_one_gone_too_long_does_not():
     assert len(link(gone, config)) == 2
 
 
+def test_an_object_of_which_less_is_seen_stays_the_same():
+    """A lorry of 8 m that turns until only its rear is seen: its middle jumps, its rear does not."""
+    lengths = [8.0] * 5 + [0.4] * 5
+    scans = [
+        Seen(i, np.array([(length / 2, 0.0, 0.0)]), np.array([(length, 2.5, 3.0)]))
+        for i, length in enumerate(lengths)
+    ]
+    (found,) = link(scans, LinkConfig())
+    assert found.frames == list(range(10))
+    assert found.velocity == pytest.approx(np.zeros(3))
+
+
 def test_the_fullest_scan_of_each_part_is_completed():
     points = (10, 90, 70, 20, 80, 30, 5, 6, 7)
     one = Sightings("a", tuple(range(9)), ((0,),) * 9, points)

@@ -138,10 +138,10 @@ class LinkConfig:
         fewest_scans: shorter tracks are left out.
     """
 
-    gate_m: float = 2.0
-    gate_per_tick_m: float = 0.5
-    longest_gap: int = 4
-    size_weight: float = 0.3
+    gate_m: float = 1.5
+    gate_per_tick_m: float = 0.1
+    longest_gap: int = 8
+    size_weight: float = 0.15
     velocity_gain: float = 0.3
     fewest_scans: int = 4
 

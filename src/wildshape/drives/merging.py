@@ -49,8 +49,10 @@ class Places:
             if shared[i, j] <= self.config.overlap:
                 break
             one, other = group[i], group[j]
+            if one is other:
+                continue
             across = [shared[min(pair), max(pair)] for pair in product(one, other)]
-            if one is not other and not any(0 <= part < self.config.apart for part in across):
+            if not any(0 <= part < self.config.apart for part in across):
                 one += other
                 group.update(dict.fromkeys(other, one))
         groups = {id(of): sorted(of) for of in group.values()}

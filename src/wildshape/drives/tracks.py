@@ -81,7 +81,9 @@ def _assigned(live: list[Linked], seen: Seen, config: LinkConfig) -> dict[int, i
     gaps = np.array([seen.tick - one.tick for one in live])
     expected = np.stack([one.centre + one.velocity * gap for one, gap in zip(live, gaps)])
     sizes = np.stack([one.size for one in live])
-    apart = np.linalg.norm((expected[:, None] - seen.centres)[..., :2], axis=-1)
+    apart = np.linalg.norm(
+        _shift(expected[:, None], sizes[:, None], seen.centres, seen.sizes)[..., :2], axis=-1
+    )
     unlike = np.abs(sizes[:, None] - seen.sizes).max(-1)
     gate = config.gate_m + config.gate_per_tick_m * (gaps - 1)
     cost = apart + config.size_weight * unlike
@@ -90,9 +92,27 @@ def _assigned(live: list[Linked], seen: Seen, config: LinkConfig) -> dict[int, i
     return {int(row): int(one) for one, row in chosen if cost[one, row] < _FORBIDDEN}
 
 
+def _shift(
+    expected: Float[np.ndarray, "*o 3"],
+    size: Float[np.ndarray, "*o 3"],
+    centre: Float[np.ndarray, "*c 3"],
+    seen_size: Float[np.ndarray, "*c 3"],
+) -> Float[np.ndarray, "*b 3"]:
+    """How far something is from where it was expected, the least of its middle and its two ends.
+
+    Where more or less of it is seen than before, one end stays.
+    """
+    middle, wider = centre - expected, (seen_size - size) / 2
+    shifts = np.stack((middle, middle - wider, middle + wider))
+    least = np.abs(shifts).argmin(0)
+    return np.take_along_axis(shifts, least[None], axis=0)[0]
+
+
 def _go_on(one: Linked, seen: Seen, row: int, config: LinkConfig) -> None:
     """An object seen again."""
-    velocity = (seen.centres[row] - one.centre) / (seen.tick - one.tick)
+    gap = seen.tick - one.tick
+    expected = one.centre + one.velocity * gap
+    shift = _shift(expected, one.size, seen.centres[row], seen.sizes[row])
     gain = config.velocity_gain if len(one.frames) > 1 else 0.5
-    one.velocity = (1 - gain) * one.velocity + gain * velocity
+    one.velocity = one.velocity + gain * shift / gap
     one.centre, one.size, one.tick = seen.centres[row], seen.sizes[row], seen.tick
