@@ -168,7 +168,7 @@ def test_an_object_out_of_sight_goes_on_and_one_gone_too_long_does_not():
 
 
 def test_an_object_of_which_less_is_seen_stays_the_same():
-    """A lorry of 8 m that turns until only its rear is seen: its middle jumps, its rear does not."""
+    """A lorry of 8 m, and then its rear alone: its middle jumps, its rear does not."""
     lengths = [8.0] * 5 + [0.4] * 5
     scans = [
         Seen(i, np.array([(length / 2, 0.0, 0.0)]), np.array([(length, 2.5, 3.0)]))
