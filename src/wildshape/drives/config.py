@@ -140,7 +140,7 @@ class LinkConfig:
 
     gate_m: float = 1.5
     gate_per_tick_m: float = 0.1
-    longest_gap: int = 8
+    longest_gap: int = 4
     size_weight: float = 0.15
     velocity_gain: float = 0.3
     fewest_scans: int = 4
