@@ -1,14 +1,42 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Memory kept between steps: on glibc the setting is accepted, elsewhere it is a no-op."""
+"""Memory kept between steps and for matrix products."""
 
+import os
 import platform
 import subprocess
 import sys
 
+import pytest
+import torch
+
 from wildshape.ops import device as allocator
 
 PROGRAM = "from wildshape.ops.device import keep_memory; print(keep_memory())"
+PRODUCT = """
+import resource, torch
+from pathlib import Path
+from wildshape.ops.device import choose_device
+choose_device("cpu")
+a, b = torch.randn(64, 512), torch.randn(512, 1024)
+first, second = torch.zeros(2, 64, 1024)
+pages = int(Path("/proc/self/statm").read_text().split()[0])
+resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize(), -1))
+torch.mm(a, b, out=first)
+resource.setrlimit(resource.RLIMIT_AS, (-1, -1))
+torch.mm(a, b, out=second)
+print(torch.equal(first, second))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is limited as Linux does")
+@pytest.mark.skipif(not torch.backends.mkl.is_available(), reason="this torch has no MKL")
+def test_a_product_is_the_same_where_no_memory_is_left():
+    alone = {**os.environ, "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", PRODUCT], capture_output=True, text=True, env=alone
+    )
+    assert done.stdout.strip() == "True", done.stderr
 
 
 def test_takes_effect_on_glibc():

@@ -19,6 +19,7 @@ from wildshape.io.output import (
     command_line,
     file_name,
     provenance,
+    remove_leftovers,
     unfinished,
 )
 from wildshape.io.progress import SILENT, Progress
@@ -98,6 +99,7 @@ class PackedStore(_Folder):
         lock_folder(self.path)
         if self._is_ours():
             self.progress.say(f"going on with the unfinished store in {self.path}")
+            remove_leftovers(self.path)
         else:
             self._make_room()
         if is_joining(self.path):

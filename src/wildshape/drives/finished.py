@@ -27,11 +27,12 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detections import pose_of
 from wildshape.io.boxes.table import BoxRow, read_box_table
 from wildshape.io.guard import read_json, read_record, reading
-from wildshape.io.output import MARKER
+from wildshape.io.output import MARKER, file_name
 from wildshape.io.poses import read_poses, read_tum
 from wildshape.io.scans.points import read_points
 from wildshape.records import Box, Points
 
+_LATEST_S = 9e9  # nanoseconds of it fit into 64 bits
 _PERIOD_S = 0.1  # of a scan, where no times are known
 
 
@@ -192,12 +193,14 @@ def read_finished(out: Path | str) -> FinishedDrive:
     T_level_sensor = level_poses(read_poses(out / TRAJECTORY, len(names)), mounting)
     ticks, _ = read_tum(out / TUM)
     for path, at in ((out / FRAMES, times or ()), (out / TUM, ticks)):
-        if not all(before < after < math.inf for before, after in pairwise(at)):
-            raise BadInputError(f"{path}: its times do not rise; write it anew.")
+        rising = all(before < after for before, after in pairwise(at))
+        if not rising or not all(abs(time) < _LATEST_S for time in at):
+            raise BadInputError(f"{path}: its times do not rise, or are none; write it anew.")
     rows: dict[str, list[BoxRow]] = defaultdict(list)
     for row in read_box_table(out / BOXES):
         if not 0 <= row.frame < len(names):
             raise BadInputError(f"{out / BOXES}: frame {row.frame} of {len(names)}; write it anew.")
+        file_name(row.track)
         if any(row.frame <= one.frame for one in rows[row.track][-1:]):
             raise BadInputError(
                 f"{out / BOXES}: the frames of track '{row.track}' do not rise; write it anew."
@@ -222,6 +225,7 @@ def _read_record(path: Path) -> dict[str, Any]:
         source, topic = (record["settings"].get(name) for name in ("source", "topic"))
         if not isinstance(source, str) or not isinstance(topic, str | None):
             raise ValueError(f"source {source!r}, topic {topic!r}")
+        file_name(Path(source).name)
         return record
 
 

@@ -169,7 +169,7 @@ def file_name(name: str) -> str:
     Raises:
         BadInputError: it is no plain file name.
     """
-    if not name or Path(name).name != name or name.startswith("."):
+    if not name or Path(name).name != name or name.startswith(".") or "\0" in name:
         raise BadInputError(f"'{name}': a track or scan of this name cannot become a file; rename.")
     return name
 

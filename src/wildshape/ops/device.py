@@ -4,6 +4,7 @@
 
 import ctypes
 import platform
+from mmap import mmap
 
 import torch
 
@@ -11,20 +12,37 @@ from wildshape.errors import BadInputError
 
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 _NEVER = 2**31 - 1
+_WORKSPACE_BYTES = 32 << 20
 
 
 def choose_device(device: str) -> str:
-    """What torch calls it; `auto` is the GPU where there is one.
+    """What torch calls it, made ready; `auto` is the GPU where there is one.
 
     Raises:
         BadInputError: a GPU is asked for, and torch finds none.
+        OSError: a processor without memory for its matrix products.
     """
     found = torch.cuda.is_available()
     if device.startswith("cuda") and not found:
         raise BadInputError(f"--device {device}: torch finds no GPU here; use --device cpu.")
     if device == "auto":
-        return "cuda" if found else "cpu"
+        device = "cuda" if found else "cpu"
+    if device == "cpu":
+        _take_workspace()
     return device
+
+
+def _take_workspace() -> None:
+    """Have MKL take the memory of its matrix products now, and keep it.
+
+    A product that finds no memory later sums in another order without a word, and the last digits
+    of a result differ.
+
+    Raises:
+        OSError: there is none now.
+    """
+    mmap(-1, _WORKSPACE_BYTES).close()
+    torch.mm(torch.zeros(64, 64), torch.zeros(64, 8192))  # takes as much as any larger one
 
 
 def keep_memory() -> bool:

@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 from tests.cars import drive_by
 
+from wildshape.datasets.destinations import PackedStore
 from wildshape.datasets.tracks.conversion import STORE, TRACKS, convert_part, finished_part
 from wildshape.datasets.tracks.source import Source
 from wildshape.datasets.tracks.truth import TruthBuilder
 from wildshape.errors import BadInputError
+from wildshape.io.store import join
+from wildshape.io.store.layout import INDEX_JSON, PARTS
 from wildshape.io.store.store import open_store
 from wildshape.io.tracks import read_track
 from wildshape.records import Track
@@ -90,6 +93,28 @@ def test_the_first_of_two_that_make_one_part_stays(tmp_path):
     convert_part(Made(2), "part", tmp_path / "0")
     assert (tmp_path / "0" / "part.json").stat().st_ino == before
     assert [path.name for path in tmp_path.iterdir()] == ["0"]
+
+
+def test_a_conversion_killed_while_it_names_its_index_leaves_nothing(tmp_path, monkeypatch):
+    out = tmp_path / "store"
+    destination = PackedStore(out, {}, overwrite=False)
+    destination.begin()
+    result = convert_part(Made(2), "part", out / PARTS / "0")
+    real = join.write_json
+
+    def killed(path, data):
+        if path.name == INDEX_JSON:
+            (out / ".killed.part").write_bytes(b"{")
+            raise KeyboardInterrupt
+        real(path, data)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(join, "write_json", killed)
+        with pytest.raises(KeyboardInterrupt):
+            destination.finish([(out / PARTS / "0", result)])
+    assert PackedStore(out, {}, overwrite=False).begin() == [result]
+    assert len(open_store(out)) == 2
+    assert not list(out.glob(".*"))
 
 
 def test_memory_does_not_grow_with_the_part(tmp_path):
