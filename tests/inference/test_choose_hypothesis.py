@@ -58,9 +58,9 @@ def test_a_second_look_never_costs_more_and_is_for_tilted_scans_alone(monkeypatc
     given = network_input(scans, of.input_points, of.sensor, of.facing)
     seen = []
 
-    def counted(network, settings, given):
+    def counted(network, settings, given, sights):
         seen.append(len(given.scans))
-        return look(network, settings, given)
+        return look(network, settings, given, sights)
 
     first = look(predictor.network, of, given)
     monkeypatch.setattr(module, "look", counted)

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rays of simulated frames: true of the object, and nothing else than the scans had changes."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from wildshape.geometry.projection.sight_lines import standing
@@ -9,8 +11,8 @@ from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
 
 def test_no_ray_that_came_back_passed_through_the_object() -> None:
-    plain = SimulationConfig(tracks=1, scans=4, occlusion=0.999)
-    config = SimulationConfig(tracks=1, scans=4, occlusion=0.999, rays=2048)
+    plain = SimulationConfig(tracks=1, scans=4, occlusion=0.999, far_m=15.0)
+    config = replace(plain, rays=2048)
     (before,), (track,) = (list(simulate_tracks(one, 7, workers=1)) for one in (plain, config))
     assert before.rays == ()
     assert all(map(np.array_equal, before.scans, track.scans))
@@ -24,4 +26,4 @@ def test_no_ray_that_came_back_passed_through_the_object() -> None:
         assert 100 < len(rays.returned) < len(rays) <= 2048
         posed = (track.T_sensor_object[i].apply_numpy(one) for one in (body, larger))
         true, wrong = (standing(shape, scan, rays).free.mean() for shape in posed)
-        assert true < 0.02 < 0.1 < wrong
+        assert true < 0.03 < 0.1 < wrong

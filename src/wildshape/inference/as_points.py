@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is handed in from Python as a scan."""
 
+from collections.abc import Mapping, Sequence
 from operator import attrgetter
 from pathlib import Path
 
@@ -9,9 +10,11 @@ import numpy as np
 from torch import Tensor
 
 from wildshape.errors import BadInputError
+from wildshape.io.rays import read_rays
 from wildshape.io.scans.points import LEAST_POINTS, check_near, drop_nonfinite, read_scan
-from wildshape.records import Points
+from wildshape.records import Points, SightLines
 
+_RAYS = ("directions", "ranges", "origins")
 _OPEN3D_TENSOR = "point.positions"
 _PLACES = ("xyz", "vertices", _OPEN3D_TENSOR, "points")
 
@@ -62,3 +65,39 @@ def _coordinates(scan: object) -> object:
             continue
         return held.cpu().numpy() if place == _OPEN3D_TENSOR else held
     return scan
+
+
+def as_rays(rays: object, name: str = "rays") -> SightLines | None:
+    """Rays handed in from Python; None for none.
+
+    Args:
+        rays: `SightLines`, a path of their file, a dict with `directions`, `ranges` and perhaps
+            `origins`, or these in a tuple.
+        name: for the error.
+
+    Raises:
+        BadInputError: they are no rays.
+    """
+    if rays is None or isinstance(rays, SightLines):
+        return rays
+    if isinstance(rays, str | Path):
+        return read_rays(rays)
+    if isinstance(rays, Mapping):
+        rays = tuple(rays[key] for key in _RAYS if rays.get(key) is not None)
+    if not isinstance(rays, tuple | list) or len(rays) not in (2, 3):
+        raise BadInputError(f"{name}: expected directions (m, 3), ranges (m,) and perhaps origins.")
+    try:
+        return SightLines(*(np.asarray(part, np.float32) for part in rays))
+    except (TypeError, ValueError) as error:
+        raise BadInputError(f"{name}: {str(error).removeprefix('rays: ')}") from error
+
+
+def rays_of_each(rays: Sequence[object], scans: Sequence[object]) -> list[SightLines | None]:
+    """`as_rays` of one set a scan, or of none at all.
+
+    Raises:
+        BadInputError: another number of sets than of scans, or no rays.
+    """
+    if rays and len(rays) != len(scans):
+        raise BadInputError(f"{len(rays)} sets of rays for {len(scans)} scans; give one a scan.")
+    return [as_rays(one, f"rays {i}") for i, one in enumerate(rays)]

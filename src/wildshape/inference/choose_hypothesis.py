@@ -20,8 +20,10 @@ from wildshape.geometry.centring import scan_centre
 from wildshape.geometry.projection.line_of_sight import face, roll, roll_angle
 from wildshape.geometry.projection.visibility import Projection
 from wildshape.geometry.sampling import drawn, sorted_points
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.confidence import look_features
 from wildshape.inference.config import HypothesisRule
+from wildshape.inference.free_space import SeenScores, Sights
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.network import Poses, ShapePoseNet
@@ -180,9 +182,35 @@ class Found(NamedTuple):
         return Found(*(old.index_copy(0, rows, part) for old, part in zip(self, new)))
 
 
-def look(network: ShapePoseNet, settings: ModelSettings, inputs: NetworkInput) -> Found:
+class Posed(NamedTuple):
+    """What is made of a batch of scans.
+
+    Attributes:
+        shapes: the network's points, canonical frame.
+        T_sensor_canonical: their poses.
+        points: of the complete shapes, sensor frames, those of `shapes` first.
+    """
+
+    shapes: Float[Tensor, "B P 3"]
+    T_sensor_canonical: SE3
+    points: Float[Tensor, "B Q 3"]
+
+    @classmethod
+    def of(cls, found: Found) -> "Posed":
+        """As the network says."""
+        T_sensor_canonical = SE3(found.rotation, found.translation)
+        return cls(found.shapes, T_sensor_canonical, T_sensor_canonical.apply(found.shapes))
+
+
+def look(
+    network: ShapePoseNet,
+    settings: ModelSettings,
+    inputs: NetworkInput,
+    sights: Sights | None = None,
+) -> Found:
     """Shapes, and the poses of the hypotheses that speak, from prepared scans."""
-    found = choose_hypothesis(network, inputs.scans, inputs.centres, settings)
+    score = score_hypotheses if sights is None else SeenScores(sights, inputs.turn)
+    found = choose_hypothesis(network, inputs.scans, inputs.centres, settings, score)
     features = look_features(inputs.scans, found.posed, found.scores, found.poses, found.believed)
     return in_sensor_frame(found, inputs, settings, features)
 
@@ -205,13 +233,15 @@ def look_twice(
     settings: ModelSettings,
     inputs: NetworkInput,
     rule: HypothesisRule = _RULE,
+    sights: Sights | None = None,
 ) -> Found:
     """`look`, and a second one at the scans that turn out to be tilted, rolled upright."""
-    first = look(network, settings, inputs)
+    first = look(network, settings, inputs, sights)
     angle = roll_angle(inputs.turn @ first.rotation)
     rows = torch.nonzero(angle.abs() > rule.upright_rad)[:, 0]
     if len(rows) == 0:
         return first
-    second = look(network, settings, inputs.part(rows).rolled(angle[rows]))
+    again = None if sights is None else sights.part(rows)
+    second = look(network, settings, inputs.part(rows).rolled(angle[rows]), again)
     cheaper = torch.nonzero(second.cost < first.cost[rows])[:, 0]
     return first.replaced(rows[cheaper], second.part(cheaper))

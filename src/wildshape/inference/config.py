@@ -204,6 +204,27 @@ class BoxConfig:
 
 
 @dataclass(frozen=True)
+class FreeSpaceConfig:
+    """How the rays of a frame are held against a shape (`free_space.py`).
+
+    Attributes:
+        nearest: rays that pass a point nearest and must agree; 0: rays are not used.
+        within_m: rays that pass farther away say nothing of a point.
+        beyond_m: a ray passed a point, or ended before it, by at least this.
+        free_m: a hypothesis costs this times the share of its shape that stands in free space.
+        low_m: points so little above a shape's lowest one are never taken out of it.
+        least_kept: a shape of which less than this share would be left stays as it is.
+    """
+
+    nearest: int = 3
+    within_m: float = 0.15
+    beyond_m: float = 0.1
+    free_m: float = 0.5
+    low_m: float = 0.4
+    least_kept: float = 0.5
+
+
+@dataclass(frozen=True)
 class ReasonRule:
     """When a result is flagged as not to be trusted (`confidence.py`).
 
@@ -258,6 +279,7 @@ class InferenceConfig:
         refine: how one completion is fitted to its scan.
         track: how the scans of a track make one object.
         box: how a box is laid around a shape.
+        free_space: how the rays of a frame are held against a shape.
         reasons: when a result is flagged.
         inliers: which points count for a registration's inlier ratio.
         ground_share: a scan of which more than this share is ground beside the object is given to
@@ -268,6 +290,7 @@ class InferenceConfig:
     refine: RefineConfig = field(default_factory=RefineConfig)
     track: TrackConfig = field(default_factory=TrackConfig)
     box: BoxConfig = field(default_factory=BoxConfig)
+    free_space: FreeSpaceConfig = field(default_factory=FreeSpaceConfig)
     reasons: ReasonRule = field(default_factory=ReasonRule)
     inliers: InlierRule = field(default_factory=InlierRule)
     ground_share: float = 0.05

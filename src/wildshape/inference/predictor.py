@@ -7,18 +7,15 @@ from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import torch
-from jaxtyping import Float
-from torch import Tensor
 
 from wildshape.geometry.ground import skirt
 from wildshape.geometry.sampling import sorted_points
 from wildshape.geometry.transforms.se3 import SE3, stack
-from wildshape.inference.as_points import as_points
+from wildshape.inference.as_points import as_points, rays_of_each
 from wildshape.inference.boxes import box_seen
-from wildshape.inference.choose_hypothesis import Found, look, look_twice, network_input
+from wildshape.inference.choose_hypothesis import Found, Posed, look, look_twice, network_input
 from wildshape.inference.compiled import compiled
 from wildshape.inference.confidence import (
     confidence_of,
@@ -28,6 +25,7 @@ from wildshape.inference.confidence import (
     warning_of,
 )
 from wildshape.inference.config import InferenceConfig
+from wildshape.inference.free_space import Rays, Sights, without_free_space
 from wildshape.inference.refine import Refined, denser, refine, with_scan
 from wildshape.inference.registration import fuse_scans, inlier_ratio, to_middle
 from wildshape.inference.tracks.complete_track import complete_together
@@ -112,27 +110,41 @@ class Predictor:
         other.network = compiled(self.network, self.settings.input_points)
         return other
 
-    def complete(self, points: object, sensor: Sensor | None = None) -> Completion:
+    def complete(
+        self, points: object, sensor: Sensor | None = None, *, rays: object = None
+    ) -> Completion:
         """The complete shape of the object of one scan.
 
         Args:
             points: `(n, 3)` array or tensor, sensor frame, metres.
             sensor: how it was taken; by default as the scans trained on.
+            rays: of the same frame that passed the object by, if known: `SightLines`, a file of
+                them, or `directions`, `ranges` and perhaps `origins` as a dict or a tuple.
 
         Raises:
-            BadInputError: not `(n, 3)`, or fewer than 16 finite points.
+            BadInputError: not `(n, 3)`, fewer than 16 finite points, or no rays.
         """
-        return next(self.complete_many([points], sensor))
+        return next(self.complete_many([points], sensor, rays=[rays]))
 
     def complete_many(
-        self, scans: Sequence[object], sensor: Sensor | None = None
+        self,
+        scans: Sequence[object],
+        sensor: Sensor | None = None,
+        *,
+        rays: Sequence[object] = (),
     ) -> Iterator[Completion]:
         """`complete` for many scans, in batches; each is completed on its own."""
+        known = rays_of_each(rays, scans)
         for start in range(0, len(scans), _BATCH):
-            yield from self._each(_checked(scans[start : start + _BATCH], start), sensor)
+            part = slice(start, start + _BATCH)
+            yield from self._each(_checked(scans[part], start), sensor, known[part])
 
     def complete_track(
-        self, scans: Sequence[object], sensor: Sensor | None = None
+        self,
+        scans: Sequence[object],
+        sensor: Sensor | None = None,
+        *,
+        rays: Sequence[object] = (),
     ) -> list[Completion]:
         """One shape from all scans of a track, in time order, posed in each of them.
 
@@ -142,33 +154,42 @@ class Predictor:
         Raises:
             BadInputError: a scan is not `(n, 3)`, or has fewer than 16 finite points.
         """
-        return self._together(_checked(scans), sensor)
+        return self._together(_checked(scans), sensor, rays_of_each(rays, scans))
 
     def complete_checked(
-        self, scans: Sequence[Points], sensor: Sensor | None = None, *, track: bool = False
+        self,
+        scans: Sequence[Points],
+        sensor: Sensor | None = None,
+        *,
+        track: bool = False,
+        rays: Rays = (),
     ) -> Iterable[Completion]:
         """`complete_many`, or with `track` `complete_track`, of scans that are known to be such.
 
         What `io` reads has passed `check_scan`; it is not checked again.
         """
-        return self._together(scans, sensor) if track else self._each(scans, sensor)
+        return self._together(scans, sensor, rays) if track else self._each(scans, sensor, rays)
 
-    def _each(self, scans: Sequence[Points], sensor: Sensor | None) -> Iterator[Completion]:
+    def _each(
+        self, scans: Sequence[Points], sensor: Sensor | None, rays: Rays = ()
+    ) -> Iterator[Completion]:
         for start in range(0, len(scans), _BATCH):
             began = time.perf_counter()
             batch = list(scans[start : start + _BATCH])
-            done = self._complete_batch(batch, sensor)
+            done = self._complete_batch(batch, sensor, rays[start : start + _BATCH])
             seconds = (time.perf_counter() - began) / len(batch)
             yield from (replace(item, seconds=seconds) for item in done)
 
-    def _together(self, scans: Sequence[Points], sensor: Sensor | None) -> list[Completion]:
+    def _together(
+        self, scans: Sequence[Points], sensor: Sensor | None, rays: Rays = ()
+    ) -> list[Completion]:
         began = time.perf_counter()
-        alone = list(self._each(scans, sensor))
+        alone = list(self._each(scans, sensor, rays))
         clouds = [
             self._off_ground(cloud, done.pose.inverse().apply_numpy(done.points), done.pose)
             for cloud, done in zip(scans, alone)
         ]
-        done = complete_together(alone, clouds, self.settings, self.config)
+        done = complete_together(alone, clouds, self.settings, self.config, rays)
         seconds = (time.perf_counter() - began) / max(len(done), 1)
         return [replace(item, seconds=seconds) for item in done]
 
@@ -216,32 +237,39 @@ class Predictor:
         return fuse_scans(clouds, to_middle(stack([item.pose for item in done])))
 
     @torch.inference_mode()
-    def _complete_batch(self, scans: list[Points], sensor: Sensor | None) -> list[Completion]:
-        found = self._found(scans)
+    def _complete_batch(
+        self, scans: list[Points], sensor: Sensor | None, rays: Rays
+    ) -> list[Completion]:
+        known = any(one is not None for one in rays)
+        sights = Sights(scans, rays, self.config.free_space) if known else None
+        found = self._found(scans, sights)
         seen = self._off_their_ground(scans, found)
         least = 1 - self.config.ground_share
         much = [len(kept) < least * len(scan) for kept, scan in zip(seen, scans)]
         if any(much):  # the network has seen the ground, too: once more without it
             rows = torch.tensor(much).nonzero()[:, 0]
-            again = self._found([seen[int(row)] for row in rows])
+            again = self._found([seen[int(row)] for row in rows], sights and sights.part(rows))
             found = found.replaced(rows, again)
             seen = self._off_their_ground(scans, found)
         posed = (
             self._refined([sorted_points(one) for one in seen], found)
             if self.refines
-            else _Posed.of(found)
+            else Posed.of(found)
         )
         clouds = zip(scans, seen)
-        return [self._completion(*both, i, found, posed, sensor) for i, both in enumerate(clouds)]
+        return [
+            self._completion(*both, i, found, posed, sensor, sights)
+            for i, both in enumerate(clouds)
+        ]
 
-    def _found(self, scans: list[Points]) -> Found:
+    def _found(self, scans: list[Points], sights: Sights | None) -> Found:
         """What the network says of scans, on the host."""
         of = self.settings
         inputs = network_input(scans, of.input_points, of.sensor, of.facing).to(self.device)
         if of.facing:
-            found = look_twice(self.network, of, inputs, self.config.hypothesis)
+            found = look_twice(self.network, of, inputs, self.config.hypothesis, sights)
         else:
-            found = look(self.network, of, inputs)
+            found = look(self.network, of, inputs, sights)
         return Found(*(part.cpu() for part in found))
 
     def _off_their_ground(self, scans: list[Points], found: Found) -> list[Points]:
@@ -251,7 +279,7 @@ class Predictor:
             for scan, shape, rotation, translation in zip(scans, *found[:3])
         ]
 
-    def _refined(self, seen: list[Points], found: Found) -> "_Posed":
+    def _refined(self, seen: list[Points], found: Found) -> Posed:
         """Shapes and poses fitted to the scans (`refine.py`), and twice as many points of each."""
         on_device = (part.to(self.device) for part in found[:3])
         up = None if self.up is None else torch.tensor(self.up, dtype=torch.float64).to(self.device)
@@ -261,7 +289,7 @@ class Predictor:
         done = Refined(*(part.cpu() for part in done))
         T_sensor_canonical = SE3(done.rotation, done.translation)
         posed = T_sensor_canonical.to(torch.float32).apply(done.shapes)
-        return _Posed(done.shapes, T_sensor_canonical, denser(posed, done.partner))
+        return Posed(done.shapes, T_sensor_canonical, denser(posed, done.partner))
 
     def _completion(
         self,
@@ -269,8 +297,9 @@ class Predictor:
         seen: Points,
         i: int,
         found: Found,
-        posed: "_Posed",
+        posed: Posed,
         sensor: Sensor | None,
+        sights: Sights | None,
     ) -> Completion:
         """Scan `i` of those found; `seen`: without ground."""
         mirror, cost = self.settings.network.mirror, float(found.cost[i])
@@ -282,12 +311,15 @@ class Predictor:
         reasons += reasons_of_result(cost, confidence, self.settings, rule)
         shape, T_sensor_can, points = posed.shapes[i], posed.T_sensor_canonical[i], posed.points[i]
         exact = self.settings.sensor == "camera"
-        whole = points.numpy()
+        whole, solid = points.numpy(), shape
+        if sights is not None:
+            alone = sights.part(torch.tensor([i]))
+            solid = without_free_space(shape, stack([T_sensor_can]), alone)
         return Completion(
             points=with_scan(whole, len(shape), scan) if exact and self.refines else whole,
             pose=T_sensor_can.to(torch.float64),
             box=box_seen(
-                shape, T_sensor_can, seen, mirror=mirror, body=not exact, config=self.config.box
+                solid, T_sensor_can, seen, mirror=mirror, body=not exact, config=self.config.box
             ),
             confidence=confidence,
             branch=int(found.branch[i]),
@@ -305,26 +337,6 @@ class Predictor:
         T_canonical_sensor = T_sensor_canonical.to(torch.float64).inverse()
         kept = scan[~skirt(T_canonical_sensor.apply_numpy(scan), shape)]
         return kept if len(kept) >= LEAST_POINTS else scan
-
-
-class _Posed(NamedTuple):
-    """What is made of a batch of scans.
-
-    Attributes:
-        shapes: the network's points, canonical frame.
-        T_sensor_canonical: their poses.
-        points: of the complete shapes, sensor frames, those of `shapes` first.
-    """
-
-    shapes: Float[Tensor, "B P 3"]
-    T_sensor_canonical: SE3
-    points: Float[Tensor, "B Q 3"]
-
-    @classmethod
-    def of(cls, found: Found) -> "_Posed":
-        """As the network says."""
-        T_sensor_canonical = SE3(found.rotation, found.translation)
-        return cls(found.shapes, T_sensor_canonical, T_sensor_canonical.apply(found.shapes))
 
 
 def _checked(scans: Sequence[object], first: int = 0) -> list[Points]:

@@ -3,11 +3,13 @@
 """Whatever a user points at, as tracks: a packed store, a DATASET, a TRACK, scans, or one scan."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 
 from wildshape.errors import BadInputError
 from wildshape.io.progress import counted
+from wildshape.io.rays import read_rays
 from wildshape.io.scans.points import (
     SENSOR_METRES,
     SUFFIXES,
@@ -184,6 +186,23 @@ def open_tracks(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> T
         scan_files(path / "scans")
         return TrackSource(path, (_name(path),), lambda _: read_track_file(path, coordinates))
     return _folder(path, coordinates)
+
+
+def with_rays(source: TrackSource, path: Path, coordinates: Coordinates) -> TrackSource:
+    """The one scan of a source with the rays in a file.
+
+    Raises:
+        BadInputError: there are several tracks or scans, or the file holds no rays.
+    """
+    rays = read_rays(path, coordinates)
+    track = source.single("--rays")
+    if len(track.scans) != 1:
+        raise BadInputError(
+            f"{path}: rays of one scan, but {source.path} holds {len(track.scans)}; keep those of a"
+            " track in its folder rays/, named as the scans."
+        )
+    seen = TrackFile(replace(track, rays=(rays,)), source.skipped_in(track.name))
+    return TrackSource(source.path, source.names, lambda _: seen)
 
 
 def _checked(track: Track) -> TrackFile:

@@ -29,6 +29,7 @@ class Scores(NamedTuple):
         to_shape: neighbours of scan points in the posed shape.
         to_scan: neighbours of posed points in the scan.
         visible: the posed points that the sensor would see.
+        free_space: what shape costs that stands where rays passed, metres, where any are known.
     """
 
     observation: Float[Tensor, "B H"]
@@ -36,10 +37,12 @@ class Scores(NamedTuple):
     to_shape: Int[Tensor, "B H N"]
     to_scan: Int[Tensor, "B H P"]
     visible: Bool[Tensor, "B H P"]
+    free_space: Float[Tensor, "B H"] | None = None
 
     def cost(self, beta: float) -> Float[Tensor, "B H"]:
-        """The label-free cost of each hypothesis, metres (METHOD 6)."""
-        return self.observation + beta * self.projection
+        """The label-free cost of each hypothesis, metres (METHOD 6, 13)."""
+        cost = self.observation + beta * self.projection
+        return cost if self.free_space is None else cost + self.free_space
 
 
 def _mean_distance(found: Neighbours, counted: Tensor | None = None) -> Tensor:

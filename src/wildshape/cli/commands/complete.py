@@ -56,6 +56,10 @@ class Settings:
     input: Input
     out: Out = None
     scans: Scans = DEFAULT_SCANS
+    rays: Annotated[
+        Path | None,
+        option(metavar="FILE", help="of one scan: rays of its frame that passed the object by"),
+    ] = None
     cloud_format: Annotated[Literal["ply", "pcd"], arg(help="of the shapes")] = "ply"
     mesh: Annotated[bool, arg(help="also write a closed mesh of each shape")] = False
     mesh_format: Annotated[Literal["ply", "obj", "glb"], arg(help="of the meshes")] = "ply"
@@ -113,7 +117,11 @@ def _options(settings: Settings) -> "FolderOptions":
     wanted = bool(settings.boxes or settings.calibration)
     boxes = BoxFiles(settings.boxes, settings.calibration) if wanted else None
     return replace(
-        settings.scans.of_folder(), clouds=settings.cloud_format, mesh=_mesh(settings), boxes=boxes
+        settings.scans.of_folder(),
+        rays=settings.rays,
+        clouds=settings.cloud_format,
+        mesh=_mesh(settings),
+        boxes=boxes,
     )
 
 
@@ -141,7 +149,7 @@ def _to_stdout(settings: Settings) -> None:
         refuse_terminal()
     track = _one_scan(settings)
     predictor = load(settings.scans.network.model, settings.scans.network.device)
-    (done,) = predictor.complete_checked(track.scans, track.sensor)
+    (done,) = predictor.complete_checked(track.scans, track.sensor, rays=track.rays)
     if done.reasons:
         say(reasons_sentence(done))
     if settings.scans.json:
@@ -153,10 +161,12 @@ def _to_stdout(settings: Settings) -> None:
 def _one_scan(settings: Settings) -> "Track":
     from wildshape.cli.pipe import as_file
     from wildshape.cli.terminal import say
-    from wildshape.io.inputs import open_tracks
+    from wildshape.io.inputs import open_tracks, with_rays
 
     with as_file(settings.input, settings.format) as path:
         source = open_tracks(path, settings.scans.files.coordinates)
+        if settings.rays is not None:
+            source = with_rays(source, settings.rays, settings.scans.files.coordinates)
         track = source.single("--out -")
     if len(track.scans) != 1:
         raise BadInputError(

@@ -52,7 +52,9 @@ def run(settings: Settings) -> None:
     source = open_tracks(settings.track, asked.files.coordinates)
     track = source.single("fuse")
     predictor = load(asked.network.model, asked.network.device)
-    done = list(predictor.complete_checked(track.scans, track.sensor, track=asked.together))
+    done = list(
+        predictor.complete_checked(track.scans, track.sensor, track=asked.together, rays=track.rays)
+    )
     fused = fuse_scans(track.scans, to_middle(stack([scan.pose for scan in done])))
     write_cloud(settings.out, fused)
     say_skipped(source.skipped)

@@ -20,7 +20,7 @@ from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.registration import to_middle
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import reading
-from wildshape.io.inputs import TrackSource, open_tracks
+from wildshape.io.inputs import TrackSource, open_tracks, with_rays
 from wildshape.io.output import Output, begin, file_name, keep_apart
 from wildshape.io.poses import times_of, write_poses, write_trajectory, write_tum
 from wildshape.io.progress import SILENT, Progress, counted, duration
@@ -60,6 +60,7 @@ class FolderOptions:
         model: checkpoint, None for the shipped one.
         device: `auto`, `cpu` or `cuda`.
         coordinates: of the files that are read.
+        rays: of the one scan that is completed, if they lie elsewhere than in its track's folder.
         track: use all scans of a track together.
         clouds: format of the shapes.
         mesh: also write a closed mesh of each shape, in this way.
@@ -70,6 +71,7 @@ class FolderOptions:
     model: Path | None = None
     device: str = "auto"
     coordinates: Coordinates = SENSOR_METRES
+    rays: Path | None = None
     track: bool = False
     clouds: CloudFormat = "ply"
     mesh: MeshFiles | None = None
@@ -81,6 +83,7 @@ class FolderOptions:
         found = {"input": str(source.resolve()), **asdict(self.coordinates)}
         found["model"] = fingerprint(self.model)
         uses = {"uses": "track"} if self.track else {}
+        uses |= {"rays": str(self.rays.resolve())} if self.rays else {}
         clouds = {} if self.clouds == "ply" else {"clouds": self.clouds}
         mesh = {"mesh": self.mesh.kind} if self.mesh else {}
         colours = {"mesh_colours": "confidence"} if self.mesh and self.mesh.coloured else {}
@@ -172,6 +175,8 @@ def complete_folder(
     if options.boxes is not None:
         options.boxes.check()
     tracks = open_tracks(source, options.coordinates)
+    if options.rays is not None:
+        tracks = with_rays(tracks, options.rays, options.coordinates)
     predictor = load(options.model, options.device)
     keep_apart(source, out)
     command, identity = "register" if registers else "complete", options.identity(source)
@@ -263,7 +268,9 @@ def _write_track(
 ) -> list[Completion]:
     """Complete the scans of a track, writing each into its folder; all but `objects.json`."""
     found: list[Completion] = []
-    for done in predictor.complete_checked(track.scans, track.sensor, track=options.track):
+    for done in predictor.complete_checked(
+        track.scans, track.sensor, track=options.track, rays=track.rays
+    ):
         name = file_name(track.scan_names[len(found)])
         if not registers:
             write_cloud(folder / COMPLETED / f"{name}.{options.clouds}", done.points)

@@ -22,6 +22,7 @@ from wildshape.inference.boxes import carried, fit_to_scans
 from wildshape.inference.choose_hypothesis import network_input
 from wildshape.inference.confidence import judged_again
 from wildshape.inference.config import BoxConfig, InferenceConfig, TrackConfig
+from wildshape.inference.free_space import Rays, Sights, without_free_space
 from wildshape.inference.refine import denser, drawn_to, padded, partners
 from wildshape.inference.tracks.heading_vote import (
     half_turn,
@@ -59,6 +60,7 @@ def complete_together(
     scans: list[Points],
     settings: ModelSettings,
     config: InferenceConfig = _DEFAULT,
+    rays: Rays = (),
 ) -> list[Completion]:
     """Completions of a track's single scans made those of one object.
 
@@ -67,6 +69,7 @@ def complete_together(
         scans: of one rigid object, in time order, sensor frames.
         settings: of the network that completed them.
         config: how they are made so.
+        rays: that passed the object by, one set a scan, if any are known.
     """
     if len(done) < 2:
         return done
@@ -81,7 +84,11 @@ def complete_together(
     shape = unit * drawn_to(shape[None] / unit, padded([seen]), config.track)[0]
     fit = fit._replace(T_sensor_object=_scaled(fit.T_sensor_object, unit))
     body = settings.sensor == "lidar"
-    fitted = _box(shape, scans, fit.T_sensor_object, config.box, mirror=mirror, body=body)
+    solid = shape
+    if any(one is not None for one in rays):
+        sights = Sights(scans, rays, config.free_space)
+        solid = without_free_space(shape, fit.T_sensor_object, sights)
+    fitted = _box(solid, scans, fit.T_sensor_object, config.box, mirror=mirror, body=body)
     whole = _denser(shape, config) if settings.facing else shape
     cost = track_cost(shape, fit.T_sensor_object, scans, settings)
     mean = float(np.mean([item.confidence for item in done]))

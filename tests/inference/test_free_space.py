@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Rays of a frame held against completed shapes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from tests.refusal import refused
+
+import wildshape
+from wildshape.geometry.transforms.se3 import SE3, stack
+from wildshape.inference.as_points import as_rays
+from wildshape.inference.config import FreeSpaceConfig
+from wildshape.inference.free_space import SeenScores, Sights, without_free_space
+from wildshape.io.rays import write_rays
+from wildshape.method.hindsight import score_hypotheses
+from wildshape.records import SightLines, Track
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+
+CONFIG = FreeSpaceConfig()
+
+
+@pytest.fixture(scope="module")
+def track() -> Track:
+    """Two scans of a car that something hides in part."""
+    config = SimulationConfig(tracks=1, scans=2, occlusion=0.999, far_m=15.0, rays=2048)
+    (found,) = simulate_tracks(config, 7, workers=1)
+    return found
+
+
+def test_what_rays_passed_is_taken_off_and_the_object_stays(track: Track) -> None:
+    assert track.shape is not None
+    assert track.T_sensor_object is not None
+    sights = Sights(track.scans, track.rays, CONFIG)
+    truth = torch.from_numpy(track.shape)
+    longer = truth * torch.tensor((1.1, 1.0, 1.0))
+    beyond = longer[:, 0].abs() > truth[:, 0].abs().max() + 0.1
+    kept = without_free_space(truth, track.T_sensor_object, sights)
+    cut = without_free_space(longer, track.T_sensor_object, sights)
+    assert len(kept) > 0.97 * len(truth)
+    assert (cut[:, 0].abs() > truth[:, 0].abs().max() + 0.1).sum() < 0.8 * beyond.sum()
+    nowhere = stack([SE3(pose.rotation, -pose.translation) for pose in track.T_sensor_object])
+    assert torch.equal(without_free_space(truth, nowhere, sights), truth)  # no ray passes there
+
+
+def test_shape_in_free_space_costs_and_what_is_hidden_does_not(track: Track) -> None:
+    """A wall stands in front of half of a plane; the other half is in the way of rays."""
+    y, z = np.meshgrid(np.linspace(-2, 2, 41), np.linspace(-1, 1, 21))
+    plane = np.stack((np.full(y.size, 10.0), y.ravel(), z.ravel()), -1).astype(np.float32)
+    ends = plane * np.where(plane[:, 1:2] > 0, 0.5, 2.0).astype(np.float32)
+    scan = np.array([[10.0, 9.0, 0.0]] * 16, np.float32)
+    centres = torch.tensor([[10.0, 0.0, 0.0]])
+    posed, centred = (torch.from_numpy(one) - centres for one in (plane, scan))
+    sights = Sights([scan], [SightLines.of_returns(ends)], CONFIG)
+    inputs = (centred[None], centres, posed[None, None], wildshape.load().settings.projection)
+    plain, seen = score_hypotheses(*inputs), SeenScores(sights, torch.eye(3)[None])(*inputs)
+    assert seen.free_space is not None
+    assert float(seen.free_space) == pytest.approx(CONFIG.free_m * 0.5, rel=0.05)
+    assert torch.equal(seen.observation, plain.observation)
+    # The nearer half, y > 0, was nearer to the scan: without it the mean is larger.
+    assert float(seen.projection) > float(plain.projection) + 0.5
+    assert float(plain.cost(0.25)) == float(plain.observation + 0.25 * plain.projection)
+
+
+def test_rays_may_be_handed_in_in_any_form_and_none_change_nothing(track: Track, tmp_path) -> None:
+    model = wildshape.load()
+    scan, rays = track.scans[0], track.rays[0]
+    assert rays is not None
+    write_rays(tmp_path / "r.npz", rays)
+    parts = {"directions": rays.directions, "ranges": rays.ranges}
+    forms = (rays, tmp_path / "r.npz", parts, tuple(parts.values()))
+    done = [model.complete(scan, rays=form) for form in forms]
+    assert all(np.array_equal(one.points, done[0].points) for one in done)
+    assert all(one.box == done[0].box for one in done)
+    alone = model.complete(scan)
+    swallowed = replace(rays, ranges=np.full(len(rays), np.inf))  # nothing is known of these
+    for none in (None, rays.part(np.zeros(0, int)), swallowed):
+        same = model.complete(scan, rays=none)
+        assert same.box == alone.box
+        assert same.cost == pytest.approx(alone.cost)
+    together = model.complete_track(track.scans, rays=track.rays)
+    assert len(together) == 2
+    refused(model.complete_track, track.scans, rays=[rays], match="1 sets of rays for 2 scans")
+    refused(as_rays, 3, match="expected directions")
+    refused(as_rays, (np.eye(3), ["a"]), match="rays: could not convert")
