@@ -71,8 +71,8 @@ def dataset(store, tmp_path_factory):
 def short_run(store):
     """The command line of a short training run into a folder."""
 
-    def arguments(out):
-        shape = ("--preset", "tiny", "--steps", STEPS, "--device", "cpu")
+    def arguments(out, steps=STEPS):
+        shape = ("--preset", "tiny", "--steps", steps, "--device", "cpu")
         return [str(argument) for argument in ("train", store, "--out", out, *shape)]
 
     return arguments

@@ -34,7 +34,7 @@ def test_a_teacher_that_is_not_there(refused, store, tmp_path):
 def test_headings_are_asked_of_lidar_weights_for_a_teacher_alone(
     refused, wildshape, store, trained, tmp_path
 ):
-    order = ("train", store, "--out", tmp_path / "run", "--preset", "small", "--steps", 2)
+    order = ("train", store, "--out", tmp_path / "run", "--preset", "tiny", "--steps", 2)
     assert "--teacher" in refused(*order, "--headings", "shipped")
     assert "LiDAR" in refused(*order, "--teacher", trained, "--headings", "airplane", "--overwrite")
     done = wildshape(*order, "--teacher", trained, "--headings", trained, "--overwrite")
