@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from wildshape.drives.config import ClusterConfig
+from wildshape.ops.connected import connected_parts
 from wildshape.records import Points
 
 _SIZED_BY = 1000  # points of a cluster that tell its size
@@ -100,16 +101,10 @@ def connected(points: Float[np.ndarray, "n 3"], reach: float, thin: float = 0.25
     Points are thinned first, to one a cell of `thin` times the reach: a step may be longer or
     shorter by as much.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import KDTree
-
     cells = np.floor(points / (thin * reach)).astype(np.int64)
     number = np.ravel_multi_index(tuple((cells - cells.min(0)).T), np.ptp(cells, axis=0) + 1)
     _, first, cell = np.unique(number, return_index=True, return_inverse=True)
-    pairs = KDTree(points[first]).query_pairs(reach, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs), bool), tuple(pairs.T)), shape=(len(first), len(first)))
-    label = connected_components(links, directed=False)[1][cell]
+    label = connected_parts(points[first].astype(np.float32), reach)[cell]
     order = np.argsort(label, kind="stable")
     parts = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
     return sorted(parts, key=len, reverse=True)

@@ -10,6 +10,7 @@ more; the cheaper answer speaks.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import torch
@@ -39,11 +40,13 @@ class NetworkInput(NamedTuple):
         scans: turned, centred and resampled.
         centres: in the turned sensor frames.
         turn: `R_turned_sensor`; the identity unless scans are turned towards their object.
+        sizes: points of each scan that come first; all others repeat one of them.
     """
 
     scans: Float[Tensor, "B N 3"]
     centres: Float[Tensor, "B 3"]
     turn: Float[Tensor, "B 3 3"]
+    sizes: Int64[Tensor, "B"]
 
     def to(self, device: torch.device) -> "NetworkInput":
         """The same on a device."""
@@ -56,7 +59,7 @@ class NetworkInput(NamedTuple):
     def rolled(self, angle: Float[Tensor, "B"]) -> "NetworkInput":
         """Rolled about the line of sight, on which the centres lie."""
         by = roll(angle)
-        return NetworkInput(self.scans @ by.mT, self.centres, by @ self.turn)
+        return NetworkInput(self.scans @ by.mT, self.centres, by @ self.turn, self.sizes)
 
 
 def network_input(
@@ -65,14 +68,15 @@ def network_input(
     """Scans as a network is given them; `facing` turns them towards their object."""
     ordered = [torch.from_numpy(sorted_points(scan)) for scan in scans]
     sampled = torch.stack([scan[torch.from_numpy(drawn(len(scan), count))] for scan in ordered])
+    sizes = torch.tensor([min(len(scan), count) for scan in ordered])
     if facing:
         frames = [face(scan, sensor_kind=sensor) for scan in ordered]
         turn = torch.stack([frame.turn for frame in frames])
         centres = torch.stack([frame.centre for frame in frames])
-        return NetworkInput(sampled @ turn.mT - centres[:, None], centres, turn)
+        return NetworkInput(sampled @ turn.mT - centres[:, None], centres, turn, sizes)
     centres = torch.stack([scan_centre(scan, sensor) for scan in ordered])
     turn = torch.eye(3).repeat(len(scans), 1, 1)
-    return NetworkInput(sampled - centres[:, None], centres, turn)
+    return NetworkInput(sampled - centres[:, None], centres, turn, sizes)
 
 
 @runtime_checkable
@@ -145,6 +149,7 @@ def choose_hypothesis(
     centres: Float[Tensor, "B 3"],
     rule: CostRule,
     score: Score[ScoresT] = score_hypotheses,
+    sizes: Int64[Tensor, "B"] | None = None,
 ) -> Chosen[ScoresT]:
     """Ask a network, score its hypotheses against the scans, and take the cheapest.
 
@@ -154,8 +159,9 @@ def choose_hypothesis(
         centres: where each scan's centre lies in the frame it was turned into.
         rule: what a hypothesis costs.
         score: gives both terms of the cost.
+        sizes: points of each scan that come first, if all others repeat one of them.
     """
-    shapes, *hypotheses = network(scans)
+    shapes, *hypotheses = network(scans, sizes)
     poses = Poses(*hypotheses)
     posed = poses.apply(shapes)
     scores = score(scans, centres, posed, rule.projection)
@@ -209,8 +215,9 @@ def look(
     sights: Sights | None = None,
 ) -> Found:
     """Shapes, and the poses of the hypotheses that speak, from prepared scans."""
-    score = score_hypotheses if sights is None else SeenScores(sights, inputs.turn)
-    found = choose_hypothesis(network, inputs.scans, inputs.centres, settings, score)
+    own = partial(score_hypotheses, sizes=inputs.sizes)
+    score = own if sights is None else SeenScores(sights, inputs.turn)
+    found = choose_hypothesis(network, inputs.scans, inputs.centres, settings, score, inputs.sizes)
     features = look_features(inputs.scans, found.posed, found.scores, found.poses, found.believed)
     return in_sensor_frame(found, inputs, settings, features)
 

@@ -9,7 +9,7 @@ is then differentiated, through the neighbours already found.
 from typing import NamedTuple
 
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, Int64
 from torch import Tensor
 from torch.profiler import record_function
 
@@ -49,12 +49,20 @@ def _mean_distance(found: Neighbours, counted: Tensor | None = None) -> Tensor:
     return masked_mean(found.distance_squared.sqrt(), counted)
 
 
+def repeats(sizes: Int64[Tensor, "B"], count: int) -> Int64[Tensor, "B N"]:
+    """How often each point is there where the first `sizes` are repeated up to `count` points."""
+    place = torch.arange(count, device=sizes.device)
+    often = count // sizes[:, None] + (place < count % sizes[:, None])
+    return torch.where(place < sizes[:, None], often, 0)
+
+
 @torch.no_grad()
 def score_hypotheses(
     scans: Float[Tensor, "B N 3"],
     centres: Float[Tensor, "B 3"],
     posed: Float[Tensor, "B H P 3"],
     projection: Projection,
+    sizes: Int64[Tensor, "B"] | None = None,
 ) -> Scores:
     """Both loss terms of every posed shape against its scan.
 
@@ -63,6 +71,8 @@ def score_hypotheses(
         centres: where each scan's centre lies in its sensor frame.
         posed: shapes in the scans' centred frames, H hypotheses each.
         projection: how the sensor's image is binned.
+        sizes: points of each scan that come first; all others repeat one of them, and are not
+            searched again. By default all.
     """
     count, hypotheses, size, _ = posed.shape
     flat = posed.flatten(0, 1)
@@ -70,13 +80,15 @@ def score_hypotheses(
     middle = centres[:, None].expand(-1, hypotheses, -1).flatten(0, 1)
     with record_function("wildshape: search"):
         both = (compared(cloud, middle, projection) for cloud in (repeated, flat))
-        to_shape, to_scan = nearest_both(*both)
+        own = None if sizes is None else sizes.repeat_interleave(hypotheses)
+        to_shape, to_scan = nearest_both(*both, own)
+        often = None if own is None else repeats(own, scans.shape[1])
     with record_function("wildshape: z-buffer"):
         bins = bin_points(flat + middle[:, None], middle, projection)
         seen = visible(bins.index, bins.depth, bins.count)
     shape = (count, hypotheses)
     return Scores(
-        _mean_distance(to_shape).view(shape),
+        _mean_distance(to_shape, often).view(shape),
         _mean_distance(to_scan, seen).view(shape),
         to_shape.index.view(*shape, -1),
         to_scan.index.view(*shape, size),

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int64
 from torch import Tensor, nn
 from torch.profiler import record_function
 
 from wildshape.errors import BadInputError
 from wildshape.method.encoders.named import Backbone, encoder_of
 from wildshape.method.encoders.pcn import PCNEncoder
+from wildshape.method.encoders.pcn_distinct import encode_distinct
 from wildshape.method.encoders.pcn_static import encode_static
 from wildshape.method.encoders.pcn_winners import encode_winners
 from wildshape.method.heads import PoseDecoder, ShapeDecoder
@@ -137,14 +138,27 @@ class ShapePoseNet(nn.Module):
         return Poses(rotation, translation * self.config.scale, logits.log_softmax(-1))
 
     def forward(
-        self, scans: Float[Tensor, "B N 3"]
+        self, scans: Float[Tensor, "B N 3"], sizes: Int64[Tensor, "B"] | None = None
     ) -> tuple[
         Float[Tensor, "B P 3"],
         Float[Tensor, "B K 3 3"],
         Float[Tensor, "B K 3"],
         Float[Tensor, "B K"],
     ]:
-        """Canonical shape, rotations, translations and log-beliefs: pure, for export."""
-        code = self.encoder(scans / self.config.scale)
+        """Canonical shape, rotations, translations and log-beliefs: pure, for export.
+
+        Args:
+            scans: centred, metres.
+            sizes: points of each that come first; all others repeat one of them. By default all.
+        """
+        scaled = scans / self.config.scale
+        code = self.encoder(scaled) if sizes is None else self._of_distinct(scaled, sizes)
         poses = self.poses(code)
         return self.canonical(code), poses.rotation, poses.translation, poses.log_belief
+
+    def _of_distinct(self, scaled: Tensor, sizes: Tensor) -> Tensor:
+        """Codes, on a CPU without the points that repeat others; a GPU wants fixed shapes."""
+        plain = isinstance(self.encoder, PCNEncoder) and self.encoder._compiled_call_impl is None
+        if not plain or scaled.device.type != "cpu":
+            return self.encoder(scaled)
+        return encode_distinct(self.encoder, scaled, sizes)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The two terms that tie a posed shape to a scan (paper eq. 2 and 3, METHOD 4 and 5)."""
 
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, Int64
 from torch import Tensor
 
 from wildshape.ops.nearest import nearest_distance
@@ -29,9 +29,9 @@ def chamfer(a: Float[Tensor, "B N 3"], b: Float[Tensor, "B M 3"]) -> Float[Tenso
 
 
 def masked_mean(
-    values: Float[Tensor, "B N"], counted: Bool[Tensor, "B N"] | None
+    values: Float[Tensor, "B N"], counted: Bool[Tensor, "B N"] | Int64[Tensor, "B N"] | None
 ) -> Float[Tensor, "B"]:
-    """Mean over the counted entries of each row; 0 where none is counted."""
+    """Mean over the counted entries of each row, as often as counted; 0 where none is."""
     if counted is None:
         return values.mean(-1)
     weight = counted.to(values.dtype)

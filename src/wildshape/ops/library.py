@@ -6,6 +6,7 @@ import ctypes
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import torch
 
@@ -30,7 +31,9 @@ _SIGNATURES = {
     "wildshape_visible": ([_P, _P, _I64, _I64, _I64, _P, _INT], _INT),
 }
 
-_NEAREST_K = [_P, _P, _P, _P, _P, _P, _I64, _I64, _I64, _I64, _F32, _P, _P, _INT, _INT]
+_NEAREST_K = (_P, _P, _P, _P, _P, _P, _I64, _I64, _I64, _I64, _F32, _P, _P, _INT, _INT)
+
+_CONNECTED = (_P, _I64, _F32, _P)
 
 
 @cache
@@ -52,12 +55,22 @@ def library() -> ctypes.CDLL | None:
     return loaded if loaded.wildshape_abi() == _ABI else None
 
 
-@cache
 def nearest_k_kernel() -> Callable[..., int] | None:
-    """The kernel that was added to the others; None where they are absent or built before it."""
-    kernel = getattr(library(), "wildshape_nearest_k", None)
+    """The k nearest neighbours; None where the library is absent or was built before them."""
+    return _added("wildshape_nearest_k", _NEAREST_K)
+
+
+def connected_kernel() -> Callable[..., int] | None:
+    """Points that hang together; None as above."""
+    return _added("wildshape_connected", _CONNECTED)
+
+
+@cache
+def _added(name: str, arguments: tuple[Any, ...]) -> Callable[..., int] | None:
+    """A kernel that was added to the others, which a library built before it lacks."""
+    kernel = getattr(library(), name, None)
     if kernel is not None:
-        kernel.argtypes, kernel.restype = _NEAREST_K, _INT
+        kernel.argtypes, kernel.restype = arguments, _INT
     return kernel
 
 

@@ -192,7 +192,9 @@ def track_cost(
         inputs = network_input(scans[part], settings.input_points, settings.sensor, settings.facing)
         posed = T_sensor_object[part].apply(shape.expand(len(inputs.scans), -1, -1)).float()
         posed = posed @ inputs.turn.mT - inputs.centres[:, None]
-        scores = score_hypotheses(inputs.scans, inputs.centres, posed[:, None], settings.projection)
+        scores = score_hypotheses(
+            inputs.scans, inputs.centres, posed[:, None], settings.projection, inputs.sizes
+        )
         found.append(scores.cost(settings.beta)[:, 0])
     return torch.cat(found).double()
 
