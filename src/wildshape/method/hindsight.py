@@ -79,9 +79,11 @@ def score_hypotheses(
     repeated = scans[:, None].expand(-1, hypotheses, -1, -1).flatten(0, 1)
     middle = centres[:, None].expand(-1, hypotheses, -1).flatten(0, 1)
     with record_function("wildshape: search"):
-        both = (compared(cloud, middle, projection) for cloud in (repeated, flat))
+        seen_points, shape_points = (
+            compared(cloud, middle, projection) for cloud in (repeated, flat)
+        )
         own = None if sizes is None else sizes.repeat_interleave(hypotheses)
-        to_shape, to_scan = nearest_both(*both, own)
+        to_shape, to_scan = nearest_both(seen_points, shape_points, own)
         often = None if own is None else repeats(own, scans.shape[1])
     with record_function("wildshape: z-buffer"):
         bins = bin_points(flat + middle[:, None], middle, projection)

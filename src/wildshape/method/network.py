@@ -158,7 +158,8 @@ class ShapePoseNet(nn.Module):
 
     def _of_distinct(self, scaled: Tensor, sizes: Tensor) -> Tensor:
         """Codes, on a CPU without the points that repeat others; a GPU wants fixed shapes."""
-        plain = isinstance(self.encoder, PCNEncoder) and self.encoder._compiled_call_impl is None
-        if not plain or scaled.device.type != "cpu":
-            return self.encoder(scaled)
-        return encode_distinct(self.encoder, scaled, sizes)
+        encoder = self.encoder
+        uncompiled = encoder._compiled_call_impl is None and scaled.device.type == "cpu"
+        if isinstance(encoder, PCNEncoder) and uncompiled:
+            return encode_distinct(encoder, scaled, sizes)
+        return encoder(scaled)
