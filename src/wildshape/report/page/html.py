@@ -246,7 +246,7 @@ def _embedded(image: bytes, kind: str) -> str:
 
 
 def _notes(notes: tuple[str, ...]) -> str:
-    items = "".join(f"<li>{escape(note)}</li>" for note in notes)
+    items = "".join(f"<li>{_prose(note)}</li>" for note in notes)
     return _section("Notes", f"<ul>{items}</ul>" if items else "")
 
 
