@@ -234,7 +234,7 @@ def test_poses_beside_the_scans_skip_the_odometry(recording, truth, tmp_path):
     lines = [f"1 0 0 {x} 0 1 0 {y} 0 0 1 0\n" for x, y in truth.places + 7.0]
     (folder / "poses.txt").write_text("".join(lines))
     drive = open_drive(folder)
-    poses = find_trajectory(drive, LEVEL, DriveConfig())
+    poses = find_trajectory(drive, LEVEL, DriveConfig()).T_world_sensor
     assert poses.translation.numpy()[:, :2] == pytest.approx(truth.places)
 
 

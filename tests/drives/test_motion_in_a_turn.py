@@ -42,7 +42,9 @@ def drive_of(scans, *, timed):
 def followed(scans, *, timed):
     """The drive, corrected as far as it can be, and how far each step is off, metres."""
     drive = drive_of(scans, timed=timed)
-    found = find_trajectory(drive, find_mounting(drive, CONFIG.mounting), CONFIG)
+    way = find_trajectory(drive, find_mounting(drive, CONFIG.mounting), CONFIG)
+    assert way.breaks.frames == ()
+    found = way.T_world_sensor
     true = np.stack([scan.T_world_sensor for scan in scans])
     steps = np.linalg.inv(true[:-1]) @ true[1:]
     walked = (found[slice(0, -1)].inverse() @ found[slice(1, None)]).matrix.numpy()

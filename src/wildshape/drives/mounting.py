@@ -63,7 +63,13 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
         BadInputError: no scan shows ground around the sensor.
     """
     chosen = np.unique(np.linspace(0, len(drive) - 1, config.scans).round().astype(int))
-    planes = [ground_plane(drive.scan(int(frame)), config) for frame in chosen]
+    scans = [drive.scan(int(frame)) for frame in chosen]
+    if all(_is_an_object(scan, config) for scan in scans):
+        raise BadInputError(
+            f"{drive.name}: its scans are of single objects, cut out; drive needs the whole scans."
+            " For objects there is `wildshape complete --track`."
+        )
+    planes = [ground_plane(scan, config) for scan in scans]
     found = np.array([plane for plane in planes if plane is not None])
     if not len(found):
         drive.read(int(chosen[0]))  # says why if it cannot be read
@@ -79,6 +85,15 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
         up = np.array((0.0, 0.0, 1.0))
     x, y, z = up.tolist()
     return Mounting(height, tilt, (x, y, z))
+
+
+def _is_an_object(scan: Points, config: MountingConfig) -> bool:
+    """Whether a scan is small and lies on one side of the sensor."""
+    if not len(scan):
+        return False
+    middle, sides = scan.mean(0), np.ptp(scan, axis=0)
+    around = (scan[:, :2] @ middle[:2] < 0).any()
+    return bool(max(sides[:2]) < config.object_m and not around)
 
 
 def ground_plane(points: Points, config: MountingConfig) -> Float[np.ndarray, "4"] | None:

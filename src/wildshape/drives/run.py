@@ -50,7 +50,7 @@ from wildshape.drives.segmentation import Cutter, read_cuts
 from wildshape.drives.sightings import Sightings, read_sightings, write_sightings
 from wildshape.drives.source import Drive
 from wildshape.drives.tracks import Seen, link
-from wildshape.drives.trajectory import find_trajectory, jumps
+from wildshape.drives.trajectory import Breaks, find_trajectory, jumps
 from wildshape.drives.vehicles import (
     Judged,
     judge,
@@ -195,8 +195,13 @@ class _Run:
         with self.clock.stage("trajectory", len(self.drive)) as at:
             if not path.is_file():
                 found = find_trajectory(self.drive, mounting, self.config, at)
-                write_trajectories(self.out, self.drive, found)
+                write_json(self.stages / "breaks.json", asdict(found.breaks))
+                write_trajectories(self.out, self.drive, found.T_world_sensor)
             return read_poses(path, len(self.drive))
+
+    @property
+    def breaks(self) -> Breaks:
+        return Breaks.read(self.stages / "breaks.json")
 
     def cut(self, mounting: Mounting, T_world_sensor: SE3) -> None:
         cutter = self.cutter(self.drive.moved_by(T_world_sensor), mounting)
@@ -234,6 +239,7 @@ class _Run:
             return given_tracks(read_cuts(self.cuts, len(self.drive)))
         counts = []
         usable = 0
+        ticks = self.breaks.ticks(self.drive.ticks, self.config.tracks)
 
         def seen() -> Iterator[Seen]:
             nonlocal usable
@@ -241,7 +247,7 @@ class _Run:
                 counts.append(cut.counts)
                 usable += cut.scanned > 0
                 moved = [T_level_sensor[frame].apply_numpy(part) for part in cut.clusters()]
-                yield Seen.of(self.drive.ticks[frame], moved)
+                yield Seen.of(ticks[frame], moved)
 
         found = link(seen(), self.config.tracks)
         fewest = min(self.config.tracks.fewest_scans, usable)
@@ -337,6 +343,7 @@ class _Run:
         empty = points.count(0)
         if empty:
             found.append(f"{empty} of {len(points)} scans are empty or cannot be read")
+        found += self.breaks.told()
         leaps = list(jumps(T_world_sensor, self.drive.ticks, self.config.trajectory))
         if leaps:
             found.append(f"the sensor jumps {len(leaps)} times, first at frame {leaps[0]}")

@@ -6,19 +6,22 @@ KISS-ICP: Vizzo et al., RA-L 2023. Rings of a level sensor on a flat road look t
 stands and hold the odometry back, so ground is used near the sensor alone, for height and tilt.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
 
-from wildshape.drives.config import DriveConfig, TrajectoryConfig
+from wildshape.drives.config import DriveConfig, LinkConfig, TrajectoryConfig
 from wildshape.drives.ground import height_above_ground
 from wildshape.drives.mounting import Mounting
 from wildshape.drives.source import Drive
 from wildshape.errors import MissingExtraError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import STANDING, Twist
+from wildshape.io.guard import read_json, record_of
 from wildshape.records import Points
 
 if TYPE_CHECKING:
@@ -28,17 +31,65 @@ _FEWEST_POINTS = 100
 _FIRST_SCANS = 3  # tell the motion at the beginning
 
 
+@dataclass(frozen=True)
+class Breaks:
+    """Where the sensor's way breaks off.
+
+    Attributes:
+        frames: whose place could not be told from the frame before.
+    """
+
+    frames: tuple[int, ...] = ()
+
+    @classmethod
+    def read(cls, path: Path) -> "Breaks":
+        """Of a file; none where there is no file."""
+        if not path.is_file():
+            return cls()
+        return record_of(cls, read_json(path, "the breaks of a way"), {})
+
+    def ticks(self, ticks: Sequence[int], config: LinkConfig) -> list[int]:
+        """Ticks with so long a pause at each break that nothing is linked across."""
+        apart = config.longest_gap + 1
+        before = np.searchsorted(self.frames, np.arange(len(ticks)), side="right")
+        return (np.asarray(ticks) + apart * before).tolist()
+
+    def told(self) -> list[str]:
+        """A sentence, if there are any."""
+        if not self.frames:
+            return []
+        count, first = len(self.frames), self.frames[0]
+        return [
+            f"the sensor's way breaks off {count} times, first at frame {first}: that scan does not"
+            " fit the one before it; no vehicle is followed across"
+        ]
+
+
+@dataclass(frozen=True)
+class Way:
+    """The way of the sensor.
+
+    Attributes:
+        T_world_sensor: `(n,)` of every frame.
+        breaks: in it.
+    """
+
+    T_world_sensor: SE3
+    breaks: Breaks = Breaks()
+
+
 def find_trajectory(
     drive: Drive,
     mounting: Mounting,
     config: DriveConfig,
     at: Callable[[int], None] = lambda _: None,
-) -> SE3:
-    """`T_world_sensor` of every frame; the world is the sensor frame of the first.
+) -> Way:
+    """The way of the sensor; the world is the sensor frame of the first frame.
 
     Poses that came with the drive are taken as they are. Scans whose points have times are
     corrected by the motion just before them, the first ones by that of a first try. A scan of
-    hardly any points goes on as the one before it went.
+    hardly any points goes on as the one before it went, and so does one that does not fit the one
+    before.
 
     Args:
         drive: its scans are read one by one.
@@ -50,12 +101,14 @@ def find_trajectory(
         MissingExtraError: KISS-ICP is not installed.
     """
     if drive.T_world_sensor is not None:
-        return drive.T_world_sensor[0].inverse() @ drive.T_world_sensor
+        return Way(drive.T_world_sensor[0].inverse() @ drive.T_world_sensor)
     motion = STANDING
     if drive.turn(0).seconds is not None:
-        _, motion = _follow(drive, range(min(len(drive), _FIRST_SCANS)), mounting, config, motion)
-    poses, _ = _follow(drive, range(len(drive)), mounting, config, motion, at)
-    return SE3.from_matrix(np.linalg.inv(poses[0]) @ np.stack(poses))
+        first = range(min(len(drive), _FIRST_SCANS))
+        motion = _follow(drive, first, mounting, config, motion)[1].motion
+    poses, odometry = _follow(drive, range(len(drive)), mounting, config, motion, at)
+    T_world_sensor = SE3.from_matrix(np.linalg.inv(poses[0]) @ np.stack(poses))
+    return Way(T_world_sensor, Breaks(tuple(odometry.lost)))
 
 
 def _follow(
@@ -65,24 +118,71 @@ def _follow(
     config: DriveConfig,
     motion: Twist,
     at: Callable[[int], None] = lambda _: None,
-) -> tuple[list[Float[np.ndarray, "4 4"]], Twist]:
-    """Poses of the first frames, and the motion after them; `motion`: before them."""
-    odometry = _odometry(config.trajectory)
+) -> "tuple[list[Float[np.ndarray, '4 4']], _Odometry]":
+    """Poses of the first frames, and the odometry after them; `motion`: before them."""
+    odometry = _Odometry(config.trajectory, motion)
     poses = []
     for frame in frames:
         if frame and _steps_differ(drive, frame):
-            odometry.last_delta = motion.after(_seconds(drive, frame)).matrix.numpy()
-        scan = _landmarks(drive.turn(frame).carried(motion), mounting, config)
-        if len(scan) < _FEWEST_POINTS:
-            odometry.last_pose = odometry.last_pose @ odometry.last_delta
-        else:
-            odometry.register_frame(scan.astype(np.float64), np.zeros(len(scan)))
+            odometry.expect(_seconds(drive, frame))
+        scan = _landmarks(drive.turn(frame).carried(odometry.motion), mounting, config)
+        odometry.follow(scan, frame)
         if frame:
-            step = SE3.from_matrix(odometry.last_delta)
-            motion = Twist.between(SE3.identity(), step, _seconds(drive, frame))
-        poses.append(odometry.last_pose.copy())
+            odometry.learn(_seconds(drive, frame))
+        poses.append(odometry.kiss.last_pose.copy())
         at(frame + 1)
-    return poses, motion
+    return poses, odometry
+
+
+class _Odometry:
+    """KISS-ICP, begun anew where a scan does not fit the one before.
+
+    Attributes:
+        motion: of the sensor, after the last scan.
+        lost: frames that did not fit.
+    """
+
+    def __init__(self, config: TrajectoryConfig, motion: Twist) -> None:
+        self.config, self.motion = config, motion
+        self.kiss = _kiss_icp(config)
+        self.lost: list[int] = []
+        self._before: Float[np.ndarray, "n 3"] | None = None
+
+    def expect(self, seconds: float) -> None:
+        """Guess the next step from the motion."""
+        self.kiss.last_delta = self.motion.after(seconds).matrix.numpy()
+
+    def learn(self, seconds: float) -> None:
+        """Take the motion from the last step."""
+        step = SE3.from_matrix(self.kiss.last_delta)
+        self.motion = Twist.between(SE3.identity(), step, seconds)
+
+    def follow(self, scan: Points, frame: int) -> None:
+        """Go one scan on."""
+        pose, step = self.kiss.last_pose, self.kiss.last_delta
+        if len(scan) < _FEWEST_POINTS:
+            self.kiss.last_pose = pose @ step
+            return
+        there = self._register(scan)
+        if self._before is not None and self._fit(there) < self.config.least_fit:
+            self.lost.append(frame)
+            self.kiss = _kiss_icp(self.config)
+            self.kiss.last_pose, self.kiss.last_delta = pose, step
+            there = self._register(scan)
+        self._before = there
+
+    def _register(self, scan: Points) -> Float[np.ndarray, "n 3"]:
+        """Some of the scan's points, in the world."""
+        _, some = self.kiss.register_frame(scan.astype(np.float64), np.zeros(len(scan)))
+        T = self.kiss.last_pose
+        return some @ T[:3, :3].T + T[:3, 3]
+
+    def _fit(self, there: Float[np.ndarray, "n 3"]) -> float:
+        """The share of a scan that lies on the one before."""
+        from scipy.spatial import KDTree
+
+        away, _ = KDTree(self._before).query(there, distance_upper_bound=self.config.fits_m)
+        return float(np.isfinite(away).mean())
 
 
 def _seconds(drive: Drive, frame: int) -> float:
@@ -114,7 +214,7 @@ def jumps(T_world_sensor: SE3, ticks: tuple[int, ...], config: TrajectoryConfig)
     yield from (np.flatnonzero(changes > config.jump_m) + 2).tolist()
 
 
-def _odometry(config: TrajectoryConfig) -> "KissICP":
+def _kiss_icp(config: TrajectoryConfig) -> "KissICP":
     try:
         from kiss_icp.config import load_config
         from kiss_icp.kiss_icp import KissICP
