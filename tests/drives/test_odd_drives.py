@@ -37,7 +37,7 @@ def test_the_way_breaks_off_where_a_scan_was_taken_elsewhere(scans):
     (told,) = way.breaks.told()
     assert "breaks off 1 times, first at frame 2" in told
     steps = np.linalg.norm(np.diff(way.T_world_sensor.translation.numpy(), axis=0), axis=1)
-    assert steps == pytest.approx(0.7, abs=0.1)  # beyond it as before it
+    assert steps[1] == pytest.approx(steps[0])  # it goes on as it went before
     assert Breaks((2,)).ticks((0, 1, 2, 3), LinkConfig(longest_gap=4)) == [0, 1, 7, 8]
 
 
