@@ -9,7 +9,7 @@ import torch
 
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.boxes import box_seen, carried, fit_to_scans
+from wildshape.inference.boxes import _nth_largest, box_seen, carried, fit_to_scans
 
 SIZE = torch.tensor((4.0, 1.8, 1.5), dtype=torch.float64)
 
@@ -88,3 +88,11 @@ def test_carried_to_the_sensor_with_the_pose():
     assert carried(fit_to_scans(surface(), [], mirror=True), pose).size == pytest.approx(
         SIZE.tolist(), abs=0.02
     )
+
+
+@pytest.mark.parametrize("size", [100, 640, 2048])
+@pytest.mark.parametrize("count", [1, 3])
+def test_the_nth_largest_is_that_of_a_sort(size, count):
+    """Equal values count as often as they are there."""
+    rows = torch.randint(0, 40, (5, size), generator=torch.Generator().manual_seed(size)).float()
+    assert torch.equal(_nth_largest(rows, count), rows.sort(descending=True).values[:, count - 1])
