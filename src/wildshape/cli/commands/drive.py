@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 EXAMPLES = (
     "wildshape drive recording --out found",
     "wildshape drive 2011_09_26_drive_0048_sync --out found",
-    "wildshape drive recording --out found --boxes json,kitti",
+    "wildshape drive recording --out found --boxes json,kitti --mesh --mcap",
     "wildshape drive recording.bag --out found --topic /velodyne_points",
     "wildshape drive recording --out found --detections results.json",
     "wildshape drive monday tuesday --out found",
@@ -245,14 +245,16 @@ def _bars() -> "Iterator[Watch]":
 
 def _sentence(found: "DriveResult") -> str:
     from wildshape.cli.terminal import say
+    from wildshape.drives.result import REPORT
     from wildshape.io.progress import counted, duration
 
     for warning in found.warnings:
         say(f"{found.out.name}: {warning}")
+    page = found.out / REPORT
     vehicles = counted(len(found.vehicles), "vehicle")
     return (
         f"found {vehicles}, {found.moving} of them moving, in {counted(found.frames, 'scan')}"
-        f" in {duration(sum(found.seconds.values()))}; see {found.out}"
+        f" in {duration(sum(found.seconds.values()))}; see {page if page.is_file() else found.out}"
     )
 
 
