@@ -94,3 +94,23 @@ def test_what_cannot_be_a_drive_is_refused_in_a_sentence(folder, tmp_path):
     (folder / "poses.txt").unlink()
     np.save(folder / "000001.npy", np.zeros((3, 3)))
     refused(open_drive, folder, match="are one frame")
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".pcd"])
+def test_times_of_points_in_scan_files(tmp_path, suffix):
+    rows = np.zeros(200, [(name, "<f4") for name in ("x", "y", "z")] + [("time", "<f8")])
+    rows["x"], rows["time"] = np.arange(200), np.linspace(-0.05, 0.05, 200)
+    rows["y"][3] = np.nan
+    names = " ".join(rows.dtype.names or ())
+    heads = {
+        ".ply": "ply\nformat binary_little_endian 1.0\nelement vertex 200\nproperty float x\n"
+        "property float y\nproperty float z\nproperty double time\nend_header\n",
+        ".pcd": f"FIELDS {names}\nSIZE 4 4 4 8\nTYPE F F F F\nPOINTS 200\nDATA binary\n",
+    }
+    for frame in range(2):
+        (tmp_path / f"{frame}{suffix}").write_bytes(heads[suffix].encode() + rows.tobytes())
+    assert open_drive(tmp_path).turn(0).seconds is None  # how long a turn takes is not known
+    (tmp_path / "times.txt").write_text("5.0\n5.1\n")
+    turn = open_drive(tmp_path).turn(1)
+    assert turn.seconds == pytest.approx(np.delete(rows["time"], 3))
+    assert turn.points[:, 0].tolist() == np.delete(rows["x"], 3).tolist()

@@ -80,11 +80,15 @@ class Drive:
         return len(self.scan_names)
 
     def turn(self, frame: int) -> Turn:
-        """A frame as it was read; without points where its file is damaged or empty."""
+        """A frame as it was read; without points where its file is damaged or empty.
+
+        Without times of points where the scans have none: how long a turn takes is not known.
+        """
         try:
-            return self.read(frame)
+            turn = self.read(frame)
         except BadInputError:
             return _NOTHING
+        return turn if self.times is not None else Turn(turn.points)
 
     def scan(self, frame: int) -> Points:
         """A frame's points where they would be seen from the sensor's place at the scan's time.

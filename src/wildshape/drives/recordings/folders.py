@@ -13,7 +13,7 @@ from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
 from wildshape.io.poses import read_poses
-from wildshape.io.scans.points import is_scan_file, read_points
+from wildshape.io.scans.points import is_scan_file, read_turn
 from wildshape.records import Turn
 
 _BESIDE = ("poses.txt", "times.txt", "timestamps.txt", "calib.txt")
@@ -27,9 +27,10 @@ class _Files:
     """Reads a frame's file."""
 
     files: tuple[Path, ...]
+    times: tuple[float, ...] | None
 
     def __call__(self, frame: int) -> Turn:
-        return Turn(read_points(self.files[frame]))
+        return read_turn(self.files[frame], None if self.times is None else self.times[frame])
 
 
 def holds_scans(path: Path) -> bool:
@@ -119,7 +120,7 @@ def _drive(
     return Drive.of(
         name=path.name or path.resolve().name,
         scan_names=[file.stem for file in files],
-        read=_Files(tuple(files)),
+        read=_Files(tuple(files), None if times is None else tuple(times)),
         times=times,
         T_world_sensor=None if poses is None else read_poses(poses, len(files)),
     )

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Num
 
 from wildshape.errors import BadInputError
 from wildshape.io.guard import check_promise, lines_of
@@ -68,6 +68,24 @@ def read_pcd(path: Path) -> Float[np.ndarray, "n 3"]:
             "truncated; copy it again."
         )
     return points
+
+
+def read_pcd_field(path: Path, names: tuple[str, ...]) -> Num[np.ndarray, "n"] | None:
+    """The first of these fields of each point, as written.
+
+    None where there is none of them, and of text and compressed files.
+
+    Raises:
+        BadInputError: as `read_pcd`.
+    """
+    with path.open("rb") as file:
+        header = _read_header(file, path)
+        found = [name for name in names if name in header.fields]
+        if header.encoding != "binary" or not found:
+            return None
+        present = path.stat().st_size - file.tell()
+        check_promise(path, "points", header.points, header.points * header.row_bytes, present)
+        return _rows(file, header)[f"{header.fields.index(found[0])}"][:, 0]
 
 
 def _read_header(file: IO[bytes], path: Path) -> _Header:
@@ -132,12 +150,17 @@ def _read_ascii(
 
 
 def _read_rows(file: IO[bytes], header: _Header) -> Float[np.ndarray, "n 3"]:
-    kinds = header.kinds
-    fields = [(f"{i}", kind, (n,)) for i, (kind, n) in enumerate(zip(kinds, header.counts))]
-    rows = np.frombuffer(file.read(header.points * header.row_bytes), np.dtype(fields))
+    rows = _rows(file, header)
     return np.stack([rows[f"{header.fields.index(axis)}"][:, 0] for axis in _AXES], -1).astype(
         np.float64
     )
+
+
+def _rows(file: IO[bytes], header: _Header) -> np.ndarray:
+    """The points of a binary file; its fields are named by their place."""
+    kinds = header.kinds
+    fields = [(f"{i}", kind, (n,)) for i, (kind, n) in enumerate(zip(kinds, header.counts))]
+    return np.frombuffer(file.read(header.points * header.row_bytes), np.dtype(fields))
 
 
 def _read_compressed(

@@ -14,7 +14,7 @@ from struct import Struct
 from typing import IO, Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Num
 
 from wildshape.errors import BadInputError
 from wildshape.io.guard import lines_of
@@ -34,6 +34,28 @@ def read_ply(path: Path) -> Float[np.ndarray, "n 3"]:
         if header.order:
             return _read_binary(file.read(), header, path)
         return _read_ascii(file, header, path)
+
+
+def read_ply_property(path: Path, names: tuple[str, ...]) -> Num[np.ndarray, "n"] | None:
+    """The first of these properties of each point, as written.
+
+    None where there is none of them, and of text.
+
+    Raises:
+        BadInputError: as `read_ply`.
+    """
+    with path.open("rb") as file:
+        header = read_header(file, path)
+        body = file.read()
+    for element, offset in offsets(body, header, path) if header.order else ():
+        if element.name == "vertex":
+            kind = row_type(body, offset, element, header.order)
+            plain = ["" if prop.list_type else prop.name for prop in element.properties]
+            found = [name for name in names if name in plain]
+            if kind is None or not found:
+                return None
+            return np.frombuffer(body, kind, element.count, offset)[f"{plain.index(found[0])}"]
+    return None
 
 
 def _read_ascii(file: IO[bytes], header: Header, path: Path) -> Float[np.ndarray, "n 3"]:

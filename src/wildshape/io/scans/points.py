@@ -14,11 +14,12 @@ from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
 from wildshape.io.scans.arrays import read_kitti_bin, read_npy, read_npz
 from wildshape.io.scans.las import read_las
-from wildshape.io.scans.pcd import read_pcd
-from wildshape.io.scans.ply import read_ply
+from wildshape.io.scans.pcd import read_pcd, read_pcd_field
+from wildshape.io.scans.ply import read_ply, read_ply_property
+from wildshape.io.scans.point_times import TIME_FIELDS, seconds_since
 from wildshape.io.scans.text import header_unit, read_text
 from wildshape.io.scans.writers import write_ply
-from wildshape.records import Unit
+from wildshape.records import Turn, Unit
 
 __all__ = [
     "LEAST_POINTS",
@@ -34,6 +35,7 @@ __all__ = [
     "is_scan_file",
     "read_points",
     "read_scan",
+    "read_turn",
     "write_ply",
 ]
 
@@ -49,6 +51,7 @@ _READERS: dict[str, tuple[str, Callable[[Path], Float[np.ndarray, "n 3"]]]] = {
     ".las": ("a LAS file", read_las),
     ".laz": ("a LAZ file", read_las),
 }
+_CLOCKS = {".ply": read_ply_property, ".pcd": read_pcd_field}
 SUFFIXES = tuple(_READERS)
 """The suffixes of scan files, in lower case."""
 
@@ -169,6 +172,27 @@ def read_points(
     points = _read(Path(path), coordinates)
     check_near(points, str(path))
     return drop_nonfinite(points).points
+
+
+def read_turn(path: Path, scan_time: float | None) -> Turn:
+    """A whole scan, and when its points were taken, if a binary PLY or PCD says so.
+
+    Args:
+        path: as of `read_points`.
+        scan_time: of the scan, seconds, if known.
+
+    Raises:
+        BadInputError: as `read_points`.
+    """
+    points = _read(path, SENSOR_METRES)
+    check_near(points, str(path))
+    read_clock = _CLOCKS.get(path.suffix.lower())
+    clock = None if read_clock is None else read_clock(path, TIME_FIELDS)
+    if clock is None:
+        return Turn(drop_nonfinite(points).points)
+    kept = _finite(points)
+    whole = np.ascontiguousarray(points[kept], np.float32)
+    return Turn(whole, seconds_since(clock[kept], scan_time))
 
 
 def read_scan(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> ScanFile:

@@ -86,6 +86,9 @@ def write_drive(
     if not _truth_file(out).is_file():
         _join(out, rows, drive.config.scans)
     shutil.rmtree(rows, ignore_errors=True)
+    if point_times:
+        times = (scans / "times.txt").read_text("utf-8")
+        write_text(out / "scans" / SEQUENCE / "times.txt", times)
     return _counted(out)
 
 
