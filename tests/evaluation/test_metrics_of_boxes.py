@@ -10,15 +10,26 @@ import pytest
 import torch
 from tests.cars import drive_by, poses_of
 
-from wildshape.evaluation.metrics import BoxScore, CompletionError, box_score, true_box
+from wildshape.evaluation.metrics import (
+    BoxScore,
+    CompletionError,
+    box_score,
+    labelled_box,
+    true_box,
+)
 from wildshape.evaluation.protocol import Spoken, run
 from wildshape.evaluation.results import CompletionScore, MethodScores
 from wildshape.evaluation.summary import figures_of, write_metrics
 from wildshape.evaluation.tables import markdown
 from wildshape.geometry.box import FittedBox
-from wildshape.geometry.transforms.rotation import random_rotation, rotation_z
+from wildshape.geometry.transforms.rotation import (
+    quaternion_from_rotation,
+    random_rotation,
+    rotation_z,
+)
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.boxes import carried
+from wildshape.records import Box
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.shapes.solid import box, ellipsoid, union
 from wildshape.simulate.truth import visible_surface
@@ -125,3 +136,16 @@ def test_an_evaluation_has_columns_where_a_method_draws_boxes(tmp_path):
     assert found["methods"]["exact"]["heading30_sym"] == 1
     assert "box IoU" in markdown([results])
     assert "box IoU" not in markdown([run({"silent": Silent()}, [track])])
+
+
+def test_boxes_are_held_against_the_label_where_there_is_one():
+    """Shape and scans are of a car of another size; each axis is told on its own."""
+    truth = labelled_box((4.0, 2.0, 1.5))
+    T = SE3(rotation_z(torch.tensor(0.7).double()), torch.tensor([9.0, 4.0, 0.3]).double())
+    w, x, y, z = quaternion_from_rotation(T.rotation).tolist()
+    px, py, pz = T.translation.tolist()
+    score = box_score(Box((px, py, pz), (4.4, 1.9, 1.5), (w, x, y, z)), truth, T)
+    assert score.bev == pytest.approx(4.0 * 1.9 / (4.4 * 1.9 + 4.0 * 0.1))
+    assert score.iou == pytest.approx(score.bev)
+    off = (score.length_off_m, score.width_off_m, score.height_off_m)
+    assert off == pytest.approx((0.4, -0.1, 0.0))

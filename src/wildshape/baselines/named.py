@@ -12,10 +12,13 @@ from wildshape.errors import BadInputError
 if TYPE_CHECKING:
     from wildshape.baselines.identity import Identity, OneScan
     from wildshape.baselines.pairs import Chained
+    from wildshape.baselines.rectangle import Rectangle
 
 NAMES = (
     "identity",
     "one-scan",
+    "rectangle",
+    "l-shape",
     "local-icp",
     "global-icp",
     "multi-start-icp",
@@ -24,7 +27,7 @@ NAMES = (
 )
 
 
-def baseline(name: str) -> "Identity | OneScan | Chained":
+def baseline(name: str) -> "Identity | OneScan | Rectangle | Chained":
     """One of `NAMES`, ready to run.
 
     Raises:
@@ -38,10 +41,13 @@ def baseline(name: str) -> "Identity | OneScan | Chained":
     from wildshape.baselines.identity import Identity, OneScan
     from wildshape.baselines.kiss_matcher import KissMatcher
     from wildshape.baselines.pairs import Chained
+    from wildshape.baselines.rectangle import fitted_l_shape, smallest
 
     makers = {
         "identity": Identity,
         "one-scan": OneScan,
+        "rectangle": smallest,
+        "l-shape": fitted_l_shape,
         "local-icp": lambda: Chained(LocalIcp()),
         "global-icp": lambda: Chained(GlobalIcp(available())),
         "multi-start-icp": lambda: Chained(MultiStartIcp()),

@@ -11,12 +11,12 @@ from jaxtyping import Float
 from torch import Tensor
 
 from wildshape.datasets.tracks.truth import shape_mirrored, shape_partial
-from wildshape.evaluation.metrics import hull_area, true_box
+from wildshape.evaluation.metrics import hull_area, labelled_box, true_box
 from wildshape.evaluation.results import Limits, Rotate, Skipped
 from wildshape.geometry.box import FittedBox
 from wildshape.geometry.transforms.rotation import random_rotation, random_yaw
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.records import Points, Sensor, Track
+from wildshape.records import Points, Sensor, SightLines, Track
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Truth:
         shape: `(g, 3)`.
         partial: `(g, 3)` as accumulated; None where the shape is known.
         area: of the surface, square metres, roughly (convex hull).
-        box: tight around the shape.
+        box: as labelled, else tight around the shape.
     """
 
     kind: str
@@ -49,6 +49,7 @@ class Case:
         sensor: how they were taken.
         T_sensor_object: true poses of the scans as turned, if known.
         truth: if known.
+        rays: of each scan those that passed the object by, if any are known.
         skipped: scans left out.
     """
 
@@ -59,6 +60,7 @@ class Case:
     T_sensor_object: SE3 | None
     truth: Truth | None
     skipped: tuple[Skipped, ...]
+    rays: tuple[SightLines | None, ...] = ()
 
     @property
     def middle(self) -> int:
@@ -83,6 +85,7 @@ def prepare(track: Track, rotate: Rotate, seed: int, limits: Limits) -> Case:
         T_sensor_object=turned.T_sensor_object,
         truth=truth,
         skipped=skipped,
+        rays=turned.rays,
     )
 
 
@@ -112,13 +115,19 @@ def _subsample(track: Track, max_scans: int | None) -> Track:
 def _truth(track: Track, count: int) -> Truth | None:
     if track.T_sensor_object is None or not track.scans:
         return None
-    body = track.sensor.kind == "lidar"
     if track.shape is not None:
-        shape, box = _thin(track.shape, count), true_box(track.shape, body=body)
-        return Truth("shape", shape, None, hull_area(shape), box)
+        shape = _thin(track.shape, count)
+        return Truth("shape", shape, None, hull_area(shape), _true_box(track, track.shape))
     whole = shape_mirrored(track)
     mirrored, partial = _thin(whole, count), _thin(shape_partial(track), count)
-    return Truth("mirrored", mirrored, partial, hull_area(mirrored), true_box(whole, body=body))
+    return Truth("mirrored", mirrored, partial, hull_area(mirrored), _true_box(track, whole))
+
+
+def _true_box(track: Track, shape: Points) -> FittedBox:
+    """As labelled, if it is, else around the true shape."""
+    if track.label_size_m is not None:
+        return labelled_box(track.label_size_m)
+    return true_box(shape, body=track.sensor.kind == "lidar")
 
 
 def _thin(points: Points, count: int) -> Points:
@@ -152,6 +161,10 @@ def turn_track(track: Track, rotate: Rotate, seed: int) -> Track:
         track,
         scans=tuple(turn[i].apply_numpy(scan) for i, scan in enumerate(track.scans)),
         T_sensor_object=None if poses is None else turn @ poses,
+        rays=tuple(
+            rays and rays.moved(turn[i].rotation.numpy(), np.zeros(3))
+            for i, rays in enumerate(track.rays)
+        ),
     )
 
 

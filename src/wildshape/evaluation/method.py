@@ -5,11 +5,11 @@
 None of them is handed anything but points and the kind of sensor (METHOD 8).
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Protocol, runtime_checkable
 
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.records import Box, Points, Sensor
+from wildshape.records import Box, Points, Sensor, SightLines
 
 
 @runtime_checkable
@@ -47,6 +47,17 @@ class BatchCompleter(Completer, Protocol):
 
     def complete_many(self, scans: list[Points], sensor: Sensor) -> Iterable[Answer]:
         """`complete` of each scan, in order."""
+        ...
+
+
+@runtime_checkable
+class SightedCompleter(Completer, Protocol):
+    """Knows what to do with the rays that passed an object by."""
+
+    def complete_sighted(
+        self, scans: list[Points], sensor: Sensor, rays: Sequence[SightLines | None]
+    ) -> Iterable[Answer]:
+        """`complete` of each scan, in order, with the rays of its frame."""
         ...
 
 

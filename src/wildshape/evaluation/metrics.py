@@ -11,6 +11,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from wildshape.geometry.box import FittedBox, box_iou
+from wildshape.geometry.footprint import footprint_iou
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.ops.nearest import nearest_both, nearest_distance
@@ -123,10 +124,18 @@ class BoxScore:
     Attributes:
         iou: shared over joint volume, 0 to 1, both boxes as they stand in space.
         heading_deg: turn about the object's vertical from the box's x to the object's, 0 to 180.
+        bev: shared over joint area seen from above the object, 0 to 1.
+        length_off_m: by how much it is longer than the true one.
+        width_off_m: wider.
+        height_off_m: higher.
     """
 
     iou: float
     heading_deg: float
+    bev: float = 0.0
+    length_off_m: float = 0.0
+    width_off_m: float = 0.0
+    height_off_m: float = 0.0
 
     @property
     def heading_sym_deg(self) -> float:
@@ -159,4 +168,15 @@ def box_score(predicted: Box, truth: FittedBox, T_sensor_object: SE3) -> BoxScor
     rotation = T_object_sensor.rotation @ rotation_from_quaternion(wxyz)
     found = FittedBox(T_object_sensor.apply(centre[None])[0], size, rotation)
     x, y = rotation[:2, 0].tolist()
-    return BoxScore(box_iou(found, truth), abs(math.degrees(math.atan2(y, x))))
+    yaw = math.atan2(y, x)
+    places = (np.array((*one.centre.tolist(), turn)) for one, turn in ((found, yaw), (truth, 0.0)))
+    place, true_place = places
+    bev = footprint_iou(place, found.size.tolist(), true_place, truth.size.tolist())
+    off = (found.size - truth.size).tolist()
+    return BoxScore(box_iou(found, truth), abs(math.degrees(yaw)), bev, *off)
+
+
+def labelled_box(size_m: tuple[float, float, float]) -> FittedBox:
+    """The labelled box of an object, whose frame has its origin at the box's centre."""
+    size = torch.tensor(size_m, dtype=torch.float64)
+    return FittedBox(torch.zeros_like(size), size, torch.eye(3, dtype=torch.float64))

@@ -19,6 +19,7 @@ from wildshape.evaluation.method import (
     Described,
     Method,
     Registrar,
+    SightedCompleter,
     TrackCompleter,
 )
 from wildshape.evaluation.metrics import (
@@ -138,6 +139,9 @@ class Spoken(NamedTuple):
 
 def complete_scans(method: Completer, case: Case) -> Sequence[Answer | None]:
     """One answer a scan, in that scan's frame; None where the method refused it."""
+    if case.rays and isinstance(method, SightedCompleter):
+        with suppress(BadInputError):
+            return list(method.complete_sighted(case.inputs(), case.sensor, case.rays))
     if isinstance(method, BatchCompleter):
         # One scan's refusal must not cost the others theirs: then each goes alone.
         with suppress(BadInputError):

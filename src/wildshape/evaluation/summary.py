@@ -100,6 +100,15 @@ FIGURES = (
     ),
     Figure("box_iou", "shared over joint volume, 0 to 1", _scans(np.mean, "box.iou"), "box IoU"),
     Figure(
+        "box_bev",
+        "shared over joint area, 0 to 1",
+        _scans(np.mean, "box.bev"),
+        "BEV IoU",
+    ),
+    Figure("box_length_bias_m", _METRES, _scans(np.mean, "box.length_off_m")),
+    Figure("box_width_bias_m", _METRES, _scans(np.mean, "box.width_off_m")),
+    Figure("box_height_bias_m", _METRES, _scans(np.mean, "box.height_off_m")),
+    Figure(
         "heading30", _SHARE, _scans(_accurate_headings, "box.heading_deg"), "heading 30, %", 1, 100
     ),
     Figure(

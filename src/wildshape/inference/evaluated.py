@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wildshape.geometry.transforms.se3 import SE3, stack
+from wildshape.inference.free_space import Rays
 from wildshape.inference.predictor import Predictor
 from wildshape.inference.registration import to_middle
 from wildshape.records import Completion, Points, Sensor
@@ -53,9 +54,13 @@ class Learned:
 
     def complete_many(self, scans: list[Points], sensor: Sensor) -> list[Completion]:
         """Of each scan, in order, shape, confidence and box."""
+        return self.complete_sighted(scans, sensor, ())
+
+    def complete_sighted(self, scans: list[Points], sensor: Sensor, rays: Rays) -> list[Completion]:
+        """The same, with the rays of the scans' frames."""
         if not (self._last and self._last[0].is_of(scans, sensor)):
             copies = [np.array(scan) for scan in scans]  # a caller may change its own
-            self._last[:] = [_Answer(copies, sensor, self._completed(scans, sensor))]
+            self._last[:] = [_Answer(copies, sensor, self._completed(scans, sensor, rays))]
         return self._last[0].done
 
     def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:
@@ -63,7 +68,7 @@ class Learned:
         done = self.complete_many(list(scans), sensor)
         return to_middle(stack([one.pose for one in done]))
 
-    def _completed(self, scans: list[Points], sensor: Sensor) -> list[Completion]:
+    def _completed(self, scans: list[Points], sensor: Sensor, rays: Rays) -> list[Completion]:
         if self.track:
-            return self.predictor.complete_track(scans, sensor)
-        return list(self.predictor.complete_many(scans, sensor))
+            return self.predictor.complete_track(scans, sensor, rays=rays)
+        return list(self.predictor.complete_many(scans, sensor, rays=rays))

@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Rectangles as rows of an evaluation, beside labelled boxes and with rays."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.cars import drive_by
+
+from wildshape.baselines.named import baseline
+from wildshape.evaluation.method import SightedCompleter
+from wildshape.evaluation.protocol import Spoken, run
+from wildshape.evaluation.summary import figures_of
+from wildshape.records import SightLines
+
+
+class Sighted:
+    """Says nothing but what it was handed."""
+
+    def complete(self, points, sensor):
+        return points
+
+    def complete_sighted(self, scans, sensor, rays):
+        # As each scan was turned, so were its rays: they end on it.
+        for scan, seen in zip(scans, rays):
+            assert np.allclose(seen.directions * seen.ranges[:, None], scan, atol=1e-4)
+        return [Spoken(scan) for scan in scans]
+
+
+@pytest.mark.parametrize("name", ["rectangle", "l-shape"])
+def test_a_car_seen_from_all_sides_has_its_labelled_box(name) -> None:
+    track = drive_by("a", scans=2, points=400)
+    whole = tuple(pose.apply_numpy(track.shape) for pose in track.T_sensor_object)
+    size = tuple(np.ptp(track.shape, axis=0).tolist())
+    seen = replace(track, scans=whole, label_size_m=size)
+    figures = figures_of(run({name: baseline(name)}, [seen], "yaw", 3).methods[0])
+    assert figures["box_bev"] > 0.95
+    assert abs(figures["box_length_bias_m"]) < 0.05
+    assert figures["heading30_sym"] == 1.0
+    longer = replace(seen, label_size_m=(size[0] + 1.0, *size[1:]))
+    off = figures_of(run({name: baseline(name)}, [longer], "yaw", 3).methods[0])
+    assert off["box_length_bias_m"] == pytest.approx(figures["box_length_bias_m"] - 1.0, abs=1e-6)
+
+
+def test_rays_reach_the_methods_that_know_them_turned_as_the_scans() -> None:
+    track = drive_by("a", scans=3, points=200)
+    seen = replace(track, rays=tuple(SightLines.of_returns(scan) for scan in track.scans))
+    assert isinstance(Sighted(), SightedCompleter)
+    for rotate in ("none", "yaw", "so3"):
+        assert len(run({"m": Sighted()}, [seen], rotate, 1).methods[0].completions) == 3
