@@ -11,7 +11,7 @@ from pathlib import Path
 
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import write_text
-from wildshape.io.guard import reading
+from wildshape.io.guard import MAX_POINTS, reading
 
 
 @dataclass(frozen=True)
@@ -105,4 +105,6 @@ def _row(words: list[str]) -> BoxRow:
     )
     if not all(map(math.isfinite, (*map(float, numbers), found.time or 0.0))):
         raise ValueError("a number that is not finite")
+    if not 0 <= found.points <= MAX_POINTS:
+        raise ValueError(f"{found.points} points")
     return found
