@@ -32,7 +32,8 @@ from turns import begin, options
 from wildshape.io.store.store import Store, open_store
 from wildshape.ops.nearest import nearest
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
-from wildshape.training.config import Recipe, learning_rate, template_weight
+from wildshape.training.config import Recipe, learning_rate
+from wildshape.training.objectives import template_weight
 from wildshape.training.recipes import PRESETS
 from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.setup import Run, setup, step_of
