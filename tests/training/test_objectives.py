@@ -123,7 +123,7 @@ def test_one_field_leaves_the_template_or_the_selector_out(batch, left_out):
             sizes = replace(SMALLEST.network, selector=False)
             loss = replace(SMALLEST.loss, belief=weight)
         network = ShapePoseNet(sizes)
-        sum(objectives_of(batch, network, loss)).backward()
+        torch.stack(list(objectives_of(batch, network, loss))).sum().backward()
         grads.append([p.grad for p in network.parameters()])
     torch.testing.assert_close(*grads)
 
