@@ -122,12 +122,13 @@ def run(settings: Settings) -> None:
     from wildshape.inference.predictor import load
 
     workers = _workers(settings)
-    folders = _folders(settings)
-    files, detections = _files(settings), _detections(settings, len(folders))
+    drives = _drives(settings)
+    folders = _folders(settings, list(drives))
+    files, detections = _files(settings), _detections(settings, drives)
     predictor = load(settings.network.model, settings.network.device)
     found: list[DriveResult] = []
     for source, out in folders.items():
-        with _bars() as watch:
+        with _bars(drives[source]) as watch:
             one = drive(
                 source,
                 out,
@@ -177,15 +178,18 @@ def _box_files(settings: Settings) -> "BoxFiles | None":
     return files if files.formats or files.calibration else None
 
 
-def _detections(settings: Settings, drives: int) -> "DetectionFile | None":
+def _detections(settings: Settings, drives: dict[Path, str]) -> "DetectionFile | None":
     from wildshape.drives.detections import DetectionFile
 
     if settings.detections is None:
         if settings.min_score is not None:
             raise BadInputError("--min-score is of detections; name them with --detections.")
         return None
-    if drives > 1:
-        raise BadInputError(f"--detections {settings.detections}: give one drive with them.")
+    if len(drives) > 1 or len(settings.source) > 1:
+        taken_for = ", ".join(text for text in drives.values() if text)
+        raise BadInputError(
+            f"--detections {settings.detections}: give one drive with them; {taken_for}."
+        )
     known = settings.calibration
     kitti = known if known is not None and known.suffix.lower() == ".txt" else None
     return DetectionFile(settings.detections, kitti, settings.min_score)
@@ -197,11 +201,24 @@ def _workers(settings: Settings) -> int:
     return settings.workers or os.cpu_count() or 1
 
 
-def _folders(settings: Settings) -> dict[Path, Path]:
-    """Where each drive goes."""
+def _drives(settings: Settings) -> dict[Path, str]:
+    """The drives of all sources; with the first of each, what the source was taken for."""
+    from wildshape.drives.recordings.opening import find_drives
+    from wildshape.io.progress import counted
+
     if not settings.source:
         raise BadInputError("drive needs a SOURCE: a folder of full scans.")
-    drives = [drive for source in settings.source for drive in _drives_in(source)]
+    drives: dict[Path, str] = {}
+    for source in settings.source:
+        found = find_drives(source)
+        several = f"{counted(len(found.drives), 'drive')} of " if len(found.drives) > 1 else ""
+        drives |= dict.fromkeys(found.drives, "")
+        drives[found.drives[0]] = f"{source}: taken for {several}{found.what}"
+    return drives
+
+
+def _folders(settings: Settings, drives: list[Path]) -> dict[Path, Path]:
+    """Where each drive goes."""
     if len(drives) == 1:
         return {drives[0]: settings.out}
     names = [drive.resolve().name for drive in drives]
@@ -211,30 +228,20 @@ def _folders(settings: Settings) -> dict[Path, Path]:
     return {drive: settings.out / name for drive, name in zip(drives, names)}
 
 
-def _drives_in(source: Path) -> list[Path]:
-    """The drives of a source; says what it was taken for."""
-    from wildshape.cli.terminal import say
-    from wildshape.drives.recordings.opening import find_drives
-    from wildshape.io.progress import counted
-
-    found = find_drives(source)
-    several = f"{counted(len(found.drives), 'drive')} of " if len(found.drives) > 1 else ""
-    say(f"{source}: taken for {several}{found.what}")
-    return found.drives
-
-
 @contextmanager
-def _bars() -> "Iterator[Watch]":
-    """A bar of progress a stage."""
+def _bars(taken_for: str) -> "Iterator[Watch]":
+    """A bar of progress a stage; before the first: after all that is refused before any work."""
     from contextlib import ExitStack
 
-    from wildshape.cli.terminal import TERMINAL
+    from wildshape.cli.terminal import TERMINAL, say
     from wildshape.io.progress import Bar
 
     with ExitStack() as stack:
         bars: dict[str, Bar] = {}
 
         def watch(stage: str, done: int, total: int) -> None:
+            if not bars and taken_for:
+                say(taken_for)
             if stage not in bars:
                 stack.pop_all().close()
                 bars[stage] = stack.enter_context(TERMINAL.bar(stage, total))
