@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calibrate the confidence of weights, and measure it on scans that it was not fitted to.
 
-    python experiments/confidence.py --cad CAD --out confidence --write calibrated.safetensors
-    python experiments/confidence.py --cad CAD --out confidence --category chair --model chair ...
+    python -m experiments.confidence --cad CAD --out confidence --write calibrated.safetensors
+    python -m experiments.confidence --cad CAD --out confidence --category chair --model chair ...
 
 Drives, or a depth camera's views of a category, are simulated twice: once of procedural shapes and
 CAD models of split `train`, which give the calibration, once with another seed and CAD models of
@@ -12,7 +12,6 @@ sees; that is said in the checkpoint. Writes OUT/confidence.json and .png and, w
 weights with their calibration.
 """
 
-import csv
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,6 +20,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import torch
 import tyro
+from experiments.mesh_credits import rows_of
 from safetensors import safe_open
 
 from wildshape.evaluation.cases import turn_track
@@ -117,9 +117,7 @@ def _meshes(settings: Settings, split: str, into: Path) -> Path:
     """The meshes of a split, linked into one folder."""
     cad = settings.cad
     assert cad is not None
-    with (cad / "manifest.csv").open(encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["split"] == split]
-    for row in rows:
+    for row in rows_of(cad, split):
         if row["category"] in settings.meshes:
             file = (cad / row["file"]).resolve()
             (into / f"{row['category']}_{file.name}").symlink_to(file)
@@ -244,7 +242,7 @@ def main(settings: Settings) -> None:
         "calibration": vars(calibration),
         "ridge": ridge,
         "scans": len(test.cd),
-        "provenance": provenance("python experiments/confidence.py --cad CAD --out OUT"),
+        "provenance": provenance("python -m experiments.confidence --cad CAD --out OUT"),
     }
     write_json(settings.out / "confidence.json", report)
     orders = {"cost alone": test.plain, "calibrated": after, "true error": [-c for c in test.cd]}

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """CAD meshes of the train split, as they are and in other proportions, for training data."""
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from experiments.mesh_credits import rows_of
 
 COPY_STRETCH = 0.2
 _STRETCH = np.array((0.12, 0.08, 0.08))
@@ -31,10 +31,8 @@ ROAD_SIZES = {
 
 
 def train_split(cad: Path, categories: tuple[str, ...]) -> list[dict[str, str]]:
-    """The manifest's rows of the train split of these categories."""
-    with (cad / "manifest.csv").open(encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["split"] == "train"]
-    return [row for row in rows if row["category"] in categories]
+    """The rows of these categories that weights may be made from."""
+    return [row for row in rows_of(cad, "train") if row["category"] in categories]
 
 
 def road_vehicles(cad: Path, into: Path, count: int, seed: int) -> None:

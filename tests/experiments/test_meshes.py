@@ -1,27 +1,31 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Training meshes: only of the train split, themselves first, copies in other proportions."""
+"""Training meshes: only those that weights may be made from, credited; copies of other sizes."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+from experiments.mesh_credits import notice
 from experiments.meshes import COPY_STRETCH, ROAD_SIZES, road_vehicles, stretched, warped
+
+from wildshape.errors import BadInputError
 
 
 @pytest.fixture(scope="module")
 def cad(tmp_path_factory):
     """A car and a bus to train on, and a car of the test split."""
     folder = tmp_path_factory.mktemp("cad")
-    rows = ["category,file,split"]
-    for category, name, split, size in (
-        ("car", "red", "train", (4.5, 2.9, 3.1)),
-        ("bus", "big", "train", (9.0, 5.0, 2.0)),
-        ("car", "blue", "test", (4.0, 1.8, 1.5)),
+    rows = ["category,file,split,tier,licence,source,name"]
+    for category, name, split, tier, licence, size in (
+        ("car", "red", "train", "A", "CC-BY-3.0", (4.5, 2.9, 3.1)),
+        ("bus", "big", "train", "A?", "CC0-1.0", (9.0, 5.0, 2.0)),
+        ("car", "gnu", "train", "B", "GPL-2.0", (4.0, 1.8, 1.5)),
+        ("car", "blue", "test", "C", "none stated", (4.0, 1.8, 1.5)),
     ):
         trimesh.creation.box(size).export(folder / f"{name}.ply")
-        rows.append(f"{category},{name}.ply,{split}")
+        rows.append(f"{category},{name}.ply,{split},{tier},{licence},gazebo_models,{name}")
     (folder / "manifest.csv").write_text("\n".join(rows), encoding="utf-8")
     return folder
 
@@ -61,6 +65,17 @@ def test_buses_are_drawn_four_times_as_often_and_copies_fit_on_roads(cad, tmp_pa
 
 def limits(name):
     return ROAD_SIZES["car" if name == "red" else "bus"]
+
+
+def test_the_notice_credits_what_asks_for_it_and_nobody_is_left_out(cad, tmp_path):
+    credited, free = notice(cad).split("public domain")
+    assert 'car "red", CC-BY-3.0, by Nathan Koenig' in credited
+    assert "big" in free
+    assert not {"gnu", "blue"} & set(notice(cad).replace(",", " ").split())
+    manifest = (cad / "manifest.csv").read_text("utf-8").replace("gazebo_models", "nobody")
+    (tmp_path / "manifest.csv").write_text(manifest, "utf-8")
+    with pytest.raises(BadInputError, match=r"red\.ply: CC-BY-3\.0, but the author of nobody"):
+        notice(tmp_path)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -1,0 +1,200 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The weights that the package ships, all of them, by one command.
+
+    python -m experiments.shipped_chain --cad CAD --out RUN
+
+CAD holds `manifest.csv` (columns category, file, split, tier, licence, source, name) and the meshes
+it names. Simulated scans alone are trained on, of procedural shapes and of meshes of split `train`
+that an Apache-2.0 file may be made from. RUN/weights holds what is shipped, and its NOTICE.
+The same command goes on with a run that was stopped; what is finished is not made again.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from shutil import copyfile
+from tempfile import TemporaryDirectory
+from typing import Literal
+
+import tyro
+from experiments.mesh_credits import notice
+from experiments.meshes import road_vehicles
+
+from experiments import confidence, views_weights
+from wildshape.io.atomic import write_text
+from wildshape.io.output import provenance
+from wildshape.io.store.store import Store, is_store, open_store
+from wildshape.io.store.writer import StoreWriter
+from wildshape.method.checkpoint import MODEL, load_checkpoint, save_checkpoint
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+from wildshape.training.loop import fit
+from wildshape.training.recipes import PRESETS
+from wildshape.training.setup import setup
+
+_SENSORS = ("hdl64", "hdl64", "hdl32", "os1-128")
+_GROUND = 1  # of the sensors the one whose scans keep some ground
+_SCANS, _SHAPE_POINTS = 20, 512
+_COMMAND = "python -m experiments.shipped_chain --cad CAD --out RUN"
+VIEWS: tuple[Literal["airplane", "chair", "car"], ...] = ("airplane", "chair", "car")
+VIEW_STEPS = {"airplane": 3500, "chair": 3500, "car": 2000}
+_TAUGHT_STEPS, _CALIBRATION_TRACKS = 3500, 60
+
+
+@dataclass(frozen=True)
+class Round:
+    """One training of the vehicles' weights.
+
+    Attributes:
+        data: seed of its tracks.
+        steps: gradient steps.
+        lr: learning rate that it falls from; None: the preset's.
+        teacher: round that poses and fuses its tracks; None: the paper's objective.
+        start: round whose weights it goes on from; None: random ones.
+    """
+
+    data: int
+    steps: int
+    lr: float | None = None
+    teacher: str | None = None
+    start: str | None = None
+
+
+ROUNDS = {
+    "first": Round(data=1, steps=14_000),
+    "taught": Round(data=1, steps=12_000, teacher="first"),
+    "chained": Round(data=2, steps=8_000, lr=6e-4, teacher="taught", start="taught"),
+    "again": Round(data=3, steps=8_000, lr=6e-4, teacher="chained", start="chained"),
+    "last": Round(data=3, steps=6_000, lr=6e-4, teacher="again", start="again"),
+}
+"""In their order; the last one is shipped."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The chain.
+
+    Attributes:
+        out: folder of the run.
+        cad: folder of CAD meshes with a manifest.
+        tracks: of each data set, an eighth for each pair of sensor and source.
+        share: of all tracks and steps; below 1 to try the chain, not to ship what comes out.
+    """
+
+    out: Path
+    cad: Path
+    tracks: int = 2400
+    share: float = 1.0
+
+    def part(self, count: int, least: int = 1) -> int:
+        """So many tracks or steps of `count`."""
+        return max(round(count * self.share), least)
+
+
+def main(settings: Settings) -> None:
+    """Every stage that is not finished, in order."""
+    weights = settings.out / "weights"
+    weights.mkdir(parents=True, exist_ok=True)
+    write_text(weights / "NOTICE", notice(settings.cad))
+    for name in ROUNDS:
+        trained(name, settings)
+    _shipped(settings.out / tuple(ROUNDS)[-1] / MODEL, settings, "vehicle")
+    for category in VIEWS:
+        _views(category, settings)
+
+
+def trained(name: str, settings: Settings) -> Path:
+    """The checkpoint of a round, trained now or resumed where it is not finished."""
+    of, folder = ROUNDS[name], settings.out / name
+    recipe = PRESETS["default"]()
+    steps, rate = settings.part(of.steps), recipe.optim.lr if of.lr is None else of.lr
+    recipe = replace(recipe, optim=replace(recipe.optim, steps=steps, lr=rate))
+    run = setup(
+        recipe,
+        _data(of.data, settings),
+        folder,
+        seed=of.data,
+        resume=True,
+        teacher=None if of.teacher is None else settings.out / of.teacher / MODEL,
+        start=None if of.start is None else settings.out / of.start / MODEL,
+        provenance=provenance(_COMMAND) | {"round": name},
+    )
+    if run.state.step < steps:  # else it is there; made anew, it would teach others
+        fit(run, lambda step, values: print(name, step, values, flush=True))
+    return folder / MODEL
+
+
+def _data(seed: int, settings: Settings) -> Store:
+    """Drives past procedural and CAD vehicles, simulated once; a store that opens is whole."""
+    path = settings.out / f"tracks{seed}"
+    if not is_store(path):
+        with StoreWriter(path, provenance(_COMMAND)) as store:
+            for number in range(len(_SENSORS)):
+                _add_drives(store, number, seed, settings)
+    return open_store(path)
+
+
+def _add_drives(store: StoreWriter, number: int, seed: int, settings: Settings) -> None:
+    """Those of one sensor."""
+    share = settings.part(settings.tracks // (2 * len(_SENSORS)), least=4)
+    config = SimulationConfig(
+        tracks=share,
+        scans=_SCANS,
+        sensor=_SENSORS[number],
+        ground=number == _GROUND,
+        shape_points=_SHAPE_POINTS,
+        varied=True,
+    )
+    own = 1000 * seed + 100 * number
+    with TemporaryDirectory() as folder:
+        road_vehicles(settings.cad, Path(folder), share, own)
+        for place, meshes in enumerate((None, Path(folder))):
+            for track in simulate_tracks(replace(config, meshes=meshes), own + place):
+                store.add(replace(track, name=f"{config.sensor}-{own + place}-{track.name}"))
+
+
+def _views(category: Literal["airplane", "chair", "car"], settings: Settings) -> None:
+    """Weights of a depth camera; those of cars ask the vehicles' which way each view looks."""
+    folder = settings.out / category
+    headings = settings.out / "weights" / "default.safetensors" if category == "car" else None
+    views_weights.main(
+        views_weights.Settings(
+            out=folder,
+            cad=settings.cad,
+            category=category,
+            steps=settings.part(VIEW_STEPS[category]),
+            taught_steps=settings.part(_TAUGHT_STEPS),
+            headings=headings,
+        )
+    )
+    _shipped(folder / f"{category}.safetensors", settings, category)
+
+
+def _shipped(
+    model: Path, settings: Settings, category: Literal["vehicle", "airplane", "chair", "car"]
+) -> None:
+    """The weights in half precision, their confidence calibrated."""
+    name = "default" if category == "vehicle" else category
+    final = settings.out / "weights" / f"{name}.safetensors"
+    if final.exists():
+        return
+    halved = settings.out / f"{name}-half.safetensors"
+    network, found = load_checkpoint(model)
+    described = replace(found, provenance=found.provenance | {"command": _COMMAND})
+    save_checkpoint(halved, network, described, half=True)
+    calibrated = settings.out / f"{name}-calibrated.safetensors"
+    tracks = settings.part(_CALIBRATION_TRACKS if category != "vehicle" else 20, least=4)
+    confidence.main(
+        confidence.Settings(
+            out=settings.out / f"{name}-confidence",
+            model=halved,
+            cad=settings.cad,
+            write=calibrated,
+            tracks=tracks,
+            category=category,
+        )
+    )
+    copyfile(calibrated, final)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Settings))
