@@ -30,7 +30,7 @@ from wildshape.inference.predictor import Predictor
 from wildshape.io.inputs import open_tracks
 from wildshape.records import Box, Track
 
-_COLUMNS = (
+COLUMNS = (
     "length", "width", "roof", "floor", "near end", "far end", "near side", "far side",
     "away", "BEV IoU", "3D IoU", "heading off, %",
 )  # fmt: skip
@@ -62,10 +62,10 @@ def main(settings: Settings) -> None:
         tracks = [_spread(track, settings.scans) for track in _tracks(path, settings.most)]
         scans = sum(len(track.scans) for track in tracks)
         print(f"\n{path.name}: {len(tracks)} objects, {scans} scans; metres\n")
-        print("| boxes | " + " | ".join(_COLUMNS) + " |\n| --- |" + " ---: |" * len(_COLUMNS))
+        print("| boxes | " + " | ".join(COLUMNS) + " |\n| --- |" + " ---: |" * len(COLUMNS))
         for name, boxes_of in _methods(models):
-            rows = [_errors(boxes_of(track), track) for track in tracks]
-            print(f"| {name} | " + " | ".join(map(_shown, _COLUMNS, np.mean(rows, axis=0))) + " |")
+            rows = [errors(boxes_of(track), track) for track in tracks]
+            print(f"| {name} | " + " | ".join(map(shown, COLUMNS, np.mean(rows, axis=0))) + " |")
 
 
 def _tracks(path: Path, most: int) -> Iterator[Track]:
@@ -96,10 +96,15 @@ def _upright(box: Box) -> UprightBox:
     return UprightBox(*box.centre, *box.size, yaw=box.yaw)
 
 
-def _errors(found: list[UprightBox], track: Track) -> Float[np.ndarray, "c"]:
+def errors(found: list[UprightBox], track: Track) -> Float[np.ndarray, "c"]:
     """The mean of an object's scans, a number for each of the columns."""
-    labels = [_upright(box) for box in _labels(track)]
+    labels = upright_labels(track)
     return np.mean([_error(*pair) for pair in zip(found, labels)], axis=0)
+
+
+def upright_labels(track: Track) -> list[UprightBox]:
+    """The label in each scan, sensor frame."""
+    return [_upright(box) for box in _labels(track)]
 
 
 def _labels(track: Track) -> list[Box]:
@@ -133,7 +138,7 @@ def _error(found: UprightBox, label: UprightBox) -> tuple[float, ...]:
     )  # fmt: skip
 
 
-def _shown(column: str, value: float) -> str:
+def shown(column: str, value: float) -> str:
     if "%" in column:
         return f"{value:.1f}"
     return f"{value:.3f}" if "IoU" in column else f"{value:+.3f}"

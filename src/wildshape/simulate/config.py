@@ -36,7 +36,7 @@ class SimulationConfig:
             every k-th scan; the others are every scan of a short stretch, as a sensor that loses
             its object early leaves it.
         rays: that passed the object by, kept with each scan at most (LiDAR).
-        varied: for training: vehicles of more sizes and rounder, sensors that differ from track to
+        varied: for training: vehicles of more sizes and forms, sensors that differ from track to
             track, and scans cut off above the ground, as crops of real ones are (LiDAR).
     """
 

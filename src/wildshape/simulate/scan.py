@@ -25,6 +25,7 @@ class Returns:
         rim_m: how near, metres.
         grazing: a pulse that meets a surface at a smaller cosine comes back less often, in
             proportion.
+        through: share of the pulses lost on glass that come back from what is behind it.
     """
 
     noise_m: float
@@ -33,6 +34,7 @@ class Returns:
     ground: bool
     rim_m: float = 0.3
     grazing: float = 0.12
+    through: float = 0.0
 
 
 class Turn(NamedTuple):
@@ -135,8 +137,11 @@ def scan(
     origin = T_object_sensor[:3, 3]
     hits = scene.cast(np.broadcast_to(origin, toward.shape), toward)
     kept = _returned(hits, target, sensor, returns, rng)
-    missed = toward[(hits.solid == 0) & ~kept]
     distance = hits.distance.astype(np.float64)
+    if returns.through > 0:
+        inside = _behind_glass(scene, target, origin, toward, hits, kept, returns, rng)
+        kept, distance = kept | (inside > 0), np.where(inside > 0, inside, distance)
+    missed = toward[(hits.solid == 0) & ~kept]
     on_target = int(kept.sum())
     if returns.ground:
         below = _ground(hits, toward, origin, half, returns.rim_m)
@@ -208,6 +213,27 @@ def _returned(
     return kept
 
 
+def _behind_glass(
+    scene: Scene,
+    target: Solid,
+    origin: np.ndarray,
+    toward: np.ndarray,
+    hits: Hits,
+    kept: np.ndarray,
+    returns: Returns,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """`(n,)` range of what a pulse meets that passed a pane of the target; else 0."""
+    reach = np.zeros(len(kept))
+    pane = (hits.solid == 0) & target.glass[hits.face] & ~kept
+    passed = np.flatnonzero(pane & (rng.random(len(kept)) < returns.through))
+    starts = origin + toward[passed] * (hits.distance[passed, None] + _PANE_M)
+    behind = scene.cast(starts, toward[passed])
+    met = (behind.solid == 0) & ~target.glass[behind.face]
+    reach[passed[met]] = hits.distance[passed[met]] + _PANE_M + behind.distance[met]
+    return reach
+
+
 def _ground(
     hits: Hits, toward: np.ndarray, origin: np.ndarray, half: np.ndarray, rim_m: float
 ) -> np.ndarray:
@@ -220,6 +246,7 @@ def _ground(
 
 
 _AROUND_M = 2.0  # wider than what is kept
+_PANE_M = 0.02
 
 
 def _box_edges(steps: int = 9) -> np.ndarray:

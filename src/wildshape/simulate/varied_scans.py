@@ -20,6 +20,7 @@ def varied_returns(usual: Returns, rng: np.random.Generator) -> Returns:
         dropout=usual.dropout + float(rng.uniform(0.0, 0.25)),
         glass=float(rng.uniform(0.02, 0.7)),
         grazing=float(rng.uniform(0.05, 0.25)),
+        through=float(rng.uniform(0.0, 0.8)),
     )
 
 

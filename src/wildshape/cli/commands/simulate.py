@@ -45,8 +45,8 @@ class Settings:
         occlusion: probability that something stands in the way in a LiDAR track.
         ground: leave ground returns at the rim of the object in.
         rays: keep the rays around each scan that did not hit the object, too (LiDAR).
-        varied: to train for real scans: more sizes, rounder forms, sensors that differ, and scans
-            cut off above the ground.
+        varied: to train for real scans: more sizes and forms, sensors that differ, and scans cut
+            off above the ground.
         workers: processes; by default one a core.
         drive: full scans of a street with traffic, their boxes and the sensor's way.
         speed: of a drive, mean, metres a second; else drawn from 4 to 10; 0 stands still.

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Vehicles made other ones: of another size, and rounder.
+"""Vehicles made other ones: of another size, and with relief.
 
 Of the points on KITTI's cars half lie within 10 cm of their labelled boxes, on our procedural ones
-three quarters. Real sides bow, ends are round in plan and lean, and cabins narrow upwards.
+three quarters: real sides belly, ends lean and cabins narrow upwards. Their corners are sharper.
 """
 
 from dataclasses import dataclass, replace
@@ -21,17 +21,19 @@ class Variety:
 
     Attributes:
         stretch: of length, width and height, a share up or down.
-        side: how much narrower a vehicle's ends are than its middle, a share at most.
+        taper: how much narrower a vehicle's ends are than its middle, a share at most.
+        belly: how much narrower its sills and shoulders are than its belt, a share at most.
         cabin: how much narrower its roof is than its belt, a share at most.
         end_m: how far its ends stand back at the corners, metres at most.
         lean_m: how far they stand back at the top or the bottom, metres at most.
     """
 
     stretch: tuple[float, float, float] = (0.08, 0.08, 0.06)
-    side: float = 0.22
-    cabin: float = 0.35
-    end_m: float = 0.6
-    lean_m: float = 0.3
+    taper: float = 0.16
+    belly: float = 0.12
+    cabin: float = 0.3
+    end_m: float = 0.15
+    lean_m: float = 0.2
 
 
 _USUAL = Variety()
@@ -59,9 +61,10 @@ def _rounded(
         rng: the only source of chance.
     """
     x, y, z = at.T
-    side, cabin = rng.uniform(0, (variety.side, variety.cabin))
-    bend = rng.uniform(2.0, 4.0)
-    narrow = (1 - side * np.abs(x) ** bend) * (1 - cabin * np.clip(z, 0, 1) ** 2)
+    taper, belly, cabin = rng.uniform(0, (variety.taper, variety.belly, variety.cabin))
+    begins, widest = rng.uniform((0.3, -0.4), (0.7, 0.1))
+    narrow = 1 - taper * np.clip((np.abs(x) - begins) / (1 - begins), 0, 1)
+    narrow = narrow - belly * (z - widest) ** 2 - cabin * np.clip(z, 0, 1) ** 2
     back = np.zeros_like(x)
     for end in (-1, 1):
         round_m, lean_m = rng.uniform((0, -variety.lean_m), (variety.end_m, variety.lean_m))

@@ -6,7 +6,7 @@ Metres, x forward, y left, wheels on z = 0. The front differs from the back: bon
 different length, windscreen and rear window of different slope.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,6 +48,7 @@ _RANGES: dict[str, dict[str, tuple[float, float]]] = {
 }  # fmt: skip
 KINDS = tuple(_RANGES)
 _SHARES = (0.34, 0.34, 0.14, 0.10, 0.08, 0.0)
+ROUNDEST_M = 0.12
 _VARIED_SHARES = (0.26, 0.34, 0.15, 0.09, 0.08, 0.08)
 
 
@@ -75,9 +76,17 @@ class _Body:
         return self.top[2:6, 0]
 
 
-def vehicle(kind: str, rng: np.random.Generator) -> Solid:
-    """A random vehicle of a kind in `KINDS`; box middle above the origin, wheels on z = 0."""
+def vehicle(kind: str, rng: np.random.Generator, roundest_m: float | None = None) -> Solid:
+    """A random vehicle of a kind in `KINDS`; box middle above the origin, wheels on z = 0.
+
+    Args:
+        kind: of vehicle.
+        rng: the only source of chance.
+        roundest_m: how far its corners, seen from above, stand back at most; None: as usual.
+    """
     body = _draw(kind, rng)
+    if roundest_m is not None:
+        body = replace(body, corner=float(rng.uniform(0.0, roundest_m)))
     parts = [_shell(body), *_wheels(body), *_mirrors(body)]
     if kind == "truck":
         parts += _cargo(body, rng)
@@ -94,7 +103,7 @@ def random_vehicle(rng: np.random.Generator) -> Solid:
 
 def varied_vehicle(rng: np.random.Generator) -> Solid:
     """A car of a random kind, more vans and transporters among them, its size and form varied."""
-    return varied(vehicle(str(rng.choice(KINDS, p=_VARIED_SHARES)), rng), rng)
+    return varied(vehicle(str(rng.choice(KINDS, p=_VARIED_SHARES)), rng, ROUNDEST_M), rng)
 
 
 def _draw(kind: str, rng: np.random.Generator) -> _Body:
