@@ -38,7 +38,7 @@ from wildshape.simulate.shapes.vehicle import ROUNDEST_M, vehicle
 from wildshape.simulate.truth import visible_surface
 
 _CUT_M, _VAN_M = 0.2, 2.0
-_NOISE_M, _LOST, _GLASS = 0.02, 0.05, 0.1
+_NOISE_M, _LOST, _GLASS, _THROUGH = 0.02, 0.05, 0.1, 0.6
 _NEIGHBOURS, _NEAR_M = 10, 0.35
 Maker = Callable[[int, Track], Solid]
 
@@ -70,7 +70,8 @@ def main(settings: Settings) -> None:
     real = [track for track in map(source.__getitem__, range(len(source))) if track.label_size_m]
     sets = {"real": real}
     for name, maker in _makers(settings.cad).items():
-        sets[name] = [_twin(track, maker(i, track), i) for i, track in enumerate(real)]
+        through = _THROUGH if name == "seen through" else 0.0
+        sets[name] = [_twin(track, maker(i, track), i, through) for i, track in enumerate(real)]
     names = ("points", "thickness, cm", "within 10 cm of the box, %", "deeper than 30 cm, %")
     print("| scans | " + " | ".join((*names, *COLUMNS)) + " |")
     print("| --- |" + " ---: |" * (len(names) + len(COLUMNS)))
@@ -85,7 +86,9 @@ def main(settings: Settings) -> None:
 
 
 def _makers(cad: Path | None) -> dict[str, Maker]:
-    makers: dict[str, Maker] = {"procedural": _procedural, "procedural, varied": _varied}
+    makers: dict[str, Maker] = {
+        "procedural": _procedural, "seen through": _procedural, "other forms": _varied,
+    }  # fmt: skip
     if cad is not None:
         cars = [cad / row["file"] for row in rows_of(cad, "test") if row["category"] == "car"]
         makers["CAD"] = lambda i, _: read_mesh(cars[(4 * i) % len(cars)], metres=True)
@@ -106,13 +109,14 @@ def _varied(number: int, track: Track) -> Solid:
     return varied(vehicle(_kind(track), rng, ROUNDEST_M), rng)
 
 
-def _twin(track: Track, solid: Solid, seed: int) -> Track:
+def _twin(track: Track, solid: Solid, seed: int, through: float) -> Track:
     """The same track as the simulator scans another car of the label's size."""
     rng = np.random.default_rng(seed)
     shape = visible_surface(solid, Scene([solid]), 8192, 0.0, rng)
     body, wanted = true_box(shape, body=True), np.array(track.label_size_m)
     moved = (solid.vertices - body.centre.numpy()) * (wanted / body.size.numpy())
-    target, assumed = replace(solid, vertices=moved), Returns(_NOISE_M, _LOST, _GLASS, ground=False)
+    target = replace(solid, vertices=moved)
+    assumed = Returns(_NOISE_M, _LOST, _GLASS, ground=False, through=through)
     scene, poses, scans = Scene([target]), track.T_sensor_object, []
     assert poses is not None
     for i in range(len(track.scans)):

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A scan has the sensor's rings, lies on the object, and loses what it should."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -50,6 +52,23 @@ def test_rings_of_a_scan_are_the_beam_table(lidar: SpinningLidar) -> None:
     )
     off = np.abs(_elevation(points)[:, None] - np.array(lidar.elevation_deg)).min(1)
     assert off.max() < 1e-4
+
+
+def test_lost_pulses_pass_the_glass_and_come_back_from_behind_it() -> None:
+    car, other = _car(), vehicle("van", np.random.default_rng(0)).moved(np.array((9.0, 0.0, -0.7)))
+    dark = Returns(noise_m=0.0, dropout=0.0, glass=0.0, ground=False)
+    T, scene = _pose(3, 6, -1.9, car), Scene([car, other])
+    outside, inside = (
+        scan(scene, car, HDL64, T, replace(dark, through=share), np.random.default_rng(0))
+        for share in (0.0, 1.0)
+    )
+    assert inside.on_target == len(inside.points) > len(outside.points) + 50
+    at = inside.points @ T[:3, :3].T + T[:3, 3]
+    half = car.bounds[1]
+    assert (np.abs(at) < half + 0.01).all()
+    far_side = at[:, 1] < -0.5 * half[1]
+    assert far_side.sum() > 20
+    assert len(inside.lost) < len(outside.lost)
 
 
 @pytest.mark.parametrize("yaw", [0.3, 2.6, -2.6, 3.1])

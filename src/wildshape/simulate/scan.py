@@ -225,11 +225,13 @@ def _behind_glass(
 ) -> np.ndarray:
     """`(n,)` range of what a pulse meets that passed a pane of the target; else 0."""
     reach = np.zeros(len(kept))
-    pane = (hits.solid == 0) & target.glass[hits.face] & ~kept
-    passed = np.flatnonzero(pane & (rng.random(len(kept)) < returns.through))
+    lost = np.flatnonzero((hits.solid == 0) & ~kept)
+    panes = lost[target.glass[hits.face[lost]]]
+    passed = panes[rng.random(len(panes)) < returns.through]
     starts = origin + toward[passed] * (hits.distance[passed, None] + _PANE_M)
     behind = scene.cast(starts, toward[passed])
-    met = (behind.solid == 0) & ~target.glass[behind.face]
+    met = np.flatnonzero(behind.solid == 0)
+    met = met[~target.glass[behind.face[met]]]
     reach[passed[met]] = hits.distance[passed[met]] + _PANE_M + behind.distance[met]
     return reach
 
