@@ -37,7 +37,7 @@ class Settings:
 
     out: OutFolder = Path("demo")
     data: OwnData = None
-    seconds: Annotated[float, arg(metavar="S")] = 110.0
+    seconds: Annotated[float, arg(metavar="S")] = 95.0
     tracks: Annotated[int, arg(metavar="N")] = 200
     test_tracks: Annotated[int, arg(metavar="N")] = 12
     drive_scans: Annotated[int, arg(metavar="N")] = 100

@@ -38,7 +38,7 @@ class DemoOptions:
     tracks: int = 200
     test_tracks: int = 12
     preset: str = "small"
-    seconds: float = 110.0
+    seconds: float = 95.0
     drive_scans: int = 100
     overwrite: bool = False
 
