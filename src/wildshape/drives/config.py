@@ -218,8 +218,8 @@ class VehicleConfig:
     usual_confidence: float = 0.1
     least_confidence: float = 0.4
     length_m: tuple[float, float] = (2.5, 9.0)
-    width_m: tuple[float, float] = (1.2, 3.2)
-    height_m: tuple[float, float] = (1.0, 3.6)
+    width_m: tuple[float, float] = (1.4, 3.2)
+    height_m: tuple[float, float] = (1.05, 3.6)
     fewest_points: int = 60
 
 
