@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from wildshape.geometry.box import FittedBox, box_iou
+from wildshape.geometry.box import FittedBox, body_sides, box_iou
 from wildshape.geometry.footprint import footprint_iou
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
 from wildshape.geometry.transforms.se3 import SE3
@@ -18,7 +18,6 @@ from wildshape.ops.nearest import nearest_both, nearest_distance
 from wildshape.records import Box, Points
 
 ACCURATE_DEG = 30.0
-_MIRROR = 0.006  # share of the surface at either side that a mirror takes at most
 
 
 @dataclass(frozen=True)
@@ -153,8 +152,7 @@ def true_box(shape: Points, *, body: bool = False) -> FittedBox:
     points = torch.from_numpy(shape).double()
     low, high = points.amin(0), points.amax(0)
     if body:
-        share = torch.tensor((_MIRROR, 1 - _MIRROR), dtype=torch.float64)
-        low[1], high[1] = points[:, 1].quantile(share)
+        low[1], high[1] = body_sides(shape[:, 1].astype(np.float64))
     return FittedBox((low + high) / 2, high - low, torch.eye(3, dtype=torch.float64))
 
 

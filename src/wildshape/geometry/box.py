@@ -20,6 +20,7 @@ from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rot
 SIGNS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
 EDGES = [(i, j) for i in range(8) for j in range(i) if np.abs(SIGNS[i] - SIGNS[j]).sum() == 2]
 _VEHICLE_M = 5.0  # the diagonal of a usual car, metres
+_MIRROR = 0.006  # share of the surface at either side that a mirror takes at most
 _INSIDE, _FLAT = 1e-9, 1e-12  # of a box's diagonal: rounding
 
 
@@ -35,6 +36,16 @@ class FittedBox(NamedTuple):
     centre: Float[Tensor, "3"]
     size: Float[Tensor, "3"]
     rotation: Float[Tensor, "3 3"]
+
+
+def body_sides(across: Float[np.ndarray, "n"]) -> tuple[float, float]:
+    """Right and left end of a vehicle as data sets label it, without its mirrors.
+
+    Args:
+        across: y of points spread evenly over its surface, metres.
+    """
+    low, high = np.quantile(across, (_MIRROR, 1 - _MIRROR))
+    return float(low), float(high)
 
 
 def box_axes(quaternion_wxyz: tuple[float, ...]) -> Float[np.ndarray, "3 3"]:

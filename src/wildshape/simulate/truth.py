@@ -38,7 +38,7 @@ def visible_surface(
     """
     found, have = [], 0
     for _ in range(12):
-        points, normals = _on_surface(solid, int(1.5 * (count - have)) + 64, rng)
+        points, normals = on_surface(solid, int(1.5 * (count - have)) + 64, rng)
         seen = points[_seen(points, normals, solid, scene, lowest_deg, rng, directions)]
         found.append(seen)
         have += len(seen)
@@ -50,9 +50,7 @@ def visible_surface(
     )
 
 
-def _on_surface(
-    solid: Solid, count: int, rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray]:
+def on_surface(solid: Solid, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """`(count, 3)` points, uniform by area (stratified along the triangle list), and normals."""
     a, b, c = (solid.vertices[solid.faces[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)

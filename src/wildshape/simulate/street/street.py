@@ -12,7 +12,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from wildshape.geometry.box import body_sides
 from wildshape.simulate.shapes.solid import Solid, cylinder, solid
+from wildshape.simulate.truth import on_surface
 
 LEAD_M = 100.0
 """Metres of street before the start of the drive, and after its end."""
@@ -138,6 +140,13 @@ class Street:
         """An actor's surface in its own frame, box centre at the origin."""
         return _shape(self.vehicles, actor.kind, actor.seed)
 
+    def label_size(self, actor: Actor) -> tuple[float, float, float]:
+        """Length, width and height as data sets label them, metres: without mirrors."""
+        length, width, height = actor.size
+        if actor.kind != "Pedestrian":
+            width = _body_width(self.vehicles, actor.kind, actor.seed)
+        return length, width, height
+
     def ground(self, low: float, high: float) -> list[Solid]:
         """The road between two places along it, and the terrain around."""
         s = np.arange(low, high + 1.0)
@@ -212,6 +221,13 @@ def _surface(points: np.ndarray, rows: int, columns: int) -> Solid:
     a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
     faces = np.stack((a, b, c, a, c, d), -1).reshape(-1, 3)
     return solid(points, faces)
+
+
+@lru_cache(maxsize=256)
+def _body_width(vehicles: Vehicles, kind: str, seed: tuple[int, ...]) -> float:
+    points, _ = on_surface(_shape(vehicles, kind, seed), 8192, np.random.default_rng(0))
+    right, left = body_sides(points[:, 1])
+    return left - right
 
 
 @lru_cache(maxsize=256)

@@ -99,7 +99,7 @@ class TrueBox:
     Attributes:
         track: number, unique in the drive.
         kind: `Car`, `Van`, `Truck` or `Pedestrian`.
-        size: along its own x (forward), y (left), z (up), metres.
+        size: along its own x (forward), y (left), z (up), metres; a vehicle's without mirrors.
         T_sensor_object: `(4, 4)`, origin at the box's centre, when the beam passed that centre.
         points: how many of the scan's points lie on it.
         moving: whether it moves.
@@ -243,7 +243,9 @@ class WholeDrive:
             turned = np.arctan2(T_sensor_object[1, 3], T_sensor_object[0, 3]) / (2 * np.pi)
             time = middle + turned * PERIOD_S
         T = self._seen(actor, time, middle if self.config.compensated else time)
-        return TrueBox(actor.track, actor.kind, actor.size, T, points, actor.moving)
+        return TrueBox(
+            actor.track, actor.kind, self.street.label_size(actor), T, points, actor.moving
+        )
 
     def _seen(self, actor: Actor, time: float, sensor_time: float) -> np.ndarray:
         """`(4, 4)` T_sensor_object of an actor at one time, a sensor at another."""
