@@ -31,16 +31,21 @@ class Sighted:
 @pytest.mark.parametrize("name", ["rectangle", "l-shape"])
 def test_a_car_seen_from_all_sides_has_its_labelled_box(name) -> None:
     track = drive_by("a", scans=2, points=400)
+    assert track.shape is not None
+    assert track.T_sensor_object is not None
     whole = tuple(pose.apply_numpy(track.shape) for pose in track.T_sensor_object)
     size = tuple(np.ptp(track.shape, axis=0).tolist())
     seen = replace(track, scans=whole, label_size_m=size)
     figures = figures_of(run({name: baseline(name)}, [seen], "yaw", 3).methods[0])
-    assert figures["box_bev"] > 0.95
-    assert abs(figures["box_length_bias_m"]) < 0.05
+    bev, bias = figures["box_bev"], figures["box_length_bias_m"]
+    assert bev is not None
+    assert bev > 0.95
+    assert bias is not None
+    assert abs(bias) < 0.05
     assert figures["heading30_sym"] == 1.0
     longer = replace(seen, label_size_m=(size[0] + 1.0, *size[1:]))
     off = figures_of(run({name: baseline(name)}, [longer], "yaw", 3).methods[0])
-    assert off["box_length_bias_m"] == pytest.approx(figures["box_length_bias_m"] - 1.0, abs=1e-6)
+    assert off["box_length_bias_m"] == pytest.approx(bias - 1.0, abs=1e-6)
 
 
 def test_rays_reach_the_methods_that_know_them_turned_as_the_scans() -> None:

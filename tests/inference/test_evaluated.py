@@ -21,10 +21,10 @@ class Counting(Predictor):
     def __init__(self):
         self.asked = 0  # no network is behind it
 
-    def complete_many(self, scans, sensor=None, rays=()):
+    def complete_many(self, scans, sensor=None, *, rays=()):
         return iter(self.complete_track(scans, sensor))
 
-    def complete_track(self, scans, sensor=None, rays=()):
+    def complete_track(self, scans, sensor=None, *, rays=()):
         self.asked += 1
         return [completion(scan) for scan in scans]
 
