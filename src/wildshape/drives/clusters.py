@@ -83,7 +83,7 @@ def _vehicle_sized(
             yield from _vehicle_sized(scan, members, reaches[1:], config)
 
 
-def _without_overhang(scan: _Above, rows: Rows, config: ClusterConfig) -> Rows:
+def _without_overhang(scan: _Above, rows: Rows, config: ClusterConfig) -> Int[np.ndarray, "some"]:
     """A cluster without what is high and reaches out beyond what is below: a tree over a car."""
     low = scan.heights[rows] < config.overhang_m
     if low.all() or low.sum() < config.fewest_points:
