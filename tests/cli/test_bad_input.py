@@ -13,6 +13,7 @@ from safetensors.torch import load_file, save_file
 
 from wildshape.inference.folders import complete_folder as results
 from wildshape.io.scans.points import read_points, write_ply
+from wildshape.io.scans.writers import write_cloud
 
 
 @pytest.fixture
@@ -216,11 +217,11 @@ def test_full_disk(wildshape, dataset, trained, tmp_path, monkeypatch):
     def full(path, points):
         if path.name == "000002.ply":
             raise OSError(errno.ENOSPC, "No space left on device", str(path))
-        write_ply(path, points)
+        write_cloud(path, points)
 
     command = ("complete", dataset, "--out", tmp_path / "c", "--model", trained)
     with monkeypatch.context() as patch:
-        patch.setattr(results, "write_ply", full)
+        patch.setattr(results, "write_cloud", full)
         found = wildshape(*command)
     assert found.code == 1
     assert "no space left" in found.err

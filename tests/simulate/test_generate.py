@@ -134,10 +134,11 @@ def test_triangles_without_their_corners_are_refused(tmp_path: Path, corner: int
 
 
 def test_triangles_that_a_file_cannot_hold_are_refused(tmp_path: Path) -> None:
-    head = "ply\nformat binary_little_endian 1.0\nelement face 100000\n"
+    head = "ply\nformat binary_little_endian 1.0\nelement vertex 3\n"
+    head += "".join(f"property float {axis}\n" for axis in "xyz") + "element face 100000\n"
     head += "property list uchar int vertex_indices\nend_header\n"
     (tmp_path / "car.ply").write_bytes(head.encode() + bytes(100_000))
-    with pytest.raises(BadInputError, match=r"car\.ply promises 100000 triangles"):
+    with pytest.raises(BadInputError, match=r"car\.ply: the header promises 100000 'face' rows"):
         _tracks(SimulationConfig(tracks=1, meshes=tmp_path))
 
 

@@ -59,7 +59,7 @@ def elsewhere(value):
     return value.to("meta")
 
 
-def no_neighbours(a, b):
+def no_neighbours(a, b, own=None):
     """What the search would return, without values."""
     both = (a, b), (b, a)
     found = [(x.new_empty(x.shape[:2]), x.new_empty(x.shape[:2]).long()) for x, _ in both]

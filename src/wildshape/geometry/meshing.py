@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import trimesh
 
 _MARGIN = 3  # cells around the swollen points
+_OFF_LEVEL = 1e-3  # of a cell: what keeps corners of the surface apart
 # Blue to orange (Okabe & Ito's two, a light grey between): told apart by colour-blind readers.
 _SCALE = np.array([(0, 114, 178), (196, 200, 206), (213, 94, 0)], np.float64)
 
@@ -90,6 +91,9 @@ def closed_mesh(
     level = float(np.median(_interpolate(depth, grid, points)))
     depth = _centred(depth, grid, points, level, config)
     depth = _large_bodies(depth, level, config.smallest_body)
+    # A place just at the level would be a corner of several cells' triangles, all at one point.
+    least = _OFF_LEVEL * grid.step
+    depth = np.where(np.abs(depth - level) < least, level + least, depth)
     vertices, faces, *_ = march(depth, level, gradient_direction="ascent")
     return trimesh.Trimesh(vertices * grid.step + grid.start, faces, process=False)
 
