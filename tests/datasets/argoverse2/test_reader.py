@@ -151,8 +151,9 @@ def test_poses_of_another_log_are_refused(log):
     columns |= {"tx_m": [0.0], "ty_m": [0.0], "tz_m": [0.0]}
     write_table(log / "city_SE3_egovehicle.feather", columns)
     refused(log, f"has no pose for the labelled sweep {STAMPS[0]}")
-    write_table(log / "city_SE3_egovehicle.feather", columns | {"qw": [0.0]})
-    refused(log, r"city_SE3_egovehicle\.feather: row 0 holds no pose")
+    for broken in ({"qw": [0.0]}, {"tx_m": [1e300]}):
+        write_table(log / "city_SE3_egovehicle.feather", columns | broken)
+        refused(log, r"city_SE3_egovehicle\.feather: row 0 holds no pose")
 
 
 def test_without_pyarrow_the_extra_is_named(log, monkeypatch):

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from wildshape.datasets.argoverse2.unpacked import unpacked_bytes
+from wildshape.datasets.tracks.labelled_boxes import WORLD_M
 from wildshape.errors import BadInputError, load_library
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
@@ -97,14 +98,14 @@ def poses(columns: Columns, path: Path) -> SE3:
     """One pose a row from the columns named in `POSE`, metres.
 
     Raises:
-        BadInputError: a row holds no finite numbers or no unit quaternion.
+        BadInputError: a row holds no place on a map or no unit quaternion.
     """
     quaternion, translation = (
         torch.as_tensor(np.stack([columns[name] for name in names], axis=-1), dtype=torch.float64)
         for names in (_QUATERNION, _TRANSLATION)
     )
     good = (quaternion.norm(dim=-1) - 1).abs() < 1e-3
-    good &= translation.isfinite().all(dim=-1)
+    good &= (translation.abs() <= WORLD_M).all(dim=-1)  # NaN is none either
     if not bool(good.all()):
         row = int((~good).nonzero()[0])
         raise BadInputError(f"{path}: row {row} holds no pose; download the file again.")

@@ -16,7 +16,7 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 
 _LARGEST_M = 1000.0
-_WORLD_M = 1e8  # of a map's coordinates
+WORLD_M = 1e8  # the largest coordinate that a map has
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def check_boxes(sizes: Float[np.ndarray, "b 3"], poses: SE3, where: str, cure: s
     """
     places = poses.matrix.numpy().reshape(-1, 16)
     sound = ((sizes > 0) & (sizes <= _LARGEST_M)).all(axis=-1) & np.isfinite(places).all(axis=-1)
-    sound &= (np.abs(places) <= _WORLD_M).all(axis=-1)
+    sound &= (np.abs(places) <= WORLD_M).all(axis=-1)
     if not sound.all():
         row = int(np.flatnonzero(~sound)[0])
         raise BadInputError(
