@@ -13,8 +13,8 @@ from typing import Annotated
 import tyro
 
 import wildshape
-from wildshape.drives.finished import FinishedDrive, FoundVehicle, read_finished
 from wildshape.drives.recordings.opening import open_drive
+from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle, read_finished
 from wildshape.report.drive.picture import write_drive_picture
 from wildshape.simulate.street.drive_folder import write_drive
 from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import torch
 
-from wildshape.drives.detections import DetectionFile
+from wildshape.drives.tracking.detections import DetectionFile
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.io.boxes.detections import Detection
 from wildshape.io.boxes.kitti import camera_at_the_lidar, write_kitti_labels

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from wildshape.drives.finished import FinishedDrive, read_finished
+from wildshape.drives.writing.finished import FinishedDrive, read_finished
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.table import BoxRow, write_box_table

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import torch
 
-from wildshape.drives.carving import carve
+from wildshape.drives.completing.carving import carve
+from wildshape.drives.completing.placing import Completed
 from wildshape.drives.config import CarveConfig
-from wildshape.drives.placing import Completed
-from wildshape.drives.sightings import Sightings
+from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.se3 import SE3
 
 _SENSOR = np.array((0.0, 0.0, 1.7))

@@ -26,7 +26,8 @@ from tests.refusal import refused
 import wildshape
 from wildshape.drives import run
 from wildshape.drives.config import DetectionConfig, DriveConfig, GroundConfig
-from wildshape.drives.detections import (
+from wildshape.drives.recordings.opening import open_drive
+from wildshape.drives.tracking.detections import (
     BoxCutter,
     DetectionFile,
     check_cut,
@@ -34,11 +35,10 @@ from wildshape.drives.detections import (
     given_tracks,
     points_in_boxes,
 )
-from wildshape.drives.ground import height_above_ground
-from wildshape.drives.mounting import find_mounting
-from wildshape.drives.recordings.opening import open_drive
-from wildshape.drives.segmentation import read_cut, read_cuts
-from wildshape.drives.sightings import read_sightings
+from wildshape.drives.tracking.ground import height_above_ground
+from wildshape.drives.tracking.mounting import find_mounting
+from wildshape.drives.tracking.segmentation import read_cut, read_cuts
+from wildshape.drives.tracking.sightings import read_sightings
 from wildshape.io.boxes.detector import upright_box
 from wildshape.io.boxes.table import read_box_table
 from wildshape.simulate.street.drive_folder import write_drive

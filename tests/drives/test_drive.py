@@ -17,11 +17,11 @@ from tests.refusal import refused
 import wildshape
 from wildshape.drives import run
 from wildshape.drives.config import ClusterConfig, DriveConfig
-from wildshape.drives.files import DriveFiles
-from wildshape.drives.mounting import Mounting
 from wildshape.drives.recordings.opening import open_drive
-from wildshape.drives.segmentation import Cutter
-from wildshape.drives.trajectory import find_trajectory
+from wildshape.drives.tracking.mounting import Mounting
+from wildshape.drives.tracking.segmentation import Cutter
+from wildshape.drives.tracking.trajectory import find_trajectory
+from wildshape.drives.writing.files import DriveFiles
 from wildshape.geometry.footprint import footprint_iou
 from wildshape.inference.folders.box_files import BoxFiles
 from wildshape.io.boxes.detections import read_detections

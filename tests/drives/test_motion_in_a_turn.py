@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from wildshape.drives.config import DriveConfig
-from wildshape.drives.mounting import find_mounting
 from wildshape.drives.source import Drive
-from wildshape.drives.trajectory import find_trajectory
+from wildshape.drives.tracking.mounting import find_mounting
+from wildshape.drives.tracking.trajectory import find_trajectory
 from wildshape.records import Turn
 from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
 

@@ -8,9 +8,9 @@ from tests.drives.street import street
 from tests.refusal import refused
 
 from wildshape.drives.config import DriveConfig, LinkConfig, MountingConfig
-from wildshape.drives.mounting import Mounting, find_mounting
 from wildshape.drives.source import Drive
-from wildshape.drives.trajectory import Breaks, find_trajectory
+from wildshape.drives.tracking.mounting import Mounting, find_mounting
+from wildshape.drives.tracking.trajectory import Breaks, find_trajectory
 from wildshape.records import Turn
 
 pytest.importorskip("kiss_icp")

@@ -14,8 +14,8 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from tests.drives.finished_drive import CARS, FRAMES, HEIGHT, SIZE, finished_drive
 
-from wildshape.drives.files import DriveFiles
-from wildshape.drives.finished import read_finished
+from wildshape.drives.writing.files import DriveFiles
+from wildshape.drives.writing.finished import read_finished
 from wildshape.errors import MissingExtraError
 
 

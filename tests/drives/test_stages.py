@@ -11,10 +11,12 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wildshape.drives.boxes import moves, smooth
-from wildshape.drives.claims import claim
-from wildshape.drives.clusters import connected, extents, find_clusters
-from wildshape.drives.completion import fullest_of_parts, keyframes
+from wildshape.drives.completing.boxes import moves, smooth
+from wildshape.drives.completing.claims import claim
+from wildshape.drives.completing.completion import fullest_of_parts, keyframes
+from wildshape.drives.completing.merging import Places
+from wildshape.drives.completing.placing import Completed
+from wildshape.drives.completing.vehicles import judge, vehicle_confidence
 from wildshape.drives.config import (
     BoxConfig,
     ClusterConfig,
@@ -27,15 +29,13 @@ from wildshape.drives.config import (
     TrajectoryConfig,
     VehicleConfig,
 )
-from wildshape.drives.ground import height_above_ground
-from wildshape.drives.merging import Places
-from wildshape.drives.mounting import Mounting, ground_plane
-from wildshape.drives.placing import Completed
-from wildshape.drives.segmentation import cut_file
-from wildshape.drives.sightings import Sightings, merged
-from wildshape.drives.tracks import Seen, link
-from wildshape.drives.trajectory import jumps
-from wildshape.drives.vehicles import judge, vehicle_confidence
+from wildshape.drives.tracking.clusters import connected, extents, find_clusters
+from wildshape.drives.tracking.ground import height_above_ground
+from wildshape.drives.tracking.mounting import Mounting, ground_plane
+from wildshape.drives.tracking.segmentation import cut_file
+from wildshape.drives.tracking.sightings import Sightings, merged
+from wildshape.drives.tracking.tracks import Seen, link
+from wildshape.drives.tracking.trajectory import jumps
 from wildshape.geometry.transforms.se3 import SE3
 
 

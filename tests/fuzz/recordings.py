@@ -25,13 +25,18 @@ from tests.fuzz.target import Arrays, Target, only_file
 from tests.io.bags.write import write_bag
 
 from wildshape.drives.config import DriveConfig
-from wildshape.drives.detections import DetectionFile, cut_boxes, find_detections, given_tracks
-from wildshape.drives.files import DriveFiles, detections_of
-from wildshape.drives.finished import read_finished
-from wildshape.drives.mounting import Mounting
 from wildshape.drives.recordings import waymo as waymo_drives
 from wildshape.drives.recordings.opening import find_drives, open_drive
 from wildshape.drives.source import Drive
+from wildshape.drives.tracking.detections import (
+    DetectionFile,
+    cut_boxes,
+    find_detections,
+    given_tracks,
+)
+from wildshape.drives.tracking.mounting import Mounting
+from wildshape.drives.writing.files import DriveFiles, detections_of
+from wildshape.drives.writing.finished import read_finished
 from wildshape.evaluation.drives.labels import Counting, read_labels
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.box_files import BoxFiles

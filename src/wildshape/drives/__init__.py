@@ -2,5 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Raw drives: a recording of full scans in, every vehicle's track, boxes and shape out, unlabelled.
 
-One module a stage, each with one public function. Start with `run`; the stages are in its order.
+Start with `run`, which calls the stages in their order: `recordings` are read scan by scan, `tracking`
+finds clusters and follows them, `completing` makes vehicles of tracks, `writing` puts them on disk.
 """

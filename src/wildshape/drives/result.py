@@ -6,7 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from wildshape.drives.outputs import BOXES, FRAMES, MCAP, MESHES, RRD, SHAPES, TRAJECTORY, TUM
+from wildshape.drives.writing.outputs import (
+    BOXES,
+    FRAMES,
+    MCAP,
+    MESHES,
+    RRD,
+    SHAPES,
+    TRAJECTORY,
+    TUM,
+)
 from wildshape.inference.folders.box_files import BOX_FILES
 from wildshape.io.guard import reading
 from wildshape.io.output import MARKER

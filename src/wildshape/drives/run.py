@@ -11,13 +11,24 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from wildshape.drives.boxes import smooth
-from wildshape.drives.carving import carve
-from wildshape.drives.claims import claim
 from wildshape.drives.clock import Clock, Watch, silent
-from wildshape.drives.completion import Completer
+from wildshape.drives.completing.boxes import smooth
+from wildshape.drives.completing.carving import carve
+from wildshape.drives.completing.claims import claim
+from wildshape.drives.completing.completion import Completer
+from wildshape.drives.completing.merging import Places
+from wildshape.drives.completing.placing import Completed, level_poses, read_completed
+from wildshape.drives.completing.vehicles import (
+    Judged,
+    judge,
+    vehicle_confidence,
+    without_parts,
+)
 from wildshape.drives.config import DriveConfig
-from wildshape.drives.detections import (
+from wildshape.drives.recordings.opening import open_drive
+from wildshape.drives.result import FILES, DriveResult, earlier_result
+from wildshape.drives.source import Drive
+from wildshape.drives.tracking.detections import (
     BoxCutter,
     DetectionFile,
     Detections,
@@ -25,11 +36,14 @@ from wildshape.drives.detections import (
     find_detections,
     given_tracks,
 )
-from wildshape.drives.files import DriveFiles
-from wildshape.drives.finished import read_finished
-from wildshape.drives.merging import Places
-from wildshape.drives.mounting import Mounting, find_mounting
-from wildshape.drives.outputs import (
+from wildshape.drives.tracking.mounting import Mounting, find_mounting
+from wildshape.drives.tracking.segmentation import Cutter, read_cuts
+from wildshape.drives.tracking.sightings import Sightings, read_sightings, write_sightings
+from wildshape.drives.tracking.tracks import Seen, link
+from wildshape.drives.tracking.trajectory import Breaks, find_trajectory, jumps
+from wildshape.drives.writing.files import DriveFiles
+from wildshape.drives.writing.finished import read_finished
+from wildshape.drives.writing.outputs import (
     BOXES,
     FRAMES,
     SHAPES,
@@ -42,20 +56,6 @@ from wildshape.drives.outputs import (
     write_shape,
     write_trajectories,
     write_vehicle_track,
-)
-from wildshape.drives.placing import Completed, level_poses, read_completed
-from wildshape.drives.recordings.opening import open_drive
-from wildshape.drives.result import FILES, DriveResult, earlier_result
-from wildshape.drives.segmentation import Cutter, read_cuts
-from wildshape.drives.sightings import Sightings, read_sightings, write_sightings
-from wildshape.drives.source import Drive
-from wildshape.drives.tracks import Seen, link
-from wildshape.drives.trajectory import Breaks, find_trajectory, jumps
-from wildshape.drives.vehicles import (
-    Judged,
-    judge,
-    vehicle_confidence,
-    without_parts,
 )
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import OBJECTS

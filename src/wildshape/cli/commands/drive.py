@@ -24,9 +24,9 @@ from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
     from wildshape.drives.clock import Watch
-    from wildshape.drives.detections import DetectionFile
-    from wildshape.drives.files import DriveFiles
     from wildshape.drives.result import DriveResult
+    from wildshape.drives.tracking.detections import DetectionFile
+    from wildshape.drives.writing.files import DriveFiles
     from wildshape.inference.folders.box_files import BoxFiles
 
 EXAMPLES = (
@@ -160,7 +160,7 @@ def _report(out: Path) -> None:
 
 
 def _files(settings: Settings) -> "DriveFiles":
-    from wildshape.drives.files import DriveFiles
+    from wildshape.drives.writing.files import DriveFiles
 
     mesh = settings.mesh_format if settings.mesh else None
     return DriveFiles(_box_files(settings), mesh, mcap=settings.mcap, rerun=settings.rerun)
@@ -179,7 +179,7 @@ def _box_files(settings: Settings) -> "BoxFiles | None":
 
 
 def _detections(settings: Settings, drives: dict[Path, str]) -> "DetectionFile | None":
-    from wildshape.drives.detections import DetectionFile
+    from wildshape.drives.tracking.detections import DetectionFile
 
     if settings.detections is None:
         if settings.min_score is not None:

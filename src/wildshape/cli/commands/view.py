@@ -103,7 +103,7 @@ def _page(
     settings: Settings,
 ) -> "tuple[AbstractContextManager[Page] | AbstractContextManager[DrivePage], int]":
     """What to serve, and how many tracks or vehicles that are."""
-    from wildshape.drives.finished import is_drive, read_finished
+    from wildshape.drives.writing.finished import is_drive, read_finished
     from wildshape.report.viewer.drive_page import serving_drive
     from wildshape.report.viewer.page import serving
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from wildshape.drives.finished import FinishedDrive, FoundVehicle, read_finished
-from wildshape.drives.playback.moments import readable_source
 from wildshape.drives.result import REPORT
 from wildshape.drives.source import Drive
+from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle, read_finished
+from wildshape.drives.writing.playback.moments import readable_source
 from wildshape.inference.registration import fuse_scans, to_middle
 from wildshape.io.progress import counted, duration
 from wildshape.records import as_text

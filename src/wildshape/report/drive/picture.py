@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from wildshape.drives.finished import FinishedDrive, FoundVehicle
-from wildshape.drives.playback.moments import PALETTE
 from wildshape.drives.source import Drive
+from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
+from wildshape.drives.writing.playback.moments import PALETTE
 from wildshape.io.atomic import atomic_write
 from wildshape.report.drive.scene import (
     NOBODY,

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A drive made ready to be drawn: frames and points thinned, each point with the vehicle it is on.
 
-The drawing frame is the level world (`drives/placing.py`): z up, metres, right-handed.
+The drawing frame is the level world (`drives/completing/placing.py`): z up, metres, right-handed.
 """
 
 from collections.abc import Sequence
@@ -13,9 +13,9 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int
 
-from wildshape.drives.finished import FinishedDrive, FoundVehicle
-from wildshape.drives.playback.moments import PALETTE
 from wildshape.drives.source import Drive
+from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
+from wildshape.drives.writing.playback.moments import PALETTE
 from wildshape.geometry.box import box_axes
 from wildshape.records import Box, Points
 from wildshape.report.page.html import quantise

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wildshape.drives.finished import FinishedDrive, FoundVehicle
-from wildshape.drives.playback.moments import colour_of, readable_source
+from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
+from wildshape.drives.writing.playback.moments import colour_of, readable_source
 from wildshape.io.boxes.detections import pose_of
 from wildshape.records import Box, Points
 from wildshape.report.drive.scene import NOBODY, SceneConfig, boxes_by_frame, thinned

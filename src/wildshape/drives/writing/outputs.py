@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from wildshape.drives.boxes import Way
-from wildshape.drives.completion import CATEGORY
-from wildshape.drives.placing import Completed, box_in_scan
-from wildshape.drives.sightings import Sightings
+from wildshape.drives.completing.boxes import Way
+from wildshape.drives.completing.completion import CATEGORY
+from wildshape.drives.completing.placing import Completed, box_in_scan
 from wildshape.drives.source import Drive
+from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import COMPLETED, OBJECTS
 from wildshape.io.atomic import write_text

@@ -11,10 +11,10 @@ from itertools import combinations, product
 
 import numpy as np
 
-from wildshape.drives.boxes import Way, expected
+from wildshape.drives.completing.boxes import Way, expected
+from wildshape.drives.completing.placing import Completed
 from wildshape.drives.config import BoxConfig, MergeConfig
-from wildshape.drives.placing import Completed
-from wildshape.drives.sightings import Sightings, merged
+from wildshape.drives.tracking.sightings import Sightings, merged
 from wildshape.geometry.footprint import footprint_overlap
 
 _LOOKED_AT = 7  # frames that tell whether two share a place

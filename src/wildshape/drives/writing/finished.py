@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from wildshape.drives.mounting import Mounting
-from wildshape.drives.outputs import BOXES, FRAMES, SHAPES, TRAJECTORY, TUM
-from wildshape.drives.placing import box_in_scan, level_poses
+from wildshape.drives.completing.placing import box_in_scan, level_poses
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.source import Drive
+from wildshape.drives.tracking.mounting import Mounting
+from wildshape.drives.writing.outputs import BOXES, FRAMES, SHAPES, TRAJECTORY, TUM
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detections import pose_of

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Int
 
-from wildshape.drives.clusters import find_clusters
 from wildshape.drives.config import DriveConfig
-from wildshape.drives.ground import height_above_ground
-from wildshape.drives.mounting import Mounting
 from wildshape.drives.source import Drive
+from wildshape.drives.tracking.clusters import find_clusters
+from wildshape.drives.tracking.ground import height_above_ground
+from wildshape.drives.tracking.mounting import Mounting
 from wildshape.io.atomic import atomic_write
 from wildshape.io.guard import reading
 from wildshape.records import Points

@@ -12,9 +12,9 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from wildshape.drives.mounting import Mounting
-from wildshape.drives.sightings import Sightings
 from wildshape.drives.source import Drive
+from wildshape.drives.tracking.mounting import Mounting
+from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation, rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import OBJECTS

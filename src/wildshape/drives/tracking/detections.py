@@ -15,11 +15,11 @@ import numpy as np
 from jaxtyping import Bool
 
 from wildshape.drives.config import DetectionConfig, DriveConfig
-from wildshape.drives.ground import height_above_ground
-from wildshape.drives.mounting import Mounting
-from wildshape.drives.segmentation import CutScan, Cutter
-from wildshape.drives.sightings import Sightings
 from wildshape.drives.source import Drive
+from wildshape.drives.tracking.ground import height_above_ground
+from wildshape.drives.tracking.mounting import Mounting
+from wildshape.drives.tracking.segmentation import CutScan, Cutter
+from wildshape.drives.tracking.sightings import Sightings
 from wildshape.errors import BadInputError
 from wildshape.inference.folders.box_files import read_camera
 from wildshape.io.boxes.detections import number_of, pose_of

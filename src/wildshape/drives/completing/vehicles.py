@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wildshape.drives.completing.merging import Places
+from wildshape.drives.completing.placing import Completed
 from wildshape.drives.config import VehicleConfig
-from wildshape.drives.merging import Places
-from wildshape.drives.placing import Completed
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from wildshape.drives.completing.vehicles import shape_nats
 from wildshape.drives.config import CompletionConfig, VehicleConfig
-from wildshape.drives.sightings import Sightings
 from wildshape.drives.source import Drive
-from wildshape.drives.vehicles import shape_nats
+from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import OBJECTS, write_completed
 from wildshape.inference.predictor import Predictor

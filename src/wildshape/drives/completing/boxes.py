@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from wildshape.drives.completing.placing import Completed
 from wildshape.drives.config import BoxConfig
-from wildshape.drives.placing import Completed
 
 
 @dataclass(frozen=True)

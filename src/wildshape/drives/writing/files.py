@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from wildshape.drives.completion import CATEGORY
-from wildshape.drives.finished import FinishedDrive, FoundVehicle
-from wildshape.drives.outputs import MCAP, MESHES, RRD
-from wildshape.drives.playback.mcap import check_mcap, write_mcap
-from wildshape.drives.playback.rerun import load_rerun, write_rerun
+from wildshape.drives.completing.completion import CATEGORY
+from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
+from wildshape.drives.writing.outputs import MCAP, MESHES, RRD
+from wildshape.drives.writing.playback.mcap import check_mcap, write_mcap
+from wildshape.drives.writing.playback.rerun import load_rerun, write_rerun
 from wildshape.geometry.meshing import closed_mesh
 from wildshape.inference.folders.box_files import BoxFiles
 from wildshape.io.boxes.detections import Detection, number_of

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
-from wildshape.drives.boxes import Way, expected
+from wildshape.drives.completing.boxes import Way, expected
+from wildshape.drives.completing.placing import Completed
 from wildshape.drives.config import DriveConfig
-from wildshape.drives.placing import Completed
-from wildshape.drives.segmentation import read_cuts
-from wildshape.drives.sightings import Sightings
+from wildshape.drives.tracking.segmentation import read_cuts
+from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 

@@ -21,8 +21,14 @@ from typing import Any
 
 import numpy as np
 
-from wildshape.drives.finished import FinishedDrive
-from wildshape.drives.playback.moments import SHAPE_POINTS, Moment, Present, moments, thinned
+from wildshape.drives.writing.finished import FinishedDrive
+from wildshape.drives.writing.playback.moments import (
+    SHAPE_POINTS,
+    Moment,
+    Present,
+    moments,
+    thinned,
+)
 from wildshape.errors import load_library
 from wildshape.geometry.box import EDGES, SIGNS
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation

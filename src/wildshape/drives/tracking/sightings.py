@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Int
 
-from wildshape.drives.segmentation import read_cut
 from wildshape.drives.source import Drive
+from wildshape.drives.tracking.segmentation import read_cut
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import read_json, reading, record_of
 from wildshape.records import Points, Track

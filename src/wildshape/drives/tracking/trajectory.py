@@ -15,9 +15,9 @@ import numpy as np
 from jaxtyping import Float
 
 from wildshape.drives.config import DriveConfig, LinkConfig, TrajectoryConfig
-from wildshape.drives.ground import height_above_ground
-from wildshape.drives.mounting import Mounting
 from wildshape.drives.source import Drive
+from wildshape.drives.tracking.ground import height_above_ground
+from wildshape.drives.tracking.mounting import Mounting
 from wildshape.errors import MissingExtraError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import STANDING, Twist

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wildshape.drives.finished import FinishedDrive, FoundVehicle
 from wildshape.drives.source import Drive
+from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
