@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wildshape.geometry.box import FittedBox, box_iou, shared_volume
+from wildshape.geometry.footprint import footprint_iou
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
 
 
@@ -100,3 +101,11 @@ def test_symmetric_and_the_same_wherever_the_two_are(centre, size, seed):
     moved = [FittedBox(move @ x.centre + far, x.size, move @ x.rotation) for x in (a, b)]
     assert box_iou(*moved) == pytest.approx(iou, abs=1e-6)
     assert box_iou(b, b) == pytest.approx(1.0, abs=1e-6)
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(-2, 2), st.floats(-2, 2))
+def test_the_footprint_of_upright_boxes_overlaps_as_the_boxes_do(angle, x, y):
+    size, other = (4.0, 1.8, 1.0), (3.0, 1.5, 1.0)
+    a, b = box(size=size), box((x, y, 0.0), other, yaw(math.degrees(angle)))
+    found = footprint_iou(np.zeros(4), size, np.array((x, y, 0.0, angle)), other)
+    assert found == pytest.approx(box_iou(a, b), abs=1e-6)

@@ -4,10 +4,12 @@
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial import KDTree
+from skimage.measure import marching_cubes
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.meshing import closed_mesh
+from wildshape.geometry.meshing import closed_mesh, off_level
 from wildshape.inference.predictor import load
 
 
@@ -50,6 +52,19 @@ def test_crumbs_are_left_out():
 def test_one_place_is_no_shape():
     with pytest.raises(BadInputError, match="all equal"):
         closed_mesh(np.ones((20, 3), np.float32))
+
+
+def test_corners_of_the_surface_stay_apart():
+    """Where the field of a grid is just the level, corners would fall together."""
+    field = np.abs(np.indices((9, 9, 9)) - 4.0).sum(0)  # whole numbers, and so is the level
+
+    def corners(field):
+        vertices, faces, *_ = marching_cubes(field, 3.0)
+        closed = trimesh.Trimesh(vertices, faces, process=True).is_watertight
+        return len(vertices) - len(np.unique(vertices.astype(np.float32), axis=0)), closed
+
+    assert corners(field)[0] > 0
+    assert corners(off_level(field, 3.0, 1e-3)) == (0, True)
 
 
 def test_completions_close(cars):

@@ -168,6 +168,7 @@ def test_a_worker_hands_on_what_it_refused(tmp_path: Path) -> None:
         ({"occlusion": 1.5}, "occlusion is 1.5"),
         ({"noise_m": -1.0}, "noise_m"),
         ({"category": "chair"}, "depth-camera"),
+        *(({"sensor": "depth-camera", of: True}, of) for of in ("rays", "ground", "varied")),
     ],
 )
 def test_bad_settings_are_refused_in_one_sentence(wrong: dict, message: str) -> None:

@@ -91,11 +91,20 @@ def closed_mesh(
     level = float(np.median(_interpolate(depth, grid, points)))
     depth = _centred(depth, grid, points, level, config)
     depth = _large_bodies(depth, level, config.smallest_body)
-    # A place just at the level would be a corner of several cells' triangles, all at one point.
-    least = _OFF_LEVEL * grid.step
-    depth = np.where(np.abs(depth - level) < least, level + least, depth)
+    depth = off_level(depth, level, _OFF_LEVEL * grid.step)
     vertices, faces, *_ = march(depth, level, gradient_direction="ascent")
     return trimesh.Trimesh(vertices * grid.step + grid.start, faces, process=False)
+
+
+def off_level(
+    depth: Float[np.ndarray, "x y z"], level: float, least: float
+) -> Float[np.ndarray, "x y z"]:
+    """The field with no value nearer to `level` than `least`, in the field's unit.
+
+    A place at the level would be a corner of several cells' triangles, all at one point: a file of
+    them is not closed.
+    """
+    return np.where(np.abs(depth - level) < least, level + least, depth)
 
 
 def _grid_around(points: np.ndarray, step: float, reach: float) -> _Grid:

@@ -62,7 +62,8 @@ class SimulationConfig:
         """Refuse what cannot be simulated.
 
         Raises:
-            BadInputError: a count, probability, sensor or category is out of range.
+            BadInputError: a count, probability, sensor or category is out of range, or something is
+                asked of a camera that LiDARs alone have.
         """
         if self.sensor not in SENSORS:
             raise BadInputError(f"sensor is {self.sensor!r}, expected one of {', '.join(SENSORS)}.")
@@ -74,6 +75,9 @@ class SimulationConfig:
                 f"category {self.category} with sensor {self.sensor}: our {self.category}s are of "
                 "unit size, expected a car; use --sensor depth-camera."
             )
+        for name in ("ground", "rays", "varied"):
+            if getattr(self, name) and not self.is_lidar:
+                raise BadInputError(f"{name} is of LiDARs, sensor is {self.sensor}; leave it out.")
 
     def _check_numbers(self) -> None:
         counts = {"tracks": self.tracks, "shape_points": self.shape_points, "scans": self.scans}

@@ -39,7 +39,7 @@ def judge(objects: list[Completed], places: Places, config: VehicleConfig) -> li
 
     def order(one: Completed) -> tuple[bool, float]:
         confidence = sure[one.seen.name]
-        return one.seen.parts > 1 and confidence > config.sure_of_parts, confidence
+        return bool(one.seen.parts) and confidence > config.sure_of_parts, confidence
 
     for one in sorted(objects, key=order, reverse=True):
         name = one.seen.name
@@ -64,7 +64,7 @@ def vehicle_confidence(one: Completed, config: VehicleConfig) -> float:
     shape = shape_nats(one.cost_m, one.size, config)
     seen = 0.5 * math.log(len(one.seen.frames) / config.usual_scans)
     said = 0.25 * math.log(max(one.confidence, 1e-6) / config.usual_confidence)
-    together = config.merged_nats if one.seen.parts > 1 else 0.0
+    together = config.merged_nats if one.seen.parts else 0.0
     nats = shape + together + min(max(seen, -1.0), 1.0) + min(max(said, -0.5), 0.5)
     return 1.0 / (1.0 + math.exp(-min(max(nats, -20.0), 20.0)))
 

@@ -25,14 +25,14 @@ class Sightings:
         frames: in which it was seen, rising.
         rows: of its clusters in each of them; fragments are several.
         points: of its clusters in each of them.
-        parts: tracks that were put together.
+        parts: names of the tracks that were put together; none: it is one track.
     """
 
     name: str
     frames: tuple[int, ...]
     rows: tuple[tuple[int, ...], ...]
     points: tuple[int, ...]
-    parts: int = 1
+    parts: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -68,7 +68,7 @@ class Sightings:
 
 
 def merged(parts: list[Sightings]) -> Sightings:
-    """Several objects as one, named after all of them."""
+    """Several tracks as one object, named after the first and how many more: `0007+2`."""
     rows: dict[int, tuple[int, ...]] = {}
     points: dict[int, int] = {}
     for part in parts:
@@ -77,11 +77,11 @@ def merged(parts: list[Sightings]) -> Sightings:
             points[frame] = points.get(frame, 0) + count
     frames = tuple(sorted(rows))
     return Sightings(
-        "-".join(part.name for part in parts),
+        f"{parts[0].name}+{len(parts) - 1}",
         frames,
         tuple(rows[frame] for frame in frames),
         tuple(points[frame] for frame in frames),
-        sum(part.parts for part in parts),
+        tuple(part.name for part in parts),
     )
 
 

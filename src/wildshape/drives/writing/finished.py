@@ -30,7 +30,7 @@ from wildshape.io.guard import read_json, read_record, reading
 from wildshape.io.output import MARKER, file_name
 from wildshape.io.poses import read_poses, read_tum
 from wildshape.io.scans.points import read_points
-from wildshape.records import Box, Points
+from wildshape.records import Box, Points, as_text
 
 _LATEST_S = 9e9  # nanoseconds of it fit into 64 bits
 _PERIOD_S = 0.1  # of a scan, where no times are known
@@ -106,7 +106,7 @@ class FinishedDrive:
     @property
     def name(self) -> str:
         """Of the recording."""
-        return self.source.stem if self.source.suffix else self.source.name
+        return as_text(self.source.stem if self.source.suffix else self.source.name)
 
     @property
     def seconds(self) -> tuple[float, ...]:

@@ -173,7 +173,7 @@ def _from_above(axes: Any, found: FinishedDrive, one: FoundVehicle, colour: str)
 
 def _short(one: FoundVehicle) -> str:
     """Of a name that several tracks gave, the first."""
-    return one.name.partition("-")[0]
+    return one.name.partition("+")[0]
 
 
 def _scale_bar(axes: Any, bounds: tuple[np.ndarray, np.ndarray]) -> None:

@@ -1,0 +1,177 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""From tracks to vehicles, stage by stage."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from wildshape.drives.completing.boxes import moves, smooth
+from wildshape.drives.completing.claims import claim
+from wildshape.drives.completing.completion import fullest_of_parts, keyframes
+from wildshape.drives.completing.merging import Places
+from wildshape.drives.completing.placing import Completed
+from wildshape.drives.completing.vehicles import judge, vehicle_confidence
+from wildshape.drives.config import (
+    BoxConfig,
+    CompletionConfig,
+    DriveConfig,
+    MergeConfig,
+    VehicleConfig,
+)
+from wildshape.drives.tracking.segmentation import cut_file
+from wildshape.drives.tracking.sightings import Sightings
+from wildshape.geometry.transforms.se3 import SE3
+
+
+def test_the_fullest_scan_of_each_part_is_completed():
+    points = (10, 90, 70, 20, 80, 30, 5, 6, 7)
+    one = Sightings("a", tuple(range(9)), ((0,),) * 9, points)
+    assert fullest_of_parts(one, 3).frames == (1, 4, 8)
+    assert fullest_of_parts(one, 3, fewest_points=60).frames == (1, 4)
+    assert fullest_of_parts(one, 3, fewest_points=1000).frames == (1,)
+    assert keyframes(one, CompletionConfig(scans=4, ticks=4, fewest_points=0)).frames == (1, 4, 8)
+
+
+def completed(boxes, frames=None, name="a", size=(4.0, 1.8, 1.5), cost=0.1, parts=()):
+    frames = tuple(range(len(boxes))) if frames is None else frames
+    whole = tuple(range(frames[0], frames[-1] + 1))
+    sightings = Sightings(name, whole, ((0,),) * len(whole), (200,) * len(whole), parts)
+    return Completed(sightings, frames, np.array(boxes, float), size, cost, 0.5)
+
+
+def test_a_moving_vehicle_goes_straight_on_between_its_completed_scans():
+    frames = (0, 4, 8, 12)
+    boxes = [(0.5 * f, -0.2 * f, 0.0, math.atan2(-0.2, 0.5)) for f in frames]
+    way = smooth(completed(boxes, frames), tuple(range(13)), BoxConfig())
+    assert way.moving
+    at = np.arange(13)
+    expected = np.column_stack((0.5 * at, -0.2 * at, 0 * at, np.full(13, math.atan2(-0.2, 0.5))))
+    assert way.boxes == pytest.approx(expected, abs=1e-9)
+
+
+def test_the_front_is_where_a_vehicle_drives_to():
+    boxes = [(0.5 * f, 0.0, 0.0, math.pi if f < 3 else 0.0) for f in range(6)]
+    way = smooth(completed(boxes), tuple(range(6)), BoxConfig())
+    assert np.abs(way.boxes[:, 3]).max() < 1e-6
+
+
+def test_a_standing_vehicle_has_one_box_whatever_one_scan_says():
+    boxes = [(5.0, 1.0, 0.0, 3.1), (5.1, 1.0, 0.0, -3.1), (9.0, 7.0, 0.0, 0.0), (5.0, 1.1, 0, 3.14)]
+    way = smooth(completed(boxes), tuple(range(4)), BoxConfig())
+    assert not way.moving
+    assert (way.boxes == way.boxes[0]).all()
+    assert way.boxes[0, :2] == pytest.approx((5.05, 1.0), abs=0.06)
+    assert abs(math.remainder(way.boxes[0, 3] - math.pi, 2 * math.pi)) < 0.05
+
+
+def test_little_or_slow_motion_is_none():
+    config = BoxConfig()
+    ticks = np.arange(60.0)
+    still = np.zeros((60, 4))
+    assert not moves(ticks, still, config)
+    creeping = still + np.outer(ticks, (0.03, 0, 0, 0))
+    assert not moves(ticks, creeping, config)
+    assert moves(ticks, still + np.outer(ticks, (0.1, 0, 0, 0)), config)
+
+
+def places():
+    return Places(tuple(range(100)), MergeConfig(), BoxConfig())
+
+
+def test_vehicles_are_told_by_cost_and_size_and_counted_once():
+    at = [(0.0, 0.0, 0.0, 0.0)]
+    objects = [
+        completed(at, name="good", cost=0.08),
+        completed([(0.5, 0.1, 0.0, 0.1)], name="again", cost=0.12),
+        completed([(9.0, 0.0, 0.0, 0.0)], name="costly", cost=0.5),
+        completed([(20.0, 0.0, 0.0, 0.0)], name="high", size=(4.0, 1.8, 5.0)),
+        completed([(0.5, 0.1, 0.0, 0.1)], frames=(90,), name="later"),
+    ]
+    said = {one.name: one.reasons for one in judge(objects, places(), VehicleConfig())}
+    assert said == {
+        "good": (),
+        "again": ("same_place_as_good",),
+        "costly": ("unlikely",),
+        "high": ("unlikely", "height"),
+        "later": ("same_place_as_good",),
+    }
+
+
+def test_less_cost_usual_size_and_more_scans_speak_for_a_vehicle():
+    config = VehicleConfig()
+    at = [(0.0, 0.0, 0.0, 0.0)] * 8
+
+    def sure(**other):
+        return vehicle_confidence(completed(at, **other), config)
+
+    assert 0.0 < sure(cost=0.3) < sure(cost=0.2) < sure(cost=0.1) < 1.0
+    assert sure(size=(4.3, 1.9, 1.0)) < sure() > sure(size=(4.3, 2.9, 1.5))
+    assert sure(size=(7.0, 2.5, 3.0)) > 0.5  # a lorry
+    assert sure(frames=tuple(range(0, 32, 4))) > sure()
+    # What is known in nats: the cost's own scale.
+    nats = [math.log(p / (1 - p)) for p in (sure(cost=0.1), sure(cost=0.1 + config.cost_scale_m))]
+    assert nats[0] - nats[1] == pytest.approx(1.0)
+
+
+def test_tracks_of_one_shape_in_one_place_are_put_together():
+    here, there = [(0.0, 0.0, 0.0, 0.0)], [(0.4, 0.1, 0.0, 0.0)]
+    objects = [
+        completed(here, frames=(0,), name="0"),
+        completed(there, frames=(90,), name="1"),  # long hidden, and standing
+        completed([(9.0, 0.0, 0.0, 0.0)], frames=(6,), name="2"),
+    ]
+    (found,) = places().fragments(objects)
+    assert (found.name, found.frames, found.parts) == ("0+1", (0, 90), ("0", "1"))
+    whole = completed(here, frames=(0,), name="0+1", parts=("0", "1"))
+    said = judge([*objects, whole], places(), VehicleConfig())
+    assert {one.name for one in said if not one.reasons} == {"0+1", "2"}
+
+
+def test_a_moving_vehicle_is_looked_for_where_its_way_leads():
+    def driving(frames, x=0.0, y=0.0, **other):
+        return completed([(x + frame, y, 0.0, 0.0) for frame in frames], frames=frames, **other)
+
+    first = driving((0, 4, 8, 12, 16), name="0")
+    beside = completed([(10.0, 3.0, 0.0, 0.0)], frames=(12,), name="parked")
+    passed = completed([(10.0, 0.0, 0.0, 0.0)], frames=(40,), name="stands there later")
+    hidden = driving((26, 30, 34), name="1")
+    behind = driving((26, 30, 34), x=-9.0, name="2")
+    (found,) = places().fragments([first, beside, hidden, behind, passed])
+    assert found.name == "0+1"
+
+
+def test_vehicles_beside_each_other_are_not_joined_by_what_lies_between():
+    def at(x, name, length=4.0):
+        return completed([(x, 0.0, 0.0, 0.0)], name=name, size=(length, 1.8, 1.5))
+
+    first, between, second = at(0.0, "0"), at(2.3, "1"), at(5.0, "2")
+    (found,) = places().fragments([first, between, second])
+    assert found.name == "0+1"
+
+
+def test_clusters_in_the_box_of_a_vehicle_are_its_own(tmp_path):
+    rng = np.random.default_rng(0)
+
+    def piece(x, y):
+        return rng.uniform((x - 0.3, y - 0.3, -0.5), (x + 0.3, y + 0.3, 0.5), (20, 3))
+
+    front, rear, beside = piece(1.5, 0.0), piece(-1.5, 0.0), piece(0.0, 1.4)
+    for frame in range(3):
+        counts = np.array([20, 20, 20])
+        points = np.concatenate((beside, front, rear)).astype(np.float32)
+        with cut_file(tmp_path, frame).open("wb") as file:
+            np.savez(file, points=points, counts=counts, scanned=90, tracks=np.array([], str))
+    at = [(0.0, 0.0, 0.0, 0.0)]
+    whole = replace(completed(at, name="whole"), seen=Sightings("whole", (0,), ((1,),), (20,)))
+    again = replace(completed(at, name="again"), seen=Sightings("again", (2,), ((2,),), (20,)))
+    still = SE3(torch.eye(3).double().expand(3, 3, 3), torch.zeros(3, 3).double())
+    found = claim([whole, again], tmp_path, still, (0, 1, 2), DriveConfig())
+    assert found.parts == {"again": "whole"}
+    (only,) = found.vehicles
+    assert only.seen.frames == (0, 1, 2)
+    assert only.seen.rows == ((1, 2),) * 3
+    assert only.seen.points == (40,) * 3

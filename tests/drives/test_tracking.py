@@ -1,0 +1,184 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""From scans to tracks, stage by stage."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from wildshape.drives.config import (
+    ClusterConfig,
+    GroundConfig,
+    LinkConfig,
+    MountingConfig,
+    TrajectoryConfig,
+)
+from wildshape.drives.tracking.clusters import connected, extents, find_clusters
+from wildshape.drives.tracking.ground import height_above_ground
+from wildshape.drives.tracking.mounting import Mounting, ground_plane
+from wildshape.drives.tracking.sightings import Sightings, merged
+from wildshape.drives.tracking.tracks import Seen, link
+from wildshape.drives.tracking.trajectory import jumps
+from wildshape.geometry.transforms.se3 import SE3
+
+
+def road(rng, count=20000, reach=30.0):
+    """Points of a flat road 1.7 m below the sensor, 1 cm rough."""
+    x, y = rng.uniform(-reach, reach, (2, count))
+    return np.column_stack((x, y, rng.normal(-1.7, 0.01, count))).astype(np.float32)
+
+
+def test_height_and_tilt_of_a_sensor_come_from_the_ground():
+    rng = np.random.default_rng(0)
+    walls = rng.uniform((-20, 8, -1.7), (20, 8.2, 5), (8000, 3)).astype(np.float32)
+    level = np.concatenate((road(rng), walls))
+    pitch = math.radians(8.0)
+    c, s = math.cos(pitch), math.sin(pitch)
+    R_sensor_level = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+    found = ground_plane((level @ R_sensor_level.T).astype(np.float32), MountingConfig())
+    assert found is not None
+    assert found[3] == pytest.approx(1.7, abs=0.02)
+    up = R_sensor_level @ (0.0, 0.0, 1.0)
+    assert math.degrees(math.acos(found[:3] @ up)) < 0.5
+    turn = Mounting(found[3], 8.0, tuple(found[:3].tolist())).levelling()
+    assert torch.allclose(
+        turn.rotation @ torch.from_numpy(found[:3]), torch.tensor([0.0, 0, 1]).double()
+    )
+    SE3.from_matrix(turn.matrix)  # a rotation
+
+
+def test_no_ground_is_found_in_a_wall_or_in_hardly_any_points():
+    rng = np.random.default_rng(0)
+    wall = rng.uniform((-9, 8, -1.7), (9, 8.05, 5), (5000, 3)).astype(np.float32)
+    assert ground_plane(wall, MountingConfig()) is None
+    assert ground_plane(road(rng, 50), MountingConfig()) is None
+
+
+def test_heights_are_above_the_ground_under_each_point():
+    rng = np.random.default_rng(1)
+    ground = road(rng)
+    slope = 0.05 * np.clip(ground[:, 0], 0, None)
+    ground[:, 2] += slope
+    boxes = rng.uniform((8, -1, 0), (12, 1, 1.5), (500, 3)).astype(np.float32)
+    boxes[:, 2] += -1.7 + 0.05 * boxes[:, 0]
+    heights = height_above_ground(np.concatenate((ground, boxes)), 1.7, GroundConfig())
+    expected = boxes[:, 2] + 1.7 - 0.05 * boxes[:, 0]
+    near = np.hypot(*ground[:, :2].T) > 3
+    assert np.nanmedian(np.abs(heights[: len(ground)][near])) == 0.0
+    high = expected > 0.4
+    assert np.abs(heights[len(ground) :][high] - expected[high]).max() < 0.15
+
+
+def test_the_ground_stage_says_nothing_on_stdout(capfd):
+    height_above_ground(road(np.random.default_rng(0)), 1.7, GroundConfig())
+    assert capfd.readouterr().out == ""
+
+
+def test_connected_is_the_components_of_all_pairs():
+    rng = np.random.default_rng(0)
+    points = rng.uniform(0, 6, (300, 3))
+    found = connected(points, 0.7, thin=1e-3)
+    near = np.linalg.norm(points[:, None] - points, axis=-1) <= 0.7
+    label = np.arange(300)
+    for _ in range(300):
+        label = np.where(near, label, 300).min(1)
+    expected = sorted((frozenset(np.flatnonzero(label == k)) for k in set(label)), key=sorted)
+    assert sorted((frozenset(part) for part in found), key=sorted) == expected
+
+
+def block(x, y, length=4.0, width=1.8, height=1.5, count=600, seed=0):
+    """Points of a car-sized block on the ground, sensor 1.7 m above it."""
+    rng = np.random.default_rng(seed)
+    low, high = (x - length / 2, y - width / 2, -1.5), (x + length / 2, y + width / 2, height - 1.7)
+    return rng.uniform(low, high, (count, 3)).astype(np.float32)
+
+
+@pytest.mark.parametrize("away", [8.0, 30.0, 55.0])
+def test_neighbours_are_apart_and_gaps_of_sparse_beams_are_bridged(away):
+    config = ClusterConfig()
+    reach = config.reach_m + config.reach_per_m * away
+    cars = (block(away, 0.0), block(away, 1.8 + 1.5 * reach, seed=1))
+    points = np.concatenate(cars)
+    found = find_clusters(points, points[:, 2] + 1.7, config)
+    assert sorted(map(len, found)) == [600, 600]
+    halves = (block(away, 0.0, width=1.0), block(away, 1.0 + 0.5 * reach, width=1.0, seed=1))
+    joined = np.concatenate(halves)
+    assert len(find_clusters(joined, joined[:, 2] + 1.7, config)) == 1
+
+
+def test_what_is_no_vehicle_by_size_or_place_is_no_cluster():
+    config = ClusterConfig()
+    for wrong in (
+        block(10, 0, length=25.0, width=0.2, count=30000),  # a wall
+        block(10, 0, length=0.5, width=0.5),  # a pole
+        block(10, 0) + np.array((0, 0, 2.5), np.float32),  # a roof
+        block(10, 0, height=0.45),  # a kerb
+        block(10, 0, count=20),
+    ):
+        assert find_clusters(wrong, wrong[:, 2] + 1.7, config) == []
+
+
+def test_extents_are_those_of_the_turned_rectangle():
+    points = block(0, 0, count=4000)
+    turn = np.array([[math.cos(0.5), -math.sin(0.5)], [math.sin(0.5), math.cos(0.5)]])
+    length, width = extents(np.column_stack((points[:, :2] @ turn.T, points[:, 2])))
+    assert length == pytest.approx(4.0, abs=0.1)
+    assert width == pytest.approx(1.8, abs=0.1)
+
+
+def seen(tick, *centres):
+    rows = np.array([(*centre, 0.0) for centre in centres], float).reshape(-1, 3)
+    return Seen(tick, rows, np.tile((4.0, 2.0, 1.5), (len(rows), 1)))
+
+
+def test_two_that_pass_each_other_stay_two():
+    scans = [seen(i, (i, 0.0), (10 - i, 2.5)) for i in range(11)]
+    found = link(scans, LinkConfig())
+    assert [one.frames for one in found] == [list(range(11))] * 2
+    assert [one.rows for one in found] == [[0] * 11, [1] * 11]
+
+
+def test_an_object_out_of_sight_goes_on_and_one_gone_too_long_does_not():
+    config = LinkConfig()
+    hidden = [
+        seen(i) if 5 <= i < 5 + config.longest_gap - 1 else seen(i, (0.8 * i, 0)) for i in range(14)
+    ]
+    assert len(link(hidden, config)) == 1
+    gone = [
+        seen(i) if 5 <= i < 6 + config.longest_gap else seen(i, (0.8 * i, 0)) for i in range(20)
+    ]
+    assert len(link(gone, config)) == 2
+
+
+def test_an_object_of_which_less_is_seen_stays_the_same():
+    """A lorry of 8 m, and then its rear alone: its middle jumps, its rear does not."""
+    lengths = [8.0] * 5 + [0.4] * 5
+    scans = [
+        Seen(i, np.array([(length / 2, 0.0, 0.0)]), np.array([(length, 2.5, 3.0)]))
+        for i, length in enumerate(lengths)
+    ]
+    (found,) = link(scans, LinkConfig())
+    assert found.frames == list(range(10))
+    assert found.velocity == pytest.approx(np.zeros(3))
+
+
+def test_pieces_of_one_scan_are_one_cloud():
+    left = Sightings("0", (3, 4), ((0,), (2,)), (40, 50))
+    right = Sightings("1", (4, 5), ((5,), (1,)), (60, 70))
+    both = merged([left, right])
+    assert both == Sightings("0+1", (3, 4, 5), ((0,), (2, 5), (1,)), (40, 110, 70), ("0", "1"))
+
+
+def test_a_jump_is_counted_and_a_missing_scan_is_none():
+    steady = [(0.8 * i, 0.0, 0.0) for i in (0, 1, 2, 5, 6, 7)]
+    config = TrajectoryConfig()
+
+    def poses(places):
+        at = torch.tensor(places, dtype=torch.float64)
+        return SE3(torch.eye(3, dtype=torch.float64).expand(len(at), 3, 3), at)
+
+    assert list(jumps(poses(steady), (0, 1, 2, 5, 6, 7), config)) == []
+    leap = [*steady[:4], *((x + 30.0, y, z) for x, y, z in steady[4:])]
+    assert 4 in jumps(poses(leap), (0, 1, 2, 5, 6, 7), config)
