@@ -57,6 +57,13 @@ def test_pandaset_scenes(tmp_path):
         assert np.median(drive.scan(frame)[:, 0]) > 0
 
 
+def test_a_release_that_names_no_scene_is_refused(tmp_path):
+    root = write_nuscenes(tmp_path / "nuscenes", [Scene("scene-0061", (), keys=2)])
+    table = next(root.rglob("scene.json"))
+    table.write_text("[" + ",".join(["{}"] * 1000) + "]")
+    refused(find_drives, root, match=r"scene\.json: names no scene")
+
+
 def test_nuscenes_scenes(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     car = Thing("car", keys=(0, 1))

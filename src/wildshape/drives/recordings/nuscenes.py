@@ -26,11 +26,19 @@ class _Sweeps:
 
 
 def find_scenes(root: Path) -> list[Path]:
-    """The scenes of a release, as paths below its folder."""
+    """The scenes of a release, as paths below its folder.
+
+    Raises:
+        BadInputError: its table is corrupt or names none.
+    """
     if not (root / "scene.json").is_file() and not any(root.glob("*/scene.json")):
         return []
     tables = find_tables(root)
-    return sorted(root / str(row.get("name")) for row in json_rows(tables / "scene.json"))
+    names = {str(row["name"]) for row in json_rows(tables / "scene.json") if "name" in row}
+    if not names:
+        path = tables / "scene.json"
+        raise BadInputError(f"{path}: names no scene; unpack nuScenes' metadata archive again.")
+    return [root / name for name in sorted(names)]
 
 
 def open_scene(path: Path) -> Drive:
