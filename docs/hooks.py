@@ -13,7 +13,15 @@ from typing import Any
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
-_RESULTS = ("shipped-weights", "depth-views", "demo", "paper-tables", "speed")
+_RESULTS = (
+    "shipped-weights",
+    "real-boxes",
+    "drive",
+    "depth-views",
+    "demo",
+    "paper-tables",
+    "speed",
+)
 COPIES = "repository"  # where files from outside of docs/ lie on the site
 WRITTEN = (
     "benchmarks/RESULTS.md",

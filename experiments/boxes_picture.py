@@ -47,7 +47,7 @@ def main(settings: Settings) -> None:
     if track.shape is None or track.T_sensor_object is None:
         raise SystemExit("a simulated track has its truth")
     model, i = load(), settings.scan
-    pose, truth = track.T_sensor_object[i], true_box(track.shape)
+    pose, truth = track.T_sensor_object[i], true_box(track.shape, body=True)
     one = model.complete(track.scans[i], track.sensor)
     whole = model.complete_track(track.scans, track.sensor)[i]
     boxes = (

@@ -204,6 +204,14 @@ def unknown(text: str) -> set[str]:
     }
 
 
+def test_the_stages_of_a_drive_name_their_modules():
+    text = (ROOT / "docs/drive.md").read_text(encoding="utf-8").partition("## The stages")[2]
+    rows = re.findall(r"^\| \w+ \| (`[^|]+) \|", text, re.MULTILINE)
+    named = [name for row in rows for name in re.findall(r"`([\w.]+)`", row)]
+    assert len(named) > 10
+    assert not [name for name in named if not is_found(f"wildshape.drives.{name}")]
+
+
 def is_ours(path: str) -> bool:
     """Whether a path is one of this project: of a Python file, or in a folder that there is."""
     folder, slash, _ = path.partition("/")
