@@ -25,7 +25,7 @@ class LossConfig:
         projection: how the sensor's image is binned; if it is `flat`, both terms are of points in
             the image (the paper's losses on 2D projections).
         template: weight of the pull of every canonical shape to the batch's mean shape, at the
-            first step (beyond the paper; see docs/decisions.md); 0 is no template at all.
+            first step (beyond the paper; see docs/accuracy.md); 0 is no template at all.
         template_end: the same at the last step; geometric in between.
         belief: weight of the cross-entropy that teaches the selector the winner; also the metres
             of cost that a nat of belief is worth when a branch is chosen.
