@@ -49,6 +49,12 @@ def test_height_and_tilt_of_a_sensor_come_from_the_ground():
     SE3.from_matrix(turn.matrix)  # a rotation
 
 
+@pytest.mark.parametrize("up", [(0.0, 0.0, -1.0), (0.0, 0.5, 0.5), (1.0, 0.0, 0.0)])
+def test_what_is_no_vertical_is_refused(up):
+    with pytest.raises(ValueError, match="the vertical is"):
+        Mounting(1.7, 0.6, up)
+
+
 def test_no_ground_is_found_in_a_wall_or_in_hardly_any_points():
     rng = np.random.default_rng(0)
     wall = rng.uniform((-9, 8, -1.7), (9, 8.05, 5), (5000, 3)).astype(np.float32)

@@ -21,6 +21,7 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 
 _MOST_POINTS, _FEWEST_POINTS = 4000, 100
+_OFF_UNIT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,15 @@ class Mounting:
     height_m: float
     tilt_deg: float
     up: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        """Refuse what is no vertical.
+
+        Raises:
+            ValueError: `up` is no unit vector, or points down.
+        """
+        if abs(math.hypot(*self.up) - 1) > _OFF_UNIT or not self.up[2] > 0:
+            raise ValueError(f"the vertical is {self.up}")
 
     @property
     def is_tilted(self) -> bool:
