@@ -11,7 +11,7 @@ A store is a folder:
   several sensors are merged, `m` rows of origins.
 - `index.safetensors`: where everything lies, the poses and all texts (tensors of `INDEX`).
 - `index.json`: format, version, checksums, provenance. Written last: no store without it.
-  (`store_checks.py` says what is compared with which checksum.)
+  (`checks.py` says what is compared with which checksum.)
 - `writing.json` while it is being written; then there may be finished `.parts/`, each with a store
   of its own, and `joining.json` while these become one.
 """
