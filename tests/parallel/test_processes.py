@@ -1,58 +1,180 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Work in several processes: order, errors, and workers that are killed."""
+"""Work in several processes: order, errors, and helpers that are killed."""
 
 import os
 import signal
-from functools import partial
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 
 import pytest
 
 from wildshape.errors import BadInputError
-from wildshape.parallel.processes import as_done, in_order
+from wildshape.parallel import processes
+from wildshape.parallel.team import ALONE, cores, team
+
+PLAIN_SCRIPT = """
+import time
+from itertools import repeat
+from wildshape.parallel import processes
+from wildshape.parallel.team import team
+processes._WORTH_S = 0.0
+print("begun")
+
+class OfTheScript:
+    def __call__(self, number):
+        return -number
+
+with team(2) as two:
+    for _ in two.as_done(time.sleep, repeat(0.01)):
+        if two.worked == 2:
+            break
+    print(list(two.in_order(OfTheScript(), [1])))
+"""
 
 
-def square(number):
-    os.write(1, b"a line that is no result\n")
-    return number * number
+@pytest.fixture(autouse=True)
+def _helpers_at_once(monkeypatch):
+    monkeypatch.setattr(processes, "_WORTH_S", 0.0)
 
 
-def killed_once(folder, number):
-    mark = Path(folder) / f"{number}"
-    if number == 3 and not mark.exists():
-        mark.touch()
+@pytest.fixture
+def two():
+    with team(2) as found:
+        yield found
+
+
+@dataclass(frozen=True)
+class Task:
+    """Squares a number; this process waits until a helper has come to the first of its items."""
+
+    folder: Path
+    here: int = field(default_factory=os.getpid)
+
+    def __call__(self, number):
+        os.write(1, b"a line that is no result\n")
+        if os.getpid() == self.here:
+            wait_for(self.folder / "came")
+            return self.done_here(number)
+        (self.folder / "came").touch()
+        return self.done_by_a_helper(number)
+
+    def done_here(self, number):
+        return number * number
+
+    def done_by_a_helper(self, number):
+        return number * number
+
+
+class Who(Task):
+    def done_here(self, number):
+        return os.getpid()
+
+    done_by_a_helper = done_here
+
+
+class KilledOnce(Task):
+    """Every second helper is killed at its item; `done` tells who did which."""
+
+    def done_here(self, number):
+        with (self.folder / "done").open("a") as file:
+            file.write(f"{number}\n")
+        return number
+
+    def done_by_a_helper(self, number):
+        mark = self.folder / f"killed at {number}"
+        if not mark.exists():
+            mark.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return self.done_here(number)
+
+
+class KilledAlways(Task):
+    def done_by_a_helper(self, number):
         os.kill(os.getpid(), signal.SIGKILL)
-    return number
 
 
-def killed_always(number):
-    os.kill(os.getpid(), signal.SIGKILL)
+class Refused(Task):
+    def done_by_a_helper(self, number):
+        raise BadInputError(f"item {number}: refused.")
 
 
-def refuse(number):
-    if number == 1:
-        raise BadInputError("item 1: refused.")
-    raise ZeroDivisionError
+class EndOfFile(Task):
+    def done_by_a_helper(self, number):
+        raise EOFError("of the task itself")
 
 
-def test_results_come_in_order():
-    assert list(in_order(square, range(20), 2)) == [i * i for i in range(20)]
-    assert sorted(as_done(square, range(20), 2)) == [i * i for i in range(20)]
+def wait_for(file):
+    until = time.monotonic() + 60
+    while not file.exists():
+        assert time.monotonic() < until
+        time.sleep(0.002)
 
 
-def test_what_a_killed_worker_held_is_done_again(tmp_path):
-    assert list(in_order(partial(killed_once, tmp_path), range(6), 2)) == list(range(6))
-    assert (tmp_path / "3").exists()
+def test_results_come_in_order(two, tmp_path):
+    assert list(two.in_order(Task(tmp_path), range(40))) == [i * i for i in range(40)]
+    assert sorted(two.as_done(Task(tmp_path), range(20))) == [i * i for i in range(20)]
 
 
-def test_what_kills_every_worker_is_given_up():
-    with pytest.raises(BadInputError, match=r"^7: the process .* ended early 3 times"):
-        list(as_done(killed_always, [7], 1))
+def test_every_process_works(two, tmp_path):
+    assert len(set(two.as_done(Who(tmp_path), range(20)))) == 2
+    assert two.worked == 2
 
 
-def test_errors_come_across():
-    with pytest.raises(BadInputError, match="item 1: refused"):
-        list(as_done(refuse, [1], 1))
-    with pytest.raises(ZeroDivisionError):
-        list(as_done(refuse, [2], 1))
+def test_short_work_is_done_here(two, monkeypatch):
+    monkeypatch.setattr(processes, "_WORTH_S", 60.0)
+    assert list(two.as_done(str, range(3))) == ["0", "1", "2"]
+    assert two.worked == ALONE.worked == 1
+
+
+def test_what_a_killed_helper_held_is_done_again_and_once(two, tmp_path):
+    assert list(two.in_order(KilledOnce(tmp_path), range(10))) == list(range(10))
+    assert any(tmp_path.glob("killed at *"))
+    assert sorted(map(int, (tmp_path / "done").read_text().split())) == list(range(10))
+
+
+def test_what_kills_every_helper_is_given_up(two, tmp_path):
+    with pytest.raises(BadInputError, match=r"^\d+: the process .* ended early 3 times"):
+        list(two.as_done(KilledAlways(tmp_path), range(10)))
+
+
+@pytest.mark.parametrize(
+    ("task", "error"),
+    [(Refused, BadInputError(r"item \d: refused")), (EndOfFile, EOFError("of the task itself"))],
+)
+def test_errors_come_across(two, tmp_path, task, error):
+    with pytest.raises(type(error), match=str(error)):
+        list(two.in_order(task(tmp_path), range(10)))
+
+
+def test_errors_of_the_items_come_too(two, tmp_path):
+    def items():
+        yield from range(5)
+        raise BadInputError("cannot be read.")
+
+    with pytest.raises(BadInputError, match="cannot be read"):
+        list(two.in_order(Task(tmp_path), items()))
+
+
+def test_work_that_is_left_ends_with_the_team(tmp_path):
+    with team(2) as two:
+        next(two.as_done(Task(tmp_path), count()))
+
+
+def test_a_script_without_a_guard_runs_once_and_its_own_tasks_are_done_here(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(PLAIN_SCRIPT)
+    run = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
+    assert run.stdout == "begun\n[-1]\n", run.stderr
+
+
+def test_the_cores_of_this_process_are_used():
+    assert 1 <= cores() <= (os.cpu_count() or 1)
+    with team() as all_of_them:
+        assert all_of_them.size == cores()
+    with pytest.raises(BadInputError, match="--workers 0: expected 1 or more"), team(0):
+        pass

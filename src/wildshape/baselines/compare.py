@@ -4,8 +4,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from wildshape.baselines.dpc import completer as dpc
 from wildshape.baselines.dpc.checkpoint import is_dpc
@@ -23,6 +24,7 @@ from wildshape.io.progress import SILENT, Progress
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates
 from wildshape.method.checkpoint import MODEL, fingerprint, weights_file
 from wildshape.ops.device import choose_device
+from wildshape.parallel.team import team
 
 OURS = "wildshape"
 """The name of our row, where it has no other."""
@@ -47,6 +49,8 @@ class ComparisonOptions:
         raw: measure the networks' own answers, not refined against the scan.
         coordinates: of the data's files.
         device: `auto`, `cpu` or `cuda`.
+        workers: processes; None: one a core.
+        ray: address of a Ray cluster in place of this machine, if any.
         overwrite: replace an earlier output.
     """
 
@@ -60,6 +64,8 @@ class ComparisonOptions:
     raw: bool = False
     coordinates: Coordinates = SENSOR_METRES
     device: str = "auto"
+    workers: int | None = None
+    ray: str | None = None
     overwrite: bool = False
 
     def __post_init__(self) -> None:
@@ -83,13 +89,24 @@ class ComparisonOptions:
 _DEFAULT = ComparisonOptions()
 
 
+class Comparison(NamedTuple):
+    """What came of it.
+
+    Attributes:
+        table: in Markdown.
+        skipped: what could not be used, with the reason.
+        workers: how many did the work.
+    """
+
+    table: str
+    skipped: tuple[tuple[str, str], ...]
+    workers: int
+
+
 def compare(
     data: Path, out: Path, options: ComparisonOptions = _DEFAULT, progress: Progress = SILENT
-) -> tuple[str, tuple[tuple[str, str], ...]]:
+) -> Comparison:
     """Measure shapes and registration against truth, and write metrics, scores, table, figures.
-
-    Returns:
-        The table, and what was skipped, each with its reason.
 
     Raises:
         BadInputError: data, models or options that cannot be used; nothing with truth.
@@ -108,19 +125,20 @@ def compare(
         if pooled
         else [_rows(models, track=options.track)] * _useful_seeds(options, progress)
     )
-    runs = [
-        evaluate_once(
-            source, {**baselines, **rows}, options.rotate, seed, options.max_scans, progress
-        )
-        for seed, rows in enumerate(evaluated)
-    ]
+    with team(options.workers, options.ray) as helpers:
+        measure = partial(evaluate_once, progress=progress, helpers=helpers)
+        runs = [
+            measure(source, {**baselines, **rows}, options.rotate, seed, options.max_scans)
+            for seed, rows in enumerate(evaluated)
+        ]
+        workers = helpers.worked
     if pooled:
         runs = _with_selected(runs, models)
     provenance = {**output.record["provenance"], "settings": output.record["settings"]}
     drawn = next(iter(evaluated[0].items()))
     table = write_evaluation(out, source, runs, drawn, provenance)
     output.finish(skipped=source.skipped)
-    return table, source.skipped
+    return Comparison(table, source.skipped, workers)
 
 
 def load_models(models: Sequence[Path], device: str, *, raw: bool = False) -> dict[str, Model]:

@@ -158,7 +158,26 @@ class FileOptions:
         return Coordinates(self.unit, self.origin)
 
 
+@dataclass(frozen=True)
+class WorkOptions:
+    """Who does the work."""
+
+    workers: Annotated[int | None, option(metavar="N", help="processes; by default one a core")] = (
+        None
+    )
+    ray: Annotated[
+        str | None,
+        option(
+            metavar="ADDRESS",
+            help="work on the Ray cluster at this address; auto: the one that this machine belongs"
+            " to, local: start one; all its machines must see the same files",
+        ),
+    ] = None
+
+
 Network = Annotated[NetworkOptions, OmitArgPrefixes]
+Work = Annotated[WorkOptions, OmitArgPrefixes]
+DEFAULT_WORK = WorkOptions()
 Files = Annotated[FileOptions, OmitArgPrefixes]
 DEFAULT_NETWORK, DEFAULT_FILES = NetworkOptions(), FileOptions()
 
@@ -173,8 +192,8 @@ class ScanOptions:
     overwrite: Overwrite = False
     json: AsJson = False
 
-    def of_folder(self) -> "FolderOptions":
-        """The same for the library."""
+    def of_folder(self, work: WorkOptions) -> "FolderOptions":
+        """The same for the library; `work`: who does it."""
         from wildshape.inference.folders.complete_folder import FolderOptions
 
         return FolderOptions(
@@ -182,6 +201,8 @@ class ScanOptions:
             device=self.network.device,
             coordinates=self.files.coordinates,
             track=self.together,
+            workers=work.workers,
+            ray=work.ray,
             overwrite=self.overwrite,
         )
 

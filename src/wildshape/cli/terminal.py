@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from wildshape.io.progress import Bar, duration, printable
 
 if TYPE_CHECKING:
-    from wildshape.inference.folders.complete_folder import FolderSummary
+    from wildshape.inference.folders.summary import FolderSummary
 
 Handler = Callable[[int, FrameType | None], None]
 

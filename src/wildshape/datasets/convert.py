@@ -4,8 +4,7 @@
 
 import hashlib
 import json
-import os
-from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -23,8 +22,7 @@ from wildshape.errors import BadInputError, MissingExtraError
 from wildshape.io.progress import SILENT, Progress, counted
 from wildshape.io.store.layout import PARTS
 from wildshape.io.write_tracks import Layout
-from wildshape.parallel.processes import as_done
-from wildshape.parallel.ray_cluster import on_ray
+from wildshape.parallel.team import ALONE, team
 
 
 @dataclass(frozen=True)
@@ -49,6 +47,19 @@ class ConversionOptions:
 _DEFAULT = ConversionOptions()
 
 
+@dataclass(frozen=True)
+class Converted:
+    """What became of a data set.
+
+    Attributes:
+        parts: what became of each, in order.
+        workers: how many did the work.
+    """
+
+    parts: list[PartResult]
+    workers: int = 1
+
+
 def convert(
     source: Source,
     out: Path,
@@ -56,8 +67,8 @@ def convert(
     progress: Progress = SILENT,
     *,
     name: str = "",
-) -> list[PartResult]:
-    """Convert all parts, or those that an earlier run did not finish; their results in order.
+) -> Converted:
+    """Convert all parts, or those that an earlier run did not finish.
 
     The output depends on the data set and the options alone, not on who worked on what when.
 
@@ -80,19 +91,19 @@ def convert(
     destination: Destination = kind(out, settings, options.overwrite, progress)
     earlier = destination.begin()
     if earlier is not None:
-        return earlier
+        return Converted(earlier)
     task = Conversion(source, (out / PARTS).absolute(), options.layout, options.truth)
     try:
-        results = _all_parts(task, parts, options, f"converting {name}", progress)
+        found = _all_parts(task, parts, options, f"converting {name}", progress)
     except (BadInputError, MissingExtraError):
         if not any(task.finished(part) for part in parts):
             destination.abandon()
         raise
-    if not any(result.tracks for result in results):
+    if not any(result.tracks for result in found.parts):
         destination.abandon()
-        raise BadInputError(_nothing(settings["root"], results))
-    destination.finish([(task.place(part), result) for part, result in zip(parts, results)])
-    return results
+        raise BadInputError(_nothing(settings["root"], found.parts))
+    destination.finish([(task.place(part), result) for part, result in zip(parts, found.parts)])
+    return found
 
 
 def _identity(
@@ -125,29 +136,20 @@ def _all_parts(
     options: ConversionOptions,
     label: str,
     progress: Progress,
-) -> list[PartResult]:
+) -> Converted:
     """The results in order, of this run and of earlier ones; progress is shown."""
     found = {part: task.finished(part) for part in parts}
     results = {part: result for part, result in found.items() if result is not None}
     todo = [part for part in parts if part not in results]
-    with progress.bar(label, len(parts), start=len(results)) as bar:
-        for part, result in _shared_out(task, todo, options):
+    needed = team(options.workers, options.ray) if todo else nullcontext(ALONE)
+    with progress.bar(label, len(parts), start=len(results)) as bar, needed as helpers:
+        for part, result in helpers.as_done(task, todo):
             results[part] = result
             so_far = list(results.values())
             refused = all(r.damage for r in so_far) or len(so_far) == len(parts)
             if not refused or any(r.tracks for r in so_far):
                 bar.at(len(so_far), _so_far(so_far))
-    return [results[part] for part in parts]
-
-
-def _shared_out(
-    task: Conversion, todo: list[Part], options: ConversionOptions
-) -> Iterator[tuple[Part, PartResult]]:
-    cores = os.cpu_count() or 1
-    workers = min(cores if options.workers is None else options.workers, len(todo))
-    if options.ray is not None and todo:
-        return on_ray(task, todo, options.ray, options.workers)
-    return as_done(task, todo, workers) if workers > 1 else map(task, todo)
+        return Converted([results[part] for part in parts], helpers.worked)
 
 
 def _so_far(results: list[PartResult]) -> str:

@@ -14,6 +14,7 @@ from wildshape.evaluation.summary import write_metrics, write_scores
 from wildshape.evaluation.tables import markdown, write_table
 from wildshape.io.inputs import TrackSource
 from wildshape.io.progress import SILENT, Progress
+from wildshape.parallel.team import ALONE, Team
 
 
 def evaluate_once(
@@ -23,6 +24,7 @@ def evaluate_once(
     seed: int,
     max_scans: int | None,
     progress: Progress = SILENT,
+    helpers: Team = ALONE,
 ) -> Results:
     """The protocol under one seed.
 
@@ -33,11 +35,11 @@ def evaluate_once(
         seed: of these turns.
         max_scans: take this many scans of a longer track, evenly.
         progress: is told how many tracks are done.
+        helpers: who does the work.
     """
+    limits = Limits(max_scans=max_scans)
     with progress.bar(f"evaluating, seed {seed}", len(source)) as bar:
-        return run_protocol(
-            methods, source, rotate, seed, bar.at, limits=Limits(max_scans=max_scans)
-        )
+        return run_protocol(methods, source, rotate, seed, bar.at, limits=limits, helpers=helpers)
 
 
 def write_evaluation(

@@ -38,6 +38,7 @@ from wildshape.evaluation.results import (
     Skipped,
 )
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.parallel.team import ALONE, Team
 from wildshape.records import Box, Points, Sensor, Track
 
 ALL_SCANS = Limits()
@@ -57,6 +58,11 @@ class _Ledger:
     def skip(self, case: Case, scan: int, reason: str) -> None:
         self.skipped.append(Skipped(case.name, case.scan_names[scan], reason))
 
+    def extend(self, more: "_Ledger") -> None:
+        self.completions += more.completions
+        self.registrations += more.registrations
+        self.skipped += more.skipped
+
     def close(self, name: str, about: str) -> MethodScores:
         return MethodScores(
             name=name,
@@ -75,6 +81,7 @@ def run(
     progress: Progress | None = None,
     *,
     limits: Limits = ALL_SCANS,
+    helpers: Team = ALONE,
 ) -> Results:
     """Every method on every track.
 
@@ -88,17 +95,42 @@ def run(
         seed: of the rotations.
         progress: called after each track with the number done and its name.
         limits: what of a track counts.
+        helpers: who does the work.
     """
     ledgers: dict[str, _Ledger] = {name: _Ledger() for name in methods}
-    for done, track in enumerate(tracks, start=1):
-        case = prepare(track, rotate, seed, limits)
-        for name, method in methods.items():
-            _evaluate(name, method, case, ledgers)
+    task = _TrackEvaluation(methods, rotate, seed, limits)
+    for done, found in enumerate(helpers.in_order(task, tracks), start=1):
+        for name, ledger in found.ledgers.items():
+            ledgers.setdefault(name, _Ledger()).extend(ledger)
         if progress is not None:
-            progress(done, track.name)
+            progress(done, found.track)
     about = {name: m.about for name, m in methods.items() if isinstance(m, Described)}
     rows = tuple(ledger.close(name, about.get(name, "")) for name, ledger in ledgers.items())
     return Results(rotate, seed, rows, limits)
+
+
+class _OfTrack(NamedTuple):
+    """What the rows say of one track."""
+
+    track: str
+    ledgers: dict[str, _Ledger]
+
+
+@dataclass(frozen=True)
+class _TrackEvaluation:
+    """Every method on one track."""
+
+    methods: Mapping[str, Method]
+    rotate: Rotate
+    seed: int
+    limits: Limits
+
+    def __call__(self, track: Track) -> _OfTrack:
+        ledgers: dict[str, _Ledger] = {name: _Ledger() for name in self.methods}
+        case = prepare(track, self.rotate, self.seed, self.limits)
+        for name, method in self.methods.items():
+            _evaluate(name, method, case, ledgers)
+        return _OfTrack(track.name, ledgers)
 
 
 def whole_track_name(name: str, method: Method) -> str:

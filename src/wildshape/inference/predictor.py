@@ -35,7 +35,8 @@ from wildshape.method.network import ShapePoseNet
 from wildshape.ops.device import choose_device
 from wildshape.records import Completion, Points, Registration, Sensor
 
-_BATCH = 32
+BATCH = 32
+"""Scans that are completed at once."""
 _DEFAULT = InferenceConfig()
 
 
@@ -135,8 +136,8 @@ class Predictor:
     ) -> Iterator[Completion]:
         """`complete` for many scans, in batches; each is completed on its own."""
         known = rays_of_each(rays, scans)
-        for start in range(0, len(scans), _BATCH):
-            part = slice(start, start + _BATCH)
+        for start in range(0, len(scans), BATCH):
+            part = slice(start, start + BATCH)
             yield from self._each(_checked(scans[part], start), sensor, known[part])
 
     def complete_track(
@@ -173,10 +174,10 @@ class Predictor:
     def _each(
         self, scans: Sequence[Points], sensor: Sensor | None, rays: Rays = ()
     ) -> Iterator[Completion]:
-        for start in range(0, len(scans), _BATCH):
+        for start in range(0, len(scans), BATCH):
             began = time.perf_counter()
-            batch = list(scans[start : start + _BATCH])
-            done = self._complete_batch(batch, sensor, rays[start : start + _BATCH])
+            batch = list(scans[start : start + BATCH])
+            done = self._complete_batch(batch, sensor, rays[start : start + BATCH])
             seconds = (time.perf_counter() - began) / len(batch)
             yield from (replace(item, seconds=seconds) for item in done)
 

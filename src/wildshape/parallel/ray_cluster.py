@@ -3,12 +3,14 @@
 """Work spread over a Ray cluster, as `processes` spreads it over the processes of one machine."""
 
 import os
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from itertools import islice
+from contextlib import contextmanager
+from itertools import count, islice
 from typing import Any, TypeVar
 
 from wildshape.errors import BadInputError, load_library
-from wildshape.parallel.processes import guarded
+from wildshape.parallel.helper import guarded
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -17,61 +19,104 @@ _RETRIES = 3
 _AHEAD = 2
 
 
-def on_ray(
-    task: Callable[[Item], Result], items: Iterable[Item], address: str, workers: int | None
-) -> Iterator[Result]:
-    """`task(item)` of all items in the order in which the work ends, on a Ray cluster.
-
-    A task whose worker or machine is lost is worked on again elsewhere. Its machines need the same
-    Wildshape, and see the same files under the same paths.
+@contextmanager
+def on_ray(address: str, workers: int | None = None) -> "Iterator[RayCluster]":
+    """A Ray cluster; one that is started here is stopped at the end of the block.
 
     Args:
-        task: can be pickled, as items and results.
-        items: taken as they are needed.
         address: of the cluster's head, `auto` for the one that this machine belongs to, `local`
-            for one that is started on this machine and stopped at the end.
+            for one that is started on this machine.
         workers: how many processors a local cluster uses.
 
     Raises:
         MissingExtraError: Ray is not installed.
-        BadInputError: no cluster there, or an item whose workers died again and again.
-        Exception: what the task raised.
+        BadInputError: no cluster answers there.
     """
     ray = load_library("ray", "--ray needs Ray", "pip install 'wildshape[ray]'")
     ours = not ray.is_initialized()
     if ours:
         _connect(ray, address, workers)
     try:
-        yield from _spread(ray, task, items)
+        yield RayCluster(ray)
     finally:
         if ours:
             ray.shutdown()
 
 
-def _spread(ray: Any, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-    remote = ray.remote(max_retries=_RETRIES)(guarded)
-    shared = ray.put(task)
-    rest = iter(items)
-    ahead = _AHEAD * max(int(ray.cluster_resources().get("CPU", 1)), 1)
-    running = {remote.remote(shared, item): item for item in islice(rest, ahead)}
-    while running:
-        (done,), _ = ray.wait(list(running), num_returns=1)
-        item = running.pop(done)
-        running |= {remote.remote(shared, more): more for more in islice(rest, 1)}
-        yield _fetched(ray, done, item)
+class RayCluster:
+    """A Ray cluster that is connected.
+
+    A task whose worker or machine is lost is worked on again elsewhere. Its machines need the same
+    Wildshape, and see the same files under the same paths.
+    """
+
+    def __init__(self, ray: Any) -> None:
+        self._ray = ray
+        self._remote = ray.remote(max_retries=_RETRIES)(_work)
+        self._numbers = count()
+
+    @property
+    def size(self) -> int:
+        """How many processors it has now; each does one item at a time."""
+        return max(int(self._ray.cluster_resources().get("CPU", 1)), 1)
+
+    @property
+    def worked(self) -> int:
+        """The same: who did what is not known."""
+        return self.size
+
+    def in_order(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+        """See `Processes.in_order`."""
+        submit = self._told(task)
+        ahead = _AHEAD * self.size
+        waiting: deque[tuple[Any, Item]] = deque()
+        for item in items:
+            waiting.append((submit(item), item))
+            if len(waiting) > ahead:
+                yield self._fetched(*waiting.popleft())
+        while waiting:
+            yield self._fetched(*waiting.popleft())
+
+    def as_done(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+        """See `Processes.as_done`."""
+        submit = self._told(task)
+        rest = iter(items)
+        running = {submit(item): item for item in islice(rest, _AHEAD * self.size)}
+        while running:
+            (done,), _ = self._ray.wait(list(running), num_returns=1)
+            item = running.pop(done)
+            running |= {submit(more): more for more in islice(rest, 1)}
+            yield self._fetched(done, item)
+
+    def _told(self, task: Callable[[Item], Result]) -> Callable[[Item], Any]:
+        """What sends an item to the cluster; the task itself travels once."""
+        number, shared = next(self._numbers), [self._ray.put(task)]
+        return lambda item: self._remote.remote(number, shared, item)
+
+    def _fetched(self, done: Any, item: object) -> Any:
+        try:
+            made = self._ray.get(done)
+        except self._ray.exceptions.RayError as lost:
+            raise BadInputError(
+                f"{item}: the Ray workers that worked on it were lost {_RETRIES + 1} times"
+                f" ({type(lost).__name__}); look at the cluster's logs, then repeat the command."
+            ) from lost
+        if isinstance(made, Exception):
+            raise made
+        return made
 
 
-def _fetched(ray: Any, done: Any, item: object) -> Any:
-    try:
-        made = ray.get(done)
-    except ray.exceptions.RayError as lost:
-        raise BadInputError(
-            f"{item}: the Ray workers that worked on it were lost {_RETRIES + 1} times"
-            f" ({type(lost).__name__}); look at the cluster's logs, then repeat the command."
-        ) from lost
-    if isinstance(made, Exception):
-        raise made
-    return made
+_task_of: dict[int, Callable[[Any], Any]] = {}
+
+
+def _work(number: int, shared: list[Any], item: Any) -> Any:
+    """The worker's side: the task is unpacked once, not for every item."""
+    ray = load_library("ray", "this work needs Ray", "pip install 'wildshape[ray]'")
+
+    if number not in _task_of:
+        _task_of.clear()
+        _task_of[number] = ray.get(shared[0])
+    return guarded(_task_of[number], item)
 
 
 def _connect(ray: Any, address: str, workers: int | None) -> None:

@@ -2,14 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulated tracks as records: the same for the same seed, however many workers make them."""
 
-import os
 from collections.abc import Iterator
 
 import numpy as np
 import torch
 
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.parallel.processes import in_order
+from wildshape.parallel.team import team
 from wildshape.records import Intrinsics, Sensor, Track
 from wildshape.simulate.config import SimulationConfig
 from wildshape.simulate.one_track import Job, RawTrack
@@ -17,8 +16,6 @@ from wildshape.simulate.sensor import DepthCamera, SpinningLidar
 from wildshape.simulate.shapes.meshes import mesh_files
 
 __all__ = ["SimulationConfig", "simulate_tracks"]
-
-_WORTH_A_WORKER = 16
 
 
 def simulate_tracks(
@@ -34,7 +31,7 @@ def simulate_tracks(
     Args:
         config: what to simulate.
         seed: at least 0.
-        workers: processes; None: one a core where there are enough tracks; 1: none beside this.
+        workers: processes; None: one a core.
 
     Raises:
         BadInputError: a mesh that cannot be used.
@@ -42,14 +39,9 @@ def simulate_tracks(
     """
     meshes = mesh_files(config.meshes) if config.meshes else ()
     job = Job(config, seed, meshes)
-    cores = os.cpu_count() or 1
-    count = min(cores, config.tracks // _WORTH_A_WORKER) if workers is None else workers
-    if count > 1:
-        raw = in_order(job.track, range(config.tracks), count)
-    else:
-        raw = (job.track(index) for index in range(config.tracks))
-    for index, made in enumerate(raw):
-        yield _record(made, config, index)
+    with team(workers) as helpers:
+        for index, made in enumerate(helpers.in_order(job.track, range(config.tracks))):
+            yield _record(made, config, index)
 
 
 def _record(raw: RawTrack, config: SimulationConfig, index: int) -> Track:

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import Positional, arg
 
 from wildshape.cli.commands import uncollected
-from wildshape.cli.options import DEFAULT_SCANS, Format, Scans, is_pipe, listed, option
+from wildshape.cli.options import (
+    DEFAULT_SCANS,
+    DEFAULT_WORK,
+    Format,
+    Scans,
+    Work,
+    is_pipe,
+    listed,
+    option,
+)
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -77,6 +86,7 @@ class Settings:
         option(metavar="FILE", help="of KITTI (.txt) or Argoverse 2 (.feather), for these boxes"),
     ] = None
     format: Format = "auto"
+    work: Work = DEFAULT_WORK
 
 
 def run(settings: Settings) -> None:
@@ -117,7 +127,7 @@ def _options(settings: Settings) -> "FolderOptions":
     wanted = bool(settings.boxes or settings.calibration)
     boxes = BoxFiles(settings.boxes, settings.calibration) if wanted else None
     return replace(
-        settings.scans.of_folder(),
+        settings.scans.of_folder(settings.work),
         rays=settings.rays,
         clouds=settings.cloud_format,
         mesh=_mesh(settings),

@@ -10,12 +10,22 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
-from wildshape.cli.options import AsJson, Layout, Origin, Overwrite, Unit, listed, option
+from wildshape.cli.options import (
+    DEFAULT_WORK,
+    AsJson,
+    Layout,
+    Origin,
+    Overwrite,
+    Unit,
+    Work,
+    listed,
+    option,
+)
 from wildshape.datasets.sources import SOURCES
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
-    from wildshape.datasets.tracks.conversion import PartResult
+    from wildshape.datasets.convert import Converted
     from wildshape.datasets.tracks.truth import TruthBuilder
 
 EXAMPLES = (
@@ -34,7 +44,7 @@ Range = Annotated[tuple[float, float] | None, listed("LOW,HIGH", float, count=2,
 Words = Annotated[tuple[str, ...] | None, listed("A,B", words=1), option()]
 Word = Annotated[str | None, option(metavar="WORD")]
 
-_OURS = ("source", "root", "out", "layout", "workers", "ray", "overwrite", "json")
+_OURS = ("source", "root", "out", "layout", "work", "overwrite", "json")
 _TRUTH = ("truth", "outliers", "outlier_radius", "outlier_neighbours", "ground_strip")
 
 
@@ -76,9 +86,6 @@ class Settings:
         edge: so many pixels at a mask's border are left out (rgbd, bop).
         rays: keep the rays around each scan that did not hit its object, too (docs/formats.md); a
             scan takes about six times the room.
-        workers: processes; by default one a core.
-        ray: spread the work over the Ray cluster at this address; `auto` finds the one that this
-            machine belongs to, `local` starts one. OUT must lie where all its machines see it.
     """
 
     source: Name
@@ -115,8 +122,7 @@ class Settings:
     max_depth: Metres = None
     edge: Count = None
     rays: bool = False
-    workers: Count = None
-    ray: Annotated[str | None, option(metavar="ADDRESS")] = None
+    work: Work = DEFAULT_WORK
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -137,13 +143,14 @@ def run(settings: Settings) -> None:
     _check(settings)
     keep_apart(settings.root, settings.out)
     # Machines of a cluster have working folders of their own.
-    root = settings.root if settings.ray is None else settings.root.absolute()
+    work = settings.work
+    root = settings.root if work.ray is None else settings.root.absolute()
     source = open_source(settings.source, root, _options(settings))
     options = ConversionOptions(
-        settings.layout, _truth(settings), settings.workers, settings.ray, settings.overwrite
+        settings.layout, _truth(settings), work.workers, work.ray, settings.overwrite
     )
-    results = convert(source, settings.out, options, TERMINAL, name=settings.source)
-    _tell(results, settings, time.monotonic() - began)
+    found = convert(source, settings.out, options, TERMINAL, name=settings.source)
+    _tell(found, settings, time.monotonic() - began)
 
 
 def _options(settings: Settings) -> dict[str, Any]:
@@ -171,7 +178,7 @@ def _truth(settings: Settings) -> "TruthBuilder | None":
 
 
 def _check(settings: Settings) -> None:
-    least = dict.fromkeys(("every", "workers", "outlier_neighbours", "views"), 1)
+    least = dict.fromkeys(("every", "outlier_neighbours", "views"), 1)
     least |= dict.fromkeys(("min_points", "min_mean_points", "min_scans", "ground_strip"), 0)
     least |= dict.fromkeys(("gap", "pixels", "edge", "max_depth", "largest_m"), 0)
     for name, bound in least.items():
@@ -186,12 +193,13 @@ def _check(settings: Settings) -> None:
         raise BadInputError(f"--range-m {low:g} {high:g}: expected two distances, nearer first.")
 
 
-def _tell(results: "list[PartResult]", settings: Settings, seconds: float) -> None:
+def _tell(found: "Converted", settings: Settings, seconds: float) -> None:
     """The figures on stdout, and what was left out as a table on stderr."""
     from wildshape.cli.terminal import answer, say
     from wildshape.datasets.destinations import left_out
     from wildshape.io.progress import counted, duration
 
+    results = found.parts
     counts = {key: sum(getattr(r, key) for r in results) for key in ("tracks", "scans", "points")}
     reasons = left_out(results)
     if reasons:
@@ -200,7 +208,9 @@ def _tell(results: "list[PartResult]", settings: Settings, seconds: float) -> No
     if damaged:
         say(f"{len(damaged)} of {len(results)} parts are damaged, for example {damaged[0]}")
     written = ", ".join(counted(n, key.removesuffix("s")) for key, n in counts.items())
-    text = f"converted {written} in {duration(seconds)}; see {settings.out}"
+    took = f"in {duration(seconds)} with {counted(found.workers, 'worker')}"
+    text = f"converted {written} {took}; see {settings.out}"
     parts = [{key: value for key, value in asdict(r).items() if key != "names"} for r in results]
     data = {"out": str(settings.out), **counts, "left_out": reasons, "parts": parts}
-    answer(text, {**data, "seconds": round(seconds, 3)}, as_json=settings.json)
+    data |= {"workers": found.workers, "seconds": round(seconds, 3)}
+    answer(text, data, as_json=settings.json)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`wildshape evaluate`: models and baselines beside each other, by METHOD 8."""
 
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -11,12 +12,14 @@ from tyro.conf import arg
 from wildshape.baselines.named import NAMES
 from wildshape.cli.options import (
     DEFAULT_FILES,
+    DEFAULT_WORK,
     AsJson,
     Data,
     Device,
     Files,
     OutFolder,
     Overwrite,
+    Work,
     listed,
     option,
 )
@@ -66,6 +69,7 @@ class Settings:
     raw: bool = False
     files: Files = DEFAULT_FILES
     device: Device = "auto"
+    work: Work = DEFAULT_WORK
     overwrite: Overwrite = False
     json: AsJson = False
 
@@ -79,7 +83,8 @@ def run(settings: Settings) -> None:
     import json
 
     from wildshape.baselines.compare import ComparisonOptions, compare
-    from wildshape.cli.terminal import TERMINAL, answer, say_skipped
+    from wildshape.cli.terminal import TERMINAL, answer, say, say_skipped
+    from wildshape.io.progress import counted, duration
 
     options = ComparisonOptions(
         models=settings.model,
@@ -92,9 +97,14 @@ def run(settings: Settings) -> None:
         raw=settings.raw,
         coordinates=settings.files.coordinates,
         device=settings.device,
+        workers=settings.work.workers,
+        ray=settings.work.ray,
         overwrite=settings.overwrite,
     )
-    table, skipped = compare(settings.data, settings.out, options, TERMINAL)
-    say_skipped(skipped)
+    began = time.monotonic()
+    found = compare(settings.data, settings.out, options, TERMINAL)
+    say_skipped(found.skipped)
+    took = duration(time.monotonic() - began)
+    say(f"measured in {took} with {counted(found.workers, 'worker')}; see {settings.out}")
     metrics = json.loads((settings.out / "metrics.json").read_text("utf-8"))
-    answer(table, metrics, as_json=settings.json)
+    answer(found.table, {**metrics, "workers": found.workers}, as_json=settings.json)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, arg
 
 from wildshape.cli.commands import uncollected
-from wildshape.cli.options import DEFAULT_SCANS, Format, Scans, is_pipe, option
+from wildshape.cli.options import DEFAULT_SCANS, DEFAULT_WORK, Format, Scans, Work, is_pipe, option
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ class Settings:
     out: Out = None
     scans: Scans = DEFAULT_SCANS
     format: Format = "auto"
+    work: Work = DEFAULT_WORK
 
 
 def run(settings: Settings) -> None:
@@ -78,7 +79,7 @@ def _tracks(settings: Settings, out: Path) -> None:
         from wildshape.cli.terminal import TERMINAL, conclude
         from wildshape.inference.folders.complete_folder import complete_folder
 
-    options = settings.scans.of_folder()
+    options = settings.scans.of_folder(settings.work)
     found = complete_folder(settings.source, out, options, TERMINAL, registers=True)
     conclude(found, as_json=settings.scans.json)
 

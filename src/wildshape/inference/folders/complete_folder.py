@@ -7,15 +7,22 @@
 
 import json
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import stack
-from wildshape.inference.confidence import ReasonCounts
 from wildshape.inference.folders.box_files import BOX_FILES, BoxFiles
+from wildshape.inference.folders.parts import (
+    COMPLETED,
+    MESH,
+    PartCompleter,
+    parts_of,
+    whole_tracks,
+)
+from wildshape.inference.folders.summary import FolderSummary
 from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.registration import to_middle
 from wildshape.io.atomic import write_json
@@ -23,21 +30,20 @@ from wildshape.io.guard import reading
 from wildshape.io.inputs import TrackSource, open_tracks, with_rays
 from wildshape.io.output import Output, begin, file_name, keep_apart
 from wildshape.io.poses import times_of, write_poses, write_trajectory, write_tum
-from wildshape.io.progress import SILENT, Progress, counted, duration
+from wildshape.io.progress import SILENT, Progress
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates, write_ply
 from wildshape.io.scans.writers import (
     CLOUD_FORMATS,
     MESH_FORMATS,
     CloudFormat,
     MeshFiles,
-    write_cloud,
-    write_mesh,
 )
 from wildshape.method.checkpoint import fingerprint
+from wildshape.parallel.team import team
 from wildshape.records import Completion, Track
 
-OBJECTS, POSES, COMPLETED = "objects.json", "poses.txt", "completed"
-MIDDLE, MESH, TUM, TRAJECTORY = "T_middle_scan.txt", "mesh", "trajectory.tum", "trajectory.json"
+OBJECTS, POSES = "objects.json", "poses.txt"
+MIDDLE, TUM, TRAJECTORY = "T_middle_scan.txt", "trajectory.tum", "trajectory.json"
 FILES = (
     *(f"*/{COMPLETED}/*.{kind}" for kind in CLOUD_FORMATS),
     *(f"*/{MESH}/*.{kind}" for kind in MESH_FORMATS),
@@ -65,6 +71,8 @@ class FolderOptions:
         clouds: format of the shapes.
         mesh: also write a closed mesh of each shape, in this way.
         boxes: also write all boxes, in these files.
+        workers: processes; None: one a core.
+        ray: address of a Ray cluster in place of this machine, if any.
         overwrite: replace an earlier output.
     """
 
@@ -76,6 +84,8 @@ class FolderOptions:
     clouds: CloudFormat = "ply"
     mesh: MeshFiles | None = None
     boxes: BoxFiles | None = None
+    workers: int | None = None
+    ray: str | None = None
     overwrite: bool = False
 
     def identity(self, source: Path) -> dict[str, Any]:
@@ -92,62 +102,6 @@ class FolderOptions:
 
 
 _DEFAULT = FolderOptions()
-
-
-@dataclass
-class FolderSummary:
-    """What was done.
-
-    Attributes:
-        out: the folder written.
-        done: the verb: `completed` or `registered`.
-        tracks: written now.
-        finished_before: tracks of an earlier, interrupted run.
-        scans: written now.
-        seconds: that it took.
-        skipped: what could not be used, with the reason.
-        dropped: a sentence on points that were not finite, or nothing.
-        reasons: which scans' results are not to be trusted.
-    """
-
-    out: Path
-    done: str
-    tracks: int = 0
-    finished_before: int = 0
-    scans: int = 0
-    seconds: float = 0.0
-    skipped: list[tuple[str, str]] = field(default_factory=list)
-    dropped: str = ""
-    reasons: ReasonCounts = field(default_factory=ReasonCounts)
-
-    def add(self, track: Track, scans: list[Completion]) -> None:
-        """Count a track."""
-        self.tracks += 1
-        self.scans += len(scans)
-        self.reasons.of((f"{track.name}/{name}" for name in track.scan_names), scans)
-
-    @property
-    def sentence(self) -> str:
-        """The same in words."""
-        earlier = counted(self.finished_before, "track")
-        before = f", {earlier} had been finished before" if self.finished_before else ""
-        return (
-            f"{self.done} {counted(self.scans, 'scan')} of {counted(self.tracks, 'track')}"
-            f" in {duration(self.seconds)}{before}; see {self.out}"
-        )
-
-    @property
-    def data(self) -> dict[str, Any]:
-        """The same as JSON values."""
-        return {
-            "out": str(self.out),
-            "tracks": self.tracks,
-            "tracks_finished_before": self.finished_before,
-            "scans": self.scans,
-            "skipped": [{"what": what, "reason": reason} for what, reason in self.skipped],
-            **self.reasons.data,
-            "seconds": round(self.seconds, 3),
-        }
 
 
 def complete_folder(
@@ -205,13 +159,13 @@ def write_results(
     registers: bool = False,
     progress: Progress = SILENT,
 ) -> FolderSummary:
-    """Complete every scan of every track and write the results, track after track.
+    """Complete every scan of every track and write the results.
 
     Args:
         source: the tracks.
         predictor: does the work.
         output: the folder, begun.
-        options: `track` and `mesh` count here.
+        options: all but the model and the box files count here.
         registers: see `complete_folder`.
         progress: is told what goes on.
 
@@ -229,11 +183,21 @@ def write_results(
         summary.finished_before += 1
         return True
 
-    with progress.bar("completing", len(source)) as bar:
-        for index, track in source.tracks(done):
-            at = lambda text, index=index: bar.at(index, text)  # noqa: E731
+    task = PartCompleter(
+        predictor,
+        output.path.absolute(),
+        together=options.track,
+        clouds=None if registers else options.clouds,
+        mesh=options.mesh,
+    )
+    parts = parts_of(source.tracks(done), together=options.track)
+    with (
+        team(options.workers, options.ray) as helpers,
+        progress.bar("completing", len(source)) as bar,
+    ):
+        for track, scans in whole_tracks(helpers.in_order(task, parts), bar):
             folder = output.path / file_name(track.name)
-            scans = _write_track(track, predictor, folder, at, options, registers=registers)
+            _write_poses(folder, track, scans, registers=registers)
             described = objects_of(
                 track,
                 scans,
@@ -244,7 +208,7 @@ def write_results(
             )
             write_json(folder / OBJECTS, described)
             summary.add(track, scans)
-            bar.at(index + 1, track.name)
+        summary.workers = helpers.worked
     summary.skipped, summary.dropped = [*earlier, *source.skipped], source.dropped
     return summary
 
@@ -257,35 +221,15 @@ def _written_before(path: Path) -> list[dict[str, str]] | None:
         return json.loads(path.read_text("utf-8"))["skipped"]
 
 
-def _write_track(
-    track: Track,
-    predictor: Predictor,
-    folder: Path,
-    at: Callable[[str], None],
-    options: FolderOptions,
-    *,
-    registers: bool,
-) -> list[Completion]:
-    """Complete the scans of a track, writing each into its folder; all but `objects.json`."""
-    found: list[Completion] = []
-    for done in predictor.complete_checked(
-        track.scans, track.sensor, track=options.track, rays=track.rays
-    ):
-        name = file_name(track.scan_names[len(found)])
-        if not registers:
-            write_cloud(folder / COMPLETED / f"{name}.{options.clouds}", done.points)
-        if options.mesh is not None:
-            scan = track.scans[len(found)] if options.mesh.coloured else None
-            write_mesh(folder / MESH / f"{name}.{options.mesh.kind}", done.mesh(scan))
-        found.append(done)
-        at(f"{track.name}, scan {len(found)} of {len(track.scans)}")
-    poses = stack([done.pose for done in found])
+def _write_poses(
+    folder: Path, track: Track, done: Sequence[Completion], *, registers: bool
+) -> None:
+    poses = stack([one.pose for one in done])
     write_poses(folder / POSES, poses)
     if registers:
         write_poses(folder / MIDDLE, to_middle(poses))
         write_tum(folder / TUM, poses, times_of(track.scan_names))
         write_trajectory(folder / TRAJECTORY, poses, track.scan_names)
-    return found
 
 
 def write_completed(
