@@ -55,6 +55,7 @@ class DriveResult:
         moving: vehicles that move.
         warnings: what is odd about the drive, a sentence each.
         seconds: by stage, of the run that found them.
+        workers: how many did the work of that run.
     """
 
     out: Path
@@ -65,6 +66,7 @@ class DriveResult:
     moving: int
     warnings: tuple[str, ...]
     seconds: dict[str, float]
+    workers: int = 1
 
 
 def earlier_result(out: Path, record: dict[str, Any]) -> DriveResult:

@@ -65,7 +65,7 @@ from wildshape.io.boxes.table import write_box_table
 from wildshape.io.guard import read_record
 from wildshape.io.output import begin, finished, keep_apart
 from wildshape.io.poses import read_poses
-from wildshape.parallel.processes import in_order
+from wildshape.parallel.team import Team, team
 
 _DEFAULT = DriveConfig()
 _NO_FILES = DriveFiles()
@@ -78,7 +78,7 @@ def drive(
     *,
     topic: str | None = None,
     predictor: Predictor | None = None,
-    workers: int = 1,
+    workers: int | None = None,
     files: DriveFiles = _NO_FILES,
     detections: DetectionFile | None = None,
     overwrite: bool = False,
@@ -96,7 +96,7 @@ def drive(
         config: the numbers of every stage.
         topic: of point clouds, for a recording of ROS that holds several.
         predictor: by default the shipped weights.
-        workers: processes that cut scans and complete objects.
+        workers: processes that cut scans and complete objects; None: one a core.
         files: what else to write into the folder.
         detections: what somebody else's detector found, in place of the clusters.
         overwrite: remove an earlier output first.
@@ -132,7 +132,9 @@ def drive(
     done = None if overwrite else finished(out, "drive", settings, parts=(BOXES, FRAMES))
     if done is None:
         output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
-        found = _Run(recording, out, config, predictor, workers, given, Clock(watch)).perform()
+        with team(workers) as helpers:
+            run = _Run(recording, out, config, predictor, helpers, given, Clock(watch))
+            found = run.perform()
         output.finish(result={**asdict(found), "out": str(out)})
     else:
         found = earlier_result(out, done)
@@ -148,7 +150,7 @@ class _Run:
     out: Path
     config: DriveConfig
     predictor: Predictor
-    workers: int
+    helpers: Team
     detections: Detections | None
     clock: Clock
 
@@ -180,6 +182,7 @@ class _Run:
             moving=sum(one.way.moving for one in vehicles),
             warnings=self.warnings(T_world_sensor),
             seconds=self.clock.seconds,
+            workers=self.helpers.worked,
         )
 
     def mounting(self) -> Mounting:
@@ -221,9 +224,7 @@ class _Run:
     def spread(self, stage: str, task: Callable[[Any], None], items: list[Any], total: int) -> None:
         """Do what is missing of a stage, by several processes where that is worth it."""
         with self.clock.stage(stage, total) as at:
-            alone = min(self.workers, len(items)) < 2
-            done = map(task, items) if alone else in_order(task, items, self.workers)
-            for number, _ in enumerate(done, total - len(items) + 1):
+            for number, _ in enumerate(self.helpers.as_done(task, items), total - len(items) + 1):
                 at(number)
 
     def tracks(self, T_level_sensor: SE3) -> list[Sightings]:

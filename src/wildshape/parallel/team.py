@@ -5,7 +5,7 @@
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, runtime_checkable
 
 from wildshape.errors import BadInputError
 from wildshape.parallel.processes import Processes
@@ -15,6 +15,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
+@runtime_checkable
 class Team(Protocol):
     """What does a task on items; no result depends on who worked on what (`Processes`)."""
 

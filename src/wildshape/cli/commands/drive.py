@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`wildshape drive`: every vehicle of a raw recording, without labels."""
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -13,10 +12,12 @@ from tyro.conf import FlagCreatePairsOff, Positional, arg
 
 from wildshape.cli.options import (
     DEFAULT_NETWORK,
+    DEFAULT_WORK,
     AsJson,
     Network,
     OutFolder,
     Overwrite,
+    Work,
     listed,
     option,
 )
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from wildshape.drives.tracking.detections import DetectionFile
     from wildshape.drives.writing.files import DriveFiles
     from wildshape.inference.folders.box_files import BoxFiles
+    from wildshape.report.drive.many import DriveAndPage
 
 EXAMPLES = (
     "wildshape drive recording --out found",
@@ -69,9 +71,7 @@ class Settings:
         str | None, option(metavar="NAME", help="of point clouds, if a recording has several")
     ] = None
     network: Network = DEFAULT_NETWORK
-    workers: Annotated[int | None, option(metavar="N", help="processes; by default one a core")] = (
-        None
-    )
+    work: Work = DEFAULT_WORK
     boxes: Annotated[
         tuple[str, ...],
         listed("A,B"),
@@ -117,46 +117,56 @@ def run(settings: Settings) -> None:
         BadInputError: a source, the model or the output cannot be used.
         MissingExtraError: a library is not installed.
     """
-    from wildshape.cli.terminal import answer
-    from wildshape.drives.run import drive
     from wildshape.inference.predictor import load
+    from wildshape.report.drive.many import DriveAndPage
 
-    workers = _workers(settings)
     drives = _drives(settings)
     folders = _folders(settings, list(drives))
     files, detections = _files(settings), _detections(settings, drives)
-    predictor = load(settings.network.model, settings.network.device)
-    found: list[DriveResult] = []
-    for source, out in folders.items():
-        with _bars(drives[source]) as watch:
-            one = drive(
-                source,
-                out,
-                topic=settings.topic,
-                predictor=predictor,
-                workers=workers,
-                files=files,
-                detections=detections,
-                overwrite=settings.overwrite,
-                watch=watch,
-            )
-            found.append(one)
-        if not settings.no_report:
-            _report(out)
-    text = "\n".join(map(_sentence, found))
-    answer(text, {"drives": [_data(one) for one in found]}, as_json=settings.json)
+    task = DriveAndPage(
+        predictor=load(settings.network.model, settings.network.device),
+        topic=settings.topic,
+        files=files,
+        detections=detections,
+        report=not settings.no_report,
+        workers=settings.work.workers,
+        overwrite=settings.overwrite,
+    )
+    if len(folders) > 1 or settings.work.ray is not None:
+        _many(task, folders, list(drives.values()), settings)
+    else:
+        _one(task, folders, drives, settings)
 
 
-def _report(out: Path) -> None:
-    """Draw the page, if it is not there yet."""
-    from wildshape.cli.terminal import TERMINAL
-    from wildshape.drives.result import REPORT
-    from wildshape.report.drive.page import write_drive_report
+def _one(
+    task: "DriveAndPage", folders: dict[Path, Path], drives: dict[Path, str], settings: Settings
+) -> None:
+    from wildshape.cli.terminal import answer
 
-    if not (out / REPORT).is_file():
-        with TERMINAL.bar("report", 1) as bar:
-            write_drive_report(out)
-            bar.at(1)
+    ((source, out),) = folders.items()
+    with _bars(drives[source]) as watch:
+        found = task.find(source, out, watch)
+    answer(_sentence(found), {"drives": [_data(found)]}, as_json=settings.json)
+
+
+def _many(
+    task: "DriveAndPage", folders: dict[Path, Path], taken_for: list[str], settings: Settings
+) -> None:
+    from wildshape.cli.terminal import TERMINAL, answer, say
+    from wildshape.io.progress import counted
+    from wildshape.report.drive.many import drive_many
+
+    say("\n".join(filter(None, taken_for)))
+    work = settings.work
+    done = drive_many(task, folders, workers=work.workers, ray=work.ray, progress=TERMINAL)
+    count, workers = counted(len(done.found), "drive"), counted(done.workers, "worker")
+    text = "\n".join((*map(_sentence, done.found), f"{count} with {workers}"))
+    refused = [{"source": str(source), "reason": why} for source, why in done.refused.items()]
+    data = {"drives": list(map(_data, done.found)), "refused": refused, "workers": done.workers}
+    answer(text, data, as_json=settings.json)
+    if done.refused:
+        reasons = " ".join(done.refused.values())
+        raise BadInputError(f"{len(done.refused)} of {len(folders)} drives not done: {reasons}")
 
 
 def _files(settings: Settings) -> "DriveFiles":
@@ -193,12 +203,6 @@ def _detections(settings: Settings, drives: dict[Path, str]) -> "DetectionFile |
     known = settings.calibration
     kitti = known if known is not None and known.suffix.lower() == ".txt" else None
     return DetectionFile(settings.detections, kitti, settings.min_score)
-
-
-def _workers(settings: Settings) -> int:
-    if settings.workers is not None and settings.workers < 1:
-        raise BadInputError(f"--workers {settings.workers}: expected 1 or more.")
-    return settings.workers or os.cpu_count() or 1
 
 
 def _drives(settings: Settings) -> dict[Path, str]:
@@ -261,7 +265,8 @@ def _sentence(found: "DriveResult") -> str:
     vehicles = counted(len(found.vehicles), "vehicle")
     return (
         f"found {vehicles}, {found.moving} of them moving, in {counted(found.frames, 'scan')}"
-        f" in {duration(sum(found.seconds.values()))}; see {page if page.is_file() else found.out}"
+        f" in {duration(sum(found.seconds.values()))} with {counted(found.workers, 'worker')};"
+        f" see {page if page.is_file() else found.out}"
     )
 
 

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The demo's last stage: a simulated drive, every vehicle in it found, and its page."""
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -49,7 +48,6 @@ def find_vehicles(out: Path, scans: int, predictor: Predictor, progress: Progres
                 out / STREET / "velodyne" / SEQUENCE,
                 out / FOUND,
                 predictor=predictor,
-                workers=os.cpu_count() or 1,
                 overwrite=(out / FOUND).exists(),
                 watch=lambda stage, done, total: bar.at(done, stage, total=total),
             )

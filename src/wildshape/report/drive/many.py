@@ -1,0 +1,125 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Drives with their pages: one by every core, many by a core each or over a Ray cluster."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from wildshape.drives.clock import Watch, silent
+from wildshape.drives.result import REPORT, DriveResult
+from wildshape.drives.run import drive
+from wildshape.drives.tracking.detections import DetectionFile
+from wildshape.drives.writing.files import DriveFiles
+from wildshape.errors import BadInputError
+from wildshape.inference.predictor import Predictor
+from wildshape.io.progress import SILENT, Progress
+from wildshape.parallel.team import cores, team
+from wildshape.report.drive.page import write_drive_report
+
+_NO_FILES = DriveFiles()
+
+
+@dataclass(frozen=True)
+class DriveAndPage:
+    """`drive` of a source into a folder, and its `report.html`.
+
+    Attributes:
+        predictor: completes the objects.
+        topic: see `drive`, as `files`, `detections` and `overwrite`.
+        report: write the page, too, where there is none.
+        workers: processes for one drive.
+    """
+
+    predictor: Predictor
+    topic: str | None = None
+    files: DriveFiles = _NO_FILES
+    detections: DetectionFile | None = None
+    report: bool = True
+    workers: int | None = None
+    overwrite: bool = False
+
+    def find(self, source: Path, out: Path, watch: Watch = silent) -> DriveResult:
+        """One drive.
+
+        Raises:
+            BadInputError: source, detections or output cannot be used.
+            MissingExtraError: a library is not installed.
+        """
+        found = drive(
+            source,
+            out,
+            topic=self.topic,
+            predictor=self.predictor,
+            workers=self.workers,
+            files=self.files,
+            detections=self.detections,
+            overwrite=self.overwrite,
+            watch=watch,
+        )
+        if self.report and not (out / REPORT).is_file():
+            watch("report", 0, 1)
+            write_drive_report(out)
+            watch("report", 1, 1)
+        return found
+
+    def __call__(self, place: tuple[Path, Path]) -> tuple[Path, DriveResult | BadInputError]:
+        """Source and output; a drive that cannot be used holds up no other."""
+        source, out = place
+        try:
+            return source, self.find(source, out)
+        except BadInputError as error:
+            return source, error
+
+
+@dataclass(frozen=True)
+class DrivesResult:
+    """What was found in many drives.
+
+    Attributes:
+        found: in the order of the drives.
+        refused: sources that cannot be used, and why.
+        workers: how many did the work.
+    """
+
+    found: list[DriveResult]
+    refused: dict[Path, str]
+    workers: int
+
+
+def drive_many(
+    task: DriveAndPage,
+    folders: Mapping[Path, Path],
+    *,
+    workers: int | None = None,
+    ray: str | None = None,
+    progress: Progress = SILENT,
+) -> DrivesResult:
+    """Each drive by one worker; a drive whose worker is killed goes on with another.
+
+    Args:
+        task: what is done with each.
+        folders: the output of each source.
+        workers: processes in all; None: one a core.
+        ray: address of a Ray cluster in place of this machine; all paths are the same there.
+        progress: is told how many are done.
+
+    Raises:
+        BadInputError: no cluster there, or a drive killed every worker.
+        MissingExtraError: a library is not installed.
+    """
+    each = (workers or cores()) // max(len(folders), 1) if ray is None else 1
+    task = replace(task, workers=max(each, 1))
+    places = [(source.absolute(), out.absolute()) for source, out in folders.items()]
+    results: dict[Path, DriveResult | BadInputError] = {}
+    with team(workers, ray) as helpers, progress.bar("drives", len(folders)) as bar:
+        for source, result in helpers.as_done(task, places):
+            results[source] = result
+            bar.at(len(results), source.name)
+        worked = helpers.worked
+    ordered = {source: results[source] for source, _ in places}
+    return DrivesResult(
+        [one for one in ordered.values() if isinstance(one, DriveResult)],
+        {source: str(why) for source, why in ordered.items() if isinstance(why, BadInputError)},
+        worked,
+    )
