@@ -46,7 +46,7 @@ def main(settings: Settings) -> None:
     with tempfile.TemporaryDirectory() as folder:
         street, out = Path(folder) / "street", Path(folder) / "found"
         write_drive(WholeDrive(StreetConfig(scans=settings.scans), settings.seed), street)
-        wildshape.drive(street / "velodyne" / "0000", out, workers=2)
+        wildshape.drive(street / "velodyne" / "0000", out)
         draw(settings, out)
 
 

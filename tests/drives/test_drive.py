@@ -156,14 +156,13 @@ def test_a_run_killed_at_any_stage_goes_on_to_the_same_boxes(
         assert (tmp_path / "out" / name).read_bytes() == (found.out / name).read_bytes(), name
 
 
+@pytest.mark.usefixtures("only_helpers")
 def test_several_processes_find_the_same(found, recording, tmp_path):
     files = DriveFiles(BoxFiles(("json", "kitti")))
     spread = wildshape.drive(recording, tmp_path / "out", workers=2, files=files)
-    assert spread.vehicles == found.vehicles
-    rows, others = (read_box_table(folder / "boxes.csv") for folder in (spread.out, found.out))
-    for row, other in zip(rows, others, strict=True):
-        assert (row.frame, row.track, row.points) == (other.frame, other.track, other.points)
-        assert (row.x, row.y, row.yaw) == pytest.approx((other.x, other.y, other.yaw), abs=1e-3)
+    assert (spread.vehicles, spread.workers) == (found.vehicles, 2)
+    assert (spread.out / "boxes.csv").read_bytes() == (found.out / "boxes.csv").read_bytes()
+    rows = read_box_table(spread.out / "boxes.csv")
     listed = json.loads((spread.out / "boxes" / "boxes.json").read_text("utf-8"))["boxes"]
     assert {(box["scan"], box["track"]) for box in listed} == {
         (f"{row.frame:06d}", row.track) for row in rows

@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Who works on what does not show in what is written."""
+
+import json
+
+import pytest
+
+
+def written(out):
+    """All files, without times and places."""
+    found = {}
+    for file in sorted(path for path in out.rglob("*") if path.is_file()):
+        if file.suffix != ".json":
+            found[file.relative_to(out)] = file.read_bytes()
+        elif file.name == "objects.json":
+            said = json.loads(file.read_text())
+            found[file.relative_to(out)] = (
+                [{**scan, "seconds": None} for scan in said.pop("scans")],
+                said,
+            )
+        elif file.name == "scores.json":
+            found[file.relative_to(out)] = json.loads(file.read_text())
+    return found
+
+
+@pytest.mark.parametrize(
+    ("command", "options", "files"),
+    [("complete", (), 6 * (6 + 2)), ("evaluate", ("--rotate", "yaw", "--max-scans", 2), 4)],
+)
+def test_the_same_is_written_by_any_number_of_workers(
+    wildshape, dataset, trained, tmp_path, request, command, options, files
+):
+    given = command, dataset, "--model", trained, "--json", *options
+    alone = wildshape(*given, "--out", tmp_path / "alone", "--workers", 1)
+    assert json.loads(alone.out)["workers"] == 1
+    request.getfixturevalue("only_helpers")
+    spread = wildshape(*given, "--out", tmp_path / "spread", "--workers", 2)
+    assert json.loads(spread.out)["workers"] == 2
+    assert written(tmp_path / "spread") == written(tmp_path / "alone")
+    assert len(written(tmp_path / "alone")) >= files
