@@ -18,14 +18,16 @@ def silent(stage: str, done: int, total: int) -> None:
 
 @dataclass
 class Clock:
-    """Seconds by stage, and who is told of progress."""
+    """Seconds by stage, and who is told of progress; `prefix` goes before the stages' names."""
 
     watch: Watch
+    prefix: str = ""
     seconds: dict[str, float] = field(default_factory=dict)
 
     @contextmanager
     def stage(self, name: str, total: int) -> Iterator[Callable[[int], None]]:
         """Time a stage; gives what tells how much of it is done."""
+        name = f"{self.prefix}{name}"
         began = time.perf_counter()
         yield lambda done: self.watch(name, done, total)
         self.seconds[name] = round(time.perf_counter() - began, 3)

@@ -1,11 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""What `drive` gives back, and which files it may write."""
+"""What decides a drive's result, what `drive` gives back, and which files it may write."""
 
-from dataclasses import dataclass
+import shlex
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from wildshape.drives.config import DriveConfig
+from wildshape.drives.source import Drive
+from wildshape.drives.tracking.detections import DetectionFile
 from wildshape.drives.writing.outputs import (
     BOXES,
     FRAMES,
@@ -17,6 +21,7 @@ from wildshape.drives.writing.outputs import (
     TUM,
 )
 from wildshape.inference.folders.box_files import BOX_FILES
+from wildshape.inference.predictor import Predictor
 from wildshape.io.guard import reading
 from wildshape.io.output import MARKER
 from wildshape.io.scans.writers import MESH_FORMATS
@@ -39,6 +44,9 @@ FILES = (
     RRD,
     REPORT,
     "stages/**/*",
+    "first/**/*",
+    "adapted/**/*",
+    "adapted.json",
 )
 
 
@@ -67,6 +75,34 @@ class DriveResult:
     warnings: tuple[str, ...]
     seconds: dict[str, float]
     workers: int = 1
+
+
+def settings_of(
+    source: Path,
+    recording: Drive,
+    topic: str | None,
+    config: DriveConfig,
+    predictor: Predictor,
+    detections: DetectionFile | None,
+) -> dict[str, Any]:
+    """What decides a drive's result, as JSON values; arguments as of `drive`."""
+    return {
+        "source": str(source.resolve()),
+        "scans": len(recording),
+        **({} if topic is None else {"topic": topic}),
+        "drive": asdict(config),
+        "model": predictor.settings.provenance,
+        "inference": asdict(predictor.config),
+        **({} if detections is None else detections.identity()),
+    }
+
+
+def line_of(source: Path, out: Path, topic: str | None, detections: DetectionFile | None) -> str:
+    """The command that finds the same; arguments as of `drive`."""
+    chosen = [] if topic is None else ["--topic", topic]
+    if detections is not None:
+        chosen += ["--detections", str(detections.path)]
+    return shlex.join(("wildshape", "drive", str(source), "--out", str(out), *chosen))
 
 
 def earlier_result(out: Path, record: dict[str, Any]) -> DriveResult:

@@ -5,12 +5,14 @@
 A stage whose files are in the output folder is not run again: a killed run goes on.
 """
 
-import shlex
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from wildshape.drives.adapting import second_pass
+from wildshape.drives.adapting.adapt import Adaptation, adapt_to, like
+from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.clock import Clock, Watch, silent
 from wildshape.drives.completing.boxes import smooth
 from wildshape.drives.completing.carving import carve
@@ -19,14 +21,14 @@ from wildshape.drives.completing.completion import Completer
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed, level_poses, read_completed
 from wildshape.drives.completing.vehicles import (
-    Judged,
     judge,
     vehicle_confidence,
     without_parts,
+    write_judged,
 )
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.recordings.opening import open_drive
-from wildshape.drives.result import FILES, DriveResult, earlier_result
+from wildshape.drives.result import FILES, DriveResult, earlier_result, line_of, settings_of
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.detections import (
     BoxCutter,
@@ -46,16 +48,13 @@ from wildshape.drives.writing.finished import read_finished
 from wildshape.drives.writing.outputs import (
     BOXES,
     FRAMES,
-    SHAPES,
     TRAJECTORY,
     Vehicle,
     boxes_of,
-    copy_object,
     rows_of,
     write_frames,
-    write_shape,
     write_trajectories,
-    write_vehicle_track,
+    write_vehicle,
 )
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import OBJECTS
@@ -65,10 +64,9 @@ from wildshape.io.boxes.table import write_box_table
 from wildshape.io.guard import read_record
 from wildshape.io.output import begin, finished, keep_apart
 from wildshape.io.poses import read_poses
-from wildshape.parallel.team import Team, team
+from wildshape.parallel.team import ALONE, Team, team
 
-_DEFAULT = DriveConfig()
-_NO_FILES = DriveFiles()
+_DEFAULT, _NO_FILES = DriveConfig(), DriveFiles()
 
 
 def drive(
@@ -81,6 +79,7 @@ def drive(
     workers: int | None = None,
     files: DriveFiles = _NO_FILES,
     detections: DetectionFile | None = None,
+    adapt: AdaptConfig | Adaptation | None = None,
     overwrite: bool = False,
     watch: Watch = silent,
 ) -> DriveResult:
@@ -99,6 +98,8 @@ def drive(
         workers: processes that cut scans and complete objects; None: one a core.
         files: what else to write into the folder.
         detections: what somebody else's detector found, in place of the clusters.
+        adapt: train the model on what was found, and complete the drive again if it is better; or
+            what came of that already (`adapting.adapt`), for several drives.
         overwrite: remove an earlier output first.
         watch: told of progress.
 
@@ -116,28 +117,23 @@ def drive(
         keep_apart(detections.path, out)
     predictor = load() if predictor is None else predictor
     keep_apart(source, out)
-    settings = {
-        "source": str(source.resolve()),
-        "scans": len(recording),
-        **({} if topic is None else {"topic": topic}),
-        "drive": asdict(config),
-        "model": predictor.settings.provenance,
-        "inference": asdict(predictor.config),
-        **({} if detections is None else detections.identity()),
-    }
-    chosen = [] if topic is None else ["--topic", topic]
-    if detections is not None:
-        chosen += ["--detections", str(detections.path)]
-    line = shlex.join(("wildshape", "drive", str(source), "--out", str(out), *chosen))
+    settings = settings_of(source, recording, topic, config, predictor, detections)
+    line = line_of(source, out, topic, detections)
+    second_pass.put_in_place(out)
+    run = _Run(recording, out, config, predictor, ALONE, given, Clock(watch))
     done = None if overwrite else finished(out, "drive", settings, parts=(BOXES, FRAMES))
     if done is None:
         output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
         with team(workers) as helpers:
-            run = _Run(recording, out, config, predictor, helpers, given, Clock(watch))
-            found = run.perform()
+            found = replace(run, helpers=helpers).perform()
         output.finish(result={**asdict(found), "out": str(out)})
     else:
         found = earlier_result(out, done)
+    if isinstance(adapt, AdaptConfig):
+        adapt = adapt_to([out], out, predictor, adapt, watch=watch)
+    if adapt is not None and adapt.model and not second_pass.is_done(out, adapt.model):
+        with team(workers) as helpers:
+            found = replace(run, helpers=helpers).again(adapt.model, found)
     files.write(read_finished(out))
     return found
 
@@ -153,14 +149,31 @@ class _Run:
     helpers: Team
     detections: Detections | None
     clock: Clock
+    second: bool = False
 
     @property
     def stages(self) -> Path:
         return self.out / "stages"
 
     @property
+    def completing(self) -> Path:
+        return second_pass.stages_of(self.out) if self.second else self.stages
+
+    @property
+    def results(self) -> Path:
+        return second_pass.results_of(self.out) if self.second else self.out
+
+    @property
     def cuts(self) -> Path:
         return self.stages / "clusters"
+
+    def again(self, model: str, first: DriveResult) -> DriveResult:
+        """A second pass with an adapted model; its results take the place of the first's."""
+        second_pass.begin_second(self.out, model)
+        adapted = like(self.predictor, Path(model))
+        clock = Clock(self.clock.watch, "second ", dict(first.seconds))
+        found = replace(self, predictor=adapted, clock=clock, second=True).perform()
+        return second_pass.conclude(self.out, found, model)
 
     def perform(self) -> DriveResult:
         mounting = self.mounting()
@@ -172,13 +185,12 @@ class _Run:
         parts = self.merged(objects, T_level_sensor)
         self.complete("merging", parts, mounting)
         vehicles = self.vehicles([*objects, *parts], T_level_sensor)
-        boxes = self.write(vehicles, T_level_sensor)
         return DriveResult(
             out=self.out,
             frames=len(self.drive),
             candidates=len(objects),
             vehicles=tuple(one.name for one in vehicles),
-            boxes=boxes,
+            boxes=self.write(vehicles, T_level_sensor),
             moving=sum(one.way.moving for one in vehicles),
             warnings=self.warnings(T_world_sensor),
             seconds=self.clock.seconds,
@@ -258,12 +270,12 @@ class _Run:
         ]
 
     def folder(self, seen: Sightings) -> Path:
-        return self.stages / "objects" / seen.name
+        return self.completing / "objects" / seen.name
 
     def complete(self, stage: str, objects: list[Sightings], mounting: Mounting) -> None:
         level = mounting.levelling() if mounting.is_tilted else None
         config = self.config.completion, self.config.vehicles
-        folder = self.stages / "objects"
+        folder = self.completing / "objects"
         completer = Completer(self.predictor, self.drive, self.cuts, folder, level, *config)
         self.spread(stage, completer, completer.missing(objects), len(objects))
 
@@ -277,19 +289,19 @@ class _Run:
 
     def merged(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Sightings]:
         """Tracks that are one object by their shapes, put together."""
-        path = self.stages / "merged.json"
+        path = self.completing / "merged.json"
         if not path.is_file():
             write_sightings(path, [] if self.tracked else self.fragments(objects, T_level_sensor))
         return read_sightings(path)
 
     def fragments(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Sightings]:
-        of = self.config
+        merging, vehicles = self.config.merging, self.config.vehicles
         likely = [
             one
             for one in self.completed(objects, T_level_sensor)
-            if vehicle_confidence(one, of.vehicles) >= of.merging.least_confidence
+            if vehicle_confidence(one, vehicles) >= merging.least_confidence
         ]
-        return Places(self.drive.ticks, of.merging, of.boxes).fragments(likely)
+        return Places(self.drive.ticks, merging, self.config.boxes).fragments(likely)
 
     def vehicles(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Vehicle]:
         ticks = self.drive.ticks
@@ -303,7 +315,7 @@ class _Run:
                 found.sort(key=lambda one: -kept[one.seen.name])
                 claimed = claim(found, self.cuts, T_level_sensor, ticks, self.config)
                 found, said = claimed.vehicles, without_parts(said, claimed.parts)
-            self.write_judged(objects, said)
+            write_judged(self.completing / "vehicles.json", objects, said)
             found = carve(found, self.drive.scan, T_level_sensor, self.config.carving)
             at(1)
             return [
@@ -311,29 +323,15 @@ class _Run:
                 for one in sorted(found, key=lambda one: one.seen.name)
             ]
 
-    def write_judged(self, objects: list[Sightings], said: list[Judged]) -> None:
-        """Why each object is a vehicle or not."""
-        judged = {one.name: (one.confidence, list(one.reasons)) for one in said}
-        rows = []
-        for seen in objects:
-            confidence, why = judged.get(seen.name, (0.0, ["first_looks"]))
-            row = {"track": seen.name, "vehicle": not why, "confidence": confidence}
-            rows.append({**row, "reasons": why})
-        write_json(self.stages / "vehicles.json", rows)
-
     def write(self, vehicles: list[Vehicle], T_level_sensor: SE3) -> int:
         with self.clock.stage("outputs", len(vehicles)) as at:
             rows = []
             for number, one in enumerate(vehicles, 1):
-                seen = one.completed.seen
-                write_vehicle_track(self.out / "tracks", seen, self.cuts, self.drive)
-                copy_object(self.folder(seen), self.out / "objects" / one.name)
-                write_shape(
-                    self.out / SHAPES / f"{one.name}.ply", self.folder(seen), one.completed.ahead_m
-                )
+                folder = self.folder(one.completed.seen)
+                write_vehicle(self.results, one, folder, self.cuts, self.drive)
                 rows += rows_of(one, boxes_of(one, T_level_sensor), self.drive)
                 at(number)
-            write_box_table(self.out / BOXES, rows)
+            write_box_table(self.results / BOXES, rows)
             return len(rows)
 
     def warnings(self, T_world_sensor: SE3) -> tuple[str, ...]:

@@ -30,7 +30,7 @@ from wildshape.training.runtime.cuda_graph import Captured
 from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.runtime.torchrun import Processes, join
 from wildshape.training.self_training.objective import SelfTaught
-from wildshape.training.self_training.pseudo_labels import fused_targets
+from wildshape.training.self_training.pseudo_labels import Fronts, fused_targets
 from wildshape.training.self_training.targets import load_targets, save_targets, true_targets
 from wildshape.training.state import STATE, TrainState, load_state
 from wildshape.training.step import Step, Views
@@ -83,6 +83,7 @@ def setup(
     start: Path | None = None,
     teacher: Path | Literal["truth"] | None = None,
     headings: Path | None = None,
+    fronts: Fronts | None = None,
     provenance: dict[str, Any] | None = None,
     taught: Taught = lambda *_: None,
     say: Say = _silent,
@@ -101,6 +102,8 @@ def setup(
             `truth` takes true poses and shapes (the oracle); by default nothing teaches.
         headings: checkpoint of LiDAR scans that is asked which way the scans look, where the
             teacher cannot know (`training/self_training/heading_transfer.py`).
+        fronts: where the objects of the store's scans look, sensor frames, if that is known; a
+            teacher's poses are turned to look there.
         provenance: written into the run and its checkpoint.
         taught: called with the tracks that the teacher has fused, and their number.
         say: is told what a user should know, a sentence each.
@@ -118,12 +121,14 @@ def setup(
     identity = _identity(recipe, store, seed, processes, start, teacher)
     if headings is not None:
         identity["headings"] = _short_hash(headings.read_bytes())
+    if fronts is not None:
+        identity["fronts"] = _short_hash(fronts.numpy().tobytes())
     folder.mkdir(parents=True, exist_ok=True)
     if resume and (folder / STATE).exists():
         load_state(folder, state, identity, store.scan_count)
     sampler = ViewSampler(store, fit_tracks, recipe.views)
     held_out = ViewSampler(store, held_tracks, recipe.views)
-    targets = _targets(teacher, headings, sampler, folder, identity, taught, recipe)
+    targets = _targets(teacher, headings, fronts, sampler, folder, identity, taught, recipe)
     views = _views(sampler, targets, seed, processes, recipe, say)
     if state.anchors is not None:
         views.hold(state.anchors)
@@ -188,6 +193,7 @@ def _identity(
 def _targets(
     teacher: Path | Literal["truth"] | None,
     headings: Path | None,
+    fronts: Fronts | None,
     sampler: ViewSampler,
     folder: Path,
     identity: dict[str, str],
@@ -201,12 +207,19 @@ def _targets(
     if teacher == "truth":
         return true_targets(sampler, config.fusion)
     time_ordered = recipe.loss.time_ordered or recipe.views.sensor == "lidar"
-    kept = {key: identity[key] for key in ("data", "teacher", "headings") if key in identity}
+    asked = ("data", "teacher", "headings", "fronts")
+    kept = {key: identity[key] for key in asked if key in identity}
     kept["rules"] = _short_hash(repr((config, time_ordered)).encode())
     found = load_targets(folder, kept, sampler.store.scan_count, len(sampler.scans_of))
     if found is None:
         found = fused_targets(
-            teacher, sampler, taught, config, time_ordered=time_ordered, headings=headings
+            teacher,
+            sampler,
+            taught,
+            config,
+            time_ordered=time_ordered,
+            headings=headings,
+            fronts=fronts,
         )
         save_targets(folder, found, kept)
     return found

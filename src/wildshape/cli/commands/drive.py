@@ -4,7 +4,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -24,12 +24,14 @@ from wildshape.cli.options import (
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
+    from wildshape.drives.adapting.adapt import Adaptation
+    from wildshape.drives.adapting.config import AdaptConfig
     from wildshape.drives.clock import Watch
     from wildshape.drives.result import DriveResult
     from wildshape.drives.tracking.detections import DetectionFile
     from wildshape.drives.writing.files import DriveFiles
     from wildshape.inference.folders.box_files import BoxFiles
-    from wildshape.report.drive.many import DriveAndPage
+    from wildshape.report.drive.many import DriveAndPage, DrivesResult
 
 EXAMPLES = (
     "wildshape drive recording --out found",
@@ -39,6 +41,7 @@ EXAMPLES = (
     "wildshape drive recording --out found --detections results.json",
     "wildshape drive monday tuesday --out found",
     "wildshape drive nuscenes/scene-0061 --out found",
+    "wildshape drive monday tuesday --out found --adapt",
 )
 
 Sources = Annotated[
@@ -105,6 +108,16 @@ class Settings:
         float | None,
         option(metavar="S", help="of detections; boxes of a lower score are left out"),
     ] = None
+    adapt: Annotated[
+        bool,
+        arg(
+            help="train the model on the vehicles found, without labels, and complete them again if"
+            " it is better on some that it was not trained on"
+        ),
+    ] = False
+    adapt_steps: Annotated[
+        int | None, option(metavar="N", help="of that training; by default 300, minutes")
+    ] = None
     no_report: Annotated[FlagCreatePairsOff[bool], arg(help="write no report.html")] = False
     overwrite: Overwrite = False
     json: AsJson = False
@@ -117,12 +130,16 @@ def run(settings: Settings) -> None:
         BadInputError: a source, the model or the output cannot be used.
         MissingExtraError: a library is not installed.
     """
+    from wildshape.drives.adapting.adapt import adapt_to
+    from wildshape.drives.writing.files import DriveFiles
     from wildshape.inference.predictor import load
     from wildshape.report.drive.many import DriveAndPage
 
+    adapt = _adapt(settings)
     drives = _drives(settings)
     folders = _folders(settings, list(drives))
     files, detections = _files(settings), _detections(settings, drives)
+    files.check()
     task = DriveAndPage(
         predictor=load(settings.network.model, settings.network.device),
         topic=settings.topic,
@@ -132,41 +149,75 @@ def run(settings: Settings) -> None:
         workers=settings.work.workers,
         overwrite=settings.overwrite,
     )
-    if len(folders) > 1 or settings.work.ray is not None:
-        _many(task, folders, list(drives.values()), settings)
-    else:
-        _one(task, folders, drives, settings)
+    several = len(folders) > 1 or settings.work.ray is not None
+    find = _many if several else _one
+    change: Adaptation | None = None
+    if adapt is not None:
+        first = find(replace(task, files=DriveFiles(), report=False), folders, drives, settings)
+        outs = [found.out for found in first.found]
+        with _bars("") as watch:
+            change = adapt_to(
+                outs, settings.out, task.predictor, adapt, overwrite=task.overwrite, watch=watch
+            )
+        task = replace(task, adapt=change, overwrite=False)
+    _answer(find(task, folders, drives, settings), change, settings, several=several)
+
+
+def _adapt(settings: Settings) -> "AdaptConfig | None":
+    from wildshape.drives.adapting.config import AdaptConfig
+
+    if not settings.adapt:
+        if settings.adapt_steps is not None:
+            raise BadInputError("--adapt-steps is of an adaptation; pass --adapt, too.")
+        return None
+    return AdaptConfig() if settings.adapt_steps is None else AdaptConfig(settings.adapt_steps)
 
 
 def _one(
     task: "DriveAndPage", folders: dict[Path, Path], drives: dict[Path, str], settings: Settings
-) -> None:
-    from wildshape.cli.terminal import answer
+) -> "DrivesResult":
+    from wildshape.report.drive.many import DrivesResult
 
+    del settings
     ((source, out),) = folders.items()
     with _bars(drives[source]) as watch:
         found = task.find(source, out, watch)
-    answer(_sentence(found), {"drives": [_data(found)]}, as_json=settings.json)
+    return DrivesResult([found], {}, found.workers)
 
 
 def _many(
-    task: "DriveAndPage", folders: dict[Path, Path], taken_for: list[str], settings: Settings
-) -> None:
-    from wildshape.cli.terminal import TERMINAL, answer, say
-    from wildshape.io.progress import counted
+    task: "DriveAndPage", folders: dict[Path, Path], drives: dict[Path, str], settings: Settings
+) -> "DrivesResult":
+    from wildshape.cli.terminal import TERMINAL, say
     from wildshape.report.drive.many import drive_many
 
-    say("\n".join(filter(None, taken_for)))
+    say("\n".join(filter(None, drives.values())))
     work = settings.work
-    done = drive_many(task, folders, workers=work.workers, ray=work.ray, progress=TERMINAL)
-    count, workers = counted(len(done.found), "drive"), counted(done.workers, "worker")
-    text = "\n".join((*map(_sentence, done.found), f"{count} with {workers}"))
-    refused = [{"source": str(source), "reason": why} for source, why in done.refused.items()]
-    data = {"drives": list(map(_data, done.found)), "refused": refused, "workers": done.workers}
-    answer(text, data, as_json=settings.json)
+    return drive_many(task, folders, workers=work.workers, ray=work.ray, progress=TERMINAL)
+
+
+def _answer(
+    done: "DrivesResult", change: "Adaptation | None", settings: Settings, *, several: bool
+) -> None:
+    from wildshape.cli.terminal import answer
+    from wildshape.io.progress import counted
+
+    said = [] if change is None else [change.sentence]
+    said += map(_sentence, done.found)
+    data: dict[str, Any] = {"drives": list(map(_data, done.found))}
+    if change is not None:
+        data["adapted"] = change.data
+    if several:
+        said.append(f"{counted(len(done.found), 'drive')} with {counted(done.workers, 'worker')}")
+        data["refused"] = [
+            {"source": str(source), "reason": why} for source, why in done.refused.items()
+        ]
+        data["workers"] = done.workers
+    answer("\n".join(said), data, as_json=settings.json)
     if done.refused:
         reasons = " ".join(done.refused.values())
-        raise BadInputError(f"{len(done.refused)} of {len(folders)} drives not done: {reasons}")
+        count = len(done.refused)
+        raise BadInputError(f"{count} of {count + len(done.found)} drives not done: {reasons}")
 
 
 def _files(settings: Settings) -> "DriveFiles":

@@ -4,12 +4,15 @@
 
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed
 from wildshape.drives.config import VehicleConfig
+from wildshape.drives.tracking.sightings import Sightings
+from wildshape.io.atomic import write_json
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,17 @@ def without_parts(said: list[Judged], parts: dict[str, str]) -> list[Judged]:
         replace(one, reasons=(f"part_of_{parts[one.name]}",)) if one.name in parts else one
         for one in said
     ]
+
+
+def write_judged(path: Path, objects: list[Sightings], said: list[Judged]) -> None:
+    """Why each object of a drive is a vehicle or not."""
+    judged = {one.name: (one.confidence, list(one.reasons)) for one in said}
+    rows = []
+    for seen in objects:
+        confidence, why = judged.get(seen.name, (0.0, ["first_looks"]))
+        row = {"track": seen.name, "vehicle": not why, "confidence": confidence}
+        rows.append({**row, "reasons": why})
+    write_json(path, rows)
 
 
 def _reasons(one: Completed, confidence: float, config: VehicleConfig) -> tuple[str, ...]:

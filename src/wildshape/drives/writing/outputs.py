@@ -68,6 +68,21 @@ def write_frames(path: Path, drive: Drive, points: Sequence[int]) -> None:
     write_text(path, text.getvalue())
 
 
+def write_vehicle(out: Path, one: Vehicle, folder: Path, cuts: Path, drive: Drive) -> None:
+    """A vehicle's track, completed object and shape, as far as they are not there yet.
+
+    Args:
+        out: folder of the results.
+        one: of the drive.
+        folder: of its completed object.
+        cuts: folder of the clusters.
+        drive: whose.
+    """
+    write_vehicle_track(out / "tracks", one.completed.seen, cuts, drive)
+    copy_object(folder, out / "objects" / one.name)
+    write_shape(out / SHAPES / f"{one.name}.ply", folder, one.completed.ahead_m)
+
+
 def write_vehicle_track(out: Path, seen: Sightings, cuts: Path, drive: Drive) -> None:
     """All scans of a vehicle as a track folder, if it is not there yet."""
     if not (out / seen.name / "scans").is_dir():

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from wildshape.drives.adapting.adapt import Adaptation
 from wildshape.drives.clock import Watch, silent
 from wildshape.drives.result import REPORT, DriveResult
 from wildshape.drives.run import drive
@@ -26,7 +27,7 @@ class DriveAndPage:
 
     Attributes:
         predictor: completes the objects.
-        topic: see `drive`, as `files`, `detections` and `overwrite`.
+        topic: see `drive`, as `files`, `detections`, `adapt` and `overwrite`.
         report: write the page, too, where there is none.
         workers: processes for one drive.
     """
@@ -35,6 +36,7 @@ class DriveAndPage:
     topic: str | None = None
     files: DriveFiles = _NO_FILES
     detections: DetectionFile | None = None
+    adapt: Adaptation | None = None
     report: bool = True
     workers: int | None = None
     overwrite: bool = False
@@ -54,6 +56,7 @@ class DriveAndPage:
             workers=self.workers,
             files=self.files,
             detections=self.detections,
+            adapt=self.adapt,
             overwrite=self.overwrite,
             watch=watch,
         )

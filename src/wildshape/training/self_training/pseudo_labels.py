@@ -61,6 +61,7 @@ from wildshape.training.self_training.targets import targets_of
 from wildshape.training.self_training.unseen_roof import RoofConfig
 
 Progress = Callable[[int, int], None]
+Fronts = Float[Tensor, "S 3"]
 
 
 @dataclass(frozen=True)
@@ -106,6 +107,7 @@ class Teacher:
         time_ordered: the scans of a track follow each other (`LossConfig.time_ordered`).
         headings: is asked which way each scan looks; None if the tracks agree among themselves.
         config: the rules' numbers.
+        fronts: where the object of each scan of the store looks, where that is known.
     """
 
     network: ShapePoseNet
@@ -115,6 +117,7 @@ class Teacher:
     time_ordered: bool
     headings: Predictor | None
     config: SelfTrainingConfig
+    fronts: Fronts | None = None
 
     @classmethod
     def of(
@@ -125,6 +128,7 @@ class Teacher:
         *,
         time_ordered: bool,
         headings: Path | None,
+        fronts: Fronts | None = None,
     ) -> "Teacher":
         """From checkpoints.
 
@@ -141,7 +145,7 @@ class Teacher:
         other = None if headings is None else load(headings, raw=True)
         if other is not None:
             check_transfer(other)
-        return cls(network, settings, views, asked, time_ordered, other, config)
+        return cls(network, settings, views, asked, time_ordered, other, config, fronts)
 
     @property
     def mirror(self) -> bool:
@@ -173,6 +177,7 @@ def fused_targets(
     *,
     time_ordered: bool = True,
     headings: Path | None = None,
+    fronts: Fronts | None = None,
 ) -> FusedTargets:
     """Targets for all scans of a sampler, from a checkpoint and the scans alone.
 
@@ -183,18 +188,22 @@ def fused_targets(
         config: the rules' numbers.
         time_ordered: the scans of a track follow each other (`LossConfig.time_ordered`).
         headings: another checkpoint, asked which way each scan looks (`heading_transfer.py`).
+        fronts: directions in which the objects look, sensor frame of each scan of the store;
+            poses that look the other way are turned, and no one is asked.
 
     Raises:
         BadInputError: a checkpoint cannot be used.
     """
-    who = Teacher.of(teacher, sampler, config, time_ordered=time_ordered, headings=headings)
+    who = Teacher.of(
+        teacher, sampler, config, time_ordered=time_ordered, headings=headings, fronts=fronts
+    )
     tracks, votes = [], []
     for done, scans in enumerate(sampler.scans_of):
         posed = pose_track(who.network, who.asked, who.settings, scans)
         votes.append(heading_votes(who, posed))
         tracks.append(refined(who, posed.turned(votes[-1])))
         progress(done + 1, len(sampler.scans_of))
-    if who.headings is None:
+    if who.headings is None and fronts is None:
         tracks = agreed_tracks(who, tracks, votes)
     if who.is_lidar:
         tracks = [levelled(track) for track in tracks]
@@ -208,6 +217,10 @@ def fused_targets(
 def heading_votes(teacher: Teacher, track: PosedTrack) -> Float[Tensor, "V"]:
     """+1 or -1 for each scan of a track: turn those of -1 and they look one way."""
     config, unit = teacher.config, teacher.unit
+    if teacher.fronts is not None:
+        looks = track.T_sensor_can.rotation[:, :, 0]
+        known = teacher.fronts[torch.from_numpy(track.scans)].to(looks.dtype)
+        return torch.where((looks * known).sum(-1) < 0, -1.0, 1.0)
     if teacher.headings is not None:
         in_units = _scaled(track.T_sensor_can, 1 / unit)
         return transferred_signs(teacher.headings, teacher.clouds(track), in_units, config.transfer)

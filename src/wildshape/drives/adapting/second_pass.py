@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where a second pass writes, and how its results take the place of the first pass's.
+
+Until it is finished the results of the first pass stay. Then they are moved into `first/`, and the
+new ones to where they were; a run killed in between is ended before anything else is done.
+"""
+
+import shutil
+from dataclasses import asdict
+from pathlib import Path
+
+from wildshape.drives.result import REPORT, DriveResult
+from wildshape.drives.writing.outputs import BOXES, MCAP, MESHES, RRD, SHAPES
+from wildshape.io.atomic import lock_folder, write_json, write_text
+from wildshape.io.guard import read_json
+from wildshape.io.output import MARKER
+from wildshape.method.checkpoint import fingerprint
+
+FIRST = "first"
+_MODEL = "model.txt"
+_FINISHED, _SAYS = "finished.json", "what `wildshape drive` says of itself"
+_FOUND = (BOXES, "tracks", "objects", SHAPES)  # the first of them is moved first
+_MADE_OF_IT = (MESHES, "boxes", MCAP, RRD, REPORT)
+
+
+def stages_of(out: Path) -> Path:
+    """What the stages of a second pass find."""
+    return out / "stages" / "adapted"
+
+
+def results_of(out: Path) -> Path:
+    """Its results until they are put in place."""
+    return stages_of(out) / "found"
+
+
+def is_done(out: Path, model: str) -> bool:
+    """Whether a drive's results are of a second pass with that model."""
+    return read_json(out / MARKER, _SAYS).get("adapted") == fingerprint(Path(model))
+
+
+def begin_second(out: Path, model: str) -> None:
+    """Keep of an earlier second pass what the same model found; of another remove all."""
+    stages = stages_of(out)
+    known = stages / _MODEL
+    if known.is_file() and known.read_text("utf-8") != fingerprint(Path(model)):
+        shutil.rmtree(stages)
+    write_text(known, fingerprint(Path(model)))
+
+
+def conclude(out: Path, found: DriveResult, model: str) -> DriveResult:
+    """Say that a second pass is finished, put its results in place, and give back what it found.
+
+    Args:
+        out: the drive's folder.
+        found: by the second pass.
+        model: that completed it.
+    """
+    result = {**asdict(found), "out": str(out)}
+    said = {"result": result, "adapted": fingerprint(Path(model))}
+    write_json(stages_of(out) / _FINISHED, said)
+    put_in_place(out)
+    return found
+
+
+def put_in_place(out: Path) -> None:
+    """Put the results of a finished second pass in place, if that is not done yet.
+
+    Raises:
+        BadInputError: what it left is damaged.
+    """
+    said = stages_of(out) / _FINISHED
+    if not said.is_file():
+        return
+    lock_folder(out)
+    found, first = results_of(out), out / FIRST
+    if (found / BOXES).is_file():  # nothing was put in place yet: what is there is the first pass's
+        first.mkdir(exist_ok=True)
+        for name in (*_FOUND, *_MADE_OF_IT):
+            _move(out / name, first / name)
+    for name in _FOUND:
+        _move(found / name, out / name)
+    marker = out / MARKER
+    record = read_json(marker, _SAYS)
+    write_json(marker, {**record, **read_json(said, "what a second pass found")})
+    said.unlink()
+
+
+def _move(path: Path, target: Path) -> None:
+    if path.exists():
+        path.rename(target)
