@@ -6,6 +6,8 @@ import json
 import math
 import shutil
 import weakref
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +18,8 @@ from tests.refusal import refused
 
 import wildshape
 from wildshape.drives import run
+from wildshape.drives.adapting import second_pass
+from wildshape.drives.adapting.adapt import Adaptation
 from wildshape.drives.config import ClusterConfig, DriveConfig
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.tracking.mounting import Mounting
@@ -28,6 +32,7 @@ from wildshape.io.boxes.detections import read_detections
 from wildshape.io.boxes.table import HEADER, read_box_table
 from wildshape.io.poses import read_poses, read_tum
 from wildshape.io.tracks import read_track
+from wildshape.method.checkpoint import SHIPPED, load_checkpoint, save_checkpoint
 from wildshape.records import Turn
 
 pytest.importorskip("kiss_icp")
@@ -172,6 +177,37 @@ def test_several_processes_find_the_same(found, recording, tmp_path):
     places = [tuple(map(int, line.split()[:2])) for line in labels.read_text().splitlines()]
     assert places == sorted(places)
     assert len(places) == len(rows)
+
+
+def test_adapted_weights_complete_a_drive_again(found, recording, tmp_path, monkeypatch):
+    """Killed before the second pass is finished the first one stays; killed later it is ended."""
+    out = Path(shutil.copytree(found.out, tmp_path / "out"))
+    network, settings = load_checkpoint(SHIPPED)
+    model = tmp_path / "model.safetensors"
+    save_checkpoint(model, network, replace(settings, provenance={"steps": 7}))
+    adapted = Adaptation(str(model), 4, 2, 0)
+    before = (out / "boxes.csv").read_bytes()
+    (out / "report.html").touch()
+
+    def killed(*_, **__):
+        raise KeyboardInterrupt
+
+    for place, name in ((run, "rows_of"), (second_pass, "write_json"), (second_pass, "_move")):
+        assert (out / "boxes.csv").read_bytes() == before
+        with monkeypatch.context() as patched:
+            patched.setattr(place, name, killed)
+            with pytest.raises(KeyboardInterrupt):
+                wildshape.drive(recording, out, adapt=adapted)
+    again = wildshape.drive(recording, out)
+    assert set(again.vehicles) == {folder.name for folder in (out / "objects").iterdir()}
+    assert {row.track for row in read_box_table(out / "boxes.csv")} == set(again.vehicles)
+    for name in again.vehicles:
+        said = json.loads((out / "objects" / name / "objects.json").read_text("utf-8"))
+        assert said["model"]["steps"] == 7
+    assert (out / "first" / "boxes.csv").read_bytes() == before
+    assert not (out / "report.html").exists()
+    monkeypatch.setattr(run._Run, "perform", killed)
+    assert wildshape.drive(recording, out, adapt=adapted) == again
 
 
 def test_other_settings_do_not_go_on_with_an_output(found, recording):

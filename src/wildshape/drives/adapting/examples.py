@@ -45,7 +45,9 @@ class Example:
 
     def some(self, count: int) -> "Example":
         """With so many of its scans, spread evenly."""
-        rows = np.unique(np.linspace(0, len(self.scans) - 1, count).round().astype(int))
+        rows = np.unique(
+            np.linspace(0, len(self.scans) - 1, min(count, len(self.scans))).round().astype(int)
+        )
         return Example(
             self.name, tuple(self.scans[row] for row in rows), self.fronts[rows], self.moving
         )
@@ -94,7 +96,7 @@ def _example(
     scans = tuple(T_level_sensor.apply_numpy(scan) for _, scan in full)
     fronts = [_front(box, T_level_sensor) for box, _ in full]
     kept = np.array(fronts).reshape(-1, 3)
-    return Example(f"{drive.out.name}-{one.name}", scans, kept, one.moving)
+    return Example(f"{drive.out.resolve().name}-{one.name}", scans, kept, one.moving)
 
 
 def _front(box: Box, T_level_sensor: SE3) -> Float[np.ndarray, "3"]:

@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a model learns of the vehicles that it found, and when that is used."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from tests.drives.finished_drive import CARS, finished_drive
+from tests.models import CONFIG, SETTINGS
+
+from wildshape.drives.adapting import adapt
+from wildshape.drives.adapting.adapt import adapt_to
+from wildshape.drives.adapting.config import AdaptConfig
+from wildshape.drives.adapting.examples import examples_of
+from wildshape.drives.adapting.measures import Measures
+from wildshape.inference.predictor import Predictor, load
+from wildshape.method.checkpoint import load_checkpoint
+from wildshape.method.network import ShapePoseNet
+from wildshape.training import loop
+
+FEW = AdaptConfig(
+    steps=3, fewest_held=1, fewest_trained=1, scans=3, fewest_scans=2, clear=0.0, save_every=2
+)
+GOOD = Measures(0.1, (0.1, 0.1, 0.1), 0.9)
+
+
+class Killed(BaseException):
+    pass
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory):
+    return finished_drive(tmp_path_factory.mktemp("drive")).out
+
+
+@pytest.fixture(scope="module")
+def predictor():
+    torch.manual_seed(1)
+    return Predictor(ShapePoseNet(CONFIG).eval(), SETTINGS)
+
+
+def measured(monkeypatch, after):
+    """The first model is measured as `GOOD`, the adapted one as `after`."""
+    found = iter((GOOD, after))
+    monkeypatch.setattr(adapt, "measure", lambda *_: next(found))
+
+
+def test_an_example_looks_where_its_boxes_look(out):
+    found = {one.name: one for one in examples_of([out], FEW)}
+    assert set(found) == {f"found-{name}" for name in CARS}
+    assert {name: one.moving for name, one in found.items()} == {
+        "found-0003": False,
+        "found-<7>": True,
+    }
+    for name, places in CARS.items():
+        _, _, yaw = places[0]
+        fronts = found[f"found-{name}"].fronts
+        assert fronts == pytest.approx(np.tile((np.cos(yaw), np.sin(yaw), 0.0), (3, 1)), abs=1e-6)
+
+
+def test_too_few_tracks_are_said(out, predictor, tmp_path):
+    found = adapt_to([out], tmp_path, predictor, AdaptConfig(clear=0.0))
+    assert found.model is None
+    assert "2 vehicle tracks" in found.sentence
+    assert "the first pass stays" in found.sentence
+    assert json.loads((tmp_path / "adapted.json").read_text())["kept"] is False
+
+
+@pytest.mark.parametrize(
+    ("after", "said"),
+    [
+        (replace(GOOD, cost_m=0.11), "its shapes cost more"),
+        (replace(GOOD, spread_m=(0.0, 0.0, 0.31)), "its sizes agree less along tracks"),
+        (replace(GOOD, headings=0.8), "it turns more scans around"),
+    ],
+)
+def test_one_worse_measure_is_enough(after, said):
+    assert after.worse_than(GOOD) == (said,)
+    assert GOOD.worse_than(GOOD) == ()
+
+
+def test_a_worse_model_is_refused(out, predictor, tmp_path, monkeypatch):
+    measured(monkeypatch, replace(GOOD, cost_m=0.11))
+    found = adapt_to([out], tmp_path, predictor, FEW)
+    assert found.model is None
+    assert "not kept, for its shapes cost more; the first pass stays" in found.sentence
+    assert not (tmp_path / "adapted" / "model.safetensors").exists()
+
+
+def test_a_better_model_is_kept_and_says_what_the_first_one_knew(
+    out, predictor, tmp_path, monkeypatch
+):
+    measured(monkeypatch, replace(GOOD, cost_m=0.09))
+    found = adapt_to([out], tmp_path, predictor, FEW)
+    said = json.loads((tmp_path / "adapted.json").read_text("utf-8"))
+    assert (said["kept"], said["steps"], said["trained"], said["held_out"]) == (True, 3, 1, 1)
+    assert (said["before"]["cost_m"], said["after"]["cost_m"]) == (0.1, 0.09)
+    adapted = load(tmp_path / "adapted")
+    assert str(tmp_path / "adapted") in str(found.model)
+    assert adapted.settings.cost_m == SETTINGS.cost_m
+    weights = (one.network.state_dict() for one in (predictor, adapted))
+    assert any(not torch.equal(was, now) for was, now in zip(*map(dict.values, weights)))
+    assert adapt_to([out], tmp_path, predictor, FEW) == found
+
+
+def test_a_killed_adaptation_goes_on_to_the_same_weights(out, predictor, tmp_path, monkeypatch):
+    """Killed behind the checkpoint of step 2 of 3, and before the adapted model is measured."""
+    save = loop.checkpoint
+
+    def killed(run):
+        save(run)
+        raise Killed
+
+    told = []
+
+    def watch(*said):
+        told.append(said)
+        if said[0] == "measuring after" and "measuring after" not in again:
+            again.append(said[0])
+            raise Killed
+
+    again = []
+    with monkeypatch.context() as patched:
+        patched.setattr(loop, "checkpoint", killed)
+        with pytest.raises(Killed):
+            adapt_to([out], tmp_path / "killed", predictor, FEW, watch=watch)
+    assert ("training", 0, 3) in told
+    assert ("measuring before", 1, 1) in told
+    told.clear()
+    with pytest.raises(Killed):
+        adapt_to([out], tmp_path / "killed", predictor, FEW, watch=watch)
+    assert told == [("training", 2, 3), ("training", 3, 3), ("measuring after", 1, 1)]
+    told.clear()
+    adapt_to([out], tmp_path / "killed", predictor, FEW, watch=watch)
+    assert told == [("training", 3, 3), ("measuring after", 1, 1)]
+    adapt_to([out], tmp_path / "whole", predictor, FEW)
+    killed_, whole = (
+        load_checkpoint(tmp_path / name / "adapted" / "run" / "candidate.safetensors")[0]
+        for name in ("killed", "whole")
+    )
+    for one, other in zip(killed_.parameters(), whole.parameters(), strict=True):
+        assert torch.equal(one, other)
