@@ -3,6 +3,6 @@
 """Raw drives: a recording of full scans in, every vehicle's track, boxes and shape out, unlabelled.
 
 Start with `run`, which calls the stages in their order. `recordings` are read scan by scan,
-`tracking` finds clusters and follows them, `completing` makes vehicles of tracks, `writing` puts
-them on disk.
+`tracking` finds clusters and follows them, `completing` makes vehicles of tracks, `adapting`
+trains on them, `writing` puts them on disk.
 """
