@@ -36,5 +36,13 @@ def car_store(cars, tmp_path_factory):
 @pytest.fixture
 def only_helpers(monkeypatch):
     """Other processes do all the work, however short it is; this one waits for them."""
+
+    def wait(handout, task):
+        with handout._change:
+            come = handout._change.wait_for(
+                lambda: handout._ready() is not None or handout.is_done(), timeout=120
+            )
+        assert come, "no helper came"
+
     monkeypatch.setattr(processes, "_WORTH_S", 0.0)
-    monkeypatch.setattr(Handout, "do_one", lambda handout, task: handout.wait())
+    monkeypatch.setattr(Handout, "do_one", wait)

@@ -14,11 +14,9 @@ def written(out):
         if file.suffix != ".json":
             found[file.relative_to(out)] = file.read_bytes()
         elif file.name == "objects.json":
-            said = json.loads(file.read_text())
-            found[file.relative_to(out)] = (
-                [{**scan, "seconds": None} for scan in said.pop("scans")],
-                said,
-            )
+            said = {**json.loads(file.read_text()), "input": None}
+            scans = [{**scan, "seconds": None} for scan in said["scans"]]
+            found[file.relative_to(out)] = {**said, "scans": scans}
         elif file.name == "scores.json":
             found[file.relative_to(out)] = json.loads(file.read_text())
     return found

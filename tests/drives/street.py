@@ -93,3 +93,11 @@ def scan(solids: list[Solid], place, seed):
     hit = away < 80.0
     noise = np.random.default_rng(seed).normal(scale=0.01, size=len(away))
     return (rays[hit] * (away + noise)[hit, None]).astype(np.float32)
+
+
+def write_scans(folder, scans):
+    """As a folder of full scans, ten a second."""
+    folder.mkdir(parents=True)
+    for frame, scan in enumerate(scans):
+        np.save(folder / f"{frame:06d}.npy", scan)
+    (folder / "times.txt").write_text("".join(f"{0.1 * i:.1f}\n" for i in range(len(scans))))

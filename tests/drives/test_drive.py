@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import trimesh
 from pyarrow import feather
-from tests.drives.street import street
+from tests.drives.street import street, write_scans
 from tests.refusal import refused
 
 import wildshape
@@ -50,11 +50,7 @@ def truth():
 @pytest.fixture(scope="module")
 def recording(truth, tmp_path_factory):
     folder = tmp_path_factory.mktemp("street") / "recording"
-    folder.mkdir()
-    for frame, scan in enumerate(truth.scans):
-        np.save(folder / f"{frame:06d}.npy", scan)
-    times = "".join(f"{0.1 * frame:.1f}\n" for frame in range(len(truth.scans)))
-    (folder / "times.txt").write_text(times)
+    write_scans(folder, truth.scans)
     return folder
 
 

@@ -59,16 +59,11 @@ class Handout(Generic[Item, Result]):
         """Work on an item in this thread, or wait for a result where there is none to take."""
         with self._change:
             taken = self._next()
-        if taken is None:
-            self.wait()
-        else:
-            number, item = taken
-            self.put(number, task(item))
-
-    def wait(self) -> None:
-        """Until a result is there, or all were given."""
-        with self._change:
-            self._change.wait_for(lambda: self._ready() is not None or self.is_done())
+            if taken is None:
+                self._change.wait_for(lambda: self._ready() is not None or self.is_done())
+                return
+        number, item = taken
+        self.put(number, task(item))
 
     def is_done(self) -> bool:
         """Whether all results were given."""

@@ -6,8 +6,9 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from itertools import count, islice
+from itertools import islice
 from typing import Any, TypeVar
+from uuid import uuid4
 
 from wildshape.errors import BadInputError, load_library
 from wildshape.parallel.helper import guarded
@@ -53,7 +54,6 @@ class RayCluster:
     def __init__(self, ray: Any) -> None:
         self._ray = ray
         self._remote = ray.remote(max_retries=_RETRIES)(_work)
-        self._numbers = count()
 
     @property
     def size(self) -> int:
@@ -90,8 +90,8 @@ class RayCluster:
 
     def _told(self, task: Callable[[Item], Result]) -> Callable[[Item], Any]:
         """What sends an item to the cluster; the task itself travels once."""
-        number, shared = next(self._numbers), [self._ray.put(task)]
-        return lambda item: self._remote.remote(number, shared, item)
+        name, shared = uuid4().hex, [self._ray.put(task)]
+        return lambda item: self._remote.remote(name, shared, item)
 
     def _fetched(self, done: Any, item: object) -> Any:
         try:
@@ -106,17 +106,17 @@ class RayCluster:
         return made
 
 
-_task_of: dict[int, Callable[[Any], Any]] = {}
+_task_of: dict[str, Callable[[Any], Any]] = {}
 
 
-def _work(number: int, shared: list[Any], item: Any) -> Any:
+def _work(name: str, shared: list[Any], item: Any) -> Any:
     """The worker's side: the task is unpacked once, not for every item."""
     ray = load_library("ray", "this work needs Ray", "pip install 'wildshape[ray]'")
 
-    if number not in _task_of:
+    if name not in _task_of:
         _task_of.clear()
-        _task_of[number] = ray.get(shared[0])
-    return guarded(_task_of[number], item)
+        _task_of[name] = ray.get(shared[0])
+    return guarded(_task_of[name], item)
 
 
 def _connect(ray: Any, address: str, workers: int | None) -> None:
