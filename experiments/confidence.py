@@ -15,7 +15,7 @@ weights with their calibration.
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import torch
@@ -33,7 +33,7 @@ from wildshape.io.output import provenance
 from wildshape.io.store.store import Store, open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import SHIPPED, load_checkpoint, save_checkpoint, weights_file
-from wildshape.method.confidence import Calibration, ConfidenceFeatures, fit_calibration
+from wildshape.method.confidence import ConfidenceFeatures, fit_calibration
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
 _VEHICLES, _SCANS = ("car", "truck", "bus"), 12
@@ -211,12 +211,12 @@ def draw(path: Path, curves: dict[str, RiskCoverage | None]) -> None:
     figure.savefig(path, dpi=130)
 
 
-def write(model: Path, out: Path, calibration: Calibration) -> None:
-    """The same weights, in the same precision, with the calibration."""
+def rewrite(model: Path, out: Path, **changes: Any) -> None:
+    """The same weights, in the same precision, with some of their settings changed."""
     network, found = load_checkpoint(model)
     with safe_open(model, framework="pt") as file:
         half = all(file.get_tensor(name).dtype == torch.float16 for name in file.keys())  # noqa: SIM118
-    save_checkpoint(out, network, replace(found, calibration=calibration), half=half)
+    save_checkpoint(out, network, replace(found, **changes), half=half)
 
 
 def main(settings: Settings) -> None:
@@ -249,7 +249,7 @@ def main(settings: Settings) -> None:
     curves = {name: risk_coverage(order, test.cd) for name, order in orders.items()}
     draw(settings.out / "confidence.png", curves)
     if settings.write is not None:
-        write(model, settings.write, calibration)
+        rewrite(model, settings.write, calibration=calibration)
     for name in ("before", "after"):
         found = report[name]
         assert isinstance(found, dict)

@@ -89,10 +89,11 @@ def _methods(models: dict[str, Predictor]) -> Iterator[tuple[str, Callable[[Trac
 
 
 def _boxes(done) -> list[UprightBox]:
-    return [_upright(one.box) for one in done]
+    return [upright(one.box) for one in done]
 
 
-def _upright(box: Box) -> UprightBox:
+def upright(box: Box) -> UprightBox:
+    """A box without its tilt."""
     return UprightBox(*box.centre, *box.size, yaw=box.yaw)
 
 
@@ -104,7 +105,7 @@ def errors(found: list[UprightBox], track: Track) -> Float[np.ndarray, "c"]:
 
 def upright_labels(track: Track) -> list[UprightBox]:
     """The label in each scan, sensor frame."""
-    return [_upright(box) for box in _labels(track)]
+    return [upright(box) for box in _labels(track)]
 
 
 def _labels(track: Track) -> list[Box]:

@@ -211,7 +211,7 @@ class Completion:
         pose: `T_sensor_canonical`.
         box: around the body that `points` and the scan show, without mirrors; x, the heading, is
             the canonical frame's.
-        confidence: 0 to 1.
+        confidence: 0 to 1: the product of the three probabilities, where there are any.
         branch: the pose branch that spoke.
         cost: its label-free cost, metres (METHOD 6).
         refined: whether the pose was refined against the scan.
@@ -219,7 +219,11 @@ class Completion:
         reasons: why it is not to be trusted, in short names; empty where nothing speaks against
             it. `inference/confidence.py` and docs/formats.md say what each means.
         seconds: time spent on this scan.
-        features: what the confidence is made from (`method/confidence.py`).
+        features: of the network's look at the scan (`method/confidence.py`).
+        p_pose: probability of a heading within 10 degrees; None for weights that state none.
+        p_box: of a box whose IoU with the true one, seen from above, is at least 0.7.
+        p_kind: of an object of the kind trained on.
+        evidence: what these three are made from (`method/trust.py`).
     """
 
     points: Points
@@ -233,13 +237,18 @@ class Completion:
     reasons: tuple[str, ...] = ()
     seconds: float = 0.0
     features: tuple[float, ...] = ()
+    p_pose: float | None = None
+    p_box: float | None = None
+    p_kind: float | None = None
+    evidence: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
-        said = ", refined" if self.refined else ""
+        known = zip(("pose", "box", "kind"), (self.p_pose, self.p_box, self.p_kind))
+        said = "".join(f", {name} {p:.2f}" for name, p in known if p is not None)
+        said += f", {self.box!r}{', refined' if self.refined else ''}"
         said += f", not to be trusted: {', '.join(self.reasons)}" if self.reasons else ""
         said += f", warning: {self.warning}" if self.warning else ""
-        points = f"{len(self.points)} points"
-        return f"Completion({points}, confidence {self.confidence:.2f}, {self.box!r}{said})"
+        return f"Completion({len(self.points)} points, confidence {self.confidence:.2f}{said})"
 
     def _repr_html_(self) -> str:
         """What a notebook shows: points and box in 3D, in one piece that needs no network."""

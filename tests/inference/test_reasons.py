@@ -9,7 +9,7 @@ import pytest
 
 from wildshape.geometry.projection.visibility import FacingBins
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.confidence import judged_again, reasons_of_result, reasons_of_scan
+from wildshape.inference.confidence import judged, reasons_of_result, reasons_of_scan
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.network import NetworkConfig
 from wildshape.records import Box, Completion, Sensor
@@ -29,6 +29,11 @@ def line(length, count=64):
     """Points on a line: the diagonal of their bounding box is its length, metres."""
     x = np.linspace(8, 8 + length, count)
     return np.column_stack((x, np.zeros((count, 2)))).astype(np.float32)
+
+
+def completion(cost, confidence):
+    box = Box((8.0, 0.0, 0.0), (4.0, 2.0, 1.0), (1.0, 0.0, 0.0, 0.0))
+    return Completion(line(4.0), SE3.identity(), box, confidence, branch=0, cost=cost)
 
 
 @pytest.mark.parametrize(
@@ -58,13 +63,28 @@ def test_reasons_of_a_scan(scan, sensor, expected):
     ],
 )
 def test_reasons_of_a_result(cost, confidence, expected):
-    assert reasons_of_result(cost, confidence, SETTINGS) == expected
+    assert reasons_of_result(completion(cost, confidence), SETTINGS) == expected
+
+
+@pytest.mark.parametrize(
+    ("pose", "box", "kind", "expected"),
+    [
+        (0.9, 0.9, 0.9, ()),
+        (0.7, 0.9, 0.7, ("low_confidence",)),
+        (0.4, 0.9, 0.9, ("low_confidence", "unsure_heading")),
+        (0.9, 0.4, 0.3, ("low_confidence", "unsure_box", "other_kind")),
+    ],
+)
+def test_reasons_of_probabilities(pose, box, kind, expected):
+    done = completion(0.1, pose * box * kind)
+    done = dataclasses.replace(done, p_pose=pose, p_box=box, p_kind=kind)
+    assert reasons_of_result(done, SETTINGS) == expected
 
 
 def test_a_track_keeps_what_speaks_against_the_scan():
-    box = Box((8.0, 0.0, 0.0), (4.0, 2.0, 1.0), (1.0, 0.0, 0.0, 0.0))
-    alone = Completion(line(4.0), SE3.identity(), box, confidence=0.05, branch=0, cost=0.4)
-    reasons = ("few_points", *reasons_of_result(alone.cost, alone.confidence, SETTINGS))
-    alone = dataclasses.replace(alone, reasons=reasons)
-    assert judged_again(alone, 0.1, 0.7, SETTINGS) == ("few_points",)
-    assert judged_again(alone, 0.4, 0.7, SETTINGS) == ("few_points", "poor_fit")
+    alone = dataclasses.replace(completion(0.4, 0.05), reasons=("few_points",))
+    alone = judged(alone, None, None, SETTINGS)
+    assert alone.reasons == ("few_points", "poor_fit", "low_confidence")
+    for cost, expected in ((0.1, ("few_points",)), (0.4, ("few_points", "poor_fit"))):
+        together = dataclasses.replace(alone, cost=cost, confidence=0.7)
+        assert judged(together, None, None, SETTINGS).reasons == expected

@@ -40,6 +40,16 @@ class Answer(Protocol):
         """Of the object, in the scan's frame."""
         ...
 
+    @property
+    def p_pose(self) -> float | None:
+        """Probability that the heading is within 10 degrees of the truth."""
+        ...
+
+    @property
+    def p_box(self) -> float | None:
+        """Probability that the box and the true one overlap by 0.7 in bird's eye view."""
+        ...
+
 
 @runtime_checkable
 class BatchCompleter(Completer, Protocol):

@@ -167,6 +167,8 @@ class Spoken(NamedTuple):
     points: Points
     confidence: float | None = None
     box: Box | None = None
+    p_pose: float | None = None
+    p_box: float | None = None
 
 
 def complete_scans(method: Completer, case: Case) -> Sequence[Answer | None]:
@@ -229,6 +231,8 @@ def _score_completion(
             box=None
             if answer.box is None
             else box_score(answer.box, truth.box, T_sensor_object[i]),
+            p_pose=answer.p_pose,
+            p_box=answer.p_box,
         )
     )
 

@@ -57,6 +57,8 @@ class CompletionScore:
         partial_points: of the accumulation as it is; None where the shape is known.
         confidence: 0 to 1, as the method states it; None if it states none.
         box: of the object, if the method draws one.
+        p_pose: probability of a heading within 10 degrees, as the method states it.
+        p_box: the same of an overlap of 0.7 with the true box in bird's eye view.
     """
 
     track: str
@@ -70,6 +72,8 @@ class CompletionScore:
     partial_points: int | None = None
     confidence: float | None = None
     box: BoxScore | None = None
+    p_pose: float | None = None
+    p_box: float | None = None
 
 
 @dataclass(frozen=True)

@@ -31,13 +31,13 @@ def rank_correlation(confidence: Sequence[float], error: Sequence[float]) -> flo
 
     None for fewer than three, or where one of the two never changes.
     """
-    doubt, errors = -_ranks(confidence), _ranks(error)
+    doubt, errors = -ranks(confidence), ranks(error)
     if len(doubt) < 3 or doubt.std() == 0 or errors.std() == 0:
         return None
     return float(np.corrcoef(doubt, errors)[0, 1])
 
 
-def _ranks(values: Sequence[float]) -> Float[np.ndarray, "n"]:
+def ranks(values: Sequence[float] | np.ndarray) -> Float[np.ndarray, "n"]:
     """The place of each value, from 1; equal ones share the mean of theirs."""
     _, at, count = np.unique(values, return_inverse=True, return_counts=True)
     return (np.cumsum(count) - (count - 1) / 2)[at]

@@ -8,15 +8,16 @@ A figure is a line of `FIGURES`: tables, JSON and the report take it from there.
 import os
 import platform
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from wildshape.evaluation.metrics import ACCURATE_DEG
+from wildshape.evaluation.calibration import HEADING_DEG, LEAST_BEV, Held, calibration
+from wildshape.evaluation.metrics import ACCURATE_DEG, BoxScore
 from wildshape.evaluation.results import CompletionScore, MethodScores, Results, Skipped
 from wildshape.evaluation.risk_coverage import RiskCoverage, rank_correlation, risk_coverage
 from wildshape.io.atomic import write_json
@@ -82,6 +83,44 @@ def _accurate_headings(degrees: list[float]) -> float:
     return max(_accurate(degrees), _accurate([180 - one for one in degrees]))
 
 
+def _held(kind: Literal["pose", "box"], part: str) -> Of:
+    """A number of how well the stated probabilities of headings or boxes held."""
+
+    def of(scores: MethodScores) -> float | None:
+        held = held_of([scores], kind)
+        return None if held is None else getattr(held, part)
+
+    return of
+
+
+def _figures_of_trust(kind: Literal["pose", "box"]) -> Iterator[Figure]:
+    yield Figure(f"p_{kind}_error", _CALIBRATED, _held(kind, "error"))
+    yield Figure(f"p_{kind}_brier", "mean squared error, 0 to 1", _held(kind, "brier"))
+    yield Figure(
+        f"p_{kind}_brier_constant", "the same of the best constant", _held(kind, "constant")
+    )
+
+
+def held_of(runs: Sequence[MethodScores], kind: Literal["pose", "box"]) -> Held | None:
+    """How well stated probabilities held, over all runs together; None where none are stated."""
+    rows = [(row, row.box) for scores in runs for row in scores.completions]
+    known = [(getattr(row, f"p_{kind}"), box) for row, box in rows if box is not None]
+    pairs = [(stated, box) for stated, box in known if stated is not None]
+    boxes = [box for _, box in pairs]
+    true = headings_right(boxes) if kind == "pose" else [box.bev >= LEAST_BEV for box in boxes]
+    return calibration([stated for stated, _ in pairs], true)
+
+
+def headings_right(boxes: Sequence[BoxScore]) -> list[bool]:
+    """Which headings are within 10 degrees of one end, the same for all: the better one."""
+    ends = (
+        [box.heading_deg <= HEADING_DEG for box in boxes],
+        [180 - box.heading_deg <= HEADING_DEG for box in boxes],
+    )
+    return max(ends, key=sum)
+
+
+_CALIBRATED = "stated less true share, mean over five bins of equal count"
 _METRES, _DEGREES, _SHARE, _COUNT = "metres", "degrees", "share, 0 to 1", "points"
 _STD = "sample standard deviation over seeds; null for one seed"
 FIGURES = (
@@ -134,6 +173,8 @@ FIGURES = (
         "metres of cd, over the share of the surest scans",
         lambda scores: curve.area if (curve := curve_of([scores])) else None,
     ),
+    *_figures_of_trust("pose"),
+    *_figures_of_trust("box"),
 )
 
 

@@ -25,6 +25,7 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.confidence import look_features
 from wildshape.inference.config import HypothesisRule
 from wildshape.inference.free_space import SeenScores, Sights
+from wildshape.inference.trust import rival_margin
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.network import Poses, ShapePoseNet
@@ -170,7 +171,10 @@ def choose_hypothesis(
 
 
 class Found(NamedTuple):
-    """What looks at scans give: shapes, `T_sensor_canonical`, cost, branch, and features."""
+    """What looks at scans give: shapes, `T_sensor_canonical`, cost, branch, and features.
+
+    The features are those of `look_features`, and last the margin of the best rival.
+    """
 
     shapes: Float[Tensor, "B P 3"]
     rotation: Float[Tensor, "B 3 3"]
@@ -218,7 +222,8 @@ def look(
     own = partial(score_hypotheses, sizes=inputs.sizes)
     score = own if sights is None else SeenScores(sights, inputs.turn)
     found = choose_hypothesis(network, inputs.scans, inputs.centres, settings, score, inputs.sizes)
-    features = look_features(inputs.scans, found.posed, found.scores, found.poses, found.believed)
+    seen = look_features(inputs.scans, found.posed, found.scores, found.poses, found.believed)
+    features = torch.cat((seen, rival_margin(found.poses, found.believed)), -1)
     return in_sensor_frame(found, inputs, settings, features)
 
 

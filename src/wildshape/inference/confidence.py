@@ -8,13 +8,14 @@ for weights of LiDARs, or the reverse), `too_large_for_model` (the bounding box'
 the largest trained on), `too_small_for_model` (below half of the smallest trained on: a scan may
 show a part of an object), `few_points`, `sensor_inside` (the points lie on all sides of the
 origin). Asked of the result: `poor_fit` (the label-free cost is far above that of scans held out in
-training), `low_confidence`. `ReasonRule` holds the bounds.
+training), `low_confidence`, and which of the probabilities is low: `unsure_heading`, `unsure_box`,
+`other_kind`. `ReasonRule` holds the bounds.
 """
 
 import math
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -30,9 +31,11 @@ from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.confidence import COVERED_M, SMALLEST_M, ConfidenceFeatures
 from wildshape.method.hindsight import Scores
 from wildshape.method.network import Poses
+from wildshape.method.trust import Calibrator, ScanFeatures, TrackFeatures
 from wildshape.records import Completion, Points, Registration, Sensor
 
 _RULE = ReasonRule()
+_OF_RESULT = ("poor_fit", "low_confidence", "unsure_heading", "unsure_box", "other_kind")
 
 
 def look_features(
@@ -119,35 +122,59 @@ def reasons_of_scan(
     return tuple(reason for reason, held in holds.items() if held)
 
 
-def reasons_of_result(
-    cost: float, confidence: float, settings: ModelSettings, rule: ReasonRule = _RULE
-) -> tuple[str, ...]:
-    """What speaks against what came out, a line a reason.
+def judged(
+    done: Completion,
+    trust: Calibrator | None,
+    evidence: ScanFeatures | TrackFeatures | None,
+    settings: ModelSettings,
+    rule: ReasonRule = _RULE,
+) -> Completion:
+    """A completion with its probabilities, if there are any, and what speaks against it.
 
     Args:
-        cost: label-free, metres.
-        confidence: 0 to 1.
+        done: with the confidence of its cost and the reasons that its scan gives.
+        trust: makes probabilities of the evidence.
+        evidence: what is known of it.
         settings: of the weights.
         rule: the bounds.
     """
+    found = None
+    if trust is not None and evidence is not None:
+        found = trust(evidence._asdict())
+        found = found._replace(kind=0.0) if done.warning else found
+        done = replace(
+            done,
+            confidence=found.product,
+            p_pose=found.pose,
+            p_box=found.box,
+            p_kind=found.kind,
+        )
+    given = tuple(evidence) if evidence is not None else ()
+    of_scan = tuple(reason for reason in done.reasons if reason not in _OF_RESULT)
+    reasons = (*of_scan, *reasons_of_result(done, settings, rule))
+    return replace(done, evidence=given, reasons=reasons)
+
+
+def reasons_of_result(
+    done: Completion, settings: ModelSettings, rule: ReasonRule = _RULE
+) -> tuple[str, ...]:
+    """What speaks against what came out, a line a reason."""
+    least = rule.low_confidence if done.p_pose is None else rule.least
     holds = {
-        "poor_fit": cost > rule.poor_fit * settings.cost_m[1],
-        "low_confidence": confidence < rule.low_confidence,
+        "poor_fit": done.cost > rule.poor_fit * settings.cost_m[1],
+        "low_confidence": done.confidence < least,
+        "unsure_heading": done.p_pose is not None and done.p_pose < rule.least,
+        "unsure_box": done.p_box is not None and done.p_box < rule.least,
+        "other_kind": done.p_kind is not None and done.p_kind < rule.least,
     }
     return tuple(reason for reason, held in holds.items() if held)
 
 
-def judged_again(
-    done: Completion,
-    cost: float,
-    confidence: float,
-    settings: ModelSettings,
-    rule: ReasonRule = _RULE,
-) -> tuple[str, ...]:
-    """The reasons of a completion whose cost and confidence have changed."""
-    before = reasons_of_result(done.cost, done.confidence, settings, rule)
-    of_scan = (reason for reason in done.reasons if reason not in before)
-    return (*of_scan, *reasons_of_result(cost, confidence, settings, rule))
+def confidence_of_cost(done: Completion, settings: ModelSettings) -> float:
+    """What decides between the scans of a track: how good the network's look at a scan was."""
+    if done.p_pose is None or not done.features:
+        return done.confidence
+    return 0.0 if done.warning else confidence_of(ConfidenceFeatures(*done.features), settings)
 
 
 def warning_of(

@@ -233,8 +233,9 @@ class ReasonRule:
         smallest: share of the smallest extent trained on, below which a scan is too small.
         largest: times the largest extent trained on, above which a warning is given.
         poor_fit: times the 90th percentile of the held-out label-free cost.
-        low_confidence: one chance in ten that the completion is as good as the median of those
-            calibrated on.
+        low_confidence: of weights without probabilities: one chance in ten that the completion is
+            as good as the median of those calibrated on.
+        least: a probability, or the product of all three, below which it is rather wrong.
     """
 
     few_points: int = 32
@@ -242,6 +243,7 @@ class ReasonRule:
     largest: float = 1.5
     poor_fit: float = 1.5
     low_confidence: float = 0.1
+    least: float = 0.5
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from wildshape.inference.compiled import compiled
 from wildshape.inference.confidence import (
     confidence_of,
     features_of,
-    reasons_of_result,
+    judged,
     reasons_of_scan,
     warning_of,
 )
@@ -29,6 +29,7 @@ from wildshape.inference.free_space import Rays, Sights, without_free_space
 from wildshape.inference.refine import Refined, denser, refine, with_scan
 from wildshape.inference.registration import fuse_scans, inlier_ratio, to_middle
 from wildshape.inference.tracks.complete_track import complete_together
+from wildshape.inference.trust import scan_features
 from wildshape.io.scans.points import LEAST_POINTS
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint, weights_file
 from wildshape.method.network import ShapePoseNet
@@ -303,33 +304,36 @@ class Predictor:
         sights: Sights | None,
     ) -> Completion:
         """Scan `i` of those found; `seen`: without ground."""
-        mirror, cost = self.settings.network.mirror, float(found.cost[i])
-        rule = self.config.reasons
-        features = features_of(scan, cost, found.features[i])
+        mirror, cost, rule = self.settings.network.mirror, float(found.cost[i]), self.config.reasons
+        features = features_of(scan, cost, found.features[i, :-1])
         warning = warning_of(scan, sensor, self.settings, rule)
-        confidence = 0.0 if warning else confidence_of(features, self.settings)
-        reasons = reasons_of_scan(scan, sensor, self.settings, rule)
-        reasons += reasons_of_result(cost, confidence, self.settings, rule)
         shape, T_sensor_can, points = posed.shapes[i], posed.T_sensor_canonical[i], posed.points[i]
         exact = self.settings.sensor == "camera"
-        whole, solid = points.numpy(), shape
+        whole, solid, standing = points.numpy(), shape, None
         if sights is not None:
             alone = sights.part(torch.tensor([i]))
             solid = without_free_space(shape, stack([T_sensor_can]), alone)
-        return Completion(
+            standing = alone.of(whole, 0)
+        done = Completion(
             points=with_scan(whole, len(shape), scan) if exact and self.refines else whole,
             pose=T_sensor_can.to(torch.float64),
             box=box_seen(
                 solid, T_sensor_can, seen, mirror=mirror, body=not exact, config=self.config.box
             ),
-            confidence=confidence,
+            confidence=0.0 if warning else confidence_of(features, self.settings),
             branch=int(found.branch[i]),
             cost=cost,
             refined=self.refines,
             warning=warning,
-            reasons=reasons,
+            reasons=reasons_of_scan(scan, sensor, self.settings, rule),
             features=features,
         )
+        if not self.refines or exact:
+            return judged(done, None, None, self.settings, rule)
+        rival = float(found.features[i, -1])
+        evidence = scan_features(done, seen, rival, found.rotation[i], standing)
+        trust = self.settings.trust
+        return judged(done, trust and trust.scan, evidence, self.settings, rule)
 
     def _off_ground(self, scan: Points, shape: Points, T_sensor_canonical: SE3) -> Points:
         """The scan without the ground beside its object, for networks that do not complete it."""

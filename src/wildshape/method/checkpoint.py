@@ -21,6 +21,7 @@ from wildshape.io.guard import record_of
 from wildshape.method.confidence import Calibration, ConfidenceFeatures
 from wildshape.method.network import NetworkConfig, ShapePoseNet
 from wildshape.method.saved_network import Format, load_network, packed_network
+from wildshape.method.trust import Trust
 from wildshape.records import SensorKind
 
 MODEL = "model.safetensors"
@@ -74,7 +75,8 @@ class ModelSettings:
         cost_m: median and 90th percentile of the label-free cost on held-out scans, metres.
         up: canonical direction that the z axes of the LiDARs trained on have in common; None if
             they have none (`geometry/gravity.py`), or for cameras.
-        calibration: of the confidence; None if truth never told (`confidence.py`).
+        calibration: of the Chamfer distance; None if truth never told (`confidence.py`).
+        trust: probabilities of heading, box and kind; None where they were not fitted (`trust.py`).
         provenance: command, commit, data, hardware, seed, steps.
         metrics: held-out figures.
     """
@@ -90,6 +92,7 @@ class ModelSettings:
     cost_m: tuple[float, float] = (0.1, 0.2)
     up: tuple[float, float, float] | None = None
     calibration: Calibration | None = None
+    trust: Trust | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
     metrics: dict[str, Any] = field(default_factory=dict)
 
@@ -167,6 +170,8 @@ def settings_from_dict(values: object) -> ModelSettings:
         raise ValueError(
             f"{len(known.weights)} weights for {len(ConfidenceFeatures._fields)} features"
         )
+    if settings.trust is not None:
+        settings.trust.check()
     return settings
 
 

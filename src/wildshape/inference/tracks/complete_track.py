@@ -20,7 +20,7 @@ from wildshape.geometry.surface import mirrored
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
 from wildshape.inference.choose_hypothesis import network_input
-from wildshape.inference.confidence import judged_again
+from wildshape.inference.confidence import confidence_of_cost, judged
 from wildshape.inference.config import BoxConfig, InferenceConfig, TrackConfig
 from wildshape.inference.free_space import Rays, Sights, without_free_space
 from wildshape.inference.refine import denser, drawn_to, padded, partners
@@ -33,8 +33,10 @@ from wildshape.inference.tracks.heading_vote import (
 )
 from wildshape.inference.tracks.joint_icp import refine_jointly, stayed_near
 from wildshape.inference.tracks.pose_outliers import without_outliers
+from wildshape.inference.trust import track_features
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.hindsight import score_hypotheses
+from wildshape.method.trust import TrackFeatures
 from wildshape.ops.nearest import nearest
 from wildshape.records import Completion, Points
 
@@ -73,7 +75,8 @@ def complete_together(
     """
     if len(done) < 2:
         return done
-    weights = torch.tensor([max(item.confidence, 1e-3) for item in done], dtype=torch.float64)
+    sure = [confidence_of_cost(item, settings) for item in done]
+    weights = torch.tensor(sure, dtype=torch.float64).clamp_min(1e-3)
     shape = _mean_shape(done, weights, settings.network.points)
     poses = stack([item.pose for item in done])
     voted = _voted(poses, shape, weights, scans, settings, config.track)
@@ -91,21 +94,34 @@ def complete_together(
     fitted = _box(solid, scans, fit.T_sensor_object, config.box, mirror=mirror, body=body)
     whole = _denser(shape, config) if settings.facing else shape
     cost = track_cost(shape, fit.T_sensor_object, scans, settings)
-    mean = float(np.mean([item.confidence for item in done]))
-    trust = [0.0 if item.warning else mean for item in done]
-    return [
+    mean = float(np.mean(sure))
+    together = [
         replace(
             item,
             points=fit.T_sensor_object[i].apply(whole).float().numpy(),
             pose=fit.T_sensor_object[i],
             box=carried(fitted, fit.T_sensor_object[i]),
-            confidence=trust[i],
-            reasons=judged_again(item, float(cost[i]), trust[i], settings, config.reasons),
+            confidence=0.0 if item.warning else mean,
             cost=float(cost[i]),
             refined=fit.refined,
         )
         for i, item in enumerate(done)
     ]
+    trust, evidence = settings.trust, _evidence(done, fit.T_sensor_object, fitted, cost)
+    return [
+        judged(item, trust and trust.track, known, settings, config.reasons)
+        for item, known in zip(together, evidence)
+    ]
+
+
+def _evidence(
+    done: list[Completion], T_sensor_object: SE3, fitted: FittedBox, cost: Float[Tensor, "V"]
+) -> list[TrackFeatures] | list[None]:
+    """What is known of each scan of the track; nothing where it is not known of all scans."""
+    if not all(item.evidence for item in done):
+        return [None] * len(done)
+    length, width, height = fitted.size.tolist()
+    return track_features(done, T_sensor_object, (length, width, height), cost)
 
 
 def _denser(shape: Float[Tensor, "P 3"], config: InferenceConfig) -> Float[Tensor, "Q 3"]:

@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Calibration error, Brier score and AUROC, by hand and in the figures of an evaluation."""
+
+import numpy as np
+import pytest
+from tests.cars import drive_by
+
+from wildshape.evaluation.calibration import auroc, calibration
+from wildshape.evaluation.metrics import BoxScore
+from wildshape.evaluation.protocol import Spoken, run
+from wildshape.evaluation.summary import figures_of, headings_right
+from wildshape.records import Box
+
+
+def test_by_hand():
+    held = calibration([0.9, 0.9, 0.2, 0.2], [True, False, False, False], bins=2)
+    assert held is not None
+    assert held.error == pytest.approx((abs(0.9 - 0.5) + 0.2) / 2)
+    assert held.brier == pytest.approx((0.01 + 0.81 + 0.04 + 0.04) / 4)
+    assert held.constant == pytest.approx(0.25 * 0.75)
+    assert calibration([], []) is None
+
+
+def test_true_probabilities_hold():
+    rng = np.random.default_rng(0)
+    p = rng.uniform(size=20_000)
+    held = calibration(p, rng.uniform(size=len(p)) < p)
+    assert held is not None
+    assert held.error < 0.01
+    assert held.brier < 0.75 * held.constant
+
+
+def test_auroc_counts_pairs():
+    assert auroc([0.9, 0.5, 0.5, 0.1], [True, True, False, False]) == pytest.approx(3.5 / 4)
+    assert auroc([0.3, 0.2], [True, True]) is None
+
+
+def test_the_front_is_one_end_for_all():
+    turns = (2.0, 175.0, 178.0, 90.0)
+    assert headings_right([BoxScore(0.5, turn) for turn in turns]) == [False, True, True, False]
+
+
+class Stating:
+    """Finds every box of the first track's size where it stands, and states probabilities."""
+
+    def complete(self, points, sensor):
+        return points
+
+    def complete_many(self, scans, sensor):
+        nowhere = Box((500.0, 0.0, 0.0), (4.0, 2.0, 1.5), (1.0, 0.0, 0.0, 0.0))
+        return [Spoken(scan, 0.5, nowhere, p_pose=0.5, p_box=0.25) for scan in scans]
+
+
+def test_an_evaluation_holds_stated_probabilities():
+    results = run({"stating": Stating()}, [drive_by(scans=4, seed=1)])
+    found = figures_of(results["stating"])
+    assert found["p_box_error"] == pytest.approx(0.25)
+    assert found["p_box_brier"] == pytest.approx(0.0625)
+    assert found["p_box_brier_constant"] == 0
+    assert found["p_pose_error"] is not None

@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Probabilities are stated where weights bring them, travel with these, and decide what is told."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+import torch
+from tests.models import CONFIG, SETTINGS, scan
+
+from wildshape.geometry.projection.sight_lines import SightLines
+from wildshape.inference.predictor import Predictor, load
+from wildshape.inference.trust import rival_margin
+from wildshape.method.checkpoint import save_checkpoint
+from wildshape.method.network import Poses, ShapePoseNet
+from wildshape.method.trust import (
+    OF_SCAN,
+    OF_TRACK,
+    Calibrator,
+    LogisticRegression,
+    ScanFeatures,
+    TrackFeatures,
+    Trust,
+)
+
+FACING = dataclasses.replace(SETTINGS, facing=True)
+
+
+def calibrator(chosen, bias):
+    lines = [LogisticRegression(n, (0.1,) * len(n), (0.0,) * len(n), bias) for n in chosen]
+    return Calibrator(*lines)
+
+
+def trusting(bias=1.0):
+    trust = Trust(calibrator(OF_SCAN, bias), calibrator(OF_TRACK, bias), "a test")
+    torch.manual_seed(0)
+    settings = dataclasses.replace(FACING, trust=trust)
+    return Predictor(ShapePoseNet(CONFIG).eval(), settings)
+
+
+def test_the_confidence_is_the_product_and_says_what_is_unsure(tmp_path):
+    made = trusting()
+    save_checkpoint(tmp_path / "m.safetensors", made.network, made.settings)
+    trust = made.settings.trust
+    assert trust is not None
+    done = load(tmp_path / "m.safetensors").complete(scan())
+    said = trust.scan(ScanFeatures(*done.evidence)._asdict())
+    assert (done.p_pose, done.p_box, done.p_kind) == tuple(said)
+    assert done.confidence == pytest.approx(said.product)
+    doubtful = trusting(bias=-9.0).complete(scan())
+    assert {"low_confidence", "unsure_heading", "unsure_box", "other_kind"} <= set(doubtful.reasons)
+    far_too_large = made.complete(9 * scan())
+    assert far_too_large.warning
+    assert far_too_large.confidence == far_too_large.p_kind == 0
+
+
+def test_a_track_has_its_own_and_keeps_its_poses():
+    """Probabilities change neither shapes nor poses: what they replace still weighs the scans."""
+    scans, made = [scan(seed) for seed in range(3)], trusting(bias=-2.0)
+    torch.manual_seed(0)
+    plain = Predictor(ShapePoseNet(CONFIG).eval(), FACING)
+    done, before = made.complete_track(scans), plain.complete_track(scans)
+    trust = made.settings.trust
+    assert trust is not None
+    for one, other in zip(done, before, strict=True):
+        np.testing.assert_array_equal(one.points, other.points)
+        torch.testing.assert_close(one.pose.matrix, other.pose.matrix, atol=0, rtol=0)
+        known = TrackFeatures(*one.evidence)
+        assert (one.p_pose, one.p_box, one.p_kind) == tuple(trust.track(known._asdict()))
+        assert known.log_scans == pytest.approx(math.log(3))
+        assert other.p_pose is None
+
+
+def test_without_probabilities_or_refinement_it_is_as_before():
+    made = trusting()
+    raw = Predictor(made.network, made.settings, raw=True).complete(scan())
+    plain = Predictor(made.network, FACING, raw=True).complete(scan())
+    assert (raw.p_pose, raw.p_box, raw.p_kind) == (None, None, None)
+    assert raw.confidence == plain.confidence
+    assert raw.reasons == plain.reasons
+
+
+def test_rays_are_evidence():
+    made, points = trusting(), scan()
+    away = points / np.linalg.norm(points, axis=1, keepdims=True)
+    through = SightLines(away, np.full(len(points), 60.0, np.float32))
+    alone, seen = made.complete(points), made.complete(points, rays=through)
+    assert math.isnan(ScanFeatures(*alone.evidence).free)
+    known = ScanFeatures(*seen.evidence)
+    assert 0 <= known.free <= 1
+    assert 0 <= known.hidden <= 1
+
+
+def test_the_rival_looks_another_way():
+    """Hypotheses at 0, 5 and 180 degrees: the cheapest one's neighbour is no rival."""
+    angle = torch.deg2rad(torch.tensor((0.0, 5.0, 180.0)))
+    c, s, zero, one = angle.cos(), angle.sin(), torch.zeros(3), torch.ones(3)
+    rows = torch.stack((c, -s, zero, s, c, zero, zero, zero, one), -1)
+    poses = Poses(rows.view(1, 3, 3, 3), torch.zeros(1, 3, 3), torch.zeros(1, 3))
+    assert rival_margin(poses, torch.tensor([[0.10, 0.11, 0.16]])).item() == pytest.approx(0.06)
+    assert rival_margin(poses, torch.tensor([[0.10, 0.11, 9.0]])).item() == pytest.approx(0.3)
