@@ -51,6 +51,7 @@ _TRACKS = {
     "hdl32": replace(_BEHIND, tracks=30, varied=True, sensor="hdl32"),
     "os1-128": replace(_BEHIND, tracks=25, varied=True, sensor="os1-128"),
 }
+STREETS = (5, 6, 7, 8, 9, 10, 11, 12)
 _SEED, _RIDGE = 7301, 3.0
 _KINDS = ("pose", "box", "kind")
 
@@ -71,7 +72,7 @@ class Settings:
     out: Path
     model: Path = SHIPPED
     write: Path | None = None
-    streets: tuple[int, ...] = (5, 6, 7, 8, 9, 10, 11, 12)
+    streets: tuple[int, ...] = STREETS
     share: float = 1.0
     check: tuple[Path, ...] = ()
 

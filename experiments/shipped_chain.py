@@ -20,7 +20,7 @@ import tyro
 from experiments.mesh_credits import notice
 from experiments.meshes import road_vehicles
 
-from experiments import confidence, views_weights
+from experiments import calibrate_confidence, confidence, views_weights
 from wildshape.io.atomic import write_text
 from wildshape.io.output import provenance
 from wildshape.io.store.store import Store, is_store, open_store
@@ -193,7 +193,22 @@ def _shipped(
             category=category,
         )
     )
-    copyfile(calibrated, final)
+    copyfile(_trusted(calibrated, settings) if category == "vehicle" else calibrated, final)
+
+
+def _trusted(model: Path, settings: Settings) -> Path:
+    """The vehicles' weights with probabilities of heading, box and kind."""
+    written = settings.out / "default-trusted.safetensors"
+    calibrate_confidence.main(
+        calibrate_confidence.Settings(
+            out=settings.out / "default-trust",
+            model=model,
+            write=written,
+            streets=calibrate_confidence.STREETS[: settings.part(8, least=2)],
+            share=settings.share,
+        )
+    )
+    return written
 
 
 if __name__ == "__main__":

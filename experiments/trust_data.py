@@ -41,7 +41,7 @@ class Known(NamedTuple):
 
     Attributes:
         features: `ScanFeatures` or `TrackFeatures`.
-        pose: whether the heading is right.
+        turn: of the heading from the true one, degrees.
         box: whether the box is.
         kind: whether it is a vehicle.
         number: of the object.
@@ -49,11 +49,17 @@ class Known(NamedTuple):
     """
 
     features: Float[np.ndarray, "n f"]
-    pose: Float[np.ndarray, "n"]
+    turn: Float[np.ndarray, "n"]
     box: Float[np.ndarray, "n"]
     kind: Float[np.ndarray, "n"]
     number: Float[np.ndarray, "n"]
     points: Float[np.ndarray, "n"]
+
+    @property
+    def pose(self) -> Float[np.ndarray, "n"]:
+        """Whether the heading is right. Which end of the canonical frame is the front, most say."""
+        ends = [turn <= HEADING_DEG for turn in (self.turn, 180 - self.turn)]
+        return np.where(np.isnan(self.turn), math.nan, max(ends, key=np.sum))
 
     @classmethod
     def joined(cls, parts: "Sequence[Known]") -> "Known":
@@ -172,10 +178,10 @@ def _completed(predictor: Predictor, cases: Iterator[_Case] | list[_Case]) -> Bo
 
 
 def _truth(done: Completion, label: UprightBox | None) -> tuple[float, float]:
-    """Whether heading and box are right; NaN without a label."""
+    """How far the heading is off, degrees, and whether the box is right; NaN without a label."""
     if label is None:
         return math.nan, math.nan
     box = upright(done.box)
     turn = abs((box.yaw - label.yaw + math.pi) % (2 * math.pi) - math.pi)
     shared = float(overlaps([box], [label]).bev[0, 0])
-    return float(math.degrees(turn) <= HEADING_DEG), float(shared >= LEAST_BEV)
+    return math.degrees(turn), float(shared >= LEAST_BEV)

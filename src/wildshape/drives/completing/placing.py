@@ -34,6 +34,7 @@ class Completed:
         size: `(3,)` length, width, height, metres.
         cost_m: label-free cost, the middle one of its scans, the fuller the heavier.
         confidence: of the completions, 0 to 1.
+        p_kind: probability that it is a vehicle; None for weights that state none.
         ahead_m: how far the boxes' middle was moved forward from that of the completed shape.
     """
 
@@ -43,6 +44,7 @@ class Completed:
     size: tuple[float, float, float]
     cost_m: float
     confidence: float
+    p_kind: float | None = None
     ahead_m: float = 0.0
 
     @property
@@ -82,7 +84,13 @@ def read_completed(seen: Sightings, folder: Path, drive: Drive, T_level_sensor: 
         size=found[0].box.size,
         cost_m=weighted_median(costs, weights),
         confidence=float(np.mean([one.score for one in found])),
+        p_kind=_mean([scan.get("p_kind") for scan in said["scans"]]),
     )
+
+
+def _mean(values: list[float | None]) -> float | None:
+    known = [float(value) for value in values if value is not None]
+    return float(np.mean(known)) if known else None
 
 
 def weighted_median(values: Float[np.ndarray, "k"], weights: Float[np.ndarray, "k"]) -> float:

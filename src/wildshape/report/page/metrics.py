@@ -114,8 +114,7 @@ def of_confidences(confidences: Sequence[float], flagged: int) -> list[str]:
     lines = [
         f"{counted(len(confidences), 'scan')} completed: a median confidence of "
         f"{float(np.median(confidences)):.2f}; {unsure:,} of them "
-        f"({_percent(unsure / len(confidences))}) are below {_SURE}, as one in ten of the scans "
-        "held out in training were: look at these first."
+        f"({_percent(unsure / len(confidences))}) are below {_SURE}: look at these first."
     ]
     if flagged:
         lines.append(
