@@ -175,7 +175,7 @@ def held(
 ) -> dict[str, dict[str, dict[str, float]]]:
     """Figures of what was left out in turn, of the real data, and of streets and real together."""
     names = ScanFeatures._fields if chosen is OF_SCAN else TrackFeatures._fields
-    found = {}
+    found: dict[str, tuple[Known, np.ndarray]] = {}
     for left, known in simulated.items():
         others = [part for name, part in simulated.items() if name != left]
         found[left] = (known, stated(fit(others, chosen, names), known, names))
@@ -190,7 +190,8 @@ def held(
     }
     print(f"\n| {'scan' if chosen is OF_SCAN else 'track'} | what | n | true | stated | error |"
           " Brier | constant | AUROC |\n| --- | --- |" + " ---: |" * 7)  # fmt: skip
-    return {name: _figures(name, [found[part] for part in parts]) for name, parts in sets.items()}
+    shown = {name: [found[part] for part in parts] for name, parts in sets.items() if parts}
+    return {name: _figures(name, parts) for name, parts in shown.items()}
 
 
 def _figures(name: str, parts: list[tuple[Known, np.ndarray]]) -> dict[str, dict[str, float]]:
