@@ -22,6 +22,7 @@ from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed, level_poses, read_completed
 from wildshape.drives.completing.vehicles import (
     judge,
+    stated,
     vehicle_confidence,
     without_parts,
     write_judged,
@@ -319,7 +320,7 @@ class _Run:
             found = carve(found, self.drive.scan, T_level_sensor, self.config.carving)
             at(1)
             return [
-                Vehicle(one, smooth(one, ticks, self.config.boxes), kept[one.seen.name])
+                Vehicle(one, smooth(one, ticks, self.config.boxes), stated(one, kept))
                 for one in sorted(found, key=lambda one: one.seen.name)
             ]
 

@@ -64,7 +64,7 @@ def scan_features(
     half = np.maximum(box.size, SMALLEST_M) / 2
     inside = (scan - np.asarray(box.centre)) @ box_axes(box.quaternion_wxyz)
     low, high = np.percentile(inside, (_OUTERMOST, 100 - _OUTERMOST), axis=0)
-    seen_length, seen_width, seen_height = ((high - low) / (2 * half)).tolist()
+    seen_length, seen_width, _ = ((high - low) / (2 * half)).tolist()
     turn = R_sensor_canonical.double().mT @ done.pose.rotation
     moved = math.degrees(float(rotation_angle(turn)))
     shares = (math.nan, math.nan)
@@ -74,13 +74,11 @@ def scan_features(
         log_cost=known.log_cost,
         rival=rival,
         entropy=known.entropy,
-        covered=known.covered,
         log_moved=math.log(moved + _UNTURNED_DEG),
         log_points=known.log_points,
         log_range=known.log_range,
         seen_length=seen_length,
         seen_width=seen_width,
-        seen_height=seen_height,
         deep=float((np.abs(inside) < half - DEEP_M).all(1).mean()),
         log_length=math.log(max(box.size[0], SMALLEST_M)),
         size_off=size_off(box.size),
@@ -117,15 +115,12 @@ def track_features(
         log_cost=mean(costs),
         scan_cost=0.0,
         rival=mean([one.rival for one in own]),
-        entropy=mean([one.entropy for one in own]),
         log_moved=mean([one.log_moved for one in own]),
         seen_width=mean([one.seen_width for one in own]),
-        seen_height=mean([one.seen_height for one in own]),
         own_off=mean([one.size_off for one in own]),
         agree=mean(alike > math.cos(math.radians(RIVAL_DEG))),
         length_spread=float(np.std([one.log_length for one in own])),
         log_points=max(one.log_points for one in own),
-        log_range=min(one.log_range for one in own),
         log_scans=math.log(len(own)),
         log_length=math.log(max(size[0], SMALLEST_M)),
         size_off=size_off(size),

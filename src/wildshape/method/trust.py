@@ -40,13 +40,11 @@ class ScanFeatures(NamedTuple):
         log_cost: label-free cost.
         rival: by how much the best hypothesis of another heading costs more, metres.
         entropy: of the network's belief in its hypotheses, nats.
-        covered: share of the shape near the scan.
         log_moved: turn from the network's pose to the refined one, logarithm of degrees.
         log_points: logarithm of the scan's number of points.
         log_range: its distance.
         seen_length: extent of the scan along its box, a share of the box's length.
         seen_width: the same across.
-        seen_height: the same upward.
         deep: share of the scan far inside the box.
         log_length: of the box.
         size_off: how far the box is from the nearest usual size, standard deviations.
@@ -57,13 +55,11 @@ class ScanFeatures(NamedTuple):
     log_cost: float
     rival: float
     entropy: float
-    covered: float
     log_moved: float
     log_points: float
     log_range: float
     seen_length: float
     seen_width: float
-    seen_height: float
     deep: float
     log_length: float
     size_off: float
@@ -80,15 +76,12 @@ class TrackFeatures(NamedTuple):
         log_cost: label-free cost of the track's shape, mean.
         scan_cost: the same in this scan.
         rival: mean.
-        entropy: mean.
         log_moved: mean.
         seen_width: mean.
-        seen_height: mean.
         own_off: mean of the scans' own `size_off`.
         agree: share of the scans whose own heading is within 10 degrees of the track's.
         length_spread: standard deviation of the lengths of the scans' own boxes, logarithms.
         log_points: of the fullest scan.
-        log_range: of the nearest scan.
         log_scans: logarithm of their number.
         log_length: of the track's box.
         size_off: of the track's box.
@@ -97,15 +90,12 @@ class TrackFeatures(NamedTuple):
     log_cost: float
     scan_cost: float
     rival: float
-    entropy: float
     log_moved: float
     seen_width: float
-    seen_height: float
     own_off: float
     agree: float
     length_spread: float
     log_points: float
-    log_range: float
     log_scans: float
     log_length: float
     size_off: float
@@ -126,18 +116,15 @@ OF_SCAN = Chosen(
         "size_off", "free", "hidden",
     ),
     kind=(
-        "log_cost", "size_off", "rival", "entropy", "covered", "seen_width", "seen_height",
+        "log_cost", "size_off", "rival", "entropy", "seen_length", "seen_width", "log_length",
         "log_points", "log_range",
     ),
 )  # fmt: skip
 OF_TRACK = Chosen(
-    pose=("rival", "scan_cost", "log_moved", "own_off", "log_scans", "log_points"),
+    pose=("rival", "scan_cost", "log_moved", "log_scans", "log_points", "log_length"),
     box=("scan_cost", "rival", "log_moved", "agree", "length_spread", "log_length"),
-    kind=(
-        "log_cost", "size_off", "own_off", "rival", "entropy", "seen_width", "seen_height",
-        "log_points", "log_range", "log_scans",
-    ),
-)  # fmt: skip
+    kind=("log_cost", "size_off", "own_off", "rival", "seen_width", "length_spread"),
+)
 
 
 def size_off(size_m: tuple[float, float, float]) -> float:
@@ -251,8 +238,9 @@ def fit_logistic(
         true: whether it holds.
         ridge: what holds the weights near zero.
     """
-    usual = np.nanmean(known, axis=0)
-    width = np.nanstd(known, axis=0) + 1e-9
+    counted = np.maximum(np.isfinite(known).sum(0), 1)
+    usual = np.nansum(known, axis=0) / counted
+    width = np.sqrt(np.nansum((known - usual) ** 2, axis=0) / counted) + 1e-9
     scaled = np.nan_to_num((known - usual) / width)
     design = np.column_stack((scaled, np.ones(len(scaled))))
     held = np.append(np.full(len(features), ridge), 1e-6)

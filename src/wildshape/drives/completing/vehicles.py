@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which of the completed objects are vehicles: by cost, size and how long seen; and none twice."""
+"""Which of the completed objects are vehicles, by the network's own word; and none twice."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -58,18 +59,30 @@ def judge(objects: list[Completed], places: Places, config: VehicleConfig) -> li
 
 
 def vehicle_confidence(one: Completed, config: VehicleConfig) -> float:
-    """How sure it is that an object is a vehicle: what speaks for it, in nats, added up.
+    """How sure it is that an object is a vehicle: `p_kind`, where the weights state it.
 
-    Its cost, its size (Gaussian around the nearest kind of vehicle), whether several tracks agree
-    on its shape, how often it was seen (at most a nat), and what the network says of its
-    completions (at most half).
+    Of other weights what speaks for one is added up, in nats: its cost, its size (Gaussian around
+    the nearest kind of vehicle), whether several tracks agree on its shape, how often it was seen
+    (at most a nat), and what the network says of its completions (at most half).
     """
+    if one.p_kind is not None:
+        return one.p_kind
     shape = shape_nats(one.cost_m, one.size, config)
     seen = 0.5 * math.log(len(one.seen.frames) / config.usual_scans)
     said = 0.25 * math.log(max(one.confidence, 1e-6) / config.usual_confidence)
     together = config.merged_nats if one.seen.parts else 0.0
     nats = shape + together + min(max(seen, -1.0), 1.0) + min(max(said, -0.5), 0.5)
     return 1.0 / (1.0 + math.exp(-min(max(nats, -20.0), 20.0)))
+
+
+def stated(one: Completed, sure: Mapping[str, float]) -> float:
+    """What its boxes state: that kind, heading and size are right, where the weights know.
+
+    Args:
+        one: a vehicle.
+        sure: by name, how sure it is that each is one; of other weights that is stated.
+    """
+    return sure[one.seen.name] if one.p_kind is None else one.confidence
 
 
 def shape_nats(cost_m: float, size: tuple[float, float, float], config: VehicleConfig) -> float:
