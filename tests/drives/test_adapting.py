@@ -61,14 +61,6 @@ def test_an_example_looks_where_its_boxes_look(out):
         assert fronts == pytest.approx(np.tile((np.cos(yaw), np.sin(yaw), 0.0), (3, 1)), abs=1e-6)
 
 
-def test_too_few_tracks_are_said(out, predictor, tmp_path):
-    found = adapt_to([out], tmp_path, predictor, AdaptConfig(clear=0.0))
-    assert found.model is None
-    assert "2 vehicle tracks" in found.sentence
-    assert "the first pass stays" in found.sentence
-    assert json.loads((tmp_path / "adapted.json").read_text())["kept"] is False
-
-
 @pytest.mark.parametrize(
     ("after", "said"),
     [

@@ -17,6 +17,7 @@ from tests.drives.street import street, write_scans
 from tests.refusal import refused
 
 import wildshape
+from wildshape.cli.main import main
 from wildshape.drives import run
 from wildshape.drives.adapting import second_pass
 from wildshape.drives.adapting.adapt import Adaptation
@@ -204,6 +205,17 @@ def test_adapted_weights_complete_a_drive_again(found, recording, tmp_path, monk
     assert not (out / "report.html").exists()
     monkeypatch.setattr(run._Run, "perform", killed)
     assert wildshape.drive(recording, out, adapt=adapted) == again
+
+
+def test_too_few_vehicles_to_adapt_to_are_said(found, recording, tmp_path, capsys):
+    out = shutil.copytree(found.out, tmp_path / "out")
+    main(["drive", str(recording), "--out", str(out), "--adapt", "--no-report"])
+    text = capsys.readouterr().out
+    assert text.startswith("not adapted: ")
+    assert "are too few; the first pass stays" in text
+    assert "found 4 vehicles" in text
+    assert json.loads((out / "adapted.json").read_text("utf-8"))["kept"] is False
+    assert (out / "boxes.csv").read_bytes() == (found.out / "boxes.csv").read_bytes()
 
 
 def test_other_settings_do_not_go_on_with_an_output(found, recording):
