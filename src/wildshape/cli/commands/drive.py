@@ -130,6 +130,7 @@ def run(settings: Settings) -> None:
         BadInputError: a source, the model or the output cannot be used.
         MissingExtraError: a library is not installed.
     """
+    from wildshape.cli.terminal import say
     from wildshape.drives.adapting.adapt import adapt_to
     from wildshape.drives.writing.files import DriveFiles
     from wildshape.inference.predictor import load
@@ -150,6 +151,8 @@ def run(settings: Settings) -> None:
         overwrite=settings.overwrite,
     )
     several = len(folders) > 1 or settings.work.ray is not None
+    if several:
+        say("\n".join(filter(None, drives.values())))
     find = _many if several else _one
     change: Adaptation | None = None
     if adapt is not None:
@@ -188,10 +191,10 @@ def _one(
 def _many(
     task: "DriveAndPage", folders: dict[Path, Path], drives: dict[Path, str], settings: Settings
 ) -> "DrivesResult":
-    from wildshape.cli.terminal import TERMINAL, say
+    from wildshape.cli.terminal import TERMINAL
     from wildshape.report.drive.many import drive_many
 
-    say("\n".join(filter(None, drives.values())))
+    del drives
     work = settings.work
     return drive_many(task, folders, workers=work.workers, ray=work.ray, progress=TERMINAL)
 
