@@ -19,7 +19,6 @@ class AdaptConfig:
         held_out: share of the tracks that are measured on and not trained on.
         fewest_held: of them.
         fewest_trained: of the others.
-        least_confidence: that a track is a vehicle's.
         scans: of a track, spread evenly.
         fewest_scans: shorter tracks are left out.
         fewest_points: of a scan.
@@ -36,7 +35,6 @@ class AdaptConfig:
     held_out: float = 0.25
     fewest_held: int = 2
     fewest_trained: int = 4
-    least_confidence: float = 0.5
     scans: int = 32
     fewest_scans: int = 4
     fewest_points: int = 100

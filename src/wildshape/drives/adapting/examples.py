@@ -59,7 +59,7 @@ class Example:
 
 
 def examples_of(outs: Sequence[Path], config: AdaptConfig) -> list[Example]:
-    """The likely vehicles of finished drives that were seen well enough.
+    """The vehicles of finished drives that were seen well enough.
 
     Raises:
         BadInputError: a drive's folder is damaged.
@@ -69,9 +69,8 @@ def examples_of(outs: Sequence[Path], config: AdaptConfig) -> list[Example]:
         drive = read_finished(out)
         mounting = read_record(out / "stages" / "mounting.json", "the mounting", Mounting)
         for one in drive.vehicles:
-            if one.confidence >= config.least_confidence:
-                example = _example(drive, one, mounting.levelling(), config)
-                found.append(example.some(config.scans))
+            example = _example(drive, one, mounting.levelling(), config)
+            found.append(example.some(config.scans))
     return [one for one in found if len(one.scans) >= config.fewest_scans]
 
 
