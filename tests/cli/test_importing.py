@@ -3,6 +3,7 @@
 """Collecting garbage is put off, and taken up again whatever happens."""
 
 import gc
+import sys
 
 import pytest
 
@@ -17,3 +18,15 @@ def test_collection_is_off_inside_and_on_afterwards():
     with pytest.raises(ImportError), uncollected():
         raise ImportError
     assert gc.isenabled()
+
+
+def test_what_a_cold_start_imports_is_never_walked_again(monkeypatch):
+    with uncollected():
+        pass
+    assert gc.get_freeze_count() == 0
+    with monkeypatch.context() as patched:
+        patched.delitem(sys.modules, "torch")
+        with uncollected():
+            pass
+    assert gc.get_freeze_count() > 0
+    gc.unfreeze()

@@ -13,6 +13,7 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor, nn
+from torch.overrides import TorchFunctionMode
 
 from wildshape.errors import BadInputError
 from wildshape.io.guard import first_line
@@ -21,6 +22,7 @@ Net = TypeVar("Net", bound=nn.Module)
 Settings = TypeVar("Settings")
 _FLOATS = ("F16", "BF16", "F32", "F64")
 _CHECKSUM = "sha256"
+_DRAWS = (Tensor.uniform_, Tensor.normal_)
 _MOST = 1e9
 _CURE = "take another copy of the file, or train it again"
 
@@ -56,7 +58,7 @@ def load_network(path: Path, form: Format[Net, Settings]) -> tuple[Net, Settings
     try:
         with safe_open(path, framework="pt") as file:
             settings = _settings(path, file.metadata() or {}, form)
-            with torch.device("meta"):
+            with torch.device("meta"), _Undrawn():
                 expected = form.build(settings).state_dict()
             check_shapes(path, file, expected)
             stored = {name: file.get_tensor(name) for name in expected}
@@ -69,9 +71,22 @@ def load_network(path: Path, form: Format[Net, Settings]) -> tuple[Net, Settings
     weights = {name: values.to(expected[name].dtype) for name, values in stored.items()}
     check_numbers(path, weights)
     _check_sum(path, stored, metadata)
-    network = form.build(settings)
+    with _Undrawn():
+        network = form.build(settings)
     network.load_state_dict(weights)
     return network.eval(), settings
+
+
+class _Undrawn(TorchFunctionMode):
+    """Weights are not drawn at random where those of a file replace them at once."""
+
+    def __torch_function__(
+        self, func: Any, types: Any, args: tuple[Any, ...] = (), kwargs: Any = None
+    ) -> Any:
+        given = kwargs or {}
+        if func in _DRAWS or getattr(func, "__module__", "") == nn.init.__name__:
+            return given.get("tensor", *args[:1])
+        return func(*args, **given)
 
 
 def packed_network(weights: Mapping[str, Tensor], metadata: dict[str, str]) -> bytes:
@@ -146,5 +161,6 @@ def check_numbers(path: Path, tensors: dict[str, Tensor]) -> None:
         BadInputError: a tensor has some.
     """
     for name, values in tensors.items():
-        if not bool((values.abs() <= _MOST).all()):
+        low, high = values.aminmax() if values.numel() else (0.0, 0.0)
+        if not (low >= -_MOST and high <= _MOST):  # of NaN neither is true
             raise BadInputError(f"{path}: {name} holds values that are no numbers; {_CURE}.")
