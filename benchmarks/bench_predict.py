@@ -34,6 +34,7 @@ from wildshape.training.recipes import PRESETS
 SIZES = ("small", "default", "paper-lidar")
 NETWORK_BARS_MS = {"small": 5.0, "paper-lidar": 20.0}
 COMPLETE_BAR_MS = 60.0
+COLD_START_BAR = 1.25  # 2 s where torch takes 1.6
 
 
 def predictor(preset: str) -> Predictor:
@@ -118,6 +119,9 @@ def starts(outcome: Outcome, scan: Points, warm: int, repeats: int) -> None:
             for label, arguments in commands.items()
         }
     outcome.add("cold start", times)
+    ratio = min(times["wildshape complete"]) / min(times["import torch"])
+    name = "cold start: times the time of import torch"
+    outcome.bar(name, ratio, COLD_START_BAR, kind="measured")
 
 
 def start(arguments: tuple[str, ...], folder: Path) -> None:
