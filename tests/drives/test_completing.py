@@ -14,7 +14,7 @@ from wildshape.drives.completing.claims import claim
 from wildshape.drives.completing.completion import fullest_of_parts, keyframes
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed
-from wildshape.drives.completing.vehicles import judge, vehicle_confidence
+from wildshape.drives.completing.vehicles import judge, stated, vehicle_confidence
 from wildshape.drives.config import (
     BoxConfig,
     CompletionConfig,
@@ -115,6 +115,19 @@ def test_less_cost_usual_size_and_more_scans_speak_for_a_vehicle():
     # What is known in nats: the cost's own scale.
     nats = [math.log(p / (1 - p)) for p in (sure(cost=0.1), sure(cost=0.1 + config.cost_scale_m))]
     assert nats[0] - nats[1] == pytest.approx(1.0)
+
+
+def test_the_weights_own_probability_goes_before_what_was_added_up():
+    here = [(0.0, 0.0, 0.0, 0.0)]
+    likely = replace(completed(here, name="likely", cost=0.5), p_kind=0.6)
+    unlikely = replace(completed(here, frames=(90,), name="unlikely"), p_kind=0.4)
+    other = completed([(30.0, 0.0, 0.0, 0.0)], name="other")
+    said = {one.name: one for one in judge([likely, unlikely, other], places(), VehicleConfig())}
+    assert (said["likely"].confidence, said["likely"].reasons) == (0.6, ())
+    assert said["unlikely"].reasons == ("unlikely",)
+    sure = {name: one.confidence for name, one in said.items()}
+    assert stated(likely, sure) == likely.confidence == 0.5  # the product, of the completions
+    assert stated(other, sure) == sure["other"] != 0.5
 
 
 def test_tracks_of_one_shape_in_one_place_are_put_together():

@@ -184,8 +184,8 @@ class CompletionConfig:
 class VehicleConfig:
     """Which completed tracks are vehicles (`vehicles.py`).
 
-    What speaks for a vehicle is added up as log-odds. The numbers were chosen by looking at two
-    unlabelled drives.
+    Where the weights state no probability, what speaks for a vehicle is added up as log-odds. The
+    numbers were chosen by looking at two unlabelled drives.
 
     Attributes:
         kinds: usual length, width, height of cars, vans and lorries, metres.
@@ -198,6 +198,7 @@ class VehicleConfig:
         merged_nats: what several tracks of one shape in one place say for a vehicle.
         usual_confidence: of the completions; more speaks for a vehicle.
         least_confidence: objects of less are left out.
+        least_kind: the same where the weights state the probability.
         length_m: from and to.
         width_m: from and to.
         height_m: from and to.
@@ -217,6 +218,7 @@ class VehicleConfig:
     merged_nats: float = 1.0
     usual_confidence: float = 0.1
     least_confidence: float = 0.4
+    least_kind: float = 0.5
     length_m: tuple[float, float] = (2.5, 9.0)
     width_m: tuple[float, float] = (1.4, 3.2)
     height_m: tuple[float, float] = (1.05, 3.6)

@@ -120,7 +120,8 @@ def write_judged(path: Path, objects: list[Sightings], said: list[Judged]) -> No
 def _reasons(one: Completed, confidence: float, config: VehicleConfig) -> tuple[str, ...]:
     limits = zip(("length", "width", "height"), one.size, _sizes(config))
     wrong = [name for name, value, (low, high) in limits if not low <= value <= high]
-    unlikely = ["unlikely"] if confidence < config.least_confidence else []
+    least = config.least_confidence if one.p_kind is None else config.least_kind
+    unlikely = ["unlikely"] if confidence < least else []
     few = ["few_points"] if one.fullest < config.fewest_points else []
     return (*unlikely, *wrong, *few)
 
