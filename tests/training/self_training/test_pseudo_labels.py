@@ -69,6 +69,16 @@ def test_every_scan_gets_a_pose_and_every_track_a_shape(car_store, targets):
         assert bool(torch.isfinite(part).all())
 
 
+def test_targets_look_where_the_objects_are_known_to_look(car_store, teacher, targets):
+    """Every second track is said to look the other way; no vote of all tracks undoes it."""
+    sampler = sampler_of(car_store)
+    fronts = targets.rotation[:, :, 0].clone()
+    for scans in sampler.scans_of[::2]:
+        fronts[torch.from_numpy(scans)] *= -1.0
+    told = fused_targets(teacher, sampler, fronts=fronts)
+    assert (told.rotation[:, :, 0] * fronts).sum(-1).min() > 0
+
+
 def test_the_fused_shape_is_its_scans_reflected(car_store, targets):
     """Carried to the canonical frame by their targets, the scans lie on the shape; so does their
     reflection."""
