@@ -21,6 +21,7 @@ from wildshape.cli.main import main
 from wildshape.drives import run
 from wildshape.drives.adapting import second_pass
 from wildshape.drives.adapting.adapt import Adaptation
+from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.config import ClusterConfig, DriveConfig
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.tracking.mounting import Mounting
@@ -215,6 +216,7 @@ def test_too_few_vehicles_to_adapt_to_are_said(found, recording, tmp_path, capsy
     assert "are too few; the first pass stays" in text
     assert "found 4 vehicles" in text
     assert json.loads((out / "adapted.json").read_text("utf-8"))["kept"] is False
+    assert wildshape.drive(recording, out, adapt=AdaptConfig()).vehicles == found.vehicles
     assert (out / "boxes.csv").read_bytes() == (found.out / "boxes.csv").read_bytes()
 
 
