@@ -34,6 +34,7 @@ from wildshape.drives.tracking.detections import (
     find_detections,
     given_tracks,
 )
+from wildshape.drives.tracking.ground import height_above_ground
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.drives.writing.files import DriveFiles, detections_of
 from wildshape.drives.writing.finished import read_finished
@@ -170,7 +171,9 @@ def _read_detections(folder: Path) -> Arrays:
     file.identity()
     drive = Drive.of("street", [f"{i:06d}" for i in range(_FRAMES)], lambda _: Turn(CLOUD))
     found = find_detections(file, drive)
-    cuts = [cut_boxes(CLOUD, row, _LEVEL, DriveConfig()) for row in found.frames]
+    config = DriveConfig()
+    heights = height_above_ground(CLOUD, _LEVEL.height_m, config.ground)
+    cuts = [cut_boxes(CLOUD, row, heights, config, CLOUD) for row in found.frames]
     for row, cut in zip(found.frames, cuts):
         yield np.array([(*one.box.centre, *one.box.size) for one in row])
         yield cut.points

@@ -210,7 +210,9 @@ class _Run:
         path = self.out / TRAJECTORY
         with self.clock.stage("trajectory", len(self.drive)) as at:
             if not path.is_file():
-                found = find_trajectory(self.drive, mounting, self.config, at)
+                cutter = self.cutter(self.drive, mounting)
+                turns = self.helpers.in_order(cutter.landmarks, range(len(self.drive)))
+                found = find_trajectory(self.drive, mounting, self.config, at, turns)
                 write_json(self.stages / "breaks.json", asdict(found.breaks))
                 write_trajectories(self.out, self.drive, found.T_world_sensor)
             return read_poses(path, len(self.drive))

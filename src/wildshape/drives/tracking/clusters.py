@@ -72,6 +72,8 @@ def _vehicle_sized(
 ) -> Iterator[Rows]:
     """Clusters of the size of vehicles; those too large are cut apart with the finer reaches."""
     for part in connected(scan.scaled[rows], reaches[0], config.thin):
+        if len(part) < config.fewest_points:
+            break
         members = _without_overhang(scan, rows[part], config)
         if len(members) < config.fewest_points or not _stands(scan.heights[members], config):
             continue
@@ -88,10 +90,11 @@ def _without_overhang(scan: _Above, rows: Rows, config: ClusterConfig) -> Int[np
     low = scan.heights[rows] < config.overhang_m
     if low.all() or low.sum() < config.fewest_points:
         return rows
-    flat = scan.points[rows, :2].astype(np.float64)
-    axes = _axes(flat[low])
-    below, above = flat[low] @ axes, flat[~low] @ axes
-    beyond = np.maximum(above - below.max(0), below.min(0) - above).max(1)
+    flat = scan.points[rows, :2].T.astype(np.float64)
+    axes = _axes(flat[:, low])
+    below, above = axes @ flat[:, low], axes @ flat[:, ~low]
+    ends, begins = below.max(1, keepdims=True), below.min(1, keepdims=True)
+    beyond = np.maximum(above - ends, begins - above).max(0)
     return rows[low] if (beyond > config.beyond_m).mean() > config.beyond else rows
 
 
@@ -117,16 +120,17 @@ def _stands(heights: Float[np.ndarray, "k"], config: ClusterConfig) -> bool:
 
 def extents(points: Points) -> tuple[float, float]:
     """Length and width of the upright rectangle of least area, of 2 degrees' steps, metres."""
-    flat = points[:, :2].astype(np.float64)
-    width, length = np.sort(np.ptp(flat @ _axes(flat), axis=0))
+    flat = points[:, :2].T.astype(np.float64)
+    width, length = np.sort(np.ptp(_axes(flat) @ flat, axis=1))
     return float(length), float(width)
 
 
-def _axes(flat: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "2 2"]:
-    """Of the rectangle of least area around points seen from above, of 2 degrees' steps."""
-    some = flat[:: 1 + len(flat) // _SIZED_BY]
+def _axes(flat: Float[np.ndarray, "2 k"]) -> Float[np.ndarray, "2 2"]:
+    """Of the rectangle of least area around points seen from above, of 2 degrees' steps; rows."""
+    some = flat[:, :: 1 + flat.shape[1] // _SIZED_BY]
     angles = np.deg2rad(np.arange(0.0, 90.0, 2.0))
-    along = some @ np.stack((np.cos(angles), np.sin(angles)))
-    across = some @ np.stack((-np.sin(angles), np.cos(angles)))
-    best = angles[(np.ptp(along, axis=0) * np.ptp(across, axis=0)).argmin()]
-    return np.array(((np.cos(best), -np.sin(best)), (np.sin(best), np.cos(best))))
+    ahead = np.stack((np.cos(angles), np.sin(angles)), axis=1)
+    aside = np.stack((-np.sin(angles), np.cos(angles)), axis=1)
+    areas = np.ptp(ahead @ some, axis=1) * np.ptp(aside @ some, axis=1)
+    best = areas.argmin()
+    return np.stack((ahead[best], aside[best]))

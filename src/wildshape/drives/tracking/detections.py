@@ -12,12 +12,10 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
 from wildshape.drives.config import DetectionConfig, DriveConfig
 from wildshape.drives.source import Drive
-from wildshape.drives.tracking.ground import height_above_ground
-from wildshape.drives.tracking.mounting import Mounting
 from wildshape.drives.tracking.segmentation import CutScan, Cutter
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.errors import BadInputError
@@ -191,34 +189,31 @@ class BoxCutter(Cutter):
 
     detections: Detections
 
-    def cut(self, frame: int) -> CutScan:
-        """What is in the boxes of one frame."""
-        boxes = self.detections.frames[frame]
-        turn = self.drive.turn(frame)
-        scan = self.drive.corrected(frame, turn)
-        return cut_boxes(scan, boxes, self.mounting, self.config, as_measured=turn.points)
+    def cut(
+        self, frame: int, scan: Points, heights: Float[np.ndarray, "n"], as_measured: Points
+    ) -> CutScan:
+        """What is in the boxes of a frame; see `cut_boxes`."""
+        return cut_boxes(scan, self.detections.frames[frame], heights, self.config, as_measured)
 
 
 def cut_boxes(
     scan: Points,
     boxes: tuple[DetectorBox, ...],
-    mounting: Mounting,
+    heights: Float[np.ndarray, "n"],
     config: DriveConfig,
-    *,
-    as_measured: Points | None = None,
+    as_measured: Points,
 ) -> CutScan:
     """The points in each box that are not ground.
 
     Args:
         scan: whole, sensor frame, metres; it may be empty.
         boxes: in it.
-        mounting: of the sensor.
+        heights: of its points above the ground.
         config: see there.
         as_measured: the scan that the detector saw, if this one was corrected for motion.
     """
-    heights = height_above_ground(mounting.level(scan), mounting.height_m, config.ground)
     stands = np.nan_to_num(heights, nan=0.0) > config.clusters.lowest_m
-    above, seen = scan[stands], (scan if as_measured is None else as_measured)[stands]
+    above, seen = scan[stands], as_measured[stands]
     rows = points_in_boxes(seen, [one.box for one in boxes], config.detections)
     full = [
         (one, own) for one, own in zip(boxes, rows) if own.sum() >= config.detections.fewest_points

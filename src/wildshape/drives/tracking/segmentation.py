@@ -7,16 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.clusters import find_clusters
 from wildshape.drives.tracking.ground import height_above_ground
 from wildshape.drives.tracking.mounting import Mounting
+from wildshape.drives.tracking.trajectory import landmarks
 from wildshape.io.atomic import atomic_write
 from wildshape.io.guard import reading
-from wildshape.records import Points
+from wildshape.records import Points, Turn
 
 
 @dataclass(frozen=True)
@@ -40,21 +41,6 @@ class CutScan:
         return np.split(self.points, np.cumsum(self.counts)[:-1]) if len(self.counts) else []
 
 
-def cut(scan: Points, mounting: Mounting, config: DriveConfig) -> CutScan:
-    """The clusters of one scan that may be vehicles.
-
-    Args:
-        scan: whole, sensor frame, metres; it may be empty.
-        mounting: of the sensor.
-        config: see there.
-    """
-    level = mounting.level(scan)
-    heights = height_above_ground(level, mounting.height_m, config.ground)
-    parts = find_clusters(level, heights, config.clusters)
-    rows = np.concatenate(parts) if parts else np.empty(0, np.int64)
-    return CutScan(scan[rows], np.array([len(part) for part in parts], np.int64), len(scan))
-
-
 @dataclass(frozen=True)
 class Cutter:
     """Cuts the scans of a drive.
@@ -75,13 +61,44 @@ class Cutter:
         """The frames that have no file yet."""
         return [i for i in range(len(self.drive)) if not cut_file(self.folder, i).is_file()]
 
-    def cut(self, frame: int) -> CutScan:
-        """The clusters of one frame."""
-        return cut(self.drive.scan(frame), self.mounting, self.config)
-
     def __call__(self, frame: int) -> None:
         """Cut one scan and write its file."""
-        found = self.cut(frame)
+        turn = self.drive.turn(frame)
+        scan = self.drive.corrected(frame, turn)
+        self._write(frame, self.cut(frame, scan, self._heights(scan), turn.points))
+
+    def landmarks(self, frame: int) -> Turn:
+        """What odometry sees of a frame, which is cut on the way.
+
+        One whose points have times is not: it must be corrected for the motion first.
+        """
+        turn = self.drive.turn(frame)
+        heights = self._heights(turn.points)
+        if turn.seconds is None:
+            self._write(frame, self.cut(frame, turn.points, heights, turn.points))
+        return landmarks(turn, heights, self.mounting, self.config)
+
+    def cut(
+        self, frame: int, scan: Points, heights: Float[np.ndarray, "n"], as_measured: Points
+    ) -> CutScan:
+        """The clusters of a frame that may be vehicles.
+
+        Args:
+            frame: which.
+            scan: whole, sensor frame, metres; it may be empty.
+            heights: of its points above the ground.
+            as_measured: the same points before they were corrected for motion.
+        """
+        del frame, as_measured
+        parts = find_clusters(self.mounting.level(scan), heights, self.config.clusters)
+        rows = np.concatenate(parts) if parts else np.empty(0, np.int64)
+        return CutScan(scan[rows], np.array([len(part) for part in parts], np.int64), len(scan))
+
+    def _heights(self, scan: Points) -> Float[np.ndarray, "n"]:
+        level = self.mounting.level(scan)
+        return height_above_ground(level, self.mounting.height_m, self.config.ground)
+
+    def _write(self, frame: int, found: CutScan) -> None:
         scanned, tracks = np.array(found.scanned), np.array(found.tracks, np.str_)
         with atomic_write(cut_file(self.folder, frame)) as file:
             np.savez(file, points=found.points, counts=found.counts, scanned=scanned, tracks=tracks)

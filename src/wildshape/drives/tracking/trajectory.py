@@ -6,8 +6,9 @@ KISS-ICP: Vizzo et al., RA-L 2023. Rings of a level sensor on a flat road look t
 stands and hold the odometry back, so ground is used near the sensor alone, for height and tilt.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,7 +23,7 @@ from wildshape.errors import MissingExtraError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import STANDING, Twist
 from wildshape.io.guard import read_json, record_of
-from wildshape.records import Points
+from wildshape.records import Points, Turn
 
 if TYPE_CHECKING:
     from kiss_icp.kiss_icp import KissICP
@@ -83,6 +84,7 @@ def find_trajectory(
     mounting: Mounting,
     config: DriveConfig,
     at: Callable[[int], None] = lambda _: None,
+    turns: Iterable[Turn] | None = None,
 ) -> Way:
     """The way of the sensor; the world is the sensor frame of the first frame.
 
@@ -96,25 +98,28 @@ def find_trajectory(
         mounting: of its sensor.
         config: see there.
         at: told how many scans are done.
+        turns: the landmarks of each frame, in order; by default they are found here.
 
     Raises:
         MissingExtraError: KISS-ICP is not installed.
     """
     if drive.T_world_sensor is not None:
         return Way(drive.T_world_sensor[0].inverse() @ drive.T_world_sensor)
+    if turns is None:
+        turns = (_landmarks_of(drive.turn(frame), mounting, config) for frame in range(len(drive)))
+    rest = iter(turns)
+    first = list(islice(rest, _FIRST_SCANS))
     motion = STANDING
-    if drive.turn(0).seconds is not None:
-        first = range(min(len(drive), _FIRST_SCANS))
-        motion = _follow(drive, first, mounting, config, motion)[1].motion
-    poses, odometry = _follow(drive, range(len(drive)), mounting, config, motion, at)
+    if first[0].seconds is not None:
+        motion = _follow(drive, first, config, motion)[1].motion
+    poses, odometry = _follow(drive, chain(first, rest), config, motion, at)
     T_world_sensor = SE3.from_matrix(np.linalg.inv(poses[0]) @ np.stack(poses))
     return Way(T_world_sensor, Breaks(tuple(odometry.lost)))
 
 
 def _follow(
     drive: Drive,
-    frames: range,
-    mounting: Mounting,
+    turns: Iterable[Turn],
     config: DriveConfig,
     motion: Twist,
     at: Callable[[int], None] = lambda _: None,
@@ -122,11 +127,10 @@ def _follow(
     """Poses of the first frames, and the odometry after them; `motion`: before them."""
     odometry = _Odometry(config.trajectory, motion)
     poses = []
-    for frame in frames:
+    for frame, turn in enumerate(turns):
         if frame and _steps_differ(drive, frame):
             odometry.expect(_seconds(drive, frame))
-        scan = _landmarks(drive.turn(frame).carried(odometry.motion), mounting, config)
-        odometry.follow(scan, frame)
+        odometry.follow(turn.carried(odometry.motion), frame)
         if frame:
             odometry.learn(_seconds(drive, frame))
         poses.append(odometry.kiss.last_pose.copy())
@@ -199,12 +203,26 @@ def _steps_differ(drive: Drive, frame: int) -> bool:
     return bool(now != before)
 
 
-def _landmarks(scan: Points, mounting: Mounting, config: DriveConfig) -> Points:
-    """What stands on the ground, and the ground near the sensor."""
-    level = mounting.level(scan)
-    heights = height_above_ground(level, mounting.height_m, config.ground)
+def landmarks(
+    turn: Turn, heights: Float[np.ndarray, "n"], mounting: Mounting, config: DriveConfig
+) -> Turn:
+    """What stands on the ground, and the ground near the sensor.
+
+    Args:
+        turn: whole.
+        heights: of its points above the ground (`ground.py`).
+        mounting: of the sensor.
+        config: see there.
+    """
+    level = mounting.level(turn.points)
     near = np.hypot(level[:, 0], level[:, 1]) < config.trajectory.ground_m
-    return scan[near | (heights > config.trajectory.standing_m)]
+    kept = near | (heights > config.trajectory.standing_m)
+    return Turn(turn.points[kept], None if turn.seconds is None else turn.seconds[kept])
+
+
+def _landmarks_of(turn: Turn, mounting: Mounting, config: DriveConfig) -> Turn:
+    heights = height_above_ground(mounting.level(turn.points), mounting.height_m, config.ground)
+    return landmarks(turn, heights, mounting, config)
 
 
 def jumps(T_world_sensor: SE3, ticks: tuple[int, ...], config: TrajectoryConfig) -> Iterator[int]:
