@@ -159,12 +159,12 @@ class CompletionConfig:
     """Which scans of a track are completed (`completion.py`).
 
     Attributes:
-        looks: scans of a track that the network sees first, the fullest of equal parts of it.
-        worst_cost_m: tracks whose best first look costs more are no vehicles; those of a labelled
-            street cost less than 0.2 m.
-        least_nats: nor are those whose looks say less for a vehicle on average, the fuller the
-            heavier. Of 41 tracks of
-            vehicles in two drives none said less than -1.9, of 60 others half did.
+        looks: scans of a track that the network sees first, the fullest of those to complete.
+        worst_cost_m: tracks whose best look costs more are no vehicles; those of a labelled street
+            cost less than 0.2 m.
+        hopeless_nats: nor are those whose fullest scan says less for a vehicle.
+        least_nats: nor those whose looks say less on average, the fuller the heavier. No vehicle of
+            two real and of a simulated street said less than -1.9; of other things most do.
         worst_nats: no single look says less.
         scans: of a track that are completed together.
         ticks: between them; neighbours at 10 Hz are nearly the same scan.
@@ -173,7 +173,8 @@ class CompletionConfig:
 
     looks: int = 3
     worst_cost_m: float = 0.2
-    least_nats: float = -4.0
+    hopeless_nats: float = -5.0
+    least_nats: float = -3.0
     worst_nats: float = -6.0
     scans: int = 16
     ticks: int = 4

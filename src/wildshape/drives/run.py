@@ -280,7 +280,7 @@ class _Run:
         config = self.config.completion, self.config.vehicles
         folder = self.completing / "objects"
         completer = Completer(self.predictor, self.drive, self.cuts, folder, level, *config)
-        self.spread(stage, completer, completer.missing(objects), len(objects))
+        self.spread(stage, completer, completer.missing(objects), len(completer.groups(objects)))
 
     def completed(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Completed]:
         """Those that were not ruled out."""

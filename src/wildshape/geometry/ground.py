@@ -45,9 +45,9 @@ def skirt(
     """
     whole = points if shape is None else shape
     low = np.quantile(whole[:, 2], rule.ends)
-    body = whole[whole[:, 2] > low + rule.above_m, :2]
-    if len(body) < rule.fewest:
+    body = whole[whole[:, 2] > low + rule.above_m, :2].T
+    if body.shape[1] < rule.fewest:
         return np.zeros(len(points), dtype=bool)
-    near, far = np.quantile(body, (rule.ends, 1 - rule.ends), axis=0)
+    near, far = np.quantile(body.copy(), (rule.ends, 1 - rule.ends), axis=1)
     beside = (points[:, :2] < near - rule.beyond_m) | (points[:, :2] > far + rule.beyond_m)
     return (points[:, 2] < low + rule.low_m) & beside.any(axis=1)

@@ -8,7 +8,7 @@ best. A scan that turns out to be tilted is rolled upright, as the first look sa
 more; the cheaper answer speaks.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
@@ -64,7 +64,7 @@ class NetworkInput(NamedTuple):
 
 
 def network_input(
-    scans: list[Points], count: int, sensor: SensorKind, facing: bool = False
+    scans: Sequence[Points], count: int, sensor: SensorKind, facing: bool = False
 ) -> NetworkInput:
     """Scans as a network is given them; `facing` turns them towards their object."""
     ordered = [torch.from_numpy(sorted_points(scan)) for scan in scans]
@@ -190,6 +190,35 @@ class Found(NamedTuple):
     def replaced(self, rows: Int[Tensor, "b"], new: "Found") -> "Found":
         """With other answers for some of the scans."""
         return Found(*(old.index_copy(0, rows, part) for old, part in zip(self, new)))
+
+
+class Looked(NamedTuple):
+    """Scans, and what a network says of them.
+
+    Attributes:
+        scans: sensor frames, metres.
+        seen: the same without ground beside the object.
+        found: one row a scan.
+        sights: with the rays of their frames, where any are known.
+    """
+
+    scans: Sequence[Points]
+    seen: Sequence[Points]
+    found: Found
+    sights: Sights | None = None
+
+    @classmethod
+    def joined(cls, parts: Sequence["Looked"]) -> "Looked":
+        """All scans; those of no part have rays."""
+        found = Found(*(torch.cat(rows) for rows in zip(*(part.found for part in parts))))
+        scans, seen = ([one for part in parts for one in part[i]] for i in (0, 1))
+        return cls(scans, seen, found)
+
+    def each(self) -> list["Looked"]:
+        """Each scan by itself, without rays."""
+        rows = torch.arange(len(self.scans))[:, None]
+        both = zip(self.scans, self.seen, rows)
+        return [Looked([scan], [seen], self.found.part(row)) for scan, seen, row in both]
 
 
 class Posed(NamedTuple):

@@ -15,7 +15,14 @@ from wildshape.geometry.sampling import sorted_points
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.as_points import as_points, rays_of_each
 from wildshape.inference.boxes import box_seen
-from wildshape.inference.choose_hypothesis import Found, Posed, look, look_twice, network_input
+from wildshape.inference.choose_hypothesis import (
+    Found,
+    Looked,
+    Posed,
+    look,
+    look_twice,
+    network_input,
+)
 from wildshape.inference.compiled import compiled
 from wildshape.inference.confidence import (
     confidence_of,
@@ -34,7 +41,7 @@ from wildshape.io.scans.points import LEAST_POINTS
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint, weights_file
 from wildshape.method.network import ShapePoseNet
 from wildshape.ops.device import choose_device
-from wildshape.records import Completion, Points, Registration, Sensor
+from wildshape.records import Box, Completion, Points, Registration, Sensor
 
 BATCH = 32
 """Scans that are completed at once."""
@@ -178,7 +185,7 @@ class Predictor:
         for start in range(0, len(scans), BATCH):
             began = time.perf_counter()
             batch = list(scans[start : start + BATCH])
-            done = self._complete_batch(batch, sensor, rays[start : start + BATCH])
+            done = self.complete_looked(self.look(batch, rays[start : start + BATCH]), sensor)
             seconds = (time.perf_counter() - began) / len(batch)
             yield from (replace(item, seconds=seconds) for item in done)
 
@@ -186,14 +193,19 @@ class Predictor:
         self, scans: Sequence[Points], sensor: Sensor | None, rays: Rays = ()
     ) -> list[Completion]:
         began = time.perf_counter()
-        alone = list(self._each(scans, sensor, rays))
+        done = self.put_together(list(self._each(scans, sensor, rays)), scans, rays)
+        seconds = (time.perf_counter() - began) / max(len(done), 1)
+        return [replace(item, seconds=seconds) for item in done]
+
+    def put_together(
+        self, alone: list[Completion], scans: Sequence[Points], rays: Rays = ()
+    ) -> list[Completion]:
+        """One shape of a track's scans that were completed each on its own."""
         clouds = [
             self._off_ground(cloud, done.pose.inverse().apply_numpy(done.points), done.pose)
             for cloud, done in zip(scans, alone)
         ]
-        done = complete_together(alone, clouds, self.settings, self.config, rays)
-        seconds = (time.perf_counter() - began) / max(len(done), 1)
-        return [replace(item, seconds=seconds) for item in done]
+        return complete_together(alone, clouds, self.settings, self.config, rays)
 
     def register(
         self, source: object, target: object, sensor: Sensor | None = None
@@ -239,9 +251,8 @@ class Predictor:
         return fuse_scans(clouds, to_middle(stack([item.pose for item in done])))
 
     @torch.inference_mode()
-    def _complete_batch(
-        self, scans: list[Points], sensor: Sensor | None, rays: Rays
-    ) -> list[Completion]:
+    def look(self, scans: Sequence[Points], rays: Rays = ()) -> Looked:
+        """What the network says of scans, in one batch, before they are completed."""
         known = any(one is not None for one in rays)
         sights = Sights(scans, rays, self.config.free_space) if known else None
         found = self._found(scans, sights)
@@ -253,18 +264,33 @@ class Predictor:
             again = self._found([seen[int(row)] for row in rows], sights and sights.part(rows))
             found = found.replaced(rows, again)
             seen = self._off_their_ground(scans, found)
-        posed = (
-            self._refined([sorted_points(one) for one in seen], found)
-            if self.refines
-            else Posed.of(found)
-        )
-        clouds = zip(scans, seen)
-        return [
-            self._completion(*both, i, found, posed, sensor, sights)
-            for i, both in enumerate(clouds)
-        ]
+        return Looked(scans, seen, found, sights)
 
-    def _found(self, scans: list[Points], sights: Sights | None) -> Found:
+    def looks(self, scans: Sequence[Points]) -> list[Looked]:
+        """What the network says of each of many scans."""
+        batches = (scans[start : start + BATCH] for start in range(0, len(scans), BATCH))
+        return [one for batch in batches for one in self.look(batch).each()]
+
+    def complete_looks(self, looks: Sequence[Looked]) -> Iterator[Completion]:
+        """Completions of scans that were looked at, each on its own."""
+        for start in range(0, len(looks), BATCH):
+            yield from self.complete_looked(Looked.joined(looks[start : start + BATCH]))
+
+    def box_of(self, look: Looked) -> Box:
+        """The box of the network's own shape of one scan."""
+        shapes, rotation, translation, *_ = look.found
+        mirror, body = self.settings.network.mirror, self.settings.sensor != "camera"
+        pose, config = SE3(rotation[0], translation[0]), self.config.box
+        return box_seen(shapes[0], pose, look.seen[0], mirror=mirror, body=body, config=config)
+
+    @torch.inference_mode()
+    def complete_looked(self, looked: Looked, sensor: Sensor | None = None) -> list[Completion]:
+        """Completions of scans that were looked at, each on its own."""
+        found, seen = looked.found, [sorted_points(one) for one in looked.seen]
+        posed = self._refined(seen, found) if self.refines else Posed.of(found)
+        return [self._completion(looked, i, posed, sensor) for i in range(len(looked.scans))]
+
+    def _found(self, scans: Sequence[Points], sights: Sights | None) -> Found:
         """What the network says of scans, on the host."""
         of = self.settings
         inputs = network_input(scans, of.input_points, of.sensor, of.facing).to(self.device)
@@ -274,7 +300,7 @@ class Predictor:
             found = look(self.network, of, inputs, sights)
         return Found(*(part.cpu() for part in found))
 
-    def _off_their_ground(self, scans: list[Points], found: Found) -> list[Points]:
+    def _off_their_ground(self, scans: Sequence[Points], found: Found) -> list[Points]:
         """Each scan without the ground beside the object found in it."""
         return [
             self._off_ground(scan, shape.numpy(), SE3(rotation, translation))
@@ -294,16 +320,10 @@ class Predictor:
         return Posed(done.shapes, T_sensor_canonical, denser(posed, done.partner))
 
     def _completion(
-        self,
-        scan: Points,
-        seen: Points,
-        i: int,
-        found: Found,
-        posed: Posed,
-        sensor: Sensor | None,
-        sights: Sights | None,
+        self, looked: Looked, i: int, posed: Posed, sensor: Sensor | None
     ) -> Completion:
-        """Scan `i` of those found; `seen`: without ground."""
+        """Scan `i` of those looked at."""
+        scan, found, sights = looked.scans[i], looked.found, looked.sights
         mirror, cost, rule = self.settings.network.mirror, float(found.cost[i]), self.config.reasons
         features = features_of(scan, cost, found.features[i, :-1])
         warning = warning_of(scan, sensor, self.settings, rule)
@@ -318,7 +338,12 @@ class Predictor:
             points=with_scan(whole, len(shape), scan) if exact and self.refines else whole,
             pose=T_sensor_can.to(torch.float64),
             box=box_seen(
-                solid, T_sensor_can, seen, mirror=mirror, body=not exact, config=self.config.box
+                solid,
+                T_sensor_can,
+                looked.seen[i],
+                mirror=mirror,
+                body=not exact,
+                config=self.config.box,
             ),
             confidence=0.0 if warning else confidence_of(features, self.settings),
             branch=int(found.branch[i]),

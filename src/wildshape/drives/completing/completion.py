@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Complete shapes of the objects of a drive.
 
-The network first looks at a few scans of each; what costs too much or has no size of a vehicle
-is left there. Of the others some scans, spread over the track, are completed together.
+Of each some scans are chosen, spread over the track. The network looks at the fullest ones first;
+what costs too much or has no size of a vehicle is left there. The others are completed together.
 """
 
-from dataclasses import dataclass, replace
+import time
+from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,7 @@ from wildshape.drives.config import CompletionConfig, VehicleConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.choose_hypothesis import Looked
 from wildshape.inference.folders.complete_folder import OBJECTS, write_completed
 from wildshape.inference.predictor import Predictor
 from wildshape.io.atomic import write_json
@@ -23,11 +26,38 @@ from wildshape.io.boxes.detections import moved
 from wildshape.records import Completion, Points
 
 RULED_OUT, CATEGORY = "ruled_out.json", "car"
+_GROUP = 8  # objects that are worked on together
+
+
+@dataclass
+class _Candidate:
+    """An object that may be a vehicle.
+
+    Attributes:
+        chosen: in the frames that may be completed.
+        clouds: its points in them, level frames.
+        looks: the network's, at the fullest of them first.
+        nats: what each of these says for a vehicle.
+    """
+
+    chosen: Sightings
+    clouds: list[Points]
+    looks: list[Looked] = field(default_factory=list)
+    nats: list[float] = field(default_factory=list)
+
+    @property
+    def order(self) -> list[int]:
+        """Its scans, the fullest first."""
+        return sorted(range(len(self.clouds)), key=lambda i: -len(self.clouds[i]))
+
+    def in_time(self) -> list[Looked]:
+        """The looks at all scans in time order."""
+        return [look for _, look in sorted(zip(self.order, self.looks), key=lambda both: both[0])]
 
 
 @dataclass(frozen=True)
 class Completer:
-    """What completes the objects of one drive.
+    """What completes the objects of one drive, some at a time: networks are faster in batches.
 
     Attributes:
         predictor: completes and refines.
@@ -47,39 +77,69 @@ class Completer:
     config: CompletionConfig
     vehicles: VehicleConfig
 
-    def missing(self, objects: list[Sightings]) -> list[Sightings]:
-        """Those that are neither completed nor ruled out yet."""
+    def groups(self, objects: list[Sightings]) -> list[list[Sightings]]:
+        """The objects in groups that are worked on together, whatever was done before."""
+        return [objects[i : i + _GROUP] for i in range(0, len(objects), _GROUP)]
+
+    def missing(self, objects: list[Sightings]) -> list[list[Sightings]]:
+        """The groups of which one is neither completed nor ruled out yet."""
         done = (OBJECTS, RULED_OUT)
         return [
-            seen
-            for seen in objects
-            if not any((self.folder / seen.name / name).is_file() for name in done)
+            group
+            for group in self.groups(objects)
+            if not all(any((self.folder / one.name / n).is_file() for n in done) for one in group)
         ]
 
-    def __call__(self, seen: Sightings) -> None:
-        """Write an object as `complete --track` does, or `ruled_out.json`: what the looks said."""
-        folder = self.folder / seen.name
-        looks = fullest_of_parts(seen, self.config.looks)
-        found = list(self._looker().complete_many(self._clouds(looks)))
-        cost = min(look.cost for look in found)
-        said = [shape_nats(look.cost, look.box.size, self.vehicles) for look in found]
-        kept = [max(one, self.config.worst_nats) for one in said]
-        nats = float(np.average(kept, weights=looks.points))
-        if cost > self.config.worst_cost_m or nats < self.config.least_nats:
-            write_json(folder / RULED_OUT, {"cost_m": cost, "nats": nats})
-            return
-        chosen = keyframes(seen, self.config)
-        done = self.predictor.complete_track(self._clouds(chosen))
-        track = chosen.track(self.cuts, self.drive, CATEGORY)
-        T_level_sensor = self.T_level_sensor
-        if T_level_sensor is not None:
-            done = [_carried(one, T_level_sensor.inverse()) for one in done]
-        write_completed(folder, track, done, self.predictor, self.cuts)
+    def __call__(self, group: list[Sightings]) -> None:
+        """Write objects as `complete --track` does, or `ruled_out.json`: what the looks said.
 
-    def _looker(self) -> Predictor:
-        """The same network, its answers not refined."""
-        of = self.predictor
-        return Predictor(of.network, of.settings, raw=True, config=of.config)
+        The network is asked of the fullest scan of each, then of some, then of all.
+        """
+        began, of = time.perf_counter(), self.config
+        chosen = [keyframes(seen, of) for seen in group]
+        every = [_Candidate(one, self._clouds(one)) for one in chosen]
+        rounds = ((1, of.hopeless_nats), (of.looks, of.least_nats), (None, of.least_nats))
+        for count, least in rounds:
+            self._look(every, count)
+            every = [one for one in every if self._may_be_a_vehicle(one, least)]
+        alone = iter(
+            self.predictor.complete_looks([look for one in every for look in one.in_time()])
+        )
+        together = [
+            self.predictor.put_together(list(islice(alone, len(one.clouds))), one.clouds)
+            for one in every
+        ]
+        seconds = (time.perf_counter() - began) / max(sum(map(len, together)), 1)
+        for one, done in zip(every, together):
+            self._write(one.chosen, [replace(scan, seconds=seconds) for scan in done])
+
+    def _look(self, every: list[_Candidate], count: int | None) -> None:
+        """Look at so many scans of each, the fullest."""
+        asked = [(one, i) for one in every for i in one.order[len(one.looks) : count]]
+        found = self.predictor.looks([one.clouds[i] for one, i in asked])
+        for (one, _), look in zip(asked, found):
+            cost, size = float(look.found.cost), self.predictor.box_of(look).size
+            said = shape_nats(cost, size, self.vehicles)
+            one.looks.append(look)
+            one.nats.append(max(said, self.config.worst_nats))
+
+    def _may_be_a_vehicle(self, one: _Candidate, least_nats: float) -> bool:
+        """Whether its looks do not say too little on average, the fuller the heavier.
+
+        If they do, that is written.
+        """
+        cost = min(float(look.found.cost) for look in one.looks)
+        nats = float(np.average(one.nats, weights=[len(look.scans[0]) for look in one.looks]))
+        if cost <= self.config.worst_cost_m and nats >= least_nats:
+            return True
+        write_json(self.folder / one.chosen.name / RULED_OUT, {"cost_m": cost, "nats": nats})
+        return False
+
+    def _write(self, chosen: Sightings, done: list[Completion]) -> None:
+        if self.T_level_sensor is not None:
+            done = [_carried(one, self.T_level_sensor.inverse()) for one in done]
+        track = chosen.track(self.cuts, self.drive, CATEGORY)
+        write_completed(self.folder / chosen.name, track, done, self.predictor, self.cuts)
 
     def _clouds(self, seen: Sightings) -> list[Points]:
         clouds = seen.clouds(self.cuts)

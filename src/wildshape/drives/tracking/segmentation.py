@@ -4,6 +4,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,8 @@ from wildshape.drives.tracking.trajectory import landmarks
 from wildshape.io.atomic import atomic_write
 from wildshape.io.guard import reading
 from wildshape.records import Points, Turn
+
+_HELD = 64  # frames whose clusters are kept in memory
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,12 @@ class CutScan:
 
     def clusters(self) -> list[Points]:
         """The points of each cluster."""
-        return np.split(self.points, np.cumsum(self.counts)[:-1]) if len(self.counts) else []
+        return [self.cluster(row) for row in range(len(self.counts))]
+
+    def cluster(self, row: int) -> Points:
+        """The points of one."""
+        end = int(self.counts[: row + 1].sum())
+        return self.points[end - int(self.counts[row]) : end]
 
 
 @dataclass(frozen=True)
@@ -116,9 +124,17 @@ def read_cut(folder: Path, frame: int) -> CutScan:
         BadInputError: the file is missing or damaged.
     """
     path = cut_file(folder, frame)
-    with reading(path, "the clusters of a scan"), np.load(path, allow_pickle=False) as found:
-        tracks = tuple(found["tracks"].tolist())
-        return CutScan(found["points"], found["counts"], int(found["scanned"]), tracks)
+    with reading(path, "the clusters of a scan"):
+        return _read_cut(path, path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=_HELD)
+def _read_cut(path: Path, written_ns: int) -> CutScan:
+    """As it was then: objects that are neighbours in time are in the same frames."""
+    del written_ns
+    with np.load(path, allow_pickle=False) as found:
+        points, counts = found["points"], found["counts"]
+        return CutScan(points, counts, int(found["scanned"]), tuple(found["tracks"].tolist()))
 
 
 def read_cuts(folder: Path, count: int) -> Iterator[CutScan]:

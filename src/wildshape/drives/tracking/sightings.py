@@ -56,8 +56,8 @@ class Sightings:
         """Its points in each frame, sensor frame, metres."""
         found = []
         for frame, rows in zip(self.frames, self.rows):
-            clusters = read_cut(cuts, frame).clusters()
-            found.append(np.concatenate([clusters[row] for row in rows]))
+            cut = read_cut(cuts, frame)
+            found.append(np.concatenate([cut.cluster(row) for row in rows]))
         return found
 
     def track(self, cuts: Path, drive: Drive, category: str) -> Track:
