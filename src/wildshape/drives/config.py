@@ -44,6 +44,7 @@ class TrajectoryConfig:
         ground_m: ground farther away is not used.
         standing_m: what is higher above the ground is.
         voxel_m: size of the local map's cells.
+        settled: a scan has found its place when a step moves it by less, metres and radians.
         fits_m: points this near to one of the scan before fit it.
         least_fit: a scan of which a smaller share fits the one before was taken elsewhere: the
             odometry begins anew. On real and simulated streets 0.87 and more fit, of scans taken
@@ -56,7 +57,8 @@ class TrajectoryConfig:
     nearest_m: float = 2.0
     ground_m: float = 10.0
     standing_m: float = 0.2
-    voxel_m: float = 0.5
+    voxel_m: float = 0.75
+    settled: float = 1e-3
     fits_m: float = 1.0
     least_fit: float = 0.65
     jump_m: float = 2.0

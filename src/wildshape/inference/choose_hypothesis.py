@@ -210,8 +210,9 @@ class Looked(NamedTuple):
     @classmethod
     def joined(cls, parts: Sequence["Looked"]) -> "Looked":
         """All scans; those of no part have rays."""
-        found = Found(*(torch.cat(rows) for rows in zip(*(part.found for part in parts))))
-        scans, seen = ([one for part in parts for one in part[i]] for i in (0, 1))
+        found = Found(*(torch.cat(rows) for rows in zip(*[part.found for part in parts])))
+        scans = [one for part in parts for one in part.scans]
+        seen = [one for part in parts for one in part.seen]
         return cls(scans, seen, found)
 
     def each(self) -> list["Looked"]:

@@ -18,6 +18,9 @@ from wildshape.ops.connected import connected_parts
 from wildshape.records import Points
 
 _SIZED_BY = 1000  # points of a cluster that tell its size
+_TURNS = np.deg2rad(np.arange(0.0, 90.0, 2.0))
+_AHEAD = np.stack((np.cos(_TURNS), np.sin(_TURNS)), axis=1)
+_ASIDE = np.stack((-np.sin(_TURNS), np.cos(_TURNS)), axis=1)
 
 Rows = Int[np.ndarray, "k"]
 
@@ -128,9 +131,6 @@ def extents(points: Points) -> tuple[float, float]:
 def _axes(flat: Float[np.ndarray, "2 k"]) -> Float[np.ndarray, "2 2"]:
     """Of the rectangle of least area around points seen from above, of 2 degrees' steps; rows."""
     some = flat[:, :: 1 + flat.shape[1] // _SIZED_BY]
-    angles = np.deg2rad(np.arange(0.0, 90.0, 2.0))
-    ahead = np.stack((np.cos(angles), np.sin(angles)), axis=1)
-    aside = np.stack((-np.sin(angles), np.cos(angles)), axis=1)
-    areas = np.ptp(ahead @ some, axis=1) * np.ptp(aside @ some, axis=1)
+    areas = np.ptp(_AHEAD @ some, axis=1) * np.ptp(_ASIDE @ some, axis=1)
     best = areas.argmin()
-    return np.stack((ahead[best], aside[best]))
+    return np.stack((_AHEAD[best], _ASIDE[best]))

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import torch
 from jaxtyping import Float
 
 from wildshape.drives.config import DriveConfig, LinkConfig, TrajectoryConfig
@@ -23,6 +24,7 @@ from wildshape.errors import MissingExtraError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import STANDING, Twist
 from wildshape.io.guard import read_json, record_of
+from wildshape.ops.nearest import nearest
 from wildshape.records import Points, Turn
 
 if TYPE_CHECKING:
@@ -183,10 +185,9 @@ class _Odometry:
 
     def _fit(self, there: Float[np.ndarray, "n 3"]) -> float:
         """The share of a scan that lies on the one before."""
-        from scipy.spatial import KDTree
-
-        away, _ = KDTree(self._before).query(there, distance_upper_bound=self.config.fits_m)
-        return float(np.isfinite(away).mean())
+        clouds = (torch.from_numpy(points).float()[None] for points in (there, self._before))
+        away = nearest(*clouds).distance_squared
+        return float((away < self.config.fits_m**2).float().mean())
 
 
 def _seconds(drive: Drive, frame: int) -> float:
@@ -245,5 +246,6 @@ def _kiss_icp(config: TrajectoryConfig) -> "KissICP":
     settings.registration.max_num_threads = 1  # the same scans give the same way to the last bit
     settings.data.deskew = False  # done before, as for all other stages
     settings.data.min_range, settings.data.max_range = config.nearest_m, config.range_m
+    settings.registration.convergence_criterion = config.settled
     settings.mapping.voxel_size = config.voxel_m
     return KissICP(settings)
