@@ -8,6 +8,16 @@ They are written into `wildshape.json` of every result and can be set from Pytho
 
 from dataclasses import dataclass, field
 
+from wildshape.inference.config import InferenceConfig, JointIcpConfig, TrackConfig
+
+INFERENCE = InferenceConfig(
+    track=TrackConfig(
+        coarse=JointIcpConfig(rounds=8),
+        fine=JointIcpConfig(rounds=8, points=256, most=4096, holding=0.02),
+    )
+)
+"""How `drive` completes objects: tracks in fewer rounds, of fewer points; boxes are as good."""
+
 
 @dataclass(frozen=True)
 class MountingConfig:
@@ -176,7 +186,7 @@ class CompletionConfig:
     looks: int = 3
     worst_cost_m: float = 0.2
     hopeless_nats: float = -5.0
-    least_nats: float = -3.0
+    least_nats: float = -2.5
     worst_nats: float = -6.0
     scans: int = 16
     ticks: int = 4

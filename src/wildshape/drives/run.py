@@ -27,7 +27,7 @@ from wildshape.drives.completing.vehicles import (
     without_parts,
     write_judged,
 )
-from wildshape.drives.config import DriveConfig
+from wildshape.drives.config import INFERENCE, DriveConfig
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.result import FILES, DriveResult, earlier_result, line_of, settings_of
 from wildshape.drives.source import Drive
@@ -116,7 +116,7 @@ def drive(
         given = find_detections(detections, recording)
         recording = given.noted(recording)
         keep_apart(detections.path, out)
-    predictor = load() if predictor is None else predictor
+    predictor = load(config=INFERENCE) if predictor is None else predictor
     keep_apart(source, out)
     settings = settings_of(source, recording, topic, config, predictor, detections)
     line = line_of(source, out, topic, detections)

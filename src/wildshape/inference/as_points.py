@@ -54,6 +54,11 @@ def as_points(scan: object, name: str = "scan") -> Points:
     return points
 
 
+def all_as_points(scans: Sequence[object], first: int = 0) -> list[Points]:
+    """Scans handed in from Python; errors count them from `first`."""
+    return [as_points(scan, f"scan {i}") for i, scan in enumerate(scans, first)]
+
+
 def _coordinates(scan: object) -> object:
     """What of an object is its points; the object itself if it is an array of some kind."""
     if isinstance(scan, Tensor):

@@ -13,7 +13,7 @@ import torch
 from wildshape.geometry.ground import skirt
 from wildshape.geometry.sampling import sorted_points
 from wildshape.geometry.transforms.se3 import SE3, stack
-from wildshape.inference.as_points import as_points, rays_of_each
+from wildshape.inference.as_points import all_as_points, as_points, rays_of_each
 from wildshape.inference.boxes import box_seen
 from wildshape.inference.choose_hypothesis import (
     Found,
@@ -41,7 +41,7 @@ from wildshape.io.scans.points import LEAST_POINTS
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint, weights_file
 from wildshape.method.network import ShapePoseNet
 from wildshape.ops.device import choose_device
-from wildshape.records import Box, Completion, Points, Registration, Sensor
+from wildshape.records import Completion, Points, Registration, Sensor
 
 BATCH = 32
 """Scans that are completed at once."""
@@ -146,7 +146,7 @@ class Predictor:
         known = rays_of_each(rays, scans)
         for start in range(0, len(scans), BATCH):
             part = slice(start, start + BATCH)
-            yield from self._each(_checked(scans[part], start), sensor, known[part])
+            yield from self._each(all_as_points(scans[part], start), sensor, known[part])
 
     def complete_track(
         self,
@@ -163,7 +163,7 @@ class Predictor:
         Raises:
             BadInputError: a scan is not `(n, 3)`, or has fewer than 16 finite points.
         """
-        return self._together(_checked(scans), sensor, rays_of_each(rays, scans))
+        return self._together(all_as_points(scans), sensor, rays_of_each(rays, scans))
 
     def complete_checked(
         self,
@@ -236,7 +236,7 @@ class Predictor:
         self, scans: Sequence[object], sensor: Sensor | None = None, *, track: bool = False
     ) -> SE3:
         """`T_sensor_canonical` of each scan; `track` as in `register_track`."""
-        done = self.complete_checked(_checked(scans), sensor, track=track)
+        done = self.complete_checked(all_as_points(scans), sensor, track=track)
         return stack([item.pose for item in done])
 
     def fuse(
@@ -246,7 +246,7 @@ class Predictor:
 
         `track` as in `register_track`.
         """
-        clouds = _checked(scans)
+        clouds = all_as_points(scans)
         done = self.complete_checked(clouds, sensor, track=track)
         return fuse_scans(clouds, to_middle(stack([item.pose for item in done])))
 
@@ -265,23 +265,6 @@ class Predictor:
             found = found.replaced(rows, again)
             seen = self._off_their_ground(scans, found)
         return Looked(scans, seen, found, sights)
-
-    def looks(self, scans: Sequence[Points]) -> list[Looked]:
-        """What the network says of each of many scans."""
-        batches = (scans[start : start + BATCH] for start in range(0, len(scans), BATCH))
-        return [one for batch in batches for one in self.look(batch).each()]
-
-    def complete_looks(self, looks: Sequence[Looked]) -> Iterator[Completion]:
-        """Completions of scans that were looked at, each on its own."""
-        for start in range(0, len(looks), BATCH):
-            yield from self.complete_looked(Looked.joined(looks[start : start + BATCH]))
-
-    def box_of(self, look: Looked) -> Box:
-        """The box of the network's own shape of one scan."""
-        shapes, rotation, translation, *_ = look.found
-        mirror, body = self.settings.network.mirror, self.settings.sensor != "camera"
-        pose, config = SE3(rotation[0], translation[0]), self.config.box
-        return box_seen(shapes[0], pose, look.seen[0], mirror=mirror, body=body, config=config)
 
     @torch.inference_mode()
     def complete_looked(self, looked: Looked, sensor: Sensor | None = None) -> list[Completion]:
@@ -367,8 +350,3 @@ class Predictor:
         T_canonical_sensor = T_sensor_canonical.to(torch.float64).inverse()
         kept = scan[~skirt(T_canonical_sensor.apply_numpy(scan), shape)]
         return kept if len(kept) >= LEAST_POINTS else scan
-
-
-def _checked(scans: Sequence[object], first: int = 0) -> list[Points]:
-    """Scans handed in from Python; errors count them from `first`."""
-    return [as_points(scan, f"scan {i}") for i, scan in enumerate(scans, first)]

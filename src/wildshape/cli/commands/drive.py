@@ -132,6 +132,7 @@ def run(settings: Settings) -> None:
     """
     from wildshape.cli.terminal import say
     from wildshape.drives.adapting.adapt import adapt_to
+    from wildshape.drives.config import INFERENCE
     from wildshape.drives.writing.files import DriveFiles
     from wildshape.inference.predictor import load
     from wildshape.report.drive.many import DriveAndPage
@@ -142,7 +143,7 @@ def run(settings: Settings) -> None:
     files, detections = _files(settings), _detections(settings, drives)
     files.check()
     task = DriveAndPage(
-        predictor=load(settings.network.model, settings.network.device),
+        predictor=load(settings.network.model, settings.network.device, config=INFERENCE),
         topic=settings.topic,
         files=files,
         detections=detections,

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wildshape.drives.completing.looking import box_of, completed, looks_at
 from wildshape.drives.completing.vehicles import shape_nats
 from wildshape.drives.config import CompletionConfig, VehicleConfig
 from wildshape.drives.source import Drive
@@ -102,9 +103,7 @@ class Completer:
         for count, least in rounds:
             self._look(every, count)
             every = [one for one in every if self._may_be_a_vehicle(one, least)]
-        alone = iter(
-            self.predictor.complete_looks([look for one in every for look in one.in_time()])
-        )
+        alone = completed([look for one in every for look in one.in_time()], self.predictor)
         together = [
             self.predictor.put_together(list(islice(alone, len(one.clouds))), one.clouds)
             for one in every
@@ -116,9 +115,9 @@ class Completer:
     def _look(self, every: list[_Candidate], count: int | None) -> None:
         """Look at so many scans of each, the fullest."""
         asked = [(one, i) for one in every for i in one.order[len(one.looks) : count]]
-        found = self.predictor.looks([one.clouds[i] for one, i in asked])
+        found = looks_at([one.clouds[i] for one, i in asked], self.predictor)
         for (one, _), look in zip(asked, found):
-            cost, size = float(look.found.cost), self.predictor.box_of(look).size
+            cost, size = float(look.found.cost), box_of(look, self.predictor).size
             said = shape_nats(cost, size, self.vehicles)
             one.looks.append(look)
             one.nats.append(max(said, self.config.worst_nats))

@@ -1,0 +1,31 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The network's looks at many scans, of whatever objects, before any is completed."""
+
+from collections.abc import Iterator, Sequence
+
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.boxes import box_seen
+from wildshape.inference.choose_hypothesis import Looked
+from wildshape.inference.predictor import BATCH, Predictor
+from wildshape.records import Box, Completion, Points
+
+
+def looks_at(scans: Sequence[Points], predictor: Predictor) -> list[Looked]:
+    """What a network says of each scan."""
+    batches = (scans[start : start + BATCH] for start in range(0, len(scans), BATCH))
+    return [one for batch in batches for one in predictor.look(batch).each()]
+
+
+def completed(looks: Sequence[Looked], predictor: Predictor) -> Iterator[Completion]:
+    """Each scan that was looked at, completed on its own."""
+    for start in range(0, len(looks), BATCH):
+        yield from predictor.complete_looked(Looked.joined(looks[start : start + BATCH]))
+
+
+def box_of(look: Looked, predictor: Predictor) -> Box:
+    """The box of the network's own shape of one scan, not refined."""
+    shapes, rotation, translation, *_ = look.found
+    mirror, body = predictor.settings.network.mirror, predictor.settings.sensor != "camera"
+    pose, config = SE3(rotation[0], translation[0]), predictor.config.box
+    return box_seen(shapes[0], pose, look.seen[0], mirror=mirror, body=body, config=config)
