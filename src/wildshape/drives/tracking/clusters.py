@@ -111,7 +111,8 @@ def connected(points: Float[np.ndarray, "n 3"], reach: float, thin: float = 0.25
     number = np.ravel_multi_index(tuple((cells - cells.min(0)).T), np.ptp(cells, axis=0) + 1)
     _, first, cell = np.unique(number, return_index=True, return_inverse=True)
     label = connected_parts(points[first].astype(np.float32), reach)[cell]
-    order = np.argsort(label, kind="stable")
+    few = label.astype(np.min_scalar_type(label.max()))  # sorted by digits
+    order = np.argsort(few, kind="stable")
     parts = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
     return sorted(parts, key=len, reverse=True)
 
