@@ -175,8 +175,9 @@ class CompletionConfig:
         worst_cost_m: tracks whose best look costs more are no vehicles; those of a labelled street
             cost less than 0.2 m.
         hopeless_nats: nor are those whose fullest scan says less for a vehicle.
-        least_nats: nor those whose looks say less on average, the fuller the heavier. No vehicle of
-            two real and of a simulated street said less than -1.9; of other things most do.
+        least_nats: nor those whose looks say less on average, the fuller the heavier. No whole
+            vehicle of three streets said less than -1.9, though fragments may; half of all else do.
+        doubtful_nats: of those whose looks say less no other scans are completed.
         worst_nats: no single look says less.
         scans: of a track that are completed together.
         ticks: between them; neighbours at 10 Hz are nearly the same scan.
@@ -186,7 +187,8 @@ class CompletionConfig:
     looks: int = 3
     worst_cost_m: float = 0.2
     hopeless_nats: float = -5.0
-    least_nats: float = -2.5
+    least_nats: float = -4.0
+    doubtful_nats: float = -2.0
     worst_nats: float = -6.0
     scans: int = 16
     ticks: int = 4

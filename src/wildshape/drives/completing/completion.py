@@ -7,6 +7,7 @@ what costs too much or has no size of a vehicle is left there. The others are co
 """
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
@@ -51,9 +52,20 @@ class _Candidate:
         """Its scans, the fullest first."""
         return sorted(range(len(self.clouds)), key=lambda i: -len(self.clouds[i]))
 
+    @property
+    def looked_at(self) -> Sightings:
+        """The object in the frames that were looked at."""
+        return self.chosen.part(sorted(self.order[: len(self.looks)]))
+
+    @property
     def in_time(self) -> list[Looked]:
-        """The looks at all scans in time order."""
+        """The looks in time order."""
         return [look for _, look in sorted(zip(self.order, self.looks), key=lambda both: both[0])]
+
+    @property
+    def said(self) -> float:
+        """What the looks say for a vehicle on average, the fuller the heavier."""
+        return float(np.average(self.nats, weights=[len(look.scans[0]) for look in self.looks]))
 
 
 @dataclass(frozen=True)
@@ -94,23 +106,26 @@ class Completer:
     def __call__(self, group: list[Sightings]) -> None:
         """Write objects as `complete --track` does, or `ruled_out.json`: what the looks said.
 
-        The network is asked of the fullest scan of each, then of some, then of all.
+        The network is asked of the fullest scan of each, then of some, then of all where these do
+        not speak against a vehicle.
         """
         began, of = time.perf_counter(), self.config
         chosen = [keyframes(seen, of) for seen in group]
         every = [_Candidate(one, self._clouds(one)) for one in chosen]
-        rounds = ((1, of.hopeless_nats), (of.looks, of.least_nats), (None, of.least_nats))
-        for count, least in rounds:
+        for count, least in ((1, of.hopeless_nats), (of.looks, of.least_nats)):
             self._look(every, count)
             every = [one for one in every if self._may_be_a_vehicle(one, least)]
-        alone = completed([look for one in every for look in one.in_time()], self.predictor)
-        together = [
-            self.predictor.put_together(list(islice(alone, len(one.clouds))), one.clouds)
-            for one in every
-        ]
+        self._look([one for one in every if one.said >= of.doubtful_nats], None)
+        alone = completed([look for one in every for look in one.in_time], self.predictor)
+        together = [self._together(alone, one) for one in every]
         seconds = (time.perf_counter() - began) / max(sum(map(len, together)), 1)
         for one, done in zip(every, together):
-            self._write(one.chosen, [replace(scan, seconds=seconds) for scan in done])
+            self._write(one.looked_at, [replace(scan, seconds=seconds) for scan in done])
+
+    def _together(self, alone: Iterator[Completion], one: _Candidate) -> list[Completion]:
+        """The next of those completed alone are of this object."""
+        done = list(islice(alone, len(one.looks)))
+        return self.predictor.put_together(done, [look.scans[0] for look in one.in_time])
 
     def _look(self, every: list[_Candidate], count: int | None) -> None:
         """Look at so many scans of each, the fullest."""
@@ -123,15 +138,12 @@ class Completer:
             one.nats.append(max(said, self.config.worst_nats))
 
     def _may_be_a_vehicle(self, one: _Candidate, least_nats: float) -> bool:
-        """Whether its looks do not say too little on average, the fuller the heavier.
-
-        If they do, that is written.
-        """
+        """Whether its looks do not say too little; if they do, that is written."""
         cost = min(float(look.found.cost) for look in one.looks)
-        nats = float(np.average(one.nats, weights=[len(look.scans[0]) for look in one.looks]))
-        if cost <= self.config.worst_cost_m and nats >= least_nats:
+        if cost <= self.config.worst_cost_m and one.said >= least_nats:
             return True
-        write_json(self.folder / one.chosen.name / RULED_OUT, {"cost_m": cost, "nats": nats})
+        said = {"cost_m": cost, "nats": one.said}
+        write_json(self.folder / one.chosen.name / RULED_OUT, said)
         return False
 
     def _write(self, chosen: Sightings, done: list[Completion]) -> None:
