@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 import trimesh
 from pyarrow import feather
 from tests.drives.street import street, write_scans
@@ -22,10 +23,12 @@ from wildshape.drives import run
 from wildshape.drives.adapting import second_pass
 from wildshape.drives.adapting.adapt import Adaptation
 from wildshape.drives.adapting.config import AdaptConfig
-from wildshape.drives.config import ClusterConfig, DriveConfig
+from wildshape.drives.completing.completion import Completer
+from wildshape.drives.config import INFERENCE, ClusterConfig, DriveConfig
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.tracking.mounting import Mounting
-from wildshape.drives.tracking.segmentation import Cutter
+from wildshape.drives.tracking.segmentation import Cutter, read_cut
+from wildshape.drives.tracking.sightings import read_sightings
 from wildshape.drives.tracking.trajectory import find_trajectory
 from wildshape.drives.writing.files import DriveFiles
 from wildshape.geometry.footprint import footprint_iou
@@ -305,6 +308,47 @@ def test_scans_are_in_memory_one_by_one(recording, tmp_path):
         cutter(frame)
     assert cutter.missing() == []
     assert most <= 2
+
+
+def test_a_scan_is_read_once_for_the_way_and_its_clusters(recording, tmp_path):
+    drive = open_drive(recording)
+    read = drive.read
+    frames = []
+    object.__setattr__(drive, "read", lambda frame: frames.append(frame) or read(frame))
+    cutter = Cutter(drive, LEVEL, tmp_path / "cuts", DriveConfig())
+    turns = map(cutter.landmarks, range(len(drive)))
+    found = find_trajectory(drive, LEVEL, DriveConfig(), turns=turns)
+    assert frames == list(range(len(drive)))
+    assert cutter.missing() == []
+    alone = find_trajectory(drive, LEVEL, DriveConfig())
+    assert torch.equal(found.T_world_sensor.matrix, alone.T_world_sensor.matrix)
+    again = replace(cutter, folder=tmp_path / "again")
+    again(3)
+    cut, other = (read_cut(one.folder, 3).points for one in (cutter, again))
+    assert np.array_equal(cut, other)
+
+
+def test_what_is_missing_of_a_group_is_completed_as_it_was(found, recording, tmp_path):
+    of, stages = DriveConfig(), found.out / "stages"
+    completer = Completer(
+        wildshape.load(config=INFERENCE),
+        open_drive(recording),
+        stages / "clusters",
+        tmp_path,
+        None,
+        of.completion,
+        of.vehicles,
+    )
+    objects = read_sightings(stages / "tracks.json")
+    (group, *_) = completer.missing(objects)
+    completer(group)
+    before = {file: file.read_bytes() for file in tmp_path.rglob("*.ply")}
+    assert before
+    lost = next(iter(before)).parents[1]
+    shutil.rmtree(lost)
+    assert completer.missing(objects)[0] == group
+    completer(group)
+    assert {file: file.read_bytes() for file in tmp_path.rglob("*.ply")} == before
 
 
 def test_three_scans_an_empty_and_a_damaged_one_are_warnings(recording, tmp_path):

@@ -174,7 +174,8 @@ class CompletionConfig:
         looks: scans of a track that the network sees first, the fullest of those to complete.
         worst_cost_m: tracks whose best look costs more are no vehicles; those of a labelled street
             cost less than 0.2 m.
-        hopeless_nats: nor are those whose fullest scan says less for a vehicle.
+        hopeless_cost_m: nor are those whose fullest scan costs more.
+        hopeless_nats: nor those whose fullest scan says less for a vehicle.
         least_nats: nor those whose looks say less on average, the fuller the heavier. No whole
             vehicle of three streets said less than -1.9, though fragments may; half of all else do.
         doubtful_nats: of those whose looks say less no other scans are completed.
@@ -186,6 +187,7 @@ class CompletionConfig:
 
     looks: int = 3
     worst_cost_m: float = 0.2
+    hopeless_cost_m: float = 0.22
     hopeless_nats: float = -5.0
     least_nats: float = -4.0
     doubtful_nats: float = -2.0

@@ -63,6 +63,11 @@ class _Candidate:
         return [look for _, look in sorted(zip(self.order, self.looks), key=lambda both: both[0])]
 
     @property
+    def cost(self) -> float:
+        """The least of the looks, metres."""
+        return min(float(look.found.cost) for look in self.looks)
+
+    @property
     def said(self) -> float:
         """What the looks say for a vehicle on average, the fuller the heavier."""
         return float(np.average(self.nats, weights=[len(look.scans[0]) for look in self.looks]))
@@ -112,9 +117,12 @@ class Completer:
         began, of = time.perf_counter(), self.config
         chosen = [keyframes(seen, of) for seen in group]
         every = [_Candidate(one, self._clouds(one)) for one in chosen]
-        for count, least in ((1, of.hopeless_nats), (of.looks, of.least_nats)):
+        for count, cost_m, nats in (
+            (1, of.hopeless_cost_m, of.hopeless_nats),
+            (of.looks, of.worst_cost_m, of.least_nats),
+        ):
             self._look(every, count)
-            every = [one for one in every if self._may_be_a_vehicle(one, least)]
+            every = [one for one in every if self._may_be_a_vehicle(one, cost_m, nats)]
         self._look([one for one in every if one.said >= of.doubtful_nats], None)
         alone = completed([look for one in every for look in one.in_time], self.predictor)
         together = [self._together(alone, one) for one in every]
@@ -137,12 +145,11 @@ class Completer:
             one.looks.append(look)
             one.nats.append(max(said, self.config.worst_nats))
 
-    def _may_be_a_vehicle(self, one: _Candidate, least_nats: float) -> bool:
-        """Whether its looks do not say too little; if they do, that is written."""
-        cost = min(float(look.found.cost) for look in one.looks)
-        if cost <= self.config.worst_cost_m and one.said >= least_nats:
+    def _may_be_a_vehicle(self, one: _Candidate, worst_cost_m: float, least_nats: float) -> bool:
+        """Whether its looks do not speak against it; if they do, that is written."""
+        if one.cost <= worst_cost_m and one.said >= least_nats:
             return True
-        said = {"cost_m": cost, "nats": one.said}
+        said = {"cost_m": one.cost, "nats": one.said}
         write_json(self.folder / one.chosen.name / RULED_OUT, said)
         return False
 
