@@ -11,7 +11,7 @@ import torch
 
 from wildshape.drives.completing.boxes import moves, smooth
 from wildshape.drives.completing.claims import claim
-from wildshape.drives.completing.completion import fullest_of_parts, keyframes
+from wildshape.drives.completing.completion import fullest_of_parts, keyframes, order_of_looks
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed
 from wildshape.drives.completing.vehicles import judge, stated, vehicle_confidence
@@ -34,6 +34,8 @@ def test_the_fullest_scan_of_each_part_is_completed():
     assert fullest_of_parts(one, 3, fewest_points=60).frames == (1, 4)
     assert fullest_of_parts(one, 3, fewest_points=1000).frames == (1,)
     assert keyframes(one, CompletionConfig(scans=4, ticks=4, fewest_points=0)).frames == (1, 4, 8)
+    assert order_of_looks(one, 3) == [1, 4, 8, 0, 2, 3, 5, 6, 7]
+    assert order_of_looks(one.part([3, 4]), 3) == [1, 0]
 
 
 def completed(boxes, frames=None, name="a", size=(4.0, 1.8, 1.5), cost=0.1, parts=()):

@@ -171,7 +171,8 @@ class CompletionConfig:
     """Which scans of a track are completed (`completion.py`).
 
     Attributes:
-        looks: scans of a track that the network sees first, the fullest of those to complete.
+        looks: scans of a track that the network sees first, the fullest of equal parts of those to
+            complete.
         worst_cost_m: tracks whose best look costs more are no vehicles; those of a labelled street
             cost less than 0.2 m.
         hopeless_cost_m: nor are those whose fullest scan costs more.

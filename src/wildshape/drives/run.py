@@ -342,11 +342,9 @@ class _Run:
         points = [cut.scanned for cut in read_cuts(self.cuts, len(self.drive))]
         write_frames(self.out / FRAMES, self.drive, points)
         found = list(self.drive.warnings)
-        empty = points.count(0)
-        if empty:
+        if empty := points.count(0):
             found.append(f"{empty} of {len(points)} scans are empty or cannot be read")
         found += self.breaks.told()
-        leaps = list(jumps(T_world_sensor, self.drive.ticks, self.config.trajectory))
-        if leaps:
+        if leaps := list(jumps(T_world_sensor, self.drive.ticks, self.config.trajectory)):
             found.append(f"the sensor jumps {len(leaps)} times, first at frame {leaps[0]}")
         return tuple(found)

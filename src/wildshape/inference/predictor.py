@@ -306,7 +306,7 @@ class Predictor:
         self, looked: Looked, i: int, posed: Posed, sensor: Sensor | None
     ) -> Completion:
         """Scan `i` of those looked at."""
-        scan, found, sights = looked.scans[i], looked.found, looked.sights
+        scan, seen, found, sights = looked.scans[i], looked.seen[i], looked.found, looked.sights
         mirror, cost, rule = self.settings.network.mirror, float(found.cost[i]), self.config.reasons
         features = features_of(scan, cost, found.features[i, :-1])
         warning = warning_of(scan, sensor, self.settings, rule)
@@ -321,12 +321,7 @@ class Predictor:
             points=with_scan(whole, len(shape), scan) if exact and self.refines else whole,
             pose=T_sensor_can.to(torch.float64),
             box=box_seen(
-                solid,
-                T_sensor_can,
-                looked.seen[i],
-                mirror=mirror,
-                body=not exact,
-                config=self.config.box,
+                solid, T_sensor_can, seen, mirror=mirror, body=not exact, config=self.config.box
             ),
             confidence=0.0 if warning else confidence_of(features, self.settings),
             branch=int(found.branch[i]),

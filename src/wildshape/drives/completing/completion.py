@@ -38,19 +38,16 @@ class _Candidate:
     Attributes:
         chosen: in the frames that may be completed.
         clouds: its points in them, level frames.
-        looks: the network's, at the fullest of them first.
+        order: in which they are looked at.
+        looks: the network's, in that order.
         nats: what each of these says for a vehicle.
     """
 
     chosen: Sightings
     clouds: list[Points]
+    order: list[int]
     looks: list[Looked] = field(default_factory=list)
     nats: list[float] = field(default_factory=list)
-
-    @property
-    def order(self) -> list[int]:
-        """Its scans, the fullest first."""
-        return sorted(range(len(self.clouds)), key=lambda i: -len(self.clouds[i]))
 
     @property
     def looked_at(self) -> Sightings:
@@ -111,12 +108,14 @@ class Completer:
     def __call__(self, group: list[Sightings]) -> None:
         """Write objects as `complete --track` does, or `ruled_out.json`: what the looks said.
 
-        The network is asked of the fullest scan of each, then of some, then of all where these do
-        not speak against a vehicle.
+        The network is asked of the fullest scan of each, then of some spread over its time, then of
+        all where these do not speak against a vehicle.
         """
         began, of = time.perf_counter(), self.config
         chosen = [keyframes(seen, of) for seen in group]
-        every = [_Candidate(one, self._clouds(one)) for one in chosen]
+        every = [
+            _Candidate(one, self._clouds(one), order_of_looks(one, of.looks)) for one in chosen
+        ]
         for count, cost_m, nats in (
             (1, of.hopeless_cost_m, of.hopeless_nats),
             (of.looks, of.worst_cost_m, of.least_nats),
@@ -136,7 +135,7 @@ class Completer:
         return self.predictor.put_together(done, [look.scans[0] for look in one.in_time])
 
     def _look(self, every: list[_Candidate], count: int | None) -> None:
-        """Look at so many scans of each, the fullest."""
+        """Look at the first so many scans of each."""
         asked = [(one, i) for one in every for i in one.order[len(one.looks) : count]]
         found = looks_at([one.clouds[i] for one, i in asked], self.predictor)
         for (one, _), look in zip(asked, found):
@@ -164,6 +163,15 @@ class Completer:
         if self.T_level_sensor is None:
             return clouds
         return [self.T_level_sensor.apply_numpy(cloud) for cloud in clouds]
+
+
+def order_of_looks(seen: Sightings, parts: int) -> list[int]:
+    """Places of an object's frames: the fullest of each of some parts first, the fullest first."""
+    places = np.arange(len(seen.frames))
+    some = [part.tolist() for part in np.array_split(places, min(parts, len(places)))]
+    first = [max(part, key=lambda place: seen.points[place]) for part in some]
+    first.sort(key=lambda place: -seen.points[place])
+    return [*first, *(place for place in places.tolist() if place not in first)]
 
 
 def keyframes(seen: Sightings, config: CompletionConfig) -> Sightings:
