@@ -164,6 +164,7 @@ def run(settings: Settings) -> None:
                 outs, settings.out, task.predictor, adapt, overwrite=task.overwrite, watch=watch
             )
         task = replace(task, adapt=change, overwrite=False)
+        drives = dict.fromkeys(drives, "")  # said already
     _answer(find(task, folders, drives, settings), change, settings, several=several)
 
 
