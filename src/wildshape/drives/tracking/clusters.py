@@ -95,7 +95,7 @@ def _without_overhang(scan: _Above, rows: Rows, config: ClusterConfig) -> Int[np
         return rows
     flat = scan.points[rows, :2].T.astype(np.float64)
     axes = _axes(flat[:, low])
-    below, above = axes @ flat[:, low], axes @ flat[:, ~low]
+    below, above = _along(axes, flat[:, low]), _along(axes, flat[:, ~low])
     ends, begins = below.max(1, keepdims=True), below.min(1, keepdims=True)
     beyond = np.maximum(above - ends, begins - above).max(0)
     return rows[low] if (beyond > config.beyond_m).mean() > config.beyond else rows
@@ -125,13 +125,20 @@ def _stands(heights: Float[np.ndarray, "k"], config: ClusterConfig) -> bool:
 def extents(points: Points) -> tuple[float, float]:
     """Length and width of the upright rectangle of least area, of 2 degrees' steps, metres."""
     flat = points[:, :2].T.astype(np.float64)
-    width, length = np.sort(np.ptp(_axes(flat) @ flat, axis=1))
+    width, length = np.sort(np.ptp(_along(_axes(flat), flat), axis=1))
     return float(length), float(width)
 
 
 def _axes(flat: Float[np.ndarray, "2 k"]) -> Float[np.ndarray, "2 2"]:
     """Of the rectangle of least area around points seen from above, of 2 degrees' steps; rows."""
     some = flat[:, :: 1 + flat.shape[1] // _SIZED_BY]
-    areas = np.ptp(_AHEAD @ some, axis=1) * np.ptp(_ASIDE @ some, axis=1)
+    areas = np.ptp(_along(_AHEAD, some), axis=1) * np.ptp(_along(_ASIDE, some), axis=1)
     best = areas.argmin()
     return np.stack((_AHEAD[best], _ASIDE[best]))
+
+
+def _along(
+    axes: Float[np.ndarray, "a 2"], flat: Float[np.ndarray, "2 k"]
+) -> Float[np.ndarray, "a k"]:
+    """Coordinates along axes: a product of matrices, for which BLAS would wake its threads."""
+    return axes[:, :1] * flat[0] + axes[:, 1:] * flat[1]
