@@ -7,6 +7,7 @@ after torch has started its threads may hang, and a spawned child would run the 
 again where that has no `if __name__ == "__main__"`. It ends with its parent.
 """
 
+import gc
 import os
 import pickle
 import subprocess
@@ -154,13 +155,23 @@ class _Work:
 
     def answer(self, kind: str, payload: bytes) -> Any:
         """What the task makes of an item; nothing for a task that is understood."""
+        if kind == "task":
+            return self._learn(payload)
         loaded = guarded(pickle.loads, payload)
         if isinstance(loaded, Exception):
             return loaded
-        if kind == "task":
-            self._task = loaded
-            return None
         return guarded(cast("Callable[[Any], Any]", self._task), loaded)
+
+    def _learn(self, payload: bytes) -> Exception | None:
+        """Import what the task needs; modules live as long as the process and are no garbage."""
+        gc.disable()
+        loaded = guarded(pickle.loads, payload)
+        gc.freeze()
+        gc.enable()
+        if isinstance(loaded, Exception):
+            return loaded
+        self._task = loaded
+        return None
 
 
 def _receive(source: BinaryIO, messages: "SimpleQueue[tuple[str, bytes]]") -> None:

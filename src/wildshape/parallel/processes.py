@@ -15,7 +15,7 @@ from wildshape.parallel.helper import Helper, UnknownTaskError
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-_AHEAD = 4
+_AHEAD = 16
 _WORTH_S = 1.0
 """Shorter work is done here: a helper needs as long to import what it needs."""
 
@@ -99,12 +99,9 @@ class _Assistant:
         self._jobs.put((task, handout))
 
     def close(self) -> None:
-        """End the helper and this thread."""
-        if self._thread.ident is None:
-            return
+        """End the helper, and soon this thread: it may wait for an import of the caller's."""
         self._jobs.put(None)
         self._helper.close()
-        self._thread.join()
 
     def _run(self) -> None:
         for task, handout in iter(self._jobs.get, None):
