@@ -80,8 +80,8 @@ class Killed(Predictor):
     def complete_many(self, *given, **known):
         return self.strike.at(super().complete_many(*given, **known))
 
-    def complete_track(self, *given, **known):
-        return list(self.strike.at(super().complete_track(*given, **known)))
+    def put_together(self, *given, **known):
+        return list(self.strike.at(super().put_together(*given, **known)))
 
 
 @pytest.fixture(scope="module")
