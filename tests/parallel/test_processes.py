@@ -165,6 +165,13 @@ def test_work_that_is_left_ends_with_the_team(tmp_path):
         next(two.as_done(Task(tmp_path), count()))
 
 
+def test_a_team_may_end_while_its_helpers_start():
+    """A pipe that was closed under its reader raised in a thread, where nobody caught it."""
+    for number in range(16):
+        with team(3) as three:
+            list(three.as_done(time.sleep, [0.002 * number] * 4))
+
+
 def test_a_script_without_a_guard_runs_once_and_its_own_tasks_are_done_here(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(PLAIN_SCRIPT)

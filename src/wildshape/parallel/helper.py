@@ -21,7 +21,8 @@ from typing import Any, BinaryIO, cast
 from wildshape.errors import BadInputError
 
 _ATTEMPTS = 3
-_LOST = (EOFError, BrokenPipeError, pickle.UnpicklingError)
+_LOST = (EOFError, BrokenPipeError, pickle.UnpicklingError, ValueError)
+"""The last of a pipe that `close` has closed meanwhile."""
 
 
 class UnknownTaskError(Exception):
