@@ -84,7 +84,9 @@ class _Undrawn(TorchFunctionMode):
         self, func: Any, types: Any, args: tuple[Any, ...] = (), kwargs: Any = None
     ) -> Any:
         given = kwargs or {}
-        if func in _DRAWS or getattr(func, "__module__", "") == nn.init.__name__:
+        if func in _DRAWS:  # zeros: who draws anew until all are in bounds comes to an end
+            return args[0].zero_()
+        if getattr(func, "__module__", "") == nn.init.__name__:
             return given.get("tensor", *args[:1])
         return func(*args, **given)
 
