@@ -13,13 +13,14 @@ from wildshape.method.trust import OF_SCAN, ScanFeatures
 NAMES = ScanFeatures._fields
 
 
-def known(seed, count=300):
-    """Headings fail where a rival is near, boxes where the cost is high; every third is no car."""
+def known(seed, count=900):
+    """Headings fail where a rival is near, boxes rather at a high cost; every third is no car."""
     rng = np.random.default_rng(seed)
     features = rng.normal(size=(count, len(NAMES)))
     columns = {name: features[:, place] for place, name in enumerate(NAMES)}
     turn = np.where(columns["rival"] > -0.7, 2.0, 178.0)
-    box = (columns["log_cost"] < 0).astype(float)
+    likely = 1 / (1 + np.exp(4 * columns["log_cost"]))
+    box = (rng.random(count) < likely).astype(float)
     kind = (np.arange(count) % 3 > 0).astype(float)
     columns["size_off"][:] += 3 * (1 - kind)
     turn[kind == 0] = box[kind == 0] = math.nan
@@ -41,4 +42,4 @@ def test_the_front_is_the_end_that_most_have():
     one = known(0)
     other = one._replace(turn=180 - one.turn)
     np.testing.assert_array_equal(one.pose, other.pose)
-    assert np.isnan(one.pose).sum() == 100
+    assert np.isnan(one.pose).sum() == 300
