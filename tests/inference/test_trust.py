@@ -12,7 +12,6 @@ from tests.models import CONFIG, SETTINGS, scan
 
 from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.inference.predictor import Predictor, load
-from wildshape.inference.trust import rival_margin
 from wildshape.method.checkpoint import save_checkpoint
 from wildshape.method.network import Poses, ShapePoseNet
 from wildshape.method.trust import (
@@ -24,6 +23,7 @@ from wildshape.method.trust import (
     TrackFeatures,
     Trust,
 )
+from wildshape.method.trust_features import rival_margin
 
 FACING = dataclasses.replace(SETTINGS, facing=True)
 

@@ -25,10 +25,10 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.confidence import look_features
 from wildshape.inference.config import HypothesisRule
 from wildshape.inference.free_space import SeenScores, Sights
-from wildshape.inference.trust import rival_margin
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.network import Poses, ShapePoseNet
+from wildshape.method.trust_features import rival_margin
 from wildshape.records import Points, SensorKind
 
 _RULE = HypothesisRule()

@@ -36,10 +36,10 @@ from wildshape.inference.free_space import Rays, Sights, without_free_space
 from wildshape.inference.refine import Refined, denser, refine, with_scan
 from wildshape.inference.registration import fuse_scans, inlier_ratio, to_middle
 from wildshape.inference.tracks.complete_track import complete_together
-from wildshape.inference.trust import scan_features
 from wildshape.io.scans.points import LEAST_POINTS
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint, weights_file
 from wildshape.method.network import ShapePoseNet
+from wildshape.method.trust_features import scan_features
 from wildshape.ops.device import choose_device
 from wildshape.records import Completion, Points, Registration, Sensor
 

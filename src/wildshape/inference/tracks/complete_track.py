@@ -33,10 +33,10 @@ from wildshape.inference.tracks.heading_vote import (
 )
 from wildshape.inference.tracks.joint_icp import refine_jointly, stayed_near
 from wildshape.inference.tracks.pose_outliers import without_outliers
-from wildshape.inference.trust import track_features
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.trust import TrackFeatures
+from wildshape.method.trust_features import track_features
 from wildshape.ops.nearest import nearest
 from wildshape.records import Completion, Points
 
