@@ -11,7 +11,7 @@ import pytest
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
-from wildshape.inference.folders import parts as results
+from wildshape.inference.folders import complete_folder as results
 from wildshape.io.scans.points import read_points, write_ply
 from wildshape.io.scans.writers import write_cloud
 

@@ -5,6 +5,7 @@
 import json
 import shutil
 import signal
+from pathlib import Path
 
 import pytest
 import torch
@@ -12,6 +13,8 @@ from safetensors.torch import load_file
 from tests.cli.processes import running, wait_for
 
 from wildshape.io.scans.points import read_points
+from wildshape.io.store.layout import JOINING_JSON
+from wildshape.io.store.store import Store
 from wildshape.io.tracks import read_poses
 
 _COPIES = 60
@@ -158,6 +161,27 @@ def test_a_conversion_to_folders_killed_at_its_end(
     assert not list(out.glob(".*"))
     assert json.loads((out / "wildshape.json").read_text())["status"] == "finished"
     assert len(list(out.glob("*/scans/*.ply"))) == len(list(dataset.glob("*/scans/*.ply")))
+
+
+def test_a_packed_conversion_killed_at_its_very_end(wildshape, dataset, tmp_path, monkeypatch):
+    """The store was whole; only the plan of its join was still there."""
+    out, remove = tmp_path / "out", Path.unlink
+    command = ("convert", "folder", dataset, out, "--workers", 1)
+
+    def killed(path, *, missing_ok=False):
+        if path.name == JOINING_JSON and path.is_file():
+            raise KeyboardInterrupt
+        remove(path, missing_ok=missing_ok)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "unlink", killed)
+        assert wildshape(*command).code == 130
+    assert (out / JOINING_JSON).is_file()
+    again = wildshape(*command)
+    assert again.code == 2
+    assert "--overwrite" in again.err
+    assert not (out / JOINING_JSON).exists()
+    assert len(Store(out)) == len(list(dataset.glob("*/scans")))
 
 
 def test_a_store_killed_while_its_first_file_was_written(wildshape, tmp_path):

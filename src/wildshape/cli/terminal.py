@@ -17,10 +17,10 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from wildshape.io.progress import Bar, duration, printable
+from wildshape.io.progress import Bar, counted, duration, printable
 
 if TYPE_CHECKING:
-    from wildshape.inference.folders.summary import FolderSummary
+    from wildshape.inference.folders.complete_folder import FolderSummary
 
 Handler = Callable[[int, FrameType | None], None]
 
@@ -66,7 +66,30 @@ def conclude(found: "FolderSummary", *, as_json: bool) -> None:
     say_skipped(found.skipped)
     if found.reasons.flagged:
         say(found.reasons.sentence)
-    answer(found.sentence, found.data, as_json=as_json)
+    answer(_sentence(found), _data(found), as_json=as_json)
+
+
+def _sentence(found: "FolderSummary") -> str:
+    earlier = counted(found.finished_before, "track")
+    before = f", {earlier} had been finished before" if found.finished_before else ""
+    return (
+        f"{found.done} {counted(found.scans, 'scan')} of {counted(found.tracks, 'track')}"
+        f" in {duration(found.seconds)} with {counted(found.workers, 'worker')}{before};"
+        f" see {found.out}"
+    )
+
+
+def _data(found: "FolderSummary") -> dict[str, Any]:
+    return {
+        "out": str(found.out),
+        "tracks": found.tracks,
+        "tracks_finished_before": found.finished_before,
+        "scans": found.scans,
+        "skipped": [{"what": what, "reason": reason} for what, reason in found.skipped],
+        **found.reasons.data,
+        "workers": found.workers,
+        "seconds": round(found.seconds, 3),
+    }
 
 
 class Terminal:

@@ -97,6 +97,8 @@ class PackedStore(_Folder):
         if self.path.exists() and not self.path.is_dir():
             raise BadInputError(f"{self.path}: is a file; OUT names a folder to write.")
         lock_folder(self.path)
+        if not (self.path / WRITING_JSON).is_file():
+            (self.path / JOINING_JSON).unlink(missing_ok=True)  # of a run killed at its very end
         if self._is_ours():
             self.progress.say(f"going on with the unfinished store in {self.path}")
             remove_leftovers(self.path)

@@ -3,7 +3,7 @@
 """Whatever a user points at, as tracks: a packed store, a DATASET, a TRACK, scans, or one scan."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 
@@ -36,6 +36,31 @@ _CURE = (
     "pass a scan file, a TRACK folder (with scans/), a DATASET folder of such tracks, a folder of "
     "scan files, or a packed store"
 )
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some scans of a track.
+
+    Attributes:
+        index: of the track in its input.
+        track: with these scans alone, and without its shape.
+        first: of these scans in the track.
+        count: of the track's scans.
+    """
+
+    index: int
+    track: Track
+    first: int
+    count: int
+
+    def __str__(self) -> str:
+        return f"{self.track.name}, scan {self.first + 1}"
+
+    @property
+    def end(self) -> int:
+        """After the last of these scans in the track."""
+        return self.first + len(self.track.scan_names)
 
 
 class TrackSource:
@@ -138,6 +163,23 @@ class TrackSource:
             yield index, track
         if last is not None and not count:
             raise last
+
+    def parts(self, most: int | None, done: Callable[[str], bool]) -> Iterator[Part]:
+        """The usable tracks in parts of at most so many scans.
+
+        Args:
+            most: scans of a part; None: all of a track.
+            done: see `tracks`.
+
+        Raises:
+            BadInputError: not a single track can be used.
+        """
+        for index, track in self.tracks(done):
+            count = len(track.scans)
+            size = most or count
+            for first in range(0, count, size):
+                rows = list(range(first, min(first + size, count)))
+                yield Part(index, replace(track.part(rows), shape=None), first, count)
 
     def single(self, why: str) -> Track:
         """The only track.

@@ -19,12 +19,20 @@ from wildshape.drives.completing.vehicles import shape_nats
 from wildshape.drives.config import CompletionConfig, VehicleConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.sightings import Sightings
-from wildshape.geometry.transforms.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.choose_hypothesis import Looked
-from wildshape.inference.folders.complete_folder import OBJECTS, write_completed
+from wildshape.inference.folders.complete_folder import (
+    COMPLETED,
+    OBJECTS,
+    POSES,
+    objects_of,
+)
 from wildshape.inference.predictor import Predictor
 from wildshape.io.atomic import write_json
 from wildshape.io.boxes.detections import moved
+from wildshape.io.output import file_name
+from wildshape.io.poses import write_poses
+from wildshape.io.scans.points import write_ply
 from wildshape.records import Completion, Points
 
 RULED_OUT, CATEGORY = "ruled_out.json", "car"
@@ -156,7 +164,12 @@ class Completer:
         if self.T_level_sensor is not None:
             done = [_carried(one, self.T_level_sensor.inverse()) for one in done]
         track = chosen.track(self.cuts, self.drive, CATEGORY)
-        write_completed(self.folder / chosen.name, track, done, self.predictor, self.cuts)
+        folder = self.folder / chosen.name
+        for name, one in zip(track.scan_names, done, strict=True):
+            write_ply(folder / COMPLETED / f"{file_name(name)}.ply", one.points)
+        write_poses(folder / POSES, stack([one.pose for one in done]))
+        said = objects_of(track, done, self.predictor, self.cuts, together=True)
+        write_json(folder / OBJECTS, said)  # last: it says that the object is done
 
     def _clouds(self, seen: Sightings) -> list[Points]:
         clouds = seen.clouds(self.cuts)

@@ -17,8 +17,7 @@ from wildshape.drives.completing.placing import Completed, box_in_scan
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.folders.complete_folder import OBJECTS
-from wildshape.inference.folders.parts import COMPLETED
+from wildshape.inference.folders.complete_folder import COMPLETED, OBJECTS
 from wildshape.io.atomic import write_text
 from wildshape.io.boxes.detections import detections_of, pose_of
 from wildshape.io.boxes.table import BoxRow

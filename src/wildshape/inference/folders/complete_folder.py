@@ -2,46 +2,43 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whole folders completed or registered, and what is written of each track (docs/formats.md).
 
-`objects.json` is written last: a track folder that has it is finished.
+`objects.json` is written last: a track folder that has it is finished. Parts of tracks are
+completed at once: results do not depend on who works on what.
 """
 
 import json
 import time
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.transforms.se3 import stack
+from wildshape.geometry.transforms.se3 import SE3, stack
+from wildshape.inference.confidence import ReasonCounts
 from wildshape.inference.folders.box_files import BOX_FILES, BoxFiles
-from wildshape.inference.folders.parts import (
-    COMPLETED,
-    MESH,
-    PartCompleter,
-    parts_of,
-    whole_tracks,
-)
-from wildshape.inference.folders.summary import FolderSummary
-from wildshape.inference.predictor import Predictor, load
+from wildshape.inference.predictor import BATCH, Predictor, load
 from wildshape.inference.registration import to_middle
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import reading
-from wildshape.io.inputs import TrackSource, open_tracks, with_rays
+from wildshape.io.inputs import Part, TrackSource, open_tracks, with_rays
 from wildshape.io.output import Output, begin, file_name, keep_apart
 from wildshape.io.poses import times_of, write_poses, write_trajectory, write_tum
-from wildshape.io.progress import SILENT, Progress
-from wildshape.io.scans.points import SENSOR_METRES, Coordinates, write_ply
+from wildshape.io.progress import SILENT, Bar, Progress
+from wildshape.io.scans.points import SENSOR_METRES, Coordinates
 from wildshape.io.scans.writers import (
     CLOUD_FORMATS,
     MESH_FORMATS,
     CloudFormat,
     MeshFiles,
+    write_cloud,
+    write_mesh,
 )
 from wildshape.method.checkpoint import fingerprint
 from wildshape.parallel.team import team
-from wildshape.records import Completion, Track
+from wildshape.records import Completion, Points, Track
 
+COMPLETED, MESH = "completed", "mesh"
 OBJECTS, POSES = "objects.json", "poses.txt"
 MIDDLE, TUM, TRAJECTORY = "T_middle_scan.txt", "trajectory.tum", "trajectory.json"
 FILES = (
@@ -99,6 +96,33 @@ class FolderOptions:
         colours = {"mesh_colours": "confidence"} if self.mesh and self.mesh.coloured else {}
         boxes = self.boxes.identity() if self.boxes else {}
         return {**found, **uses, **clouds, **mesh, **colours, **boxes}
+
+
+@dataclass
+class FolderSummary:
+    """What was done.
+
+    Attributes:
+        out: the folder written.
+        done: the verb: `completed` or `registered`.
+        tracks, scans: written now.
+        finished_before: tracks of an earlier, interrupted run.
+        seconds, workers: that it took.
+        skipped: what could not be used, with the reason.
+        dropped: a sentence on points that were not finite, or nothing.
+        reasons: which scans' results are not to be trusted.
+    """
+
+    out: Path
+    done: str
+    tracks: int = 0
+    finished_before: int = 0
+    scans: int = 0
+    seconds: float = 0.0
+    workers: int = 1
+    skipped: list[tuple[str, str]] = field(default_factory=list)
+    dropped: str = ""
+    reasons: ReasonCounts = field(default_factory=ReasonCounts)
 
 
 _DEFAULT = FolderOptions()
@@ -183,21 +207,22 @@ def write_results(
         summary.finished_before += 1
         return True
 
-    task = PartCompleter(
+    task = _PartCompleter(
         predictor,
         output.path.absolute(),
         together=options.track,
         clouds=None if registers else options.clouds,
         mesh=options.mesh,
     )
-    parts = parts_of(source.tracks(done), together=options.track)
+    parts = source.parts(None if options.track else BATCH, done)
     with (
         team(options.workers, options.ray) as helpers,
         progress.bar("completing", len(source)) as bar,
     ):
-        for track, scans in whole_tracks(helpers.in_order(task, parts), bar):
+        for track, scans in _whole_tracks(helpers.in_order(task, parts), bar):
             folder = output.path / file_name(track.name)
-            _write_poses(folder, track, scans, registers=registers)
+            poses = stack([one.pose for one in scans])
+            _write_poses(folder, track, poses, registers=registers)
             described = objects_of(
                 track,
                 scans,
@@ -207,10 +232,66 @@ def write_results(
                 skipped=source.skipped_in(track.name),
             )
             write_json(folder / OBJECTS, described)
-            summary.add(track, scans)
+            summary.tracks, summary.scans = summary.tracks + 1, summary.scans + len(scans)
+            summary.reasons.of((f"{track.name}/{name}" for name in track.scan_names), scans)
         summary.workers = helpers.worked
     summary.skipped, summary.dropped = [*earlier, *source.skipped], source.dropped
     return summary
+
+
+@dataclass(frozen=True)
+class _PartCompleter:
+    """Completes a part and writes its shapes and meshes.
+
+    Attributes:
+        predictor: does the work.
+        out: a folder of each track is written there.
+        together: use all scans of a track together.
+        clouds: format of the shapes; None: write none.
+        mesh: also write a closed mesh of each shape, in this way.
+    """
+
+    predictor: Predictor
+    out: Path
+    together: bool
+    clouds: CloudFormat | None
+    mesh: MeshFiles | None
+
+    def __call__(self, part: Part) -> tuple[Part, list[Completion]]:
+        """Complete and write the scans of a part; returns both without points."""
+        track = part.track
+        done = self.predictor.complete_checked(
+            track.scans, track.sensor, track=self.together, rays=track.rays
+        )
+        bare = []
+        for name, scan, one in zip(track.scan_names, track.scans, done):
+            self._write(self.out / file_name(track.name), file_name(name), scan, one)
+            bare.append(replace(one, points=one.points[:0].copy()))
+        return replace(part, track=replace(track, scans=(), rays=())), bare
+
+    def _write(self, folder: Path, name: str, scan: Points, done: Completion) -> None:
+        if self.clouds is not None:
+            write_cloud(folder / COMPLETED / f"{name}.{self.clouds}", done.points)
+        if self.mesh is not None:
+            seen = scan if self.mesh.coloured else None
+            write_mesh(folder / MESH / f"{name}.{self.mesh.kind}", done.mesh(seen))
+
+
+def _whole_tracks(
+    parts: Iterable[tuple[Part, list[Completion]]], bar: Bar
+) -> Iterator[tuple[Track, list[Completion]]]:
+    """The tracks, put together again from parts in order; `bar` is told how many are done."""
+    names: list[str] = []
+    found: list[Completion] = []
+    for part, done in parts:
+        names += part.track.scan_names
+        found += done
+        if part.end < part.count:
+            bar.at(part.index, f"{part.track.name}, scan {part.end} of {part.count}")
+            continue
+        yield replace(part.track, scan_names=tuple(names)), found
+        bar.at(part.index + 1, part.track.name)
+        names, found = [], []
 
 
 def _written_before(path: Path) -> list[dict[str, str]] | None:
@@ -221,34 +302,12 @@ def _written_before(path: Path) -> list[dict[str, str]] | None:
         return json.loads(path.read_text("utf-8"))["skipped"]
 
 
-def _write_poses(
-    folder: Path, track: Track, done: Sequence[Completion], *, registers: bool
-) -> None:
-    poses = stack([one.pose for one in done])
+def _write_poses(folder: Path, track: Track, poses: SE3, *, registers: bool) -> None:
     write_poses(folder / POSES, poses)
     if registers:
         write_poses(folder / MIDDLE, to_middle(poses))
         write_tum(folder / TUM, poses, times_of(track.scan_names))
         write_trajectory(folder / TRAJECTORY, poses, track.scan_names)
-
-
-def write_completed(
-    folder: Path, track: Track, done: Sequence[Completion], predictor: Predictor, source: Path
-) -> None:
-    """Write a track completed from all its scans together; `objects.json` last.
-
-    Args:
-        folder: of the track.
-        track: its scans' names become names of files.
-        done: one a scan.
-        predictor: what completed them.
-        source: where the scans come from.
-    """
-    for name, one in zip(track.scan_names, done, strict=True):
-        write_ply(folder / COMPLETED / f"{file_name(name)}.ply", one.points)
-    write_poses(folder / POSES, stack([one.pose for one in done]))
-    said = objects_of(track, done, predictor, source, together=True)
-    write_json(folder / OBJECTS, said)
 
 
 def objects_of(

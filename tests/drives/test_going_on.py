@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A drive that was killed, or is gone through a second time."""
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tests.refusal import refused
+
+import wildshape
+from wildshape.cli.main import main
+from wildshape.drives import run
+from wildshape.drives.adapting import second_pass
+from wildshape.drives.adapting.adapt import Adaptation
+from wildshape.drives.adapting.config import AdaptConfig
+from wildshape.drives.completing.completion import Completer
+from wildshape.drives.config import INFERENCE, ClusterConfig, DriveConfig
+from wildshape.drives.recordings.opening import open_drive
+from wildshape.drives.tracking.sightings import read_sightings
+from wildshape.io.boxes.table import read_box_table
+from wildshape.method.checkpoint import SHIPPED, load_checkpoint, save_checkpoint
+
+pytest.importorskip("kiss_icp")
+pytest.importorskip("pypatchworkpp")
+
+
+def test_a_run_killed_at_any_stage_goes_on_to_the_same_boxes(
+    found, recording, tmp_path, monkeypatch
+):
+    """The stages are stopped one after the other; each next run begins where the last stopped."""
+
+    class Killed(BaseException):
+        pass
+
+    def killed(*_, **__):
+        raise Killed
+
+    for stage in ("find_trajectory", "Cutter", "link", "write_sightings", "judge", "rows_of"):
+        with monkeypatch.context() as patched:
+            patched.setattr(run, stage, killed)
+            with pytest.raises(Killed):
+                wildshape.drive(recording, tmp_path / "out")
+    again = wildshape.drive(recording, tmp_path / "out")
+    assert again.seconds["trajectory"] < 1.0
+    for name in ("boxes.csv", "trajectory.txt", "frames.csv", "stages/tracks.json"):
+        assert (tmp_path / "out" / name).read_bytes() == (found.out / name).read_bytes(), name
+
+
+def test_adapted_weights_complete_a_drive_again(found, recording, tmp_path, monkeypatch):
+    """Killed before the second pass is finished the first one stays; killed later it is ended."""
+    out = Path(shutil.copytree(found.out, tmp_path / "out"))
+    network, settings = load_checkpoint(SHIPPED)
+    model = tmp_path / "model.safetensors"
+    save_checkpoint(model, network, replace(settings, provenance={"steps": 7}))
+    adapted = Adaptation(str(model), 4, 2, 0)
+    before = (out / "boxes.csv").read_bytes()
+    (out / "report.html").touch()
+
+    def killed(*_, **__):
+        raise KeyboardInterrupt
+
+    for place, name in ((run, "rows_of"), (second_pass, "write_json"), (second_pass, "_move")):
+        assert (out / "boxes.csv").read_bytes() == before
+        with monkeypatch.context() as patched:
+            patched.setattr(place, name, killed)
+            with pytest.raises(KeyboardInterrupt):
+                wildshape.drive(recording, out, adapt=adapted)
+    again = wildshape.drive(recording, out)
+    assert set(again.vehicles) == {folder.name for folder in (out / "objects").iterdir()}
+    assert {row.track for row in read_box_table(out / "boxes.csv")} == set(again.vehicles)
+    for name in again.vehicles:
+        said = json.loads((out / "objects" / name / "objects.json").read_text("utf-8"))
+        assert said["model"]["steps"] == 7
+    assert (out / "first" / "boxes.csv").read_bytes() == before
+    assert not (out / "report.html").exists()
+    monkeypatch.setattr(run._Run, "perform", killed)
+    assert wildshape.drive(recording, out, adapt=adapted) == again
+
+
+def test_too_few_vehicles_to_adapt_to_are_said(found, recording, tmp_path, capsys):
+    out = shutil.copytree(found.out, tmp_path / "out")
+    main(["drive", str(recording), "--out", str(out), "--adapt", "--no-report"])
+    text = capsys.readouterr().out
+    assert text.startswith("not adapted: ")
+    assert "are too few; the first pass stays" in text
+    assert "found 4 vehicles" in text
+    assert json.loads((out / "adapted.json").read_text("utf-8"))["kept"] is False
+    assert wildshape.drive(recording, out, adapt=AdaptConfig()).vehicles == found.vehicles
+    assert (out / "boxes.csv").read_bytes() == (found.out / "boxes.csv").read_bytes()
+
+
+def test_other_settings_do_not_go_on_with_an_output(found, recording):
+    other = DriveConfig(clusters=ClusterConfig(range_m=40.0))
+    refused(wildshape.drive, recording, found.out, other, match="--overwrite")
+
+
+def test_what_is_missing_of_a_group_is_completed_as_it_was(found, recording, tmp_path):
+    of, stages = DriveConfig(), found.out / "stages"
+    completer = Completer(
+        wildshape.load(config=INFERENCE),
+        open_drive(recording),
+        stages / "clusters",
+        tmp_path,
+        None,
+        of.completion,
+        of.vehicles,
+    )
+    objects = read_sightings(stages / "tracks.json")
+    (group, *_) = completer.missing(objects)
+    completer(group)
+    before = {file: file.read_bytes() for file in tmp_path.rglob("*.ply")}
+    assert before
+    lost = next(iter(before)).parents[1]
+    shutil.rmtree(lost)
+    assert completer.missing(objects)[0] == group
+    completer(group)
+    assert {file: file.read_bytes() for file in tmp_path.rglob("*.ply")} == before
