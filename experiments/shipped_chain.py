@@ -68,6 +68,9 @@ ROUNDS = {
 }
 """In their order; the last one is shipped."""
 
+OCCLUSION = {1: 0.3, 2: 0.6, 3: 0.6}
+"""Share of the tracks past something that stands in the way, by the seed of the data."""
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -140,6 +143,7 @@ def _add_drives(store: StoreWriter, number: int, seed: int, settings: Settings) 
         tracks=share,
         scans=_SCANS,
         sensor=_SENSORS[number],
+        occlusion=OCCLUSION[seed],
         ground=number == _GROUND,
         shape_points=_SHAPE_POINTS,
         varied=True,
