@@ -9,6 +9,7 @@ import torch
 from tests import naive
 from tests.strategies import clouds, rotation_about
 
+from wildshape.geometry.surface import mirrored
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.training.self_training.objective import pose_terms, seen_from, shape_terms
 
@@ -123,7 +124,7 @@ def test_seen_from_equals_brute_force(seed):
 
 
 def test_one_side_is_seen_and_with_a_mirror_both():
-    shape, sensors = box(count=4000), torch.tensor([[0.5, -8.0, 0.5], [-0.5, -8.0, 0.5]])
+    shape, sensors = mirrored(box()[None])[0], torch.tensor([[0.5, -8.0, 0.5], [-0.5, -8.0, 0.5]])
     right, left = shape[:, 1] < -0.89, shape[:, 1] > 0.89
     one = seen_from(shape[None], sensors[None], _NO_END, mirror=False)[0]
     assert float(one[right].float().mean()) > 0.05
@@ -131,8 +132,8 @@ def test_one_side_is_seen_and_with_a_mirror_both():
     both = seen_from(shape[None], sensors[None], _NO_END, mirror=True)[0]
     assert float(both[left].float().mean()) > 0.05
     assert bool((both | ~one).all())
-    reflected = shape * torch.tensor((1.0, -1.0, 1.0))
-    assert torch.equal(seen_from(reflected[None], sensors[None], _NO_END, mirror=True)[0], both)
+    on_both_sides = mirrored(sensors[None])
+    assert torch.equal(seen_from(shape[None], on_both_sides, _NO_END, mirror=False)[0], both)
 
 
 def test_what_lies_above_the_end_of_the_view_was_not_seen():

@@ -16,7 +16,7 @@ from torch import Tensor
 
 def slope(points: Float[Tensor, "... 3"]) -> Float[Tensor, "..."]:
     """Tangent of each point's elevation; z up, any unit."""
-    return points[..., 2] / points[..., :2].norm(dim=-1).clamp_min(1e-9)
+    return points[..., 2] / torch.hypot(points[..., 0], points[..., 1]).clamp_min(1e-9)
 
 
 def view_top(highest: Sequence[float], *, same_deg: float = 0.25, fewest: int = 3) -> float:

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from wildshape.geometry.projection.spherical import to_spherical
 
-_WINDOW = 256
+_WINDOW = 256  # a power of two
 _BEHIND = 1e-3
 
 
@@ -92,11 +92,12 @@ def facing_bins(
     points: Float[Tensor, "B N 3"], centre: Float[Tensor, "B 3"], bins: FacingBins
 ) -> Bins:
     """Bins of `cell_m` metres at the distance of `centre`, in axes that face it."""
-    turned = points @ facing_rotation(centre).mT
+    # Coordinate by coordinate in memory: a CPU takes the angles of many points at once there.
+    turned = (facing_rotation(centre) @ points.mT).mT
     polar = to_spherical(turned)
     cell = bins.cell_m / centre.norm(dim=-1).clamp_min(bins.cell_m)
-    u = torch.floor(polar.azimuth / cell[:, None]).long() % _WINDOW
-    v = torch.floor(polar.pitch / cell[:, None]).long() % _WINDOW
+    u = torch.floor(polar.azimuth / cell[:, None]).long() & (_WINDOW - 1)
+    v = torch.floor(polar.pitch / cell[:, None]).long() & (_WINDOW - 1)
     return Bins(u * _WINDOW + v, polar.range, _WINDOW * _WINDOW)
 
 

@@ -18,6 +18,7 @@ from torch.profiler import record_function
 from wildshape.method.encoders.pcn import PCNEncoder
 from wildshape.ops.column_argmax import column_argmax
 
+_ROWS, _FEATURES = 64, 32  # products of few sizes: each new one is prepared, which takes as long
 _MIXERS = np.array((0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)).view(np.int64)
 
 
@@ -63,20 +64,29 @@ def _winning_rows(
 
     One cloud at a time keeps its activations in the cache. Of equal points the first counts.
     """
-    weight3, weight4 = (
-        layer.weight.T.to(scoring) for layer in (encoder.join_point, encoder.point4)
-    )
+    weight3, weight4 = (layer.weight.to(scoring) for layer in (encoder.join_point, encoder.point4))
+    weight4 = weight4.T.contiguous()
     pooled_rows, code_rows = [], []
-    for cloud, distinct in zip(points, distinct_rows(points)):
+    for cloud, rows in zip(points, distinct_rows(points)):
+        distinct = torch.cat((rows, rows[:1].expand(-len(rows) % _ROWS)))
         local = torch.addmm(encoder.point1.bias, cloud[distinct], encoder.point1.weight.T).relu_()
         local = torch.addmm(encoder.point2.bias, local, encoder.point2.weight.T)
         row = column_argmax(local)
         pooled = local.gather(0, row[None])
-        bias = (encoder.join_pooled(pooled) + encoder.join_point.bias)[0]
-        joined = torch.addmm(bias.to(scoring), local.to(scoring), weight3).relu_()
+        bias = (encoder.join_pooled(pooled) + encoder.join_point.bias).T
+        joined = torch.addmm(bias.to(scoring), weight3, local.to(scoring).T).relu_()
+        lit = _lit_first(joined)
+        deep = joined.index_select(0, lit).T @ weight4.index_select(0, lit)
         pooled_rows.append(distinct[row])
-        code_rows.append(distinct[column_argmax((joined @ weight4).to(local.dtype))])
+        code_rows.append(distinct[column_argmax(deep.to(local.dtype))])
     return torch.stack(pooled_rows), torch.stack(code_rows)
+
+
+def _lit_first(joined: Float[Tensor, "c n"]) -> Int[Tensor, "k"]:
+    """Features that any point lights, and a few that none does: the others add nothing."""
+    most, feature = joined.amax(1).sort(descending=True)
+    lit = int(most.count_nonzero())
+    return feature[: lit + -lit % _FEATURES]
 
 
 def distinct_rows(points: Float[Tensor, "B N 3"]) -> list[Int[Tensor, "n"]]:

@@ -141,7 +141,7 @@ class ViewSampler:
         else:
             turn = _turns(len(points), config.turn, int(rng.integers(2**62)))
             turned = points @ turn.mT
-            centres = torch.stack([scan_centre(scan, config.sensor) for scan in turned])
+            centres = scan_centre(turned, config.sensor)
         return points @ turn.mT - centres[:, None], centres, turn
 
     def as_posed(
@@ -222,11 +222,9 @@ class ViewSampler:
 def _frames_of(points: Float[Tensor, "B n 3"], config: ViewConfig) -> Facing:
     """Turn and centre of scans that are to be posed: towards their objects, or as they are."""
     if config.turn == "facing":
-        found = [face(scan, sensor_kind=config.sensor) for scan in points]
-        return Facing(*(torch.stack(parts) for parts in zip(*found)))
+        return face(points, sensor_kind=config.sensor)
     as_recorded = torch.eye(3, device=points.device).repeat(len(points), 1, 1)
-    centres = [scan_centre(scan, config.sensor) for scan in points]
-    return Facing(as_recorded, torch.stack(centres))
+    return Facing(as_recorded, scan_centre(points, config.sensor))
 
 
 def centre_turns_along(config: ViewConfig) -> bool:

@@ -15,7 +15,7 @@ from wildshape.geometry.projection.visibility import FacingBins, facing_bins
 from wildshape.method.multiview import LossConfig
 from wildshape.method.network import Encoding, ShapePoseNet
 from wildshape.method.observation import masked_mean
-from wildshape.ops.nearest import nearest_both
+from wildshape.ops.nearest import nearest_both, nearest_distance
 from wildshape.ops.zbuffer import visible
 from wildshape.training.batches.fused import FusedBatch
 from wildshape.training.objectives import Objective, template_deviation
@@ -188,17 +188,12 @@ def shape_terms(
         config: what is far.
     """
     to_target, to_shape = nearest_both(shapes.detach(), targets)
-    precision = _distance(shapes, targets, to_target.index)
-    coverage = _distance(targets, shapes, to_shape.index)
+    precision = nearest_distance(shapes, targets, to_target)
+    coverage = nearest_distance(targets, shapes, to_shape)
     if known is None:
         return ShapeTerms(precision.mean(-1), coverage.mean(-1))
     near = masked_mean(precision.clamp_max(config.far_m), known)
     return ShapeTerms(near, coverage.clamp_max(2 * config.far_m).mean(-1))
-
-
-def _distance(source: Tensor, target: Tensor, index: Tensor) -> Tensor:
-    found = target.gather(1, index[..., None].expand(-1, -1, 3))
-    return (source - found).square().sum(-1).clamp_min(_SMALLEST).sqrt()
 
 
 @torch.no_grad()
@@ -215,15 +210,14 @@ def seen_from(
         shapes: predicted, canonical frame, z up.
         sensors: places in the same frame, level.
         view_top: slope above which they see nothing.
-        mirror: the object is symmetric in y = 0: what was seen of one side is known of the other.
+        mirror: the second half of the points is the reflection of the first in y = 0: what was
+            seen of one side is known of the other.
         config: in which bins points hide others.
     """
     seen = torch.zeros(shapes.shape[:2], dtype=torch.bool, device=shapes.device)
-    sides = (1.0, -1.0) if mirror else (1.0,)
+    shapes = shapes.mT.contiguous().mT  # as `facing_bins` has them in memory
     for place in sensors.unbind(1):
-        for side in sides:
-            at = place * place.new_tensor((1.0, side, 1.0))
-            rays = shapes - at[:, None]
-            bins = facing_bins(rays, rays.mean(1), FacingBins(config.cell_m))
-            seen |= visible(bins.index, bins.depth, bins.count) & within_view(rays, view_top)
-    return seen
+        rays = shapes - place[:, None]
+        bins = facing_bins(rays, rays.mean(1), FacingBins(config.cell_m))
+        seen |= visible(bins.index, bins.depth, bins.count) & within_view(rays, view_top)
+    return seen | seen.roll(shapes.shape[1] // 2, 1) if mirror else seen
