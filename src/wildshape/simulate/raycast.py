@@ -54,8 +54,8 @@ class Scene:
         raw = self._scene.run(o, d, query="INTERSECT", output=1)
         face = raw["primID"].astype(np.int64)
         hit = np.flatnonzero(face >= 0)
-        normal = raw["Ng"][hit]
-        dot = np.abs(np.einsum("ij,ij->i", normal, d[hit]))
+        normal = raw["Ng"].take(hit, axis=0)
+        dot = np.abs(np.einsum("ij,ij->i", normal, d.take(hit, axis=0)))
         cosine = np.zeros(len(d), np.float32)
         cosine[hit] = dot / np.maximum(np.linalg.norm(normal, axis=1), 1e-20)
         distance = np.full(len(d), np.inf, np.float32)

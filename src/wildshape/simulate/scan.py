@@ -141,16 +141,16 @@ def scan(
     if returns.through > 0:
         inside = _behind_glass(scene, target, origin, toward, hits, kept, returns, rng)
         kept, distance = kept | (inside > 0), np.where(inside > 0, inside, distance)
-    missed = toward[(hits.solid == 0) & ~kept]
+    missed = toward.take(np.flatnonzero((hits.solid == 0) & ~kept), axis=0)
     on_target = int(kept.sum())
     if returns.ground:
         below = _ground(hits, toward, origin, half, returns.rim_m)
         lost = rng.random(len(below)) < returns.dropout
         distance = np.where(below > 0, below, distance)
         kept = np.where(below > 0, ~lost, kept)
-    reach = distance[kept]
-    reach = reach + returns.noise_m * rng.standard_normal(len(reach))
-    on_ray = toward[kept] * reach[:, None]
+    back = np.flatnonzero(kept)
+    reach = distance[back] + returns.noise_m * rng.standard_normal(len(back))
+    on_ray = toward.take(back, axis=0) * reach[:, None]
     R = T_object_sensor[:3, :3]
     return Turn(_turned(on_ray, R), on_target, phase, _turned(missed, R))
 

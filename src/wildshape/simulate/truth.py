@@ -60,7 +60,8 @@ def on_surface(solid: Solid, count: int, rng: np.random.Generator) -> tuple[np.n
     u, v = rng.random((2, count, 1))
     fold = u + v > 1
     u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
-    return a[face] + u * (b - a)[face] + v * (c - a)[face], normal[face]
+    corner, along, across, outward = (x.take(face, axis=0) for x in (a, b - a, c - a, normal))
+    return corner + u * along + v * across, outward
 
 
 def _seen(
@@ -82,15 +83,16 @@ def _seen(
     pool = _directions(2048, lowest_deg, rng)
     for turn in range(directions):
         left = np.flatnonzero(~seen)
-        toward = pool[rng.integers(0, len(pool), len(left))]
+        toward = pool.take(rng.integers(0, len(pool), len(left)), axis=0)
+        outward = side.take(left, axis=0)
         if solid.closed or turn % 2 == 0:
-            away = np.einsum("ij,ij->i", side[left, :2], toward[:, :2]) < 0
-            toward[away, :2] *= -1
+            away = np.einsum("ij,ij->i", outward[:, :2], toward[:, :2]) < 0
+            toward[:, :2] *= np.where(away, -1.0, 1.0)[:, None]
         if solid.closed:  # from behind, a closed body hides its own face
-            faces_us = np.einsum("ij,ij->i", side[left], toward) > 0
-            left, toward = left[faces_us], toward[faces_us]
+            faces_us = np.flatnonzero(np.einsum("ij,ij->i", outward, toward) > 0)
+            left, toward = left[faces_us], toward.take(faces_us, axis=0)
         reach = np.full(len(left), far * (1 - 2e-4))
-        hidden = scene.blocked(points[left] + far * toward, -toward, reach)
+        hidden = scene.blocked(points.take(left, axis=0) + far * toward, -toward, reach)
         seen[left[~hidden]] = True
     return seen
 
