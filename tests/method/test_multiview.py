@@ -10,7 +10,7 @@ from tests.strategies import clouds
 from wildshape.geometry.projection.visibility import FacingBins, PixelBins, PolarBins
 from wildshape.geometry.transforms.rotation import random_rotation
 from wildshape.method.hindsight import score_hypotheses
-from wildshape.method.multiview import LossConfig, multiview_loss
+from wildshape.method.multiview import LossConfig, multiview_loss, winners
 from wildshape.method.observation import observation_term, one_way_chamfer, projection_term
 
 PROJECTIONS = [PolarBins(0.03, 0.03), FacingBins(0.3), PixelBins(1 / 30)]
@@ -62,6 +62,40 @@ def test_hindsight_gives_a_gradient_to_the_winning_branch_alone():
         won = torch.nn.functional.one_hot(terms.winner, 4).bool()
         assert (size[won] > 0).all()
         assert (size[~won] == 0).all()
+
+
+@pytest.mark.parametrize("hindsight", ["scan", "track", "batch"])
+def test_hindsight_is_the_least_loss_that_one_branch_a_scan_a_track_or_a_batch_can_have(hindsight):
+    """Against the loss of every choice of branches: of a batch there are K of them."""
+    scans, leaves = batch()
+    config = LossConfig(0.25, FacingBins(0.3), hindsight=hindsight)
+    terms = multiview_loss(**scans, **leaves, config=config)
+    alone = {k: leaves[k].detach() for k in ("rotation", "translation")}
+    of_branch = [
+        [
+            multiview_loss(
+                scans["scans"][b : b + 1],
+                scans["centres"][b : b + 1],
+                leaves["shapes"][b // 3 : b // 3 + 1],
+                *(part[b : b + 1, k : k + 1] for part in alone.values()),
+                config=config,
+            ).total.detach()
+            for k in range(4)
+        ]
+        for b in range(6)
+    ]
+    cost = torch.tensor(of_branch, dtype=torch.float64)
+    together = {"scan": 1, "track": 3, "batch": 6}[hindsight]
+    least = cost.view(-1, together, 4).sum(1).amin(-1).sum() / 2
+    torch.testing.assert_close(terms.total.detach(), least)
+    assert len(terms.winner.view(-1, together).unique(dim=1).T) == 1
+
+
+def test_hindsight_for_a_batch_by_hand():
+    cost = torch.tensor([[1.0, 3.0], [9.0, 2.0], [1.0, 2.0], [1.0, 2.0]])
+    assert winners(cost, 2, "scan").tolist() == [0, 1, 0, 0]
+    assert winners(cost, 2, "track").tolist() == [1, 1, 0, 0]
+    assert winners(cost, 2, "batch").tolist() == [1, 1, 1, 1]
 
 
 def test_the_winner_is_the_branch_of_least_cost():

@@ -4,7 +4,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import torch
 from jaxtyping import Float, Int
@@ -14,6 +14,8 @@ from wildshape.geometry.projection.image_plane import compared
 from wildshape.geometry.projection.visibility import PolarBins, Projection
 from wildshape.method.hindsight import Scores, score_hypotheses
 from wildshape.method.observation import observation_term, projection_term
+
+Hindsight = Literal["scan", "track", "batch"]
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,8 @@ class LossConfig:
             views that come in no order.
         agree_at: shares of the run at which all tracks agree on which way is front; from then on
             a branch more than 90 degrees from its scan's agreed pose cannot win.
+        hindsight: for what one branch wins: each `scan`, the views of a `track`, or a `batch`. The
+            paper says "for each batch" (section 4.1), DPC's hindsight is each scan's.
     """
 
     beta: float = 0.05
@@ -43,6 +47,7 @@ class LossConfig:
     belief: float = 0.0
     time_ordered: bool = False
     agree_at: tuple[float, ...] = ()
+    hindsight: Hindsight = "scan"
 
 
 # From the cost of each branch, metres added to it when the winner is chosen: (B, K) to (B, K).
@@ -91,12 +96,28 @@ def multiview_loss(
         posed = shape[:, None] @ rotation.mT + translation[:, :, None]
         scores = score_hypotheses(scans, centres, posed, config.projection)
         cost = scores.cost(config.beta)
-        winner = (cost if handicap is None else cost + handicap(cost)).argmin(-1)
+        cost = cost if handicap is None else cost + handicap(cost)
+        winner = winners(cost, views, config.hindsight)
     posed = _posed(shape, rotation, translation, winner)
     seen, made = (compared(cloud, centres, config.projection) for cloud in (scans, posed))
     observation, projection = _winner_terms(seen, made, scores, winner)
     total = (observation + config.beta * projection).mean() * views
     return LossTerms(total, observation.mean().detach(), projection.mean().detach(), winner)
+
+
+def winners(cost: Float[Tensor, "B K"], views: int, hindsight: Hindsight) -> Int[Tensor, "B"]:
+    """The branch of each scan that gets the gradient: that of least mean cost among its like.
+
+    Args:
+        cost: of the branches, metres, the views of a track next to each other.
+        views: of a track.
+        hindsight: whether a branch wins for a scan, for a track or for the whole batch.
+    """
+    if hindsight == "scan":
+        return cost.argmin(-1)
+    together = views if hindsight == "track" else len(cost)
+    best = cost.unflatten(0, (-1, together)).mean(1).argmin(-1)
+    return best.repeat_interleave(together)
 
 
 def _posed(shape: Tensor, rotation: Tensor, translation: Tensor, winner: Tensor) -> Tensor:
