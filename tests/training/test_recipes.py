@@ -4,15 +4,21 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
 
 from wildshape.geometry.projection.visibility import PixelBins, PolarBins
 from wildshape.method.network import ShapePoseNet
+from wildshape.method.observation import chamfer
+from wildshape.training.batches.fused import FusedSampler
+from wildshape.training.batches.occlusion_augmentation import partly_hidden
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.config import learning_rate
 from wildshape.training.objectives import WeaklySupervised
-from wildshape.training.recipes import PRESETS, paper_lidar, paper_views
+from wildshape.training.recipes import PRESETS, paper_lidar, paper_views, shape_oracle
+from wildshape.training.self_training.objective import SelfTaught
+from wildshape.training.self_training.targets import true_targets
 
 
 @pytest.mark.parametrize("recipe", [paper_lidar(), paper_views()])
@@ -65,3 +71,23 @@ def test_every_preset_is_named_and_takes_a_step(name, car_store):
         assert p.grad is not None, weight
         assert p.grad.isfinite().all(), weight
         assert p.grad.abs().sum() > 0, weight
+
+
+def test_the_papers_oracle_learns_true_shapes_of_scans_as_recorded_and_no_pose(car_store):
+    recipe = shape_oracle(replace(paper_lidar(), views=replace(paper_lidar().views, tracks=1)))
+    rules, views = recipe.self_training, ViewSampler(car_store, np.arange(8), recipe.views)
+    targets = true_targets(views)
+    batch = FusedSampler(views, targets, rules.draw).draw(3)
+    for drawn, known in ((batch.shapes, targets.shapes), (batch.rotation, targets.rotation)):
+        assert (drawn[:, None] - known).flatten(2).abs().amax(-1).amin(1).max() < 1e-6
+    scan, rng = torch.from_numpy(car_store.scan_points(0)), np.random.default_rng(0)
+    assert all(partly_hidden(scan, rng, 1, rules.draw.occlusion) is scan for _ in range(50))
+    torch.manual_seed(0)
+    network = ShapePoseNet(recipe.network)
+    found = SelfTaught(network, recipe.loss, complete=True, distances=rules.loss)(batch, 0.0)
+    shapes = network.canonical(network.encode(batch.scans))
+    torch.testing.assert_close(found.loss, chamfer(shapes, batch.shapes).mean())
+    found.loss.backward()
+    for name, weight in network.named_parameters():
+        assert weight.grad is not None
+        assert bool(weight.grad.any()) != name.startswith("pose."), name

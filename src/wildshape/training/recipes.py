@@ -10,8 +10,11 @@ from wildshape.io.store.store import Store
 from wildshape.method.encoders.named import Backbone
 from wildshape.method.multiview import LossConfig
 from wildshape.method.network import NetworkConfig
+from wildshape.training.batches.fused import DrawConfig
+from wildshape.training.batches.occlusion_augmentation import OcclusionConfig
 from wildshape.training.batches.views import ViewConfig
 from wildshape.training.config import OptimConfig, Recipe
+from wildshape.training.self_training.objective import TaughtLossConfig
 
 
 def paper_lidar() -> Recipe:
@@ -133,6 +136,18 @@ def tiny() -> Recipe:
 def with_encoder(recipe: Recipe, backbone: Backbone) -> Recipe:
     """The recipe with that point network as the encoder, of the same widths."""
     return replace(recipe, network=replace(recipe.network, backbone=backbone))
+
+
+def shape_oracle(recipe: Recipe) -> Recipe:
+    """The recipe for the paper's oracle (section 5.7), whose teacher is the truth: shapes alone.
+
+    Encoder and shape decoder learn the canonical shape; no pose is learned, and scans are taught
+    as they were recorded.
+    """
+    plain = OcclusionConfig(strip=0.0, side=0.0, top=0.0, feet=0.0, rings=0.0)
+    draw = DrawConfig(larger=0.0, axis=0.0, reflected=0.0, both_ends=1.0, near=1.0, occlusion=plain)
+    loss = TaughtLossConfig(pose=0.0, belief=0.0)
+    return replace(recipe, self_training=replace(recipe.self_training, draw=draw, loss=loss))
 
 
 PRESETS = {

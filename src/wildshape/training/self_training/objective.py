@@ -29,12 +29,14 @@ class TaughtLossConfig:
     """How far a network is from what it is taught. Lengths are for vehicles.
 
     Attributes:
+        pose: weight of the pose beside the shape; 0 teaches no pose, as the paper's oracle has it.
         belief: weight of the cross-entropy that teaches the selector the winner.
         cell_m: bins in which nearer points of a shape hide others from a sensor.
         far_m: farther apart, real scans say nothing; coverage counts up to twice as far.
         strays: share of a target's points beyond its box on each axis.
     """
 
+    pose: float = 1.0
     belief: float = 0.1
     cell_m: float = 0.25
     far_m: float = 0.4
@@ -90,7 +92,8 @@ class SelfTaught(nn.Module):
         precision, coverage, distance = (
             part.mean() for part in (shape.precision, shape.coverage, pose.distance)
         )
-        loss = distance + precision + coverage - self.distances.belief * belief
+        rules = self.distances
+        loss = rules.pose * distance + precision + coverage - rules.belief * belief
         if self.config.template > 0:
             loss = loss + self.config.template_end * deviation
         lengths = {
