@@ -167,6 +167,29 @@ def test_a_perfect_method_has_no_error_and_two_rows():
     assert known(figures_of(results["oracle, whole track"]))["cd"] < 1e-5
 
 
+class Canonical:
+    """Knows the true shape, and says nothing of where it is."""
+
+    def __init__(self, shape):
+        self.shape = shape
+
+    def complete_canonical(self, scans, sensor):
+        return [self.shape for _ in scans]
+
+
+@pytest.mark.parametrize("rotate", ["none", "so3"])
+def test_shapes_in_the_objects_frame_are_measured_there_however_scans_are_turned(rotate):
+    track = drive_by(scans=4)
+    shape = np.asarray(track.shape)
+    moved = shape + np.array((0, 0, 5), np.float32)
+    methods = {"right": Canonical(shape), "moved": Canonical(moved)}
+    results = run(methods, [track, replace(track, name="bare", T_sensor_object=None)], rotate)
+    assert known(figures_of(results["right"]))["cd"] < 1e-6
+    assert known(figures_of(results["moved"]))["cd"] > 5
+    assert not results["right"].registrations
+    assert {one.track for one in results["right"].skipped} == {"bare"}
+
+
 class Picky(OneScan):
     """Refuses, or answers nonsense, by the number of points."""
 

@@ -81,6 +81,19 @@ class TrackCompleter(Protocol):
 
 
 @runtime_checkable
+class CanonicalCompleter(Protocol):
+    """Completes scans in the frame of their object, and does not find where that lies.
+
+    What does so was told that frame in training, or by the truth of other objects: bounds, which no
+    user can have.
+    """
+
+    def complete_canonical(self, scans: list[Points], sensor: Sensor) -> Iterable[Points]:
+        """The complete shape `(m, 3)` of each scan, object frame, metres."""
+        ...
+
+
+@runtime_checkable
 class Described(Protocol):
     """Says what it is, for the foot of a table."""
 
@@ -99,4 +112,4 @@ class Registrar(Protocol):
         ...
 
 
-Method = Completer | TrackCompleter | Registrar
+Method = Completer | TrackCompleter | Registrar | CanonicalCompleter

@@ -15,6 +15,7 @@ from wildshape.evaluation.cases import Case, Truth, prepare
 from wildshape.evaluation.method import (
     Answer,
     BatchCompleter,
+    CanonicalCompleter,
     Completer,
     Described,
     Method,
@@ -146,6 +147,8 @@ def _evaluate(name: str, method: Method, case: Case, ledgers: dict[str, _Ledger]
         return
     if isinstance(method, Completer):
         _score_scans(method, case, ledger)
+    if isinstance(method, CanonicalCompleter):
+        _score_canonical(method, case, ledger)
     if isinstance(method, TrackCompleter):
         _score_whole(method, case, ledgers.setdefault(whole_track_name(name, method), _Ledger()))
     if isinstance(method, Registrar):
@@ -154,11 +157,23 @@ def _evaluate(name: str, method: Method, case: Case, ledgers: dict[str, _Ledger]
 
 def _score_scans(method: Completer, case: Case, ledger: _Ledger) -> None:
     if case.truth is None or case.T_sensor_object is None:
-        for i in range(len(case.scans)):
-            ledger.skip(case, i, "completion: no true shape")
+        _skip_scans(case, ledger)
         return
     for i, answer in enumerate(complete_scans(method, case)):
-        _score_completion(answer, case, case.truth, case.T_sensor_object, i, ledger)
+        _score_completion(answer, case, case.truth, case.T_sensor_object[i], i, ledger)
+
+
+def _skip_scans(case: Case, ledger: _Ledger) -> None:
+    for i in range(len(case.scans)):
+        ledger.skip(case, i, "completion: no true shape")
+
+
+def _score_canonical(method: CanonicalCompleter, case: Case, ledger: _Ledger) -> None:
+    if case.truth is None:
+        _skip_scans(case, ledger)
+        return
+    for i, points in enumerate(method.complete_canonical(case.inputs(), case.sensor)):
+        _score_completion(Spoken(points), case, case.truth, SE3.identity(), i, ledger)
 
 
 class Spoken(NamedTuple):
@@ -195,7 +210,8 @@ def _score_whole(method: TrackCompleter, case: Case, ledger: _Ledger) -> None:
         ledger.skip(case, case.middle, "completion: no true shape")
         return
     answer = _spoken(method.complete_track, case.inputs(), case)
-    _score_completion(answer, case, case.truth, case.T_sensor_object, case.middle, ledger)
+    T_sensor_object = case.T_sensor_object[case.middle]
+    _score_completion(answer, case, case.truth, T_sensor_object, case.middle, ledger)
 
 
 def _score_completion(
@@ -213,7 +229,7 @@ def _score_completion(
     if len(predicted) == 0 or not np.isfinite(predicted).all():
         ledger.skip(case, i, f"completion: {NOT_FINITE}")
         return
-    local = T_sensor_object[i].inverse().apply_numpy(np.asarray(predicted, dtype=np.float32))
+    local = T_sensor_object.inverse().apply_numpy(np.asarray(predicted, dtype=np.float32))
     partial = None if truth.partial is None else completion_error(local, truth.partial)
     floor = distance_floor(truth.area, len(local)) + distance_floor(truth.area, len(truth.shape))
     ledger.completions.append(
@@ -228,9 +244,7 @@ def _score_completion(
             cd_floor=floor,
             partial_points=None if truth.partial is None else len(truth.partial),
             confidence=answer.confidence,
-            box=None
-            if answer.box is None
-            else box_score(answer.box, truth.box, T_sensor_object[i]),
+            box=None if answer.box is None else box_score(answer.box, truth.box, T_sensor_object),
             p_pose=answer.p_pose,
             p_box=answer.p_box,
         )

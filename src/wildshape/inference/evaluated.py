@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A predictor as evaluation wants a method: completions and poses, nothing else."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.free_space import Rays
-from wildshape.inference.predictor import Predictor
+from wildshape.inference.predictor import BATCH, Predictor
 from wildshape.inference.registration import to_middle
 from wildshape.records import Completion, Points, Sensor
 
@@ -72,3 +72,25 @@ class Learned:
         if self.track:
             return self.predictor.complete_track(scans, sensor, rays=rays)
         return list(self.predictor.complete_many(scans, sensor, rays=rays))
+
+
+@dataclass(frozen=True)
+class CanonicalShapes:
+    """A network's shapes in the frame that it was taught: the paper's oracle (section 5.7).
+
+    Attributes:
+        predictor: of a network whose poses were not trained.
+    """
+
+    predictor: Predictor
+
+    @property
+    def about(self) -> str:
+        """What sets this row apart."""
+        return "shapes in the object's true frame; no pose is found"
+
+    def complete_canonical(self, scans: list[Points], sensor: Sensor) -> Iterator[Points]:  # noqa: ARG002
+        """The complete shape `(m, 3)` of each scan, in its object's frame, metres."""
+        for start in range(0, len(scans), BATCH):
+            looked = self.predictor.look(scans[start : start + BATCH])
+            yield from looked.found.shapes.numpy()

@@ -92,6 +92,15 @@ class Dpc:
         """
         return stack([self._posed_cloud(scan, sensor)[1] for scan in scans])
 
+    def canonical(self, points: Points, sensor: Sensor) -> tuple[Points, SE3]:
+        """Canonical shape `(m, 3)` in metres, and `T_sensor_canonical`.
+
+        Raises:
+            BadInputError: as `complete`.
+        """
+        cloud, T_sensor_canonical = self._posed_cloud(points, sensor)
+        return cloud.float().numpy(), T_sensor_canonical
+
     @torch.inference_mode()
     def _posed_cloud(self, points: Points, sensor: Sensor) -> tuple[Float[Tensor, "n 3"], SE3]:
         """Canonical points in metres, and `T_sensor_canonical`; float64."""
