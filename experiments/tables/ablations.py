@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, Literal
 
 from experiments.tables.given import Given
-from experiments.tables.rows import default_form, paper_form, views_form
+from experiments.tables.rows import default_form, flat, paper_form, views_form
 from experiments.tables.table import Block, Table, Trained
 
 from wildshape.evaluation.paper import ABLATION_ROWS, VIEW_COUNT_ROWS
@@ -42,6 +42,8 @@ def _paper_drives(given: Given) -> Block:
         replace(base, name="full: beta 0.05, K 4, 4 views"),
         changed(base, "w/o projection", "loss", beta=0.0),
         changed(base, "w/o hindsight: K 1", "network", branches=1),
+        changed(base, "hindsight for a track", "loss", hindsight="track"),
+        changed(base, "hindsight for a batch", "loss", hindsight="batch"),
         changed(base, "beta 0.25", "loss", beta=0.25),
         changed(base, "K 2", "network", branches=2),
         changed(base, "K 8", "network", branches=8),
@@ -72,14 +74,8 @@ def _views(given: Given, category: Category) -> Block:
         replace(base, name=f"{category}, full"),
         changed(base, f"{category}, w/o projection", "loss", beta=0.0),
         changed(base, f"{category}, w/o hindsight: K 1", "network", branches=1),
-        *((_flat(base),) if category == "car" else ()),
+        *((flat(base, "car, losses on 2D projections"),) if category == "car" else ()),
     )
     paper = tuple(row for row in ABLATION_ROWS if f" {category}," in row.data)
     title = f"Depth views, {category}, the paper's form"
     return Block(title, given.views(category, "test"), rows, paper, percent=True)
-
-
-def _flat(base: Trained) -> Trained:
-    """The paper's "Ours*": distances are those in the image."""
-    projection = replace(base.recipe.loss.projection, flat=True)
-    return changed(base, "car, losses on 2D projections", "loss", projection=projection)

@@ -36,12 +36,14 @@ class Given:
         config = SimulationConfig(tracks=count)
         return Simulated(f"cars-{split}", config, _SEEDS[split], self._cad(("car",), split))
 
-    def views(self, category: Category, split: Split) -> Simulated:
-        """Depth views of unit-sized objects, five each."""
+    def views(self, category: Category, split: Split, noise: float | None = None) -> Simulated:
+        """Depth views of unit-sized objects, five each; `noise` is the sigma of depths."""
         count = self.size.train if split == "train" else self.size.test
-        config = SimulationConfig(tracks=count, sensor="depth-camera", category=category)
-        cad = self._cad((category,), split)
-        return Simulated(f"{category}-views-{split}", config, _SEEDS[split], cad)
+        config = SimulationConfig(
+            tracks=count, sensor="depth-camera", category=category, noise_m=noise
+        )
+        cad, name = self._cad((category,), split), "noisy-views" if noise else "views"
+        return Simulated(f"{category}-{name}-{split}", config, _SEEDS[split], cad)
 
     def trucks(self) -> Simulated:
         """As many trucks as the paper had.

@@ -33,6 +33,8 @@ def rungs(given: Given) -> tuple[Trained, ...]:
     """What is added, in order; each keeps what stands before it."""
     size, data = given.size, given.drives("train")
     base, goal = paper_form(size, data), small()
+    if size.own_schedule:  # a rung changes one thing, so all have one schedule
+        base = replace(base, recipe=replace(base.recipe, optim=_ours(given).recipe.optim))
     facing = _with(base, "views", turn="facing", window=goal.views.window)
     facing = _with(facing, "loss", projection=goal.loss.projection, beta=goal.loss.beta)
     mirror = _with(facing, "network", mirror=True)

@@ -54,8 +54,8 @@ class Making:
 
 
 def _pooled(row: Row, measured: tuple[Measured, ...]) -> bool:
-    """Whether a seed can be selected: DPC's checkpoints know no label-free cost."""
-    ours = isinstance(row, Trained) and isinstance(row.recipe, Recipe)
+    """Whether a seed can be selected: DPC, and what finds no pose, know no label-free cost."""
+    ours = isinstance(row, Trained) and isinstance(row.recipe, Recipe) and row.answer != "canonical"
     return ours and len(measured) > 1
 
 

@@ -3,7 +3,7 @@
 """Rows measured by the protocol of METHOD 8: once a seed, found again when finished."""
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from experiments.tables.data import key, store_of
@@ -12,6 +12,7 @@ from experiments.tables.train import Model, Workshop, model_of
 
 from wildshape.baselines.dpc import completer as dpc
 from wildshape.baselines.dpc.checkpoint import is_dpc
+from wildshape.baselines.dpc.pre_aligned import pre_aligned
 from wildshape.baselines.named import baseline
 from wildshape.cli.terminal import TERMINAL, say
 from wildshape.errors import MissingExtraError
@@ -26,13 +27,16 @@ from wildshape.evaluation.results import (
     Rotate,
     Skipped,
 )
-from wildshape.inference.evaluated import Learned
+from wildshape.inference.evaluated import CanonicalShapes, Learned
 from wildshape.inference.predictor import load
 from wildshape.io.atomic import write_json
-from wildshape.io.inputs import open_tracks
+from wildshape.io.inputs import TrackSource, open_tracks
 from wildshape.io.output import provenance
+from wildshape.io.store.store import open_store
 from wildshape.method.checkpoint import fingerprint
 from wildshape.ops.device import choose_device
+from wildshape.records import Track
+from wildshape.training.setup import split_tracks
 
 
 @dataclass(frozen=True)
@@ -56,18 +60,30 @@ def measure(
     """Scores of a row; None where a library that it needs is not installed."""
     model = model_of(shop, row, seed) if isinstance(row, Trained) else None
     mark = _mark(row, model)
-    name = f"{key(row.name, mark, block.test, rotate, seed, max_scans)}.json"
+    truth = ("accumulated",) if block.accumulated else ()
+    name = f"{key(row.name, mark, block.test, rotate, seed, max_scans, *truth)}.json"
     path = shop.folder / "scores" / name
     if not path.is_file():
         method = method_of(shop, row, model)
         if method is None:
             return None
         source = open_tracks(store_of(shop.folder, block.test))
+        source = WithoutShapes(source) if block.accumulated else source
         found = evaluate_once(source, {row.name: method}, rotate, seed, max_scans, TERMINAL)
         made = {**provenance(shop.command), "model": mark}
         write_json(path, {"results": asdict(found), "made": made})
     kept = json.loads(path.read_text("utf-8"))
     return Measured(as_results(kept["results"], Limits(max_scans=max_scans)), kept["made"], model)
+
+
+class WithoutShapes(TrackSource):
+    """Tracks whose true shapes are not known: evaluation accumulates their scans."""
+
+    def __init__(self, source: TrackSource) -> None:
+        super().__init__(source.path, source.names, source._read)
+
+    def __getitem__(self, index: int) -> Track:
+        return replace(super().__getitem__(index), shape=None)
 
 
 def seeds_of(row: Row, rotate: Rotate, seeds: int) -> range:
@@ -87,17 +103,28 @@ def _mark(row: Row, model: Model | None) -> str:
 def method_of(shop: Workshop, row: Row, model: Model | None) -> Method | None:
     """What is measured; of trained rows the network's own answers, unless the row says more."""
     if model is not None and is_dpc(model.path):
-        return dpc.load(model.path, choose_device(shop.device))
+        assert isinstance(row, Trained)
+        method = dpc.load(model.path, choose_device(shop.device))
+        aligned = row.answer == "canonical"
+        return pre_aligned(method, _held_out(shop, row)) if aligned else method
     if isinstance(row, Shipped) or model is not None:
         path = None if model is None else model.path
         answer = row.answer if isinstance(row, Trained) else "refined"
-        predictor = load(path, shop.device, raw=answer == "raw")
+        predictor = load(path, shop.device, raw=answer in ("raw", "canonical"))
+        if answer == "canonical":
+            return CanonicalShapes(predictor)
         return Learned(predictor, track=answer == "track")
     try:
         return baseline(row.name)
     except MissingExtraError as error:
         say(f"row {row.name} left out: {error}")
         return None
+
+
+def _held_out(shop: Workshop, row: Trained) -> list[Track]:
+    """The tracks of a row's data that it was not trained on."""
+    store = open_store(shop.data(row))
+    return [store.track(int(index)) for index in split_tracks(len(store))[1]]
 
 
 def as_results(kept: dict[str, Any], limits: Limits) -> Results:

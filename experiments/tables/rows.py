@@ -2,13 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rows that several tables share."""
 
+from dataclasses import replace
+
 from experiments.tables.data import Data
 from experiments.tables.size import Size, sized, sized_dpc
 from experiments.tables.table import Baseline, Trained
 
 from wildshape.baselines.dpc.objective import dpc, dpc_dagger, dpc_lidar
-from wildshape.training.recipes import default, paper_lidar, paper_views
+from wildshape.training.config import Recipe
+from wildshape.training.recipes import default, paper_lidar, paper_views, shape_oracle
 
+ORACLE = "oracle"
+"""Taught the true pose, too; the paper's own is `paper_oracle`."""
 REGISTERING = (
     "identity",
     "local-icp",
@@ -36,7 +41,28 @@ def default_form(size: Size, data: Data) -> Trained:
 
 def oracle(size: Size, data: Data) -> Trained:
     """The paper's network, taught the truth."""
-    return Trained("oracle", sized(paper_lidar(), size), data, teacher="truth")
+    return Trained(ORACLE, sized(paper_lidar(), size), data, teacher="truth")
+
+
+def paper_oracle(taught: Trained) -> Trained:
+    """An oracle as the paper has it: no pose is learned, shapes are measured in the true frame."""
+    assert isinstance(taught.recipe, Recipe)
+    recipe = shape_oracle(taught.recipe)
+    name = "oracle, shape alone (the paper's)"
+    return replace(taught, name=name, recipe=recipe, answer="canonical")
+
+
+def aligned(row: Trained) -> Trained:
+    """DPC as its authors judge it: the same weights."""
+    return replace(row, name=f"{row.name} (pre-aligned)", answer="canonical")
+
+
+def flat(base: Trained, name: str) -> Trained:
+    """The paper's "Ours*": distances are those in the image."""
+    assert isinstance(base.recipe, Recipe)
+    loss = base.recipe.loss
+    loss = replace(loss, projection=replace(loss.projection, flat=True))
+    return replace(base, name=name, recipe=replace(base.recipe, loss=loss))
 
 
 def views_form(size: Size, data: Data) -> Trained:
@@ -46,7 +72,7 @@ def views_form(size: Size, data: Data) -> Trained:
 
 def views_oracle(size: Size, data: Data) -> Trained:
     """The paper's network on depth views, taught the truth."""
-    return Trained("oracle", sized(paper_views(), size), data, teacher="truth")
+    return Trained(ORACLE, sized(paper_views(), size), data, teacher="truth")
 
 
 def dpc_views(size: Size, data: Data) -> tuple[Trained, Trained]:

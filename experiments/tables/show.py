@@ -77,6 +77,19 @@ def _part(part: Part) -> str:
     return "\n\n".join([title, pipe_table(heading, rows), notes(summaries)])
 
 
+def as_printed(part: Part) -> str:
+    """The part with the paper's columns alone, its rows beneath ours."""
+    summaries = part.summaries()
+    known = PaperRow.__dataclass_fields__
+    columns = [one for one in _columns(part.block, summaries) if one.name in known]
+    rows = [[summary.name, *cells_of(summary, columns)[:-1]] for summary in summaries]
+    for row in part.block.paper:
+        name, _, *cells, _ = _paper(row, columns, part.block)
+        rows.append([name, *cells])
+    heading = ["method", *(column.heading for column in columns)]
+    return f"## {part.block.title}: {ROTATE[part.rotate]}\n\n{pipe_table(heading, rows)}\n"
+
+
 def _columns(block: Block, summaries: Sequence[Summary]) -> list[Figure]:
     """Those of an evaluation's own table, and both parts of the CD against partial truth."""
     columns = columns_of(summaries)

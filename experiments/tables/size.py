@@ -7,7 +7,7 @@ from typing import Literal
 
 from wildshape.baselines.dpc.objective import DpcRecipe
 from wildshape.baselines.dpc.objective import small as small_dpc
-from wildshape.training.config import Recipe
+from wildshape.training.config import OptimConfig, Recipe
 from wildshape.training.recipes import small, tiny
 
 Like = Literal["tiny", "small"]
@@ -31,6 +31,8 @@ class Size:
             views and trucks where `like` is tiny.
         max_scans: of a tested track, evenly; None: all.
         like: the preset whose widths, points and schedule are used where `steps` is given.
+        own_schedule: recipes of the paper keep the shape of their schedule instead, shortened
+            evenly: steps down, neither warm-up nor averaged weights; `like` gives the first rate.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Size:
     seeds: int
     max_scans: int | None
     like: Like = "tiny"
+    own_schedule: bool = False
 
     @property
     def ablation_seeds(self) -> int:
@@ -75,7 +78,7 @@ SIZES = {
     "test": Size("test", 6, 3, 10, 2, 4),
     "tiny": Size("tiny", 40, 12, 400, 3, 6),
     "hour": Size("hour", 200, 30, 1000, 3, 8),
-    "small": Size("small", 300, 60, 6000, 3, 12, "small"),
+    "small": Size("small", 300, 60, 6000, 3, 12, "small", own_schedule=True),
     "full": Size("full", 4000, 141, None, 5, None),
 }
 
@@ -102,9 +105,19 @@ def sized(recipe: Recipe, size: Size) -> Recipe:
         recipe,
         network=network,
         views=replace(recipe.views, points=base.views.points),
-        optim=replace(base.optim, steps=size.steps),
+        optim=schedule(recipe, base, size),
         validate_every=min(1000, size.steps),
     )
+
+
+def schedule(recipe: Recipe, base: Recipe, size: Size) -> OptimConfig:
+    """That of our preset, or the paper's own at as many steps."""
+    assert size.steps is not None
+    own = recipe.optim
+    if not (size.own_schedule and own.decay_every):
+        return replace(base.optim, steps=size.steps)
+    every = max(1, own.decay_every * size.steps // own.steps)
+    return replace(own, steps=size.steps, decay_every=every, lr=base.optim.lr)
 
 
 def sized_dpc(recipe: DpcRecipe, size: Size) -> DpcRecipe:

@@ -12,7 +12,7 @@ from wildshape.evaluation.paper import PaperRow
 from wildshape.evaluation.results import Rotate
 from wildshape.training.config import Recipe
 
-Answer = Literal["raw", "refined", "track"]
+Answer = Literal["raw", "refined", "track", "canonical"]
 PROTOCOLS: tuple[Rotate, ...] = ("none", "yaw", "so3")
 
 
@@ -26,8 +26,8 @@ class Trained:
         data: trained on, without labels unless the teacher is the truth.
         teacher: whose poses and shapes are taught (same seed); `truth`: the oracle.
         start: whose weights are fine-tuned (same seed).
-        answer: what is measured: the network's own answer, the same refined against its scan, or
-            what all scans of a track say together.
+        answer: what is measured: the network's own answer, the same refined against its scan, what
+            all scans of a track say together, or shapes alone, in the object's own frame.
     """
 
     name: str
@@ -73,6 +73,7 @@ class Block:
         rotate: input protocols.
         percent: objects are of unit size, and CD is printed times 100.
         paper_partial: the paper's shapes were measured against partial truth.
+        accumulated: truth is made of the track's scans, as the paper makes it, and not known.
     """
 
     title: str
@@ -82,6 +83,7 @@ class Block:
     rotate: tuple[Rotate, ...] = ("none",)
     percent: bool = False
     paper_partial: bool = False
+    accumulated: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,257 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The paper's own claims: vehicles, depth views and ablations at size `small`, three seeds.
+
+python -m experiments.paper_tables --cad CAD --out RUN
+
+One row after another, in the order of their worth; after each the pages are written again, with the
+rows that are finished, and the time that is left is said. Stopped at any instant, the same command
+goes on. `--plan` only says what is to be done.
+"""
+
+import json
+import shlex
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import tyro
+from experiments.tables import ablations, vehicle, views
+from experiments.tables.given import Given
+from experiments.tables.make import Making, chosen_rows, make
+from experiments.tables.measure import measure, seeds_of
+from experiments.tables.show import as_printed
+from experiments.tables.rows import ORACLE
+from experiments.tables.size import SIZES, Size
+from experiments.tables.table import Block, Row, Table, Trained
+from experiments.tables.train import Workshop
+
+from wildshape.baselines.dpc.objective import DpcRecipe
+from wildshape.cli.terminal import say
+from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.io.atomic import write_json, write_text
+from wildshape.io.progress import duration
+
+RECORD = "paper-tables.json"
+"""Seconds that each finished row took."""
+PRINTED = "printed.md"
+"""The page with the paper's columns alone."""
+_OF_THE_PAPER = "the paper's form"
+
+# Seconds of two cores at size small, a first guess: of a step of 32 scans, and of a measurement.
+_STEP_S = {"ours": 0.13, "taught": 0.22, "DPC": 0.25}
+_MEASURE_S, _SCANS = 30.0, 32
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is made.
+
+    Attributes:
+        out: folder of data, runs, scores and pages.
+        cad: folder of CAD meshes with a manifest; else our procedural shapes.
+        device: of trainings and predictions.
+        share: of steps and tracks, for a trial.
+        steps: of each training instead of the size's own.
+        seeds: trainings of each row.
+        rows: only rows whose names hold one of these, with commas.
+        plan: say what is to be done, and how long it takes, and do nothing.
+    """
+
+    out: Path
+    cad: Path | None = None
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    share: float = 1.0
+    steps: int | None = None
+    seeds: int = 3
+    rows: str = ""
+    plan: bool = False
+
+
+@dataclass(frozen=True)
+class Job:
+    """A row of a table, trained once a seed, and measured in every block that has it.
+
+    Attributes:
+        table: its name.
+        row: it.
+        blocks: that have it.
+        seeds: trainings.
+        known: a row before it is trained alike.
+    """
+
+    table: str
+    row: Row
+    blocks: tuple[Block, ...]
+    seeds: int
+    known: bool
+
+    @property
+    def name(self) -> str:
+        """Of the row, and of the first block that has it."""
+        return f"{self.table}, {self.blocks[0].title}: {self.row.name}"
+
+    @property
+    def guess_s(self) -> float:
+        """Seconds, before anything was measured."""
+        measured = sum(
+            len(seeds_of(self.row, rotate, self.seeds))
+            for block in self.blocks
+            for rotate in block.rotate
+        )
+        return _MEASURE_S * measured + self._training_s
+
+    @property
+    def _training_s(self) -> float:
+        if not isinstance(self.row, Trained) or self.known:
+            return 0.0
+        recipe = self.row.recipe
+        kind = "DPC" if isinstance(recipe, DpcRecipe) else "taught" if self.row.teacher else "ours"
+        scans = recipe.views.tracks * recipe.views.views / _SCANS
+        return self.seeds * recipe.optim.steps * _STEP_S[kind] * scans
+
+    def work(self, shop: Workshop, size: Size) -> None:
+        """Train and measure, as far as that is not done."""
+        for block in self.blocks:
+            for rotate in block.rotate:
+                for seed in seeds_of(self.row, rotate, self.seeds):
+                    measure(shop, self.row, block, rotate, seed, size.max_scans)
+
+
+def tables(given: Given, seeds: int, words: tuple[str, ...] = ()) -> dict[str, Table]:
+    """The tables of the paper's claims, in the order of their worth; one oracle, the paper's."""
+    made = {
+        "vehicle": _without(vehicle.table(given), ORACLE),
+        "views": _without(views.table(given), ORACLE),
+        "ablations": _papers_part(ablations.table(given)),
+    }
+    found = {name: _with_rows(table, words) for name, table in made.items()}
+    return {name: replace(table, seeds=seeds) for name, table in found.items() if table}
+
+
+def _papers_part(table: Table) -> Table:
+    """Without the blocks of what we added."""
+    blocks = tuple(block for block in table.blocks if _OF_THE_PAPER in block.title)
+    return replace(table, blocks=blocks)
+
+
+def _without(table: Table, name: str) -> Table:
+    """Without the rows of that name."""
+    kept = [replace(b, rows=tuple(r for r in b.rows if r.name != name)) for b in table.blocks]
+    return replace(table, blocks=tuple(kept))
+
+
+def _with_rows(table: Table, words: tuple[str, ...]) -> Table | None:
+    try:
+        return chosen_rows(table, words)
+    except BadInputError:
+        return None
+
+
+def jobs(made: dict[str, Table]) -> list[Job]:
+    """A job a row; rows that are trained alike in two blocks are one."""
+    found: dict[object, Job] = {}
+    trained: set[str] = set()
+    for name, table in made.items():
+        for block in table.blocks:
+            for row in block.rows:
+                of = row.key if isinstance(row, Trained) else str(block.test)
+                job = found.get((name, row.name, of)) or Job(
+                    name, row, (), table.seeds, of in trained
+                )
+                found[name, row.name, of] = replace(job, blocks=(*job.blocks, block))
+                trained.add(of)
+    return list(found.values())
+
+
+def changed(size: Size, share: float, steps: int | None) -> Size:
+    """A size with a share of the tracks and steps, or other steps, under a name of its own."""
+    assert size.steps is not None
+    if steps is not None:
+        size = replace(size, name=f"{size.name}-{steps}-steps", steps=steps)
+    if share == 1:
+        return size
+    counts = {
+        name: max(4, round(share * getattr(size, name))) for name in ("train", "test", "steps")
+    }
+    return replace(size, name=f"{size.name}-{share:g}", **counts)
+
+
+def left_s(todo: list[Job], spent: dict[str, float], all_jobs: list[Job]) -> float:
+    """Seconds left: what is guessed, by what the finished rows took of their guesses."""
+    done = [job for job in all_jobs if job.name in spent]
+    guessed = sum(job.guess_s for job in done)
+    pace = sum(spent[job.name] for job in done) / guessed if guessed else 1.0
+    return pace * sum(job.guess_s for job in todo)
+
+
+def only_finished(table: Table, name: str, finished: list[Job]) -> Table | None:
+    """The table with the rows that are finished."""
+    rows = [job.row for job in finished if job.table == name]
+    kept = [replace(b, rows=tuple(row for row in b.rows if row in rows)) for b in table.blocks]
+    blocks = tuple(block for block in kept if block.rows)
+    return replace(table, blocks=blocks) if blocks else None
+
+
+def write_pages(shop: Workshop, given: Given, made: dict[str, Table], finished: list[Job]) -> None:
+    """Each table's page with the rows that are finished, and one with the paper's columns alone."""
+    printed = []
+    for name, whole in made.items():
+        table = only_finished(whole, name, finished)
+        if table is None:
+            continue
+        make(shop, given, table, f"{name}-{given.size.name}", shop.folder)
+        parts = Making(shop, given, table).parts()
+        printed += [as_printed(part) for part in parts if part.rotate == "none"]
+    head = f"# The paper's tables, our rows above its own\n\n`{shop.command}`\n"
+    write_text(shop.folder / PRINTED, "\n".join([head, *printed]))
+
+
+def run(settings: Settings, command: str) -> None:
+    """Work through the plan."""
+    size = changed(SIZES["small"], settings.share, settings.steps)
+    given = Given(size, settings.cad)
+    shop = Workshop(settings.out, settings.device, command)
+    words = tuple(word.strip() for word in settings.rows.split(",") if word.strip())
+    made = tables(given, settings.seeds, words)
+    planned, spent = jobs(made), _spent(settings.out / RECORD)
+    for number, job in enumerate(planned, start=1):
+        if settings.plan:
+            state = "done" if job.name in spent else f"about {duration(job.guess_s)}"
+            print(f"{number:3} {job.name}: {state}")
+            continue
+        if job.name in spent:
+            continue
+        began = time.monotonic()
+        job.work(shop, size)
+        spent[job.name] = round(time.monotonic() - began, 1)
+        write_json(settings.out / RECORD, spent)
+        write_pages(shop, given, made, [one for one in planned if one.name in spent])
+        todo = [one for one in planned if one.name not in spent]
+        left = duration(left_s(todo, spent, planned))
+        say(
+            f"{number} of {len(planned)} rows, {job.name}: {duration(spent[job.name])}; left {left}"
+        )
+    todo = [job for job in planned if job.name not in spent]
+    print(f"{len(todo)} of {len(planned)} rows are left: {duration(left_s(todo, spent, planned))}")
+
+
+def _spent(record: Path) -> dict[str, float]:
+    return json.loads(record.read_text("utf-8")) if record.is_file() else {}
+
+
+if __name__ == "__main__":
+    arguments = sys.argv[1:]
+    try:
+        run(
+            tyro.cli(Settings, args=arguments),
+            shlex.join(["python", "-m", "experiments.paper_tables", *arguments]),
+        )
+    except (BadInputError, MissingExtraError) as error:
+        print(error, file=sys.stderr)
+        sys.exit(2)
+    except KeyboardInterrupt as stopped:
+        print(stopped, file=sys.stderr)
+        sys.exit(130)
