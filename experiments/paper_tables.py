@@ -22,8 +22,8 @@ from experiments.tables import ablations, vehicle, views
 from experiments.tables.given import Given
 from experiments.tables.make import Making, chosen_rows, make
 from experiments.tables.measure import measure, seeds_of
-from experiments.tables.show import as_printed
 from experiments.tables.rows import ORACLE
+from experiments.tables.show import as_printed
 from experiments.tables.size import SIZES, Size
 from experiments.tables.table import Block, Row, Table, Trained
 from experiments.tables.train import Workshop
