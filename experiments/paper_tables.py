@@ -189,8 +189,8 @@ def left_s(todo: list[Job], spent: dict[str, float], all_jobs: list[Job]) -> flo
 
 def only_finished(table: Table, name: str, finished: list[Job]) -> Table | None:
     """The table with the rows that are finished."""
-    rows = [job.row for job in finished if job.table == name]
-    kept = [replace(b, rows=tuple(row for row in b.rows if row in rows)) for b in table.blocks]
+    have = [(job.row, block) for job in finished if job.table == name for block in job.blocks]
+    kept = [replace(b, rows=tuple(row for row in b.rows if (row, b) in have)) for b in table.blocks]
     blocks = tuple(block for block in kept if block.rows)
     return replace(table, blocks=blocks) if blocks else None
 

@@ -24,7 +24,8 @@ from wildshape.evaluation.metrics import BoxScore
 from wildshape.evaluation.protocol import run
 from wildshape.evaluation.results import Results
 from wildshape.evaluation.summary import figures_of
-from wildshape.training.recipes import PRESETS, paper_lidar
+from wildshape.training.config import learning_rate
+from wildshape.training.recipes import PRESETS, default, paper_lidar
 
 ROWS = "paper's form,identity"
 TWO = ("vehicle", "seeds")
@@ -44,7 +45,12 @@ def test_vehicle_table(folder):
     assert "† 3D vehicle: oracle" in page
     assert "Only rows with" in page
     made = json.loads((folder / "vehicle-test.json").read_text("utf-8"))
-    assert [part["rotate"] for part in made["parts"]] == ["none", "yaw", "so3"]
+    assert [part["rotate"] for part in made["parts"]] == ["none", "yaw", "so3", "none"]
+    known, fused = (made["parts"][i]["methods"]["identity"] for i in (0, 3))
+    assert (known["truth"], fused["truth"]) == ("shape", "mirrored")
+    assert known["cd_partial"] is None
+    assert fused["coverage_partial"] < fused["coverage"]
+    assert known["acc30"] == fused["acc30"]
     ours = made["rows"]["ours, paper's form"]
     assert ours["recipe"]["optim"]["steps"] == 10
     assert len(ours["trained"]) == 2
@@ -127,6 +133,18 @@ def test_size_keeps_what_is_minimised():
     assert tiny.optim.steps == SIZES["tiny"].steps
     for preset in PRESETS.values():
         assert sized(preset(), SIZES["full"]) == preset()
+
+
+def test_size_small_keeps_the_papers_schedule_shortened_evenly():
+    """Its learning rate falls after the same shares of the run by the same factor."""
+    whole = paper_lidar().optim
+    short, ours = (sized(make_(), SIZES["small"]).optim for make_ in (paper_lidar, default))
+    assert (short.warmup, short.average, short.clip, short.steps) == (0, 0, 0, 6000)
+    for share in (0.0, 0.249, 0.251, 0.6, 0.999):
+        falls = [learning_rate(int(share * o.steps), o) / o.lr for o in (whole, short)]
+        assert falls[0] == pytest.approx(falls[1])
+    assert (ours.decay_every, ours.average) == (0, 0.998)
+    assert sized(paper_lidar(), SIZES["hour"]).optim.decay_every == 0
 
 
 def test_scores_are_read_as_they_were_written():

@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The paper's claims by one command: what is planned, done row by row, and found again."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from experiments.paper_tables import (  # pyright: ignore
+    PRINTED,
+    RECORD,
+    Settings,
+    changed,
+    jobs,
+    left_s,
+    run,
+    tables,
+)
+from experiments.tables.given import Given  # pyright: ignore
+from experiments.tables.size import SIZES  # pyright: ignore
+from experiments.tables.table import Trained  # pyright: ignore
+
+from experiments import paper_tables  # pyright: ignore
+
+
+@pytest.fixture(scope="module")
+def planned():
+    return jobs(tables(Given(SIZES["small"], Path("cad")), 3))
+
+
+def test_the_plan_has_every_row_that_the_claims_need(planned):
+    names = [job.name for job in planned]
+    assert len(set(names)) == len(names)
+    for wanted in (
+        "vehicle, Simulated drives past cars: oracle, shape alone (the paper's)",
+        "vehicle, Simulated drives past cars: DPC-LIDAR",
+        "vehicle, Simulated drives past cars: global-icp",
+        "views, Chair: DPC-dagger (pre-aligned)",
+        "views, Car: ours, losses on 2D projections",
+        "views, Airplane, depths with noise of 0.01: ours, paper's form, trained with noise",
+        "ablations, Simulated drives, the paper's form: hindsight for a batch",
+    ):
+        assert wanted in names
+    ours = next(job for job in planned if job.name.endswith("cars: ours, paper's form"))
+    assert [(block.accumulated, len(block.rotate)) for block in ours.blocks] == [(0, 3), (1, 1)]
+
+
+def test_what_is_trained_once_is_counted_once(planned):
+    trained = [job for job in planned if isinstance(job.row, Trained)]
+    assert len({job.row.key for job in trained}) == sum(not job.known for job in trained)
+    full = next(job for job in trained if "full: beta" in job.name)
+    assert full.known
+    assert full.guess_s < replace(full, known=False).guess_s
+
+
+def test_what_is_left_goes_by_what_was_spent(planned):
+    assert left_s(planned, {}, planned) == pytest.approx(sum(job.guess_s for job in planned))
+    first, *todo = planned
+    slow = {first.name: 3 * first.guess_s}
+    assert left_s(todo, slow, planned) == pytest.approx(3 * sum(job.guess_s for job in todo))
+
+
+def test_rows_are_made_and_found_again(tmp_path, monkeypatch, capsys):
+    given = Settings(tmp_path, share=0.01, rows="identity")
+    run(given, "the command")
+    assert "0 of 4 rows are left" in capsys.readouterr().out
+    spent = json.loads((tmp_path / RECORD).read_text("utf-8"))
+    assert len(spent) == 4
+    page = (tmp_path / PRINTED).read_text("utf-8")
+    assert "| identity | " in page
+    assert "CD floor" not in page
+    assert "† 3D vehicle: Local-ICP" in page
+    assert (tmp_path / "views-small-0.01.md").is_file()
+    monkeypatch.setattr(paper_tables, "measure", None)
+    run(given, "the command")
+    assert json.loads((tmp_path / RECORD).read_text("utf-8")) == spent
+
+
+def test_a_share_has_a_name_of_its_own():
+    small = SIZES["small"]
+    assert changed(small, 1.0, None) == small
+    shared = changed(small, 0.1, None)
+    assert (shared.name, shared.train, shared.test, shared.steps) == ("small-0.1", 30, 6, 600)
+    assert changed(small, 1.0, 3000).steps == 3000
