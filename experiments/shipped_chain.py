@@ -16,6 +16,7 @@ from shutil import copyfile
 from tempfile import TemporaryDirectory
 from typing import Literal
 
+import torch
 import tyro
 from experiments.mesh_credits import notice
 from experiments.meshes import road_vehicles
@@ -26,6 +27,7 @@ from wildshape.io.output import provenance
 from wildshape.io.store.store import Store, is_store, open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import MODEL, load_checkpoint, save_checkpoint
+from wildshape.method.ray_encoder import RayConfig
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.loop import fit
 from wildshape.training.recipes import PRESETS
@@ -50,6 +52,7 @@ class Round:
         lr: learning rate that it falls from; None: the preset's.
         teacher: round that poses and fuses its tracks; None: the paper's objective.
         start: round whose weights it goes on from; None: random ones.
+        rays: the network sees those of the frames, too.
     """
 
     data: int
@@ -57,6 +60,7 @@ class Round:
     lr: float | None = None
     teacher: str | None = None
     start: str | None = None
+    rays: bool = False
 
 
 ROUNDS = {
@@ -64,12 +68,13 @@ ROUNDS = {
     "taught": Round(data=1, steps=12_000, teacher="first"),
     "chained": Round(data=2, steps=8_000, lr=6e-4, teacher="taught", start="taught"),
     "again": Round(data=3, steps=8_000, lr=6e-4, teacher="chained", start="chained"),
-    "last": Round(data=3, steps=6_000, lr=6e-4, teacher="again", start="again"),
+    "last": Round(data=3, steps=6_000, lr=6e-4, teacher="again", start="again", rays=True),
 }
 """In their order; the last one is shipped."""
 
-OCCLUSION = {1: 0.3, 2: 0.6, 3: 0.6}
-"""Share of the tracks past something that stands in the way, by the seed of the data."""
+OCCLUSION, RAYS = {1: 0.3, 2: 0.6, 3: 0.6}, {1: 0, 2: 0, 3: 512}
+"""By the seed of the data: the share of the tracks past something that stands in the way, and the
+rays kept with a scan."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +99,8 @@ class Settings:
 
 
 def main(settings: Settings) -> None:
-    """Every stage that is not finished, in order."""
+    """Every stage that is not finished, in order; one thread: sums do not depend on the machine."""
+    torch.set_num_threads(1)
     weights = settings.out / "weights"
     weights.mkdir(parents=True, exist_ok=True)
     write_text(weights / "NOTICE", notice(settings.cad))
@@ -110,7 +116,8 @@ def trained(name: str, settings: Settings) -> Path:
     of, folder = ROUNDS[name], settings.out / name
     recipe = PRESETS["default"]()
     steps, rate = settings.part(of.steps), recipe.optim.lr if of.lr is None else of.lr
-    recipe = replace(recipe, optim=replace(recipe.optim, steps=steps, lr=rate))
+    network = replace(recipe.network, rays=RayConfig() if of.rays else None)
+    recipe = replace(recipe, network=network, optim=replace(recipe.optim, steps=steps, lr=rate))
     run = setup(
         recipe,
         _data(of.data, settings),
@@ -144,6 +151,7 @@ def _add_drives(store: StoreWriter, number: int, seed: int, settings: Settings) 
         scans=_SCANS,
         sensor=_SENSORS[number],
         occlusion=OCCLUSION[seed],
+        rays=RAYS[seed],
         ground=number == _GROUND,
         shape_points=_SHAPE_POINTS,
         varied=True,

@@ -92,7 +92,8 @@ def test_the_shipped_weights_know_a_car_at_any_roll():
 def test_network_input_is_centred_and_the_centres_bring_it_back(sensor, centre_of):
     rng = np.random.default_rng(0)
     scans = [rng.normal((8, 1, -1), 1, (n, 3)).astype(np.float32) for n in (40, 300)]
-    inputs, centres, turn, sizes = network_input(scans, 64, sensor)
+    inputs, centres, turn, sizes, rays = network_input(scans, 64, sensor)
+    assert rays.shape == (2, 0, 6)
     assert sizes.tolist() == [40, 64]
     assert torch.equal(turn, torch.eye(3).expand(len(scans), 3, 3))
     for i, points in enumerate(scans):

@@ -8,6 +8,7 @@ import numpy as np
 
 from wildshape.geometry.projection.sight_lines import standing
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+from wildshape.simulate.scan import Backdrop
 
 
 def test_no_ray_that_came_back_passed_through_the_object() -> None:
@@ -27,3 +28,28 @@ def test_no_ray_that_came_back_passed_through_the_object() -> None:
         posed = (track.T_sensor_object[i].apply_numpy(one) for one in (body, larger))
         true, wrong = (standing(shape, scan, rays).free.mean() for shape in posed)
         assert true < 0.03 < 0.1 < wrong
+
+
+def test_for_training_something_stands_behind_and_the_scans_stay_as_they_are() -> None:
+    plain = SimulationConfig(tracks=6, scans=2, far_m=15.0, varied=True)
+    before = list(simulate_tracks(plain, 3, workers=1))
+    tracks = list(simulate_tracks(replace(plain, rays=1024), 3, workers=1))
+    assert all(
+        np.array_equal(a, b) for x, y in zip(before, tracks) for a, b in zip(x.scans, y.scans)
+    )
+    above = []
+    for track in tracks:
+        for rays in track.rays:
+            assert rays is not None
+            back = rays.returned
+            level = back.directions[:, 2] > 0
+            above.append(float(back.ranges[level].max(initial=0.0)))
+    assert 0 < sum(far > 5 for far in above) < len(above)
+
+
+def test_a_wall_along_the_road_is_met_on_the_far_side_and_below_its_top() -> None:
+    wall, origin = Backdrop(5.0, 2.0), np.array((0.0, -10.0, 1.0))
+    toward = np.array(((0.0, 1.0, 0.0), (0.0, 1.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0)))
+    toward /= np.linalg.norm(toward, axis=1, keepdims=True)
+    assert wall.distance(origin, toward, -0.5).tolist() == [15.0, np.inf, np.inf, np.inf]
+    assert wall.distance(-origin, -toward, -0.5)[0] == 15.0

@@ -13,7 +13,8 @@ from safetensors.torch import load_file, save_file
 from tests.training.worker import SMALLEST
 
 from wildshape.errors import BadInputError
-from wildshape.method.checkpoint import load_checkpoint
+from wildshape.method.checkpoint import MODEL, load_checkpoint
+from wildshape.method.ray_encoder import RayConfig
 from wildshape.training.loop import StopRequested, fit, setup, split_tracks
 from wildshape.training.state import STATE
 
@@ -211,6 +212,17 @@ def test_few_tracks_are_both_fitted_and_held_out_many_are_not():
     assert len(held) == 5
     assert sorted([*fitted, *held]) == list(range(100))
     assert list(split_tracks(100)[1]) == list(held)
+
+
+def test_a_network_that_sees_rays_starts_from_one_that_does_not(car_store, undisturbed, tmp_path):
+    first = undisturbed / MODEL
+    seeing = replace(SMALLEST, network=replace(SMALLEST.network, rays=RayConfig(count=8)))
+    started = setup(seeing, car_store, tmp_path / "second", start=first).state.network
+    before, _ = load_checkpoint(first)
+    for name, weights in before.state_dict().items():
+        assert torch.equal(started.state_dict()[name], weights)
+    assert not started.rays.change.weight.any()
+    assert started.rays.layer1.weight.any()
 
 
 def test_fine_tuning_starts_from_the_checkpoint_and_refuses_another_size(car_store, tmp_path):

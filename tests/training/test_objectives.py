@@ -105,7 +105,9 @@ def objectives_of(batch, network, loss):
     """What both objectives ask of a network that has seen these scans."""
     turns, ends = batch.turn[:4], torch.full((4,), 0.1)
     shapes, sensors = torch.randn(4, 80, 3), 5 * torch.randn(4, 2, 3)
-    taught = FusedBatch(batch.scans[:4], turns, torch.ones(4, 3), shapes, sensors, ends)
+    taught = FusedBatch(
+        batch.scans[:4], turns, torch.ones(4, 3), shapes, sensors, ends, torch.zeros(4, 0, 6)
+    )
     yield WeaklySupervised(network, loss)(batch, 1.0).loss
     yield SelfTaught(network, loss, False)(taught, 1.0).loss
 
@@ -138,7 +140,9 @@ def test_what_is_taught_does_not_depend_on_the_size_of_the_objects():
         network = ShapePoseNet(replace(SMALLEST.network, scale=2 * unit))
         places = (unit * part for part in (torch.ones(4, 3), shapes, 5 * sensors))
         ends = torch.full((4,), 0.1)
-        batch = FusedBatch(unit * scans, rotation, *places, view_top=ends)
+        batch = FusedBatch(
+            unit * scans, rotation, *places, view_top=ends, rays=torch.zeros(4, 0, 6)
+        )
         found.append(SelfTaught(network, SMALLEST.loss, False, unit=unit)(batch, 0.0))
     large, small = found
     torch.testing.assert_close(large.loss, small.loss, atol=1e-3, rtol=1e-3)

@@ -19,6 +19,8 @@ from torch import Tensor
 
 from wildshape.geometry.centring import scan_centre
 from wildshape.geometry.projection.line_of_sight import face, roll, roll_angle
+from wildshape.geometry.projection.ray_points import KINDS
+from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.projection.visibility import Projection
 from wildshape.geometry.sampling import drawn, sorted_points
 from wildshape.geometry.transforms.se3 import SE3
@@ -28,6 +30,7 @@ from wildshape.inference.free_space import SeenScores, Sights
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.network import Poses, ShapePoseNet
+from wildshape.method.ray_encoder import RayConfig
 from wildshape.method.trust_features import rival_margin
 from wildshape.records import Points, SensorKind
 
@@ -42,12 +45,15 @@ class NetworkInput(NamedTuple):
         centres: in the turned sensor frames.
         turn: `R_turned_sensor`; the identity unless scans are turned towards their object.
         sizes: points of each scan that come first; all others repeat one of them.
+        rays: beside each object (`ray_points`), turned and centred likewise; R = 0 where none are
+            known, or where the network sees none.
     """
 
     scans: Float[Tensor, "B N 3"]
     centres: Float[Tensor, "B 3"]
     turn: Float[Tensor, "B 3 3"]
     sizes: Int64[Tensor, "B"]
+    rays: Float[Tensor, "B R 6"]
 
     def to(self, device: torch.device) -> "NetworkInput":
         """The same on a device."""
@@ -60,7 +66,18 @@ class NetworkInput(NamedTuple):
     def rolled(self, angle: Float[Tensor, "B"]) -> "NetworkInput":
         """Rolled about the line of sight, on which the centres lie."""
         by = roll(angle)
-        return NetworkInput(self.scans @ by.mT, self.centres, by @ self.turn, self.sizes)
+        rays = torch.cat((self.rays[..., :3] @ by.mT, self.rays[..., 3:]), dim=-1)
+        return NetworkInput(self.scans @ by.mT, self.centres, by @ self.turn, self.sizes, rays)
+
+    def beside(self, sights: Sights | None, config: RayConfig | None) -> "NetworkInput":
+        """The same with the rays of the scans' frames, if there are any and a network sees them."""
+        if sights is None or config is None:
+            return self
+        seen = [
+            _rays_seen(one, turn, centre, config)
+            for one, turn, centre in zip(sights.rays, self.turn, self.centres, strict=True)
+        ]
+        return self._replace(rays=torch.stack(seen))
 
 
 def network_input(
@@ -70,14 +87,28 @@ def network_input(
     ordered = [torch.from_numpy(sorted_points(scan)) for scan in scans]
     sampled = torch.stack([scan[torch.from_numpy(drawn(len(scan), count))] for scan in ordered])
     sizes = torch.tensor([min(len(scan), count) for scan in ordered])
+    unseen = torch.zeros(len(scans), 0, 3 + KINDS)
     if facing:
         frames = [face(scan, sensor_kind=sensor) for scan in ordered]
         turn = torch.stack([frame.turn for frame in frames])
         centres = torch.stack([frame.centre for frame in frames])
-        return NetworkInput(sampled @ turn.mT - centres[:, None], centres, turn, sizes)
+        return NetworkInput(sampled @ turn.mT - centres[:, None], centres, turn, sizes, unseen)
     centres = torch.stack([scan_centre(scan, sensor) for scan in ordered])
     turn = torch.eye(3).repeat(len(scans), 1, 1)
-    return NetworkInput(sampled - centres[:, None], centres, turn, sizes)
+    return NetworkInput(sampled - centres[:, None], centres, turn, sizes, unseen)
+
+
+def _rays_seen(
+    rays: SightLines | None,
+    turn: Float[Tensor, "3 3"],
+    centre: Float[Tensor, "3"],
+    config: RayConfig,
+) -> Float[Tensor, "R 6"]:
+    if rays is None:
+        return torch.zeros(config.count, 3 + KINDS)
+    found = rays.returned
+    ends, starts = (torch.from_numpy(part) @ turn.T for part in (found.ends, found.starts))
+    return config.seen(ends, starts, centre)
 
 
 @runtime_checkable
@@ -151,6 +182,7 @@ def choose_hypothesis(
     rule: CostRule,
     score: Score[ScoresT] = score_hypotheses,
     sizes: Int64[Tensor, "B"] | None = None,
+    rays: Float[Tensor, "B R 6"] | None = None,
 ) -> Chosen[ScoresT]:
     """Ask a network, score its hypotheses against the scans, and take the cheapest.
 
@@ -161,8 +193,9 @@ def choose_hypothesis(
         rule: what a hypothesis costs.
         score: gives both terms of the cost.
         sizes: points of each scan that come first, if all others repeat one of them.
+        rays: beside each object, if known.
     """
-    shapes, *hypotheses = network(scans, sizes)
+    shapes, *hypotheses = network(scans, sizes, rays)
     poses = Poses(*hypotheses)
     posed = poses.apply(shapes)
     scores = score(scans, centres, posed, rule.projection)
@@ -251,7 +284,9 @@ def look(
     """Shapes, and the poses of the hypotheses that speak, from prepared scans."""
     own = partial(score_hypotheses, sizes=inputs.sizes)
     score = own if sights is None else SeenScores(sights, inputs.turn)
-    found = choose_hypothesis(network, inputs.scans, inputs.centres, settings, score, inputs.sizes)
+    found = choose_hypothesis(
+        network, inputs.scans, inputs.centres, settings, score, inputs.sizes, inputs.rays
+    )
     seen = look_features(inputs.scans, found.posed, found.scores, found.poses, found.believed)
     features = torch.cat((seen, rival_margin(found.poses, found.believed)), -1)
     return in_sensor_frame(found, inputs, settings, features)

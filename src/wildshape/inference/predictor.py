@@ -276,7 +276,8 @@ class Predictor:
     def _found(self, scans: Sequence[Points], sights: Sights | None) -> Found:
         """What the network says of scans, on the host."""
         of = self.settings
-        inputs = network_input(scans, of.input_points, of.sensor, of.facing).to(self.device)
+        inputs = network_input(scans, of.input_points, of.sensor, of.facing)
+        inputs = inputs.beside(sights, of.network.rays).to(self.device)
         if of.facing:
             found = look_twice(self.network, of, inputs, self.config.hypothesis, sights)
         else:

@@ -17,6 +17,7 @@ from wildshape.method.encoders.pcn_distinct import encode_distinct
 from wildshape.method.encoders.pcn_static import encode_static
 from wildshape.method.encoders.pcn_winners import encode_winners
 from wildshape.method.heads import PoseDecoder, ShapeDecoder
+from wildshape.method.ray_encoder import RayConfig, RayEncoder
 
 # How codes with a gradient are computed: through the winning points (CPU), searched in float32 or
 # in bfloat16; in passes of fixed shape (GPU), or those with products in bfloat16.
@@ -44,6 +45,7 @@ class NetworkConfig:
         neighbours: of a point, where the encoder looks at neighbourhoods (`pointnet2`, `dgcnn`);
             fewer than the 20 to 32 of their papers, for scans of few points.
         centres: of neighbourhoods in the two levels of `pointnet2`; a quarter of its paper's.
+        rays: how the rays beside the object are seen, too (beyond the paper); None: not at all.
     """
 
     encoder: tuple[int, int, int, int] = (128, 256, 512, 1024)
@@ -59,6 +61,7 @@ class NetworkConfig:
     backbone: Backbone = "pcn"
     neighbours: int = 16
     centres: tuple[int, int] = (128, 32)
+    rays: RayConfig | None = None
 
     def __post_init__(self) -> None:
         """Refuse what would silently give another number of points."""
@@ -106,15 +109,24 @@ class ShapePoseNet(nn.Module):
         )
         self.shape = ShapeDecoder(code, config.decoder, config.points, config.mirror, config.start)
         self.pose = PoseDecoder(code, config.pose, config.branches, config.spread, config.selector)
+        self.rays = None if config.rays is None else RayEncoder(config.rays.widths, code)
 
     def encode(
-        self, scans: Float[Tensor, "B N 3"], encoding: Encoding | None = None
+        self,
+        scans: Float[Tensor, "B N 3"],
+        encoding: Encoding | None = None,
+        rays: Float[Tensor, "B R 6"] | None = None,
     ) -> Float[Tensor, "B z"]:
         """Code of centred scans; `encoding` matters to training alone, by default as exact as fast.
 
         Without a gradient the encoder runs as it is, in the type of its weights, and so do others
-        than PCN's with one.
+        than PCN's with one. Rays (`ray_points`) change the codes of networks that see them.
         """
+        return self._beside(rays, self._of_scans(scans, encoding))
+
+    def _of_scans(
+        self, scans: Float[Tensor, "B N 3"], encoding: Encoding | None
+    ) -> Float[Tensor, "B z"]:
         scaled = scans / self.config.scale
         if not torch.is_grad_enabled() or not isinstance(self.encoder, PCNEncoder):
             with record_function("wildshape: encoder dense"):
@@ -128,6 +140,13 @@ class ShapePoseNet(nn.Module):
         with record_function("wildshape: encoder static"):
             return encode_static(self.encoder, scaled, inner)
 
+    def _beside(self, rays: Tensor | None, code: Float[Tensor, "B z"]) -> Float[Tensor, "B z"]:
+        """The codes with what the rays beside the objects add."""
+        if rays is None or self.rays is None or not rays.shape[1]:
+            return code
+        at = rays[..., :3] / self.config.scale
+        return code + self.rays(torch.cat((at, rays[..., 3:]), dim=-1).to(code.dtype))
+
     def canonical(self, code: Float[Tensor, "B z"]) -> Float[Tensor, "B P 3"]:
         """`Y_can`, metres."""
         return self.shape(code).float() * self.config.scale
@@ -138,7 +157,10 @@ class ShapePoseNet(nn.Module):
         return Poses(rotation, translation * self.config.scale, logits.log_softmax(-1))
 
     def forward(
-        self, scans: Float[Tensor, "B N 3"], sizes: Int64[Tensor, "B"] | None = None
+        self,
+        scans: Float[Tensor, "B N 3"],
+        sizes: Int64[Tensor, "B"] | None = None,
+        rays: Float[Tensor, "B R 6"] | None = None,
     ) -> tuple[
         Float[Tensor, "B P 3"],
         Float[Tensor, "B K 3 3"],
@@ -150,9 +172,11 @@ class ShapePoseNet(nn.Module):
         Args:
             scans: centred, metres.
             sizes: points of each that come first; all others repeat one of them. By default all.
+            rays: beside each object (`ray_points`), if known.
         """
         scaled = scans / self.config.scale
         code = self.encoder(scaled) if sizes is None else self._of_distinct(scaled, sizes)
+        code = self._beside(rays, code)
         poses = self.poses(code)
         return self.canonical(code), poses.rotation, poses.translation, poses.log_belief
 

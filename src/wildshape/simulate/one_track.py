@@ -15,7 +15,7 @@ from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.simulate.config import SimulationConfig
 from wildshape.simulate.occluder import occluders
 from wildshape.simulate.raycast import Scene
-from wildshape.simulate.scan import Returns, Turn, passing_rays, scan
+from wildshape.simulate.scan import Backdrop, Returns, Turn, passing_rays, scan
 from wildshape.simulate.sensor import DepthCamera, SpinningLidar
 from wildshape.simulate.shapes.meshes import read_mesh
 from wildshape.simulate.shapes.solid import Solid
@@ -27,6 +27,7 @@ from wildshape.simulate.truth import visible_surface
 from wildshape.simulate.varied_scans import cut_above_ground, varied_returns
 
 _ATTEMPTS = 60
+_WALLED, _WALL_OFFSET_M, _WALL_HEIGHT_M = 0.7, (2.0, 20.0), (1.0, 8.0)
 
 
 @dataclass(frozen=True)
@@ -130,20 +131,39 @@ def _lidar_track(
                 usable.append((turn, T_object_sensor))
             if len(usable) == scans:
                 clouds, used = [turn.points for turn, _ in usable], np.stack([T for _, T in usable])
-                passed = (
-                    ()
-                    if of_rays is None
-                    else tuple(
-                        passing_rays(scene, target, lidar, T, returns, turn, config.rays, of_rays)
-                        for turn, T in usable
-                    )
-                )
+                seen = _Seen(scene, target, lidar, returns, config)
+                passed = () if of_rays is None else seen.passing(usable, of_rays)
                 return RawTrack(clouds, used, shape, target.kind, passed)
     raise BadInputError(
         f"the object {target.kind or 'given'} gives no {scans} scans of >= {config.min_points} "
         f"points to {lidar.name} within {config.far_m:g} m: it is too small, not in metres, or "
         "ask for fewer scans."
     )
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What a drive past an object saw."""
+
+    scene: Scene
+    target: Solid
+    lidar: SpinningLidar
+    returns: Returns
+    config: SimulationConfig
+
+    def passing(
+        self, turns: list[tuple[Turn, np.ndarray]], rng: np.random.Generator
+    ) -> tuple[SightLines | None, ...]:
+        """The rays of each turn that passed the object by."""
+        wall, most = self.backdrop(rng), self.config.rays
+        seen, returns = (self.scene, self.target, self.lidar), self.returns
+        return tuple(passing_rays(*seen, T, returns, turn, most, rng, wall) for turn, T in turns)
+
+    def backdrop(self, rng: np.random.Generator) -> Backdrop | None:
+        """For training a hedge or a house beyond the object, more often than not."""
+        if not self.config.varied or rng.random() >= _WALLED:
+            return None
+        return Backdrop(float(rng.uniform(*_WALL_OFFSET_M)), float(rng.uniform(*_WALL_HEIGHT_M)))
 
 
 def _stretch(

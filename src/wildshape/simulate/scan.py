@@ -129,6 +129,7 @@ def scan(
         T_object_sensor: `(4, 4)` where it stands.
         returns: how pulses are lost.
         rng: the only source of chance.
+        backdrop: what stands around the scene, if anything.
     """
     half = target.bounds[1]
     grown = half + ((returns.rim_m, returns.rim_m, 0.0) if returns.ground else 0.0)
@@ -160,6 +161,30 @@ def _turned(vectors: np.ndarray, R_object_sensor: np.ndarray) -> np.ndarray:
     return np.einsum("ji,nj->ni", R_object_sensor, vectors).astype(np.float32)
 
 
+@dataclass(frozen=True)
+class Backdrop:
+    """A wall along the road, beyond the object as the sensor sees it.
+
+    Attributes:
+        offset_m: of the wall from the object's middle.
+        height_m: above the ground.
+    """
+
+    offset_m: float
+    height_m: float
+
+    def distance(self, origin: np.ndarray, toward: np.ndarray, ground_z: float) -> np.ndarray:
+        """How far rays `(n, 3)` go until they meet it, metres; infinite where they do not.
+
+        Object frame, x along the road.
+        """
+        y = -np.copysign(self.offset_m, origin[1])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            reach = (y - origin[1]) / toward[:, 1]
+            met = (reach > 0) & (origin[2] + reach * toward[:, 2] < ground_z + self.height_m)
+        return np.where(met, reach, np.inf)
+
+
 def passing_rays(
     scene: Scene,
     target: Solid,
@@ -169,11 +194,12 @@ def passing_rays(
     turn: Turn,
     most: int,
     rng: np.random.Generator,
+    backdrop: Backdrop | None = None,
 ) -> SightLines | None:
     """The rays of the same turn that passed the object by, or did not come back from it.
 
     The ground goes on for ever; behind the object there is nothing else than what blocks the view
-    of it.
+    of it, and the backdrop.
 
     Args:
         scene: see `scan`.
@@ -184,6 +210,7 @@ def passing_rays(
         turn: what `scan` made of it.
         most: rays returned at most.
         rng: the only source of chance.
+        backdrop: what stands beyond the object, if anything.
     """
     half = target.bounds[1]
     R, origin = T_object_sensor[:3, :3], T_object_sensor[:3, 3]
@@ -191,8 +218,10 @@ def passing_rays(
     hits = scene.cast(np.broadcast_to(origin, toward.shape), toward)
     with np.errstate(divide="ignore"):
         ground = np.where(toward[:, 2] < 0, (-half[2] - origin[2]) / toward[:, 2], np.inf)
-    reach = np.minimum(hits.distance, ground)
-    by = (hits.solid != 0) | (ground < hits.distance)
+    wall = np.inf if backdrop is None else backdrop.distance(origin, toward, -half[2])
+    other = np.minimum(ground, wall)
+    reach = np.minimum(hits.distance, other)
+    by = (hits.solid != 0) | (other < hits.distance)
     back = by & (reach < sensor.max_range_m) & (rng.random(len(reach)) >= returns.dropout)
     noisy = reach[back] + returns.noise_m * rng.standard_normal(int(back.sum()))
     ends = _turned(toward[back] * noisy[:, None], R)

@@ -6,7 +6,7 @@ import copy
 import hashlib
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -237,7 +237,8 @@ def _views(
     device = processes.device
     if targets is not None:
         draw = recipe.self_training.draw
-        single = FusedSampler(sampler, targets, draw, mirror=recipe.network.mirror)
+        net = recipe.network
+        single = FusedSampler(sampler, targets, draw, mirror=net.mirror, rays=net.rays)
         return HostViews(single, seed, processes.rank, device)
     if device.type != "cuda":
         return HostViews(sampler, seed, processes.rank, device)
@@ -284,10 +285,14 @@ def _records(run: Run) -> bool:
 
 
 def _network(recipe: Recipe, start: Path | None) -> ShapePoseNet:
-    """A new network, or the checkpoint's."""
+    """A new network, or the checkpoint's; one that sees rays may start from one that does not."""
     if start is None:
         return ShapePoseNet(recipe.network)
     network, settings = load_checkpoint(start)
+    if replace(recipe.network, rays=None) == settings.network:
+        seeing = ShapePoseNet(recipe.network)  # what it sees of rays is new, if it sees any
+        seeing.load_state_dict(network.state_dict(), strict=False)
+        return seeing
     if settings.network != recipe.network:
         raise BadInputError(
             f"{start}: its sizes are not those of the preset {recipe.name}: expected"

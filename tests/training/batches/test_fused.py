@@ -9,9 +9,19 @@ import pytest
 import torch
 from tests.strategies import clouds, rotation_about
 
+from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.projection.visibility import FacingBins, facing_bins
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.training.batches.fused import FusedSampler, FusedTargets, both_ends, stretching
+from wildshape.method.ray_encoder import RayConfig
+from wildshape.training.batches.fused import (
+    DrawConfig,
+    FusedSampler,
+    FusedTargets,
+    both_ends,
+    stretching,
+    with_hidden,
+)
+from wildshape.training.batches.occlusion_augmentation import OcclusionConfig
 from wildshape.training.batches.views import ViewConfig, ViewSampler
 
 CONFIG = ViewConfig(tracks=3, views=4, points=300, turn="facing", roll=0.5)
@@ -174,3 +184,42 @@ def test_scans_from_close_by_are_drawn_up_to_four_times_as_often(car_store, cars
     assert shares is not None
     np.testing.assert_allclose(shares / shares[0], (1, 1, 2, 4, 4), rtol=1e-5)
     assert abs(shares.sum() - 1) < 1e-12
+
+
+def test_rays_go_with_their_scans(car_store, cars, monkeypatch):
+    """Rays that end where the object's own points lie are seen where these are seen."""
+    monkeypatch.setattr(
+        car_store, "rays_of", lambda scan: SightLines.of_returns(car_store.scan_points(scan)[:64])
+    )
+    plain = sampler_of(car_store, cars, mirror=True, points=6000)  # nearly all are drawn
+    whole = OcclusionConfig(strip=0.0, side=0.0, top=0.0, feet=0.0, rings=0.0)
+    config = DrawConfig(without_rays=0.25, occlusion=whole)
+    seeing = RayConfig(count=32, depth_m=9.0, within_m=9.0)
+    sampler = FusedSampler(plain.views, plain.targets, config, mirror=True, rays=seeing)
+    batches = [sampler.draw(3, step) for step in range(4)]
+    rays, scans = (torch.cat([getattr(b, of) for b in batches]) for of in ("rays", "scans"))
+    assert rays.shape == (48, 32, 6)
+    known = rays[..., 3:].any(-1)
+    without = ~known.any(1)
+    assert 5 < int(without.sum()) < 20
+    assert bool(known[~without].all())
+    apart = torch.cdist(rays[~without][..., :3], scans[~without]).amin(2)
+    assert float((apart < 1e-3).float().mean()) > 0.85
+
+
+def test_networks_that_see_no_rays_are_drawn_none(car_store, cars):
+    assert sampler_of(car_store, cars).draw(1).rays.shape == (12, 0, 6)
+
+
+def test_what_is_hidden_now_ends_rays_before_it():
+    rng, hidden = np.random.default_rng(0), torch.tensor([[8.0, 1.0, 0.0], [9.0, -1.0, 0.5]])
+    rays = SightLines.of_returns(np.array([[30.0, 0.0, 0.0]], np.float32))
+    found = with_hidden(rays, hidden, rng, 5)
+    assert found.ranges[0] == 30
+    assert len(found) == 3
+    for direction, reach in zip(found.directions[1:], found.ranges[1:]):
+        along = (hidden / hidden.norm(dim=1, keepdim=True)).numpy() @ direction
+        at = int(along.argmax())
+        assert along[at] == pytest.approx(1.0)
+        assert reach < 0.81 * float(hidden[at].norm())
+    assert with_hidden(rays, hidden[:0], rng, 5) is rays

@@ -19,7 +19,8 @@ def _wall(top: float) -> torch.Tensor:
 
 
 def _drawn(points: torch.Tensor, fewest: int = 100) -> list[torch.Tensor]:
-    return [partly_hidden(points, np.random.default_rng(seed), fewest) for seed in range(200)]
+    rngs = map(np.random.default_rng, range(200))
+    return [partly_hidden(points, rng, fewest).points for rng in rngs]
 
 
 def _wide_gaps(part: torch.Tensor) -> int:
@@ -33,6 +34,17 @@ def test_what_is_left_is_of_the_scan_and_as_many_points():
     for part in _drawn(points):
         assert part.shape == points.shape
         assert {tuple(point) for point in part.tolist()} <= known
+
+
+def test_what_is_hidden_is_of_the_scan_and_no_longer_seen():
+    points, hidden = _wall(1.0), 0
+    for seed in range(40):
+        part = partly_hidden(points, np.random.default_rng(seed), 100)
+        seen, gone = ({tuple(p) for p in some.tolist()} for some in part)
+        assert gone <= {tuple(point) for point in points.tolist()}
+        assert not seen & gone
+        hidden += len(gone) > 0
+    assert 10 <= hidden <= 30
 
 
 def test_a_fifth_of_the_scans_lack_a_strip_and_a_fifth_one_side():

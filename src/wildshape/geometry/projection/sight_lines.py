@@ -93,6 +93,11 @@ class SightLines:
         return np.zeros_like(self.directions) if self.origins is None else self.origins
 
     @property
+    def ends(self) -> Float[np.ndarray, "m 3"]:
+        """Where the rays end, metres; infinite where nothing came back."""
+        return self.starts + self.directions * self.ranges[:, None]
+
+    @property
     def returned(self) -> "SightLines":
         """Those that came back."""
         return self.part(np.flatnonzero(np.isfinite(self.ranges)))

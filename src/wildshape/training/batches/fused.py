@@ -6,6 +6,7 @@ The trainer's reader for self-training (`pseudo_labels.py` makes the targets) an
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -14,7 +15,14 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from wildshape.training.batches.occlusion_augmentation import OcclusionConfig, partly_hidden
+from wildshape.geometry.projection.ray_points import KINDS
+from wildshape.geometry.projection.sight_lines import SightLines
+from wildshape.method.ray_encoder import RayConfig
+from wildshape.training.batches.occlusion_augmentation import (
+    OcclusionConfig,
+    PartlyHidden,
+    partly_hidden,
+)
 from wildshape.training.batches.views import ViewSampler
 
 
@@ -31,6 +39,7 @@ class DrawConfig:
         both_ends: tracks that saw both ends are drawn so many times as often.
         near_m: LiDAR scans from nearer than this are drawn more often, as their distance squared.
         near: at most so many times.
+        without_rays: share of the scans whose rays are left out, so that scans alone work, too.
         occlusion: what is taken away of LiDAR scans.
     """
 
@@ -42,10 +51,12 @@ class DrawConfig:
     both_ends: float = 3.0
     near_m: float = 8.0
     near: float = 4.0
+    without_rays: float = 0.2
     occlusion: OcclusionConfig = field(default_factory=OcclusionConfig)
 
 
 _DEFAULT = DrawConfig()
+_ENDED = (0.2, 0.8)
 
 
 class FusedTargets(NamedTuple):
@@ -79,6 +90,8 @@ class FusedBatch(NamedTuple):
         shapes: target shapes, canonical frame.
         sensors: some places from which the track was seen, canonical frame.
         view_top: slope above which they saw nothing.
+        rays: beside each object, in the scan's turned and centred frame (`ray_points`); R = 0 for
+            networks that see none.
     """
 
     scans: Float[Tensor, "B N 3"]
@@ -87,6 +100,7 @@ class FusedBatch(NamedTuple):
     shapes: Float[Tensor, "B G 3"]
     sensors: Float[Tensor, "B O 3"]
     view_top: Float[Tensor, "B"]
+    rays: Float[Tensor, "B R 6"]
 
     def to(self, device: torch.device | str) -> "FusedBatch":
         """The same batch on a device."""
@@ -111,9 +125,19 @@ class FusedSampler:
         config: DrawConfig = _DEFAULT,
         *,
         mirror: bool = False,
+        rays: RayConfig | None = None,
     ) -> None:
-        """Sample from the sampler's tracks; `mirror`: objects are symmetric in y = 0."""
+        """Sample from the sampler's tracks.
+
+        Args:
+            views: draws the scans.
+            targets: of all scans.
+            config: how scans are drawn and changed.
+            mirror: objects are symmetric in y = 0.
+            rays: how a network sees them; None: not at all.
+        """
         self.views, self.targets, self.config, self.mirror = views, targets, config, mirror
+        self.rays = rays
         seen = both_ends(targets.sensors, config.end_on_deg)
         share = torch.where(seen, config.both_ends, 1.0).double().numpy()
         self._share = share / share.sum()
@@ -126,7 +150,8 @@ class FusedSampler:
         count = self.views.config.tracks * self.views.config.views
         tracks = rng.choice(len(scans_of), count, p=self._share)
         rows = np.asarray([rng.choice(scans_of[track], p=self._shares[track]) for track in tracks])
-        points = torch.stack([self._seen(int(scan), rng) for scan in rows])
+        seen = [self._seen(int(scan), rng) for scan in rows]
+        points = torch.stack([one.points for one in seen])
         at, chosen = torch.from_numpy(rows), torch.from_numpy(tracks)
         rotation, factors = targets.rotation[at], _factors(count, rng, self.config)
         stretch = stretching(rotation, factors)
@@ -138,7 +163,8 @@ class FusedSampler:
         shapes = targets.shapes[chosen] * factors[:, None]
         steeper = factors[:, 2] / (factors[:, 0] * factors[:, 1]).sqrt()
         view_top = targets.view_top[chosen] * steeper
-        batch = FusedBatch(scans, turn @ rotation, translation, shapes, sensors, view_top)
+        rays = self._rays_beside(rows, seen, turn @ stretch, centres, rng)
+        batch = FusedBatch(scans, turn @ rotation, translation, shapes, sensors, view_top, rays)
         if not self.mirror:
             return batch
         return reflected(batch, rng.random(count) < self.config.reflected)
@@ -152,13 +178,45 @@ class FusedSampler:
         share = share.numpy()
         return share / share.sum()
 
-    def _seen(self, scan: int, rng: np.random.Generator) -> Float[Tensor, "n 3"]:
+    def _seen(self, scan: int, rng: np.random.Generator) -> PartlyHidden:
         """A scan of the store, or a part of it."""
         points = self.views.picked(scan, rng)
         config = self.views.config
         if config.sensor != "lidar":
-            return points
+            return PartlyHidden(points, points[:0])
         return partly_hidden(points, rng, config.min_points, self.config.occlusion)
+
+    def _rays_beside(
+        self,
+        scans: np.ndarray,
+        seen: Sequence[PartlyHidden],
+        moved: Float[Tensor, "B 3 3"],
+        centres: Float[Tensor, "B 3"],
+        rng: np.random.Generator,
+    ) -> Float[Tensor, "B R 6"]:
+        """Those of the scans' frames, as their network sees them; of some scans none."""
+        if self.rays is None:
+            return centres.new_zeros(len(scans), 0, 3 + KINDS)
+        found = centres.new_zeros(len(scans), self.rays.count, 3 + KINDS)
+        for row, left_out in enumerate(rng.random(len(scans)) < self.config.without_rays):
+            rays = None if left_out else self.views.store.rays_of(int(scans[row]))
+            if rays is None:
+                continue
+            lines = with_hidden(rays.returned, seen[row].hidden, rng, self.rays.count // 2)
+            ends, starts = (torch.from_numpy(p) @ moved[row].mT for p in (lines.ends, lines.starts))
+            found[row] = self.rays.seen(ends, starts, centres[row])
+        return found
+
+
+def with_hidden(
+    rays: SightLines, hidden: Float[Tensor, "h 3"], rng: np.random.Generator, most: int
+) -> SightLines:
+    """Rays, and those that end before points that something hides: at some part of their way."""
+    if not len(hidden):
+        return rays
+    points = hidden[torch.from_numpy(rng.integers(len(hidden), size=min(len(hidden), most)))]
+    ended = points * float(rng.uniform(*_ENDED))
+    return SightLines.joined((rays, SightLines.of_returns(ended.numpy())))
 
 
 def both_ends(
@@ -190,7 +248,8 @@ def reflected(batch: FusedBatch, chosen: Bool[np.ndarray, "B"]) -> FusedBatch:
     across = signs[:, None]
     scans, shapes, sensors = batch.scans * across, batch.shapes * across, batch.sensors * across
     translation = batch.translation * signs
-    return FusedBatch(scans, rotation, translation, shapes, sensors, batch.view_top)
+    rays = torch.cat((batch.rays[..., :3] * across, batch.rays[..., 3:]), dim=-1)
+    return FusedBatch(scans, rotation, translation, shapes, sensors, batch.view_top, rays)
 
 
 def stretching(

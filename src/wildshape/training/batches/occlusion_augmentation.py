@@ -6,6 +6,7 @@ Beyond the paper, for self-training: what the whole track showed is taught of su
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -50,13 +51,28 @@ class OcclusionConfig:
 _DEFAULT = OcclusionConfig()
 
 
+class PartlyHidden(NamedTuple):
+    """A scan of which less is seen.
+
+    Attributes:
+        points: as many as before, of the part that is seen.
+        hidden: the points before which something stands now.
+    """
+
+    points: Float[Tensor, "n 3"]
+    hidden: Float[Tensor, "h 3"]
+
+
 def partly_hidden(
     points: Float[Tensor, "n 3"],
     rng: np.random.Generator,
     fewest: int,
     config: OcclusionConfig = _DEFAULT,
-) -> Float[Tensor, "n 3"]:
-    """The points of a LiDAR scan, or as many points of a part of it.
+) -> PartlyHidden:
+    """A LiDAR scan, or as many points of a part of it.
+
+    What the sensor does not look at, above its field of view and between its beams, is gone and not
+    hidden.
 
     Args:
         points: sensor frame, z up.
@@ -64,22 +80,24 @@ def partly_hidden(
         fewest: points that have to be left; else the scan stays as it is.
         config: how often what is hidden.
     """
-    kept = torch.ones(len(points), dtype=torch.bool)
+    looked_at = torch.ones(len(points), dtype=torch.bool)
+    open_to_view = looked_at.clone()
     if rng.random() < config.strip:
-        kept &= ~_strip(points, rng, config)
+        open_to_view &= ~_strip(points, rng, config)
     if rng.random() < config.side:
-        kept &= _one_side(points, rng, config)
+        open_to_view &= _one_side(points, rng, config)
     if rng.random() < config.top:
         slopes = slope(points)
-        kept &= slopes <= max(rng.uniform(0.0, 1.0) ** 2 * float(slopes.max()), 0.0)
+        looked_at &= slopes <= max(rng.uniform(0.0, 1.0) ** 2 * float(slopes.max()), 0.0)
     if rng.random() < config.feet:
-        kept &= _elevation_place(points) >= rng.uniform(0.0, config.feet_height)
+        open_to_view &= _elevation_place(points) >= rng.uniform(0.0, config.feet_height)
     if rng.random() < config.rings:
-        kept &= _rings(points, rng, config)
-    rows = torch.nonzero(kept)[:, 0]
+        looked_at &= _rings(points, rng, config)
+    rows = torch.nonzero(looked_at & open_to_view)[:, 0]
     if len(rows) < fewest or len(rows) == len(points):
-        return points
-    return points[rows[torch.from_numpy(rng.integers(len(rows), size=len(points)))]]
+        return PartlyHidden(points, points[:0])
+    kept = points[rows[torch.from_numpy(rng.integers(len(rows), size=len(points)))]]
+    return PartlyHidden(kept, points[looked_at & ~open_to_view])
 
 
 def _strip(

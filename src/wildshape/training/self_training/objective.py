@@ -74,7 +74,7 @@ class SelfTaught(nn.Module):
 
     def forward(self, batch: FusedBatch, template: float | Tensor) -> Objective:  # noqa: ARG002
         """Loss of one batch; the weight of the template does not change from step to step."""
-        code = self.network.encode(batch.scans, self.encoding)
+        code = self.network.encode(batch.scans, self.encoding, batch.rays)
         with record_function("wildshape: heads"):
             poses, shapes = self.network.poses(code), self.network.canonical(code) / self.unit
         translation, batch = poses.translation / self.unit, self._in_units(batch)

@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the rays beside an object add to the code of its scan (beyond the paper).
+
+A scan alone does not say why it ends where it does: something may hide the rest, or there may be
+no more. The rays of the frame know.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+from torch.nn.functional import relu
+
+from wildshape.geometry.projection.ray_points import KINDS, ray_points
+
+_NEVER = -1e9
+
+
+@dataclass(frozen=True)
+class RayConfig:
+    """How a network sees the rays beside its object.
+
+    Attributes:
+        count: points of rays that it sees at most (`ray_points.py`).
+        widths: of the layers that each of them goes through.
+        depth_m: half of what an object may be deep.
+        within_m: points of rays farther from the scan's centre are not seen.
+    """
+
+    count: int = 192
+    widths: tuple[int, int, int] = (64, 128, 256)
+    depth_m: float = 2.5
+    within_m: float = 5.0
+
+    def seen(
+        self, ends: Float[Tensor, "m 3"], starts: Float[Tensor, "m 3"], centre: Float[Tensor, "3"]
+    ) -> Float[Tensor, "R 6"]:
+        """The rays beside an object as the network sees them (`ray_points`)."""
+        limits = {"depth_m": self.depth_m, "within_m": self.within_m}
+        return ray_points(ends, centre, self.count, starts=starts, **limits)
+
+
+class RayEncoder(nn.Module):
+    """Points of rays to a change of the code: a small PointNet; none at the start of training.
+
+    Args:
+        widths: of its layers.
+        code: length of the code.
+    """
+
+    def __init__(self, widths: tuple[int, int, int], code: int) -> None:
+        super().__init__()
+        self.layer1 = nn.Linear(3 + KINDS, widths[0])
+        self.layer2 = nn.Linear(widths[0], widths[1])
+        self.layer3 = nn.Linear(widths[1], widths[2])
+        self.change = nn.Linear(widths[2], code)
+        nn.init.zeros_(self.change.weight)
+        nn.init.zeros_(self.change.bias)
+
+    def forward(self, rays: Float[Tensor, "B R 6"]) -> Float[Tensor, "B z"]:
+        """What to add to codes; nothing to those of scans without rays.
+
+        Args:
+            rays: see `ray_points`; positions in units of the network's scale.
+        """
+        known = rays[..., 3:].any(-1)
+        each = self.layer3(relu(self.layer2(relu(self.layer1(rays)))))
+        most = relu(each).masked_fill(~known[..., None], _NEVER).amax(1)
+        some = known.any(1, keepdim=True)
+        return self.change(torch.where(some, most, 0.0)) * some
