@@ -20,7 +20,7 @@ def table(given: Given) -> Table:
     """Both forms on drives, the paper's on depth views: of cars alone before size small."""
     blocks = [_paper_drives(given), _ours_drives(given)]
     categories: tuple[Category, ...] = ("car",)
-    if given.size.name in ("small", "full"):
+    if given.size.steps is None or given.size.like == "small":
         categories = ("airplane", "car", "chair")
     blocks += [_views(given, category) for category in categories]
     title = "Ablations (paper, supplement, tables 5 and 6)"
