@@ -81,7 +81,8 @@ def test_the_papers_oracle_learns_true_shapes_of_scans_as_recorded_and_no_pose(c
     for drawn, known in ((batch.shapes, targets.shapes), (batch.rotation, targets.rotation)):
         assert (drawn[:, None] - known).flatten(2).abs().amax(-1).amin(1).max() < 1e-6
     scan, rng = torch.from_numpy(car_store.scan_points(0)), np.random.default_rng(0)
-    assert all(partly_hidden(scan, rng, 1, rules.draw.occlusion) is scan for _ in range(50))
+    plain = rules.draw.occlusion
+    assert all(partly_hidden(scan, rng, 1, plain).points is scan for _ in range(50))
     torch.manual_seed(0)
     network = ShapePoseNet(recipe.network)
     found = SelfTaught(network, recipe.loss, complete=True, distances=rules.loss)(batch, 0.0)
