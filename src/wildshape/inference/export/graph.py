@@ -99,7 +99,7 @@ class CompletionGraph(nn.Module):
     def _look(self, turned: Tensor, centre: Tensor, turn: Tensor) -> _Look:
         """Shapes, and the poses of the hypotheses that speak."""
         sizes = torch.full(turned.shape[:1], turned.shape[1])
-        unseen = turned.new_zeros(len(turned), 0, 6)
+        unseen = turned.new_zeros(turned.shape[0], 0, 6)
         inputs = NetworkInput(turned - centre[:, None], centre, turn, sizes, unseen)
         found = choose_hypothesis(self.network, inputs.scans, centre, self.settings, score_plain)
         features = look_plain(found.posed, found.scores, found.poses.log_belief, found.believed)
