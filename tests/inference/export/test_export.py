@@ -24,6 +24,7 @@ from wildshape.method.checkpoint import SHIPPED, ModelSettings, save_checkpoint
 from wildshape.method.confidence import Calibration
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.network import NetworkConfig, ShapePoseNet
+from wildshape.method.ray_encoder import RayConfig
 from wildshape.ops.nearest import nearest_both
 from wildshape.ops.zbuffer import visible
 
@@ -64,6 +65,7 @@ OTHERS = {
         "extent_m": (0.5, 1.5),
     },
     "lidar.pt2": {
+        "network": replace(CONFIG, selector=True, rays=RayConfig(count=8)),  # graphs see none
         "projection": PolarBins(0.03, 0.04, flat=True),
         "beta": 0.5,
         "facing": True,
