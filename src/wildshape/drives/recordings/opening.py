@@ -21,10 +21,14 @@ from wildshape.drives.recordings.folders import (
     open_kitti_raw,
     open_sequence,
 )
+from wildshape.drives.recordings.messages import (
+    find_bag,
+    find_packets,
+    open_packet_file,
+    open_recording,
+)
 from wildshape.drives.recordings.nuscenes import find_scenes, open_scene
-from wildshape.drives.recordings.packets import find_packets, open_packet_file
 from wildshape.drives.recordings.pandaset import find_pandaset, open_pandaset
-from wildshape.drives.recordings.ros import find_bag, open_recording
 from wildshape.drives.recordings.waymo import find_segments, open_segment
 from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
