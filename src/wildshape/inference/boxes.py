@@ -7,7 +7,7 @@ shape and in a scan, and do not count at the ends and sides. A decoder draws tow
 where more of a scan than that lies outside of the shape, the box ends where the scan does.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 
 import torch
@@ -42,7 +42,7 @@ def box_seen(
 
 def fit_to_scans(
     shape: Float[Tensor, "P 3"],
-    seen: Sequence[Tensor],
+    seen: Iterable[Tensor],
     *,
     mirror: bool,
     body: bool = True,
@@ -66,8 +66,9 @@ def fit_to_scans(
     config = config if body else replace(config, shape_share=0.0, seen_share=0.0)
     low, high = _ends(_rows(exact, axes), config)
     reach = config.reach * (high - low).norm()
-    lows, highs = [low], [high]
+    lows, highs, scans = [low], [high], 0
     for points in seen:
+        scans += 1
         rows = _rows(points.double(), axes)
         if mirror:
             rows[1].abs_()
@@ -76,7 +77,7 @@ def fit_to_scans(
             begins, ends = _without_outermost(near, int(config.seen_share * near.shape[1]))
             highs.append(ends)
             lows.append(_reflected(begins, ends) if mirror else begins)
-    rank = min(len(seen) // config.scans_a_witness, len(lows) - 1)
+    rank = min(scans // config.scans_a_witness, len(lows) - 1)
     low = torch.minimum(low, torch.stack(lows).sort(0).values[rank])
     high = torch.maximum(high, torch.stack(highs).sort(0).values[-1 - rank])
     return FittedBox(axes @ ((low + high) / 2), high - low, axes)

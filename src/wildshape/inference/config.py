@@ -103,6 +103,7 @@ class JointIcpConfig:
 
 
 _FINE = JointIcpConfig(rounds=15, points=512, most=4096, holding=0.02)
+_ONTO = JointIcpConfig(points=256)
 
 
 @dataclass(frozen=True)
@@ -154,6 +155,9 @@ class TrackConfig:
         outliers: poses that no neighbour shares.
         coarse: first fit of the poses to each other.
         fine: the fit that goes on from it.
+        key_scans: of a longer track so many, evenly spread, are fitted to each other; with the
+            points of more the fits are worse.
+        onto: fit of each other scan to the key scans.
         within_m: fits that move a pose farther are not believed.
         within_rad: fits that turn a pose farther are not believed.
         most_points: of all scans, fused.
@@ -168,6 +172,8 @@ class TrackConfig:
     outliers: PoseOutlierConfig = field(default_factory=PoseOutlierConfig)
     coarse: JointIcpConfig = field(default_factory=JointIcpConfig)
     fine: JointIcpConfig = _FINE
+    key_scans: int = 32
+    onto: JointIcpConfig = _ONTO
     within_m: float = 1.5
     within_rad: float = 0.6
     most_points: int = 4096

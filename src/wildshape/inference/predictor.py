@@ -35,7 +35,7 @@ from wildshape.inference.config import InferenceConfig
 from wildshape.inference.free_space import Rays, Sights, without_free_space
 from wildshape.inference.refine import Refined, denser, refine, with_scan
 from wildshape.inference.registration import fuse_scans, inlier_ratio, to_middle
-from wildshape.inference.tracks.complete_track import complete_together
+from wildshape.inference.tracks.complete_track import Gathered, complete_together
 from wildshape.io.scans.points import LEAST_POINTS
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint, weights_file
 from wildshape.method.network import ShapePoseNet
@@ -163,7 +163,7 @@ class Predictor:
         Raises:
             BadInputError: a scan is not `(n, 3)`, or has fewer than 16 finite points.
         """
-        return self._together(all_as_points(scans), sensor, rays_of_each(rays, scans))
+        return list(self._together(all_as_points(scans), sensor, rays_of_each(rays, scans)))
 
     def complete_checked(
         self,
@@ -191,21 +191,23 @@ class Predictor:
 
     def _together(
         self, scans: Sequence[Points], sensor: Sensor | None, rays: Rays = ()
-    ) -> list[Completion]:
+    ) -> Iterator[Completion]:
         began = time.perf_counter()
-        done = self.put_together(list(self._each(scans, sensor, rays)), scans, rays)
-        seconds = (time.perf_counter() - began) / max(len(done), 1)
-        return [replace(item, seconds=seconds) for item in done]
+        done = self.put_together(self._each(scans, sensor, rays), scans, rays)
+        seconds = (time.perf_counter() - began) / max(len(scans), 1)
+        return (replace(item, seconds=seconds) for item in done)
 
     def put_together(
-        self, alone: list[Completion], scans: Sequence[Points], rays: Rays = ()
-    ) -> list[Completion]:
+        self, alone: Iterable[Completion], scans: Sequence[Points], rays: Rays = ()
+    ) -> Iterator[Completion]:
         """One shape of a track's scans that were completed each on its own."""
-        clouds = [
-            self._off_ground(cloud, done.pose.inverse().apply_numpy(done.points), done.pose)
-            for cloud, done in zip(scans, alone)
-        ]
-        return complete_together(alone, clouds, self.settings, self.config, rays)
+        if len(scans) < 2:
+            return iter(alone)
+        gathered = Gathered(self.settings)
+        for cloud, done in zip(scans, alone):
+            shape = done.pose.inverse().apply_numpy(done.points)
+            gathered.add(done, self._off_ground(cloud, shape, done.pose))
+        return complete_together(gathered, self.config, rays)
 
     def register(
         self, source: object, target: object, sensor: Sensor | None = None

@@ -14,6 +14,7 @@ from tests.models import CONFIG, SETTINGS
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
+from wildshape.inference.config import TrackConfig
 from wildshape.inference.predictor import Predictor
 from wildshape.inference.refine import drawn_to, padded
 from wildshape.inference.tracks import complete_track as whole
@@ -43,6 +44,13 @@ def completed(poses):
     ]
 
 
+def together(done, scans):
+    gathered = whole.Gathered(SETTINGS)
+    for item, scan in zip(done, scans):
+        gathered.add(item, scan)
+    return list(whole.complete_together(gathered))
+
+
 def turned_around(poses, rows):
     back = poses @ half_turn(0.0)
     return stack([back[i] if i in rows else poses[i] for i in range(len(poses))])
@@ -61,7 +69,7 @@ def test_half_turns_are_voted_out_and_poses_come_nearer(turned):
     track = each_turned(TRACK, torch.Generator().manual_seed(0)) if turned else TRACK
     true = poses_of(track)
     start = turned_around(spoilt(true, seed=1, degrees=3.0, metres=0.1), {1, 5})
-    done = whole.complete_together(completed(start), list(track.scans), SETTINGS)
+    done = together(completed(start), track.scans)
     error = [true[i].inverse() @ item.pose for i, item in enumerate(done)]
     assert max(float(torch.rad2deg(e.angle())) for e in error) < 5.0
     # One shape, posed in every scan.
@@ -100,8 +108,31 @@ def test_a_better_refinement_is_kept():
 
 
 def test_one_scan_is_completed_as_ever():
-    done = completed(poses_of(TRACK)[:1])
-    assert whole.complete_together(done, list(TRACK.scans[:1]), SETTINGS) is done
+    predictor, done = Predictor(ShapePoseNet(CONFIG), SETTINGS), completed(poses_of(TRACK)[:1])
+    assert list(predictor.put_together(done, TRACK.scans[:1])) == done
+
+
+def test_of_a_long_track_key_scans_are_fitted_to_each_other_and_the_others_to_them():
+    true = poses_of(TRACK)
+    start, few = spoilt(true, seed=1), TrackConfig(key_scans=4)
+    fit = whole.refine_checked(list(TRACK.scans), start, mirror=True, config=few)
+    assert fit.refined
+    before, after = (
+        (relative(true).inverse() @ relative(poses)).angle()
+        for poses in (start, fit.T_sensor_object)
+    )
+    others = [1, 3, 5]
+    assert float(after[others].mean()) < 0.7 * float(before[others].mean())
+
+
+def test_all_of_a_long_track_look_one_way():
+    """Where the object turns fast its neighbours say less of each other than elsewhere."""
+    generator = torch.Generator().manual_seed(2)
+    step = torch.linspace(0.0, 0.2, 600, dtype=torch.float64)
+    back = torch.rand(600, generator=generator) < 0.3
+    rotation = rotation_z(step.cumsum(0) + torch.where(back, torch.pi, 0.0))
+    signs = continuous_signs(rotation)
+    assert torch.equal(signs < 0, back) or torch.equal(signs > 0, back)
 
 
 def test_slow_turns_are_told_from_scans_turned_each_on_their_own():

@@ -140,7 +140,8 @@ class Completer:
     def _together(self, alone: Iterator[Completion], one: _Candidate) -> list[Completion]:
         """The next of those completed alone are of this object."""
         done = list(islice(alone, len(one.looks)))
-        return self.predictor.put_together(done, [look.scans[0] for look in one.in_time])
+        scans = [look.scans[0] for look in one.in_time]
+        return list(self.predictor.put_together(done, scans))
 
     def _look(self, every: list[_Candidate], count: int | None) -> None:
         """Look at the first so many scans of each."""

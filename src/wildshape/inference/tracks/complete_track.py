@@ -6,6 +6,7 @@ Beyond the paper. Each scan was completed on its own first; here they are held a
 Nothing but the scans and what the network said of each is used.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -31,7 +32,12 @@ from wildshape.inference.tracks.heading_vote import (
     turned_where,
     voted_signs,
 )
-from wildshape.inference.tracks.joint_icp import refine_jointly, stayed_near
+from wildshape.inference.tracks.joint_icp import (
+    fused_surface,
+    refine_jointly,
+    refine_onto,
+    stayed_near,
+)
 from wildshape.inference.tracks.pose_outliers import without_outliers
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.hindsight import score_hypotheses
@@ -40,7 +46,7 @@ from wildshape.method.trust_features import track_features
 from wildshape.ops.nearest import nearest
 from wildshape.records import Completion, Points
 
-_BATCH = 32
+_BATCH, _LEAST_SURE = 32, 1e-3
 _DEFAULT = InferenceConfig()
 
 
@@ -56,28 +62,65 @@ class TrackFit(NamedTuple):
     refined: bool
 
 
+class Gathered:
+    """Completions of a track's single scans without their points, and their mean shape.
+
+    Points of one index are the same place of every canonical shape. That holds for the network's
+    own points, which come first.
+
+    Attributes:
+        done: each scan on its own, in time order, without points.
+        scans: of one rigid object, sensor frames.
+        sure: how sure each is of its own pose, 0 to 1.
+    """
+
+    def __init__(self, settings: ModelSettings) -> None:
+        """`settings`: of the network that completes them."""
+        self.settings = settings
+        self.done: list[Completion] = []
+        self.scans: list[Points] = []
+        self.sure: list[float] = []
+        self._sum = torch.zeros(settings.network.points, 3, dtype=torch.float64)
+
+    def add(self, done: Completion, scan: Points) -> None:
+        """The next scan."""
+        own = torch.from_numpy(done.points[: len(self._sum)]).double()
+        self.sure.append(confidence_of_cost(done, self.settings))
+        self._sum += self._weight(self.sure[-1]) * done.pose.inverse().apply(own)
+        self.done.append(replace(done, points=done.points[:0].copy()))
+        self.scans.append(scan)
+
+    @property
+    def weights(self) -> Float[Tensor, "V"]:
+        """What each scan counts."""
+        return torch.tensor([self._weight(one) for one in self.sure], dtype=torch.float64)
+
+    @property
+    def shape(self) -> Float[Tensor, "P 3"]:
+        """The mean of the canonical shapes."""
+        return self._sum / self.weights.sum()
+
+    @staticmethod
+    def _weight(sure: float) -> float:
+        return max(sure, _LEAST_SURE)
+
+
 @torch.inference_mode()
 def complete_together(
-    done: list[Completion],
-    scans: list[Points],
-    settings: ModelSettings,
-    config: InferenceConfig = _DEFAULT,
-    rays: Rays = (),
-) -> list[Completion]:
+    gathered: Gathered, config: InferenceConfig = _DEFAULT, rays: Rays = ()
+) -> Iterator[Completion]:
     """Completions of a track's single scans made those of one object.
 
     Args:
-        done: each scan on its own.
-        scans: of one rigid object, in time order, sensor frames.
-        settings: of the network that completed them.
+        gathered: of two scans or more.
         config: how they are made so.
         rays: that passed the object by, one set a scan, if any are known.
+
+    Returns:
+        One a scan; each has its points when it is taken.
     """
-    if len(done) < 2:
-        return done
-    sure = [confidence_of_cost(item, settings) for item in done]
-    weights = torch.tensor(sure, dtype=torch.float64).clamp_min(1e-3)
-    shape = _mean_shape(done, weights, settings.network.points)
+    done, scans, settings = gathered.done, gathered.scans, gathered.settings
+    shape, weights = gathered.shape, gathered.weights
     poses = stack([item.pose for item in done])
     voted = _voted(poses, shape, weights, scans, settings, config.track)
     mirror, unit = settings.network.mirror, unit_of(settings.extent_m[1])
@@ -94,24 +137,23 @@ def complete_together(
     fitted = _box(solid, scans, fit.T_sensor_object, config.box, mirror=mirror, body=body)
     whole = _denser(shape, config) if settings.facing else shape
     cost = track_cost(shape, fit.T_sensor_object, scans, settings)
-    mean = float(np.mean(sure))
-    together = [
-        replace(
+    mean = float(np.mean(gathered.sure))
+    trust, evidence = settings.trust, _evidence(done, fit.T_sensor_object, fitted, cost)
+
+    def together(i: int) -> Completion:
+        item, T_sensor_object = done[i], fit.T_sensor_object[i]
+        item = replace(
             item,
-            points=fit.T_sensor_object[i].apply(whole).float().numpy(),
-            pose=fit.T_sensor_object[i],
-            box=carried(fitted, fit.T_sensor_object[i]),
+            points=T_sensor_object.apply(whole).float().numpy(),
+            pose=T_sensor_object,
+            box=carried(fitted, T_sensor_object),
             confidence=0.0 if item.warning else mean,
             cost=float(cost[i]),
             refined=fit.refined,
         )
-        for i, item in enumerate(done)
-    ]
-    trust, evidence = settings.trust, _evidence(done, fit.T_sensor_object, fitted, cost)
-    return [
-        judged(item, trust and trust.track, known, settings, config.reasons)
-        for item, known in zip(together, evidence)
-    ]
+        return judged(item, trust and trust.track, evidence[i], settings, config.reasons)
+
+    return map(together, range(len(done)))
 
 
 def _evidence(
@@ -150,20 +192,8 @@ def _box(
 ) -> FittedBox:
     """One box for all scans of the track, object frame."""
     T_object_sensor = T_sensor_object.inverse()
-    seen = [T_object_sensor[i].apply(torch.from_numpy(s).double()) for i, s in enumerate(scans)]
+    seen = (T_object_sensor[i].apply(torch.from_numpy(s).double()) for i, s in enumerate(scans))
     return fit_to_scans(shape, seen, mirror=mirror, body=body, config=config)
-
-
-def _mean_shape(
-    done: list[Completion], weights: Float[Tensor, "V"], count: int
-) -> Float[Tensor, "P 3"]:
-    """The mean of the canonical shapes: points of one index are the same place of the object.
-
-    That holds for the network's own `count` points, which come first.
-    """
-    points = [torch.from_numpy(item.points[:count]).double() for item in done]
-    shapes = [item.pose.inverse().apply(of) for item, of in zip(done, points)]
-    return (torch.stack(shapes) * weights[:, None, None]).sum(0) / weights.sum()
 
 
 def _voted(
@@ -218,13 +248,42 @@ def track_cost(
 def refine_checked(
     scans: list[Points], voted: SE3, *, mirror: bool, config: TrackConfig = _DEFAULT.track
 ) -> TrackFit:
-    """Refined poses, kept only if the scans then lie nearer to each other, and near the vote."""
+    """Refined poses, kept only if the scans then lie nearer to each other, and near the vote.
+
+    Of a long track the key scans are fitted to each other, and each other scan to them.
+    """
+    if len(scans) > config.key_scans:
+        return _by_key_scans(scans, voted, mirror, config)
     refined = refine_jointly(scans, voted, mirror=mirror, config=config.coarse)
     refined = refine_jointly(scans, refined, mirror=False, config=config.fine)
     before, after = (_disagreement(scans, T, mirror, config) for T in (voted, refined))
-    if stayed_near(voted, refined, config) and after < before:
+    if bool(stayed_near(voted, refined, config).all()) and after < before:
         return TrackFit(refined, refined=True)
     return TrackFit(voted, refined=False)
+
+
+def _by_key_scans(scans: list[Points], voted: SE3, mirror: bool, config: TrackConfig) -> TrackFit:
+    """A pose that would leave the vote far behind stays what it was."""
+    rows = torch.linspace(0, len(scans) - 1, config.key_scans).round().long()
+    keys = [scans[i] for i in rows.tolist()]
+    fit = refine_checked(keys, voted[rows], mirror=mirror, config=config)
+    if not fit.refined:
+        return TrackFit(voted, refined=False)
+    surface = fused_surface(keys, fit.T_sensor_object, config.onto, mirror=mirror)
+    parts = [slice(start, start + _BATCH) for start in range(0, len(scans), _BATCH)]
+    moved = [refine_onto(surface, scans[part], voted[part], config.onto) for part in parts]
+    rotation, translation = (
+        torch.cat([T.rotation for T in moved]),
+        torch.cat([T.translation for T in moved]),
+    )
+    near = stayed_near(voted, SE3(rotation, translation), config)
+    rotation = torch.where(near[:, None, None], rotation, voted.rotation)
+    translation = torch.where(near[:, None], translation, voted.translation)
+    rotation[rows], translation[rows] = (
+        fit.T_sensor_object.rotation,
+        fit.T_sensor_object.translation,
+    )
+    return TrackFit(SE3(rotation, translation), refined=True)
 
 
 def _disagreement(

@@ -19,7 +19,7 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import HeadingVoteConfig
 from wildshape.ops.nearest import nearest
 
-_FEWEST, _SMALLEST_M = 4, 1e-9
+_FEWEST, _SMALLEST_M, _STRETCH = 4, 1e-9, 128
 _DEFAULT = HeadingVoteConfig()
 
 
@@ -44,10 +44,23 @@ def continuous_signs(
 ) -> Float[Tensor, "V"]:
     """+1 or -1 for each pose: turn those of -1 by a half turn and no neighbours are opposed.
 
-    A problem of signs (Z2 synchronisation), solved by the leading eigenvector.
+    A problem of signs (Z2 synchronisation), solved by the leading eigenvector. That of a long track
+    would be all but zero in most of it: stretches are solved that overlap by half.
     """
+    signs = _leading_signs(rotation[:_STRETCH], config)
+    for start in range(_STRETCH // 2, len(rotation) - _STRETCH // 2, _STRETCH // 2):
+        more = _leading_signs(rotation[start : start + _STRETCH], config)
+        known = len(signs) - start
+        more = more if float((signs[start:] * more[:known]).sum()) >= 0 else -more
+        signs = torch.cat((signs, more[known:]))
+    return signs
+
+
+def _leading_signs(
+    rotation: Float[Tensor, "V 3 3"], config: HeadingVoteConfig
+) -> Float[Tensor, "V"]:
     relative = rotation[:, None].mT @ rotation[None]
-    cosine = (relative.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2
+    cosine = (_trace(relative) - 1) / 2
     order = torch.arange(len(rotation))
     near = (order[:, None] - order).abs() <= config.neighbours
     eigenvector = torch.linalg.eigh(cosine * near).eigenvectors[:, -1]
@@ -66,7 +79,7 @@ def slow(rotation: Float[Tensor, "V 3 3"], config: HeadingVoteConfig = _DEFAULT)
     return float(angle.quantile(0.75)) < config.slow_deg
 
 
-def _trace(matrix: Float[Tensor, "V 3 3"]) -> Float[Tensor, "V"]:
+def _trace(matrix: Float[Tensor, "*batch 3 3"]) -> Float[Tensor, "*batch"]:
     return matrix.diagonal(dim1=-2, dim2=-1).sum(-1)
 
 

@@ -5,14 +5,15 @@
 Beyond the paper. The network poses each scan on its own, to a degree and a decimetre. The scans of
 one rigid object must lie on one surface: every scan is moved onto the others (and, where the object
 is symmetric, onto their reflection in the canonical plane y = 0), round after round, with a robust
-kernel that narrows. No label is used.
+kernel that narrows. Of a long track a few scans do so, and each other one is moved onto what those
+show. No label is used.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from wildshape.geometry.surface import mirrored, planes
@@ -25,11 +26,11 @@ from wildshape.records import Points
 _TRACK = TrackConfig()
 
 
-class _Surface(NamedTuple):
-    """Points and unit normals of the scans in the object frame, `(V, n, 3)` each."""
+class Surface(NamedTuple):
+    """Points and unit normals in the object frame."""
 
-    points: Tensor
-    normals: Tensor
+    points: Float[Tensor, "*n 3"]
+    normals: Float[Tensor, "*n 3"]
 
 
 @torch.no_grad()
@@ -62,17 +63,49 @@ def refine_jointly(
         moved = T_object_sensor.apply(points)
         if step % 3 == 0 or step >= rounds - 2:
             normals = surface_normals(moved.flatten(0, 1), config).view_as(moved)
-        width = max(config.widest_m * config.narrower**step, config.narrowest_m)
-        T_object_sensor = _moved(T_object_sensor, _Surface(moved, normals), width, mirror, config)
+        onto = _counterparts(Surface(moved, normals), mirror)
+        T_object_sensor = _moved(T_object_sensor, moved, onto, _width(step, config), config)
     T_object_sensor = _as_a_whole(start, T_object_sensor, points, mirror) @ T_object_sensor
     return T_object_sensor.inverse().to(T_sensor_object.rotation.dtype)
 
 
-def stayed_near(before: SE3, after: SE3, config: TrackConfig = _TRACK) -> bool:
-    """Whether no pose moved farther than a network errs, half turns aside."""
+def fused_surface(
+    scans: list[Points], T_sensor_object: SE3, config: JointIcpConfig, *, mirror: bool
+) -> Surface:
+    """What some scans show together, `most` points (with `mirror` twice as many), object frame."""
+    points = torch.from_numpy(_sampled(scans, config.most // len(scans)))
+    points = T_sensor_object.to(torch.float32).inverse().apply(points).flatten(0, 1)
+    surface = Surface(points, surface_normals(points, config))
+    return Surface(*(mirrored(part[None])[0] for part in surface)) if mirror else surface
+
+
+@torch.no_grad()
+def refine_onto(
+    surface: Surface, scans: list[Points], T_sensor_object: SE3, config: JointIcpConfig
+) -> SE3:
+    """Poses near the given ones under which each scan by itself lies on a surface.
+
+    Args:
+        surface: of the same object (`fused_surface`).
+        scans: sensor frames, metres.
+        T_sensor_object: one pose a scan.
+        config: how.
+    """
+    points = torch.from_numpy(_sampled(scans, config.points))
+    T_object_sensor = T_sensor_object.to(torch.float32).inverse()
+    for step in range(config.rounds):
+        moved = T_object_sensor.apply(points)
+        nearest = nearest_k(moved.flatten(0, 1)[None], surface.points[None], 1).index
+        nearest = nearest.view(moved.shape[:2])
+        onto = Surface(surface.points[nearest], surface.normals[nearest])
+        T_object_sensor = _moved(T_object_sensor, moved, onto, _width(step, config), config)
+    return T_object_sensor.inverse().to(T_sensor_object.rotation.dtype)
+
+
+def stayed_near(before: SE3, after: SE3, config: TrackConfig = _TRACK) -> Bool[Tensor, "V"]:
+    """Which poses moved no farther than a network errs, half turns aside."""
     moved = before.inverse() @ after
-    turned = bool((moved.angle() < config.within_rad).all())
-    return turned and bool((moved.translation.norm(dim=-1) < config.within_m).all())
+    return (moved.angle() < config.within_rad) & (moved.translation.norm(dim=-1) < config.within_m)
 
 
 def _sampled(scans: list[Points], count: int) -> Float[np.ndarray, "V n 3"]:
@@ -94,12 +127,20 @@ def surface_normals(
     return planes(some[None], around)[1][0]
 
 
+def _width(step: int, config: JointIcpConfig) -> float:
+    """Of the robust kernel."""
+    return max(config.widest_m * config.narrower**step, config.narrowest_m)
+
+
 def _moved(
-    T_object_sensor: SE3, surface: _Surface, width: float, mirror: bool, config: JointIcpConfig
+    T_object_sensor: SE3,
+    points: Float[Tensor, "V n 3"],
+    onto: Surface,
+    width: float,
+    config: JointIcpConfig,
 ) -> SE3:
-    """One Gauss-Newton step of every scan onto the others."""
-    points = surface.points
-    at, normal = _counterparts(surface, mirror)
+    """One Gauss-Newton step of every scan, its points posed, onto the points' counterparts."""
+    at, normal = onto
     off = points - at
     kernel = (1 + off.square().sum(-1) / width**2) ** -2  # Geman-McClure
     centre = points.mean(1, keepdim=True)
@@ -120,7 +161,7 @@ def _moved(
     return about @ T_object_sensor
 
 
-def _counterparts(surface: _Surface, mirror: bool) -> tuple[Tensor, Tensor]:
+def _counterparts(surface: Surface, mirror: bool) -> Surface:
     """The nearest point of the other scans to each point, and its normal."""
     count, size, _ = surface.points.shape
     points, normals = (part.flatten(0, 1) for part in surface)
@@ -132,7 +173,7 @@ def _counterparts(surface: _Surface, mirror: bool) -> tuple[Tensor, Tensor]:
     query = surface.points.flatten(0, 1)[None]
     found = nearest_k(query, points[None], 1, groups=(own[None], groups[None]))
     index = found.index.view(count, size)
-    return points[index], normals[index]
+    return Surface(points[index], normals[index])
 
 
 def _as_a_whole(start: SE3, end: SE3, points: Tensor, mirror: bool) -> SE3:

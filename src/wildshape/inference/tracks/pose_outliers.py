@@ -17,6 +17,7 @@ from wildshape.inference.config import PoseOutlierConfig, TrackConfig
 from wildshape.inference.tracks.heading_vote import slow
 
 _DEFAULT = TrackConfig()
+_REACH = 3  # scans apart of two neighbours that are compared
 
 
 def without_outliers(T_sensor_object: SE3, config: TrackConfig = _DEFAULT) -> SE3:
@@ -60,18 +61,32 @@ def outliers(
     the scans stay.
     """
     count = len(rotation)
-    trace = (rotation[:, None].mT @ rotation[None]).diagonal(dim1=-2, dim2=-1).sum(-1)
-    angle = torch.rad2deg(torch.acos(((trace - 1) / 2).clamp(-1, 1)))
-    alike, apart = angle < config.alike_deg, angle > config.apart_deg
-    off = torch.tensor([_contradicted(i, alike, apart) for i in range(count)])
+    angle = _to_next(rotation).tolist()
+    off = torch.tensor([_contradicted(i, angle, config) for i in range(count)])
     return off if 2 * int(off.sum()) < count else torch.zeros_like(off)
 
 
-def _contradicted(i: int, alike: Bool[Tensor, "V V"], apart: Bool[Tensor, "V V"]) -> bool:
+def _to_next(rotation: Float[Tensor, "V 3 3"]) -> Float[Tensor, "V 4"]:
+    """The angle in degrees between each scan and itself, the next, the one after that, and on."""
+    count = len(rotation)
+    angle = rotation.new_full((count, _REACH + 1), torch.nan)
+    for on in range(min(_REACH + 1, count)):
+        relative = rotation[: count - on].mT @ rotation[on:]
+        cosine = (relative.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2
+        angle[: count - on, on] = torch.rad2deg(torch.acos(cosine.clamp(-1, 1)))
+    return angle
+
+
+def _contradicted(i: int, to_next: list[list[float]], config: PoseOutlierConfig) -> bool:
     """Whether more pairs of neighbours that agree are against scan `i` than for it."""
-    last = len(alike) - 1
+    last = len(to_next) - 1
+
+    def angle(j: int, k: int) -> float:
+        return to_next[min(j, k)][abs(j - k)]
+
     pairs = [(i - back, i + on) for back, on in ((1, 1), (1, 2), (2, 1))]
     pairs += [(1, 2)] if i == 0 else [(last - 1, last - 2)] if i == last else []
-    agree = [(j, k) for j, k in pairs if min(j, k) >= 0 and max(j, k) <= last and bool(alike[j, k])]
-    against = sum(bool(apart[i, j] & apart[i, k]) for j, k in agree)
-    return against > sum(bool(alike[i, j] & alike[i, k]) for j, k in agree)
+    within = [(j, k) for j, k in pairs if min(j, k) >= 0 and max(j, k) <= last]
+    agree = [(angle(i, j), angle(i, k)) for j, k in within if angle(j, k) < config.alike_deg]
+    against = sum(min(pair) > config.apart_deg for pair in agree)
+    return against > sum(max(pair) < config.alike_deg for pair in agree)

@@ -249,7 +249,8 @@ def refined(teacher: Teacher, track: PosedTrack) -> PosedTrack:
 def chained(scans: list[Points], T_sensor_can: SE3, config: SelfTrainingConfig = _DEFAULT) -> SE3:
     """Poses that fit their neighbours, unless a scan would jump."""
     found = refine_by_graph(scans, T_sensor_can, config.graph)
-    return found if stayed_near(T_sensor_can, found, config.track) else T_sensor_can
+    stayed = bool(stayed_near(T_sensor_can, found, config.track).all())
+    return found if stayed else T_sensor_can
 
 
 def agreed_tracks(
