@@ -66,6 +66,7 @@ def test_page_is_served_here_until_it_is_interrupted(wildshape, completed, monke
         raise KeyboardInterrupt
 
     monkeypatch.setattr(page, "run_until_interrupted", once)
+    monkeypatch.setattr(page, "_PATIENCE_S", 0.0)  # no browser comes
     found = wildshape("view", completed, "--port", "0", "--no-open", "--json")
     assert found.code == 0, found
     assert found.err == "closed\n"

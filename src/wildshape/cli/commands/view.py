@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import FlagCreatePairsOff, Positional, arg
 
+from wildshape.cli.commands import uncollected
 from wildshape.cli.options import (
     DEFAULT_FILES,
     DEFAULT_NETWORK,
@@ -84,10 +85,11 @@ def run(settings: Settings) -> None:
     """
     import webbrowser
 
-    from wildshape.cli.terminal import answer, say
-    from wildshape.report.viewer.page import run_until_interrupted
+    with uncollected():
+        from wildshape.cli.terminal import answer, say
+        from wildshape.report.viewer.page import run_until_interrupted
 
-    page_of, tracks = _page(settings)
+        page_of, tracks = _page(settings)
     with page_of as page:
         text = f"showing {settings.input} at {page.url} (this machine only); Ctrl-C ends it"
         answer(text, {"url": page.url, "tracks": tracks}, as_json=settings.json)

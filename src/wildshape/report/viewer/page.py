@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from viser import ViserServer
 
 HOST = "127.0.0.1"
-_PLAY_SECONDS, _SPEAK_SECONDS, _STOP_SECONDS = 0.12, 0.5, 5.0
+_PLAY_SECONDS, _SPEAK_SECONDS, _STOP_SECONDS, _LOOK_SECONDS = 0.12, 0.5, 5.0, 0.05
+_PATIENCE_S, _DRAWN_S = 10.0, 1.0  # for a browser to open the page, and to draw it
 
 
 @runtime_checkable
@@ -53,6 +54,7 @@ class Page:
         self.stage: Stage | None = None
         self.status = ""
         self.turn = 0  # which choice of a track is the latest
+        self.opened = False  # by a browser
         self.panel = Panel(server, source.labels, self.refresh, self.choose)
         self.choose(0)
 
@@ -130,6 +132,8 @@ class Page:
         spoke = 0.0
         total, shown = len(stage.track.scans), self.panel.wish().scan
         for scan, done in self.source.make(number, stage.track, shown):
+            if len(stage.completions) == 1:
+                self._let_it_be_drawn(turn)
             with self.lock:
                 if turn != self.turn:
                     return
@@ -141,6 +145,15 @@ class Page:
                     spoke = time.monotonic()
                     self.refresh()
         self._say("", turn)
+
+    def _let_it_be_drawn(self, turn: int) -> None:
+        """A page that opens draws the first scan before all others are sent: twice as soon."""
+        patience = time.monotonic() + _PATIENCE_S
+        while turn == self.turn and not self.opened and time.monotonic() < patience:
+            time.sleep(_LOOK_SECONDS)
+            if self.server.get_clients():
+                self.opened = True
+                time.sleep(_DRAWN_S)
 
     def _say(self, text: str, turn: int) -> None:
         with self.lock:
