@@ -94,7 +94,8 @@ def _write_object(out: Path, name: str, names: list[str], scans: list, shape: np
         yaw = float(torch.atan2(T.rotation[1, 0], T.rotation[0, 0]))
         wxyz = [float(np.cos(yaw / 2)), 0.0, 0.0, float(np.sin(yaw / 2))]
         box = {"centre": T.translation.tolist(), "size": SIZE, "quaternion_wxyz": wxyz}
-        entries.append({"scan": names[frame], "box": box, "confidence": 0.9, "cost_m": 0.05})
+        stated = {"confidence": 0.9, "p_pose": 0.97, "p_box": 0.94, "p_kind": 0.99}
+        entries.append({"scan": names[frame], "box": box, "cost_m": 0.05, **stated})
     poses = torch.stack([scans[frame][1].matrix for frame in kept])
     write_poses(folder / "poses.txt", SE3.from_matrix(poses))
     said = {"track": name, "sensor": "lidar", "category": "car", "scans": entries}

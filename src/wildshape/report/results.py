@@ -3,7 +3,7 @@
 """What `complete` and `register` left of a track, read back: objects.json and what is beside."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +19,12 @@ from wildshape.io.scans.writers import CLOUD_FORMATS
 from wildshape.records import Box, Points, Track
 
 MARKER, OBJECTS, METRICS, SCORES = "wildshape.json", "objects.json", "metrics.json", "scores.json"
+PROBABILITIES = {"p_pose": "heading right", "p_box": "box right", "p_kind": "kind right"}
+MEANING = (
+    "The chances that the heading is within 10° of the truth, that the box shares 0.7 of the joint "
+    "area with the true one, from above, and that it is an object of the kind trained on; the "
+    "confidence is their product."
+)
 
 
 @dataclass(frozen=True)
@@ -136,7 +142,38 @@ def read_result(folder: Path, inputs: Inputs) -> TrackResult:
         for scan in found.scans:
             box_of(found.entry(scan))
             doubt_of(found.entry(scan))
+        chances_of(found.entries)
     return found
+
+
+def chances_in(folder: Path) -> dict[str, float]:
+    """`chances_of` all scans of a track's folder.
+
+    Raises:
+        BadInputError: objects.json is damaged.
+    """
+    with reading(folder / OBJECTS, "what complete or register writes"):
+        return chances_of(read_object(folder / OBJECTS).get("scans") or ())
+
+
+def chances_of_scores(scores: Path, method: str) -> dict[str, dict[str, float]]:
+    """`chances_of` each track by one method's row in scores.json.
+
+    Raises:
+        BadInputError: the file is damaged.
+    """
+    scans: dict[str, list[dict[str, Any]]] = {}
+    with reading(scores, "what evaluate writes"):
+        for scan in _rows_of(scores, method, "completions"):
+            scans.setdefault(str(scan["track"]), []).append(scan)
+        return {track: chances_of(entries) for track, entries in scans.items()}
+
+
+def _rows_of(scores: Path, method: str, what: str) -> Iterator[dict[str, Any]]:
+    """Records of one method in scores.json: `completions` or `registrations`."""
+    runs = json.loads(scores.read_text("utf-8"))["runs"]
+    for row in (row for run in runs for row in run["methods"] if row["name"] == method):
+        yield from row[what]
 
 
 def errors_of_scores(scores: Path, method: str) -> dict[str, dict[str, list[float]]]:
@@ -147,14 +184,12 @@ def errors_of_scores(scores: Path, method: str) -> dict[str, dict[str, list[floa
     """
     found: dict[str, dict[str, list[float]]] = {"cd": {}, "rotation_deg": {}, "translation_m": {}}
     with reading(scores, "what evaluate writes"):
-        runs = json.loads(scores.read_text("utf-8"))["runs"]
-        for row in (row for run in runs for row in run["methods"] if row["name"] == method):
-            for scan in row["completions"]:
-                cd = float(scan["error"]["precision"]) + float(scan["error"]["coverage"])
-                found["cd"].setdefault(str(scan["track"]), []).append(cd)
-            for scan in row["registrations"]:
-                for name in ("rotation_deg", "translation_m"):
-                    found[name].setdefault(str(scan["track"]), []).append(float(scan[name]))
+        for scan in _rows_of(scores, method, "completions"):
+            cd = float(scan["error"]["precision"]) + float(scan["error"]["coverage"])
+            found["cd"].setdefault(str(scan["track"]), []).append(cd)
+        for scan in _rows_of(scores, method, "registrations"):
+            for name in ("rotation_deg", "translation_m"):
+                found[name].setdefault(str(scan["track"]), []).append(float(scan[name]))
     return found
 
 
@@ -162,6 +197,16 @@ def doubt_of(entry: Mapping[str, Any]) -> str:
     """Why a scan's result is not to be trusted: its warning, or its reasons in plain words."""
     reasons = ", ".join(str(reason).replace("_", " ") for reason in entry.get("reasons") or ())
     return str(entry.get("warning") or reasons)
+
+
+def chances_of(entries: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """Mean probabilities of scans, by the words for them (`MEANING`); without those not stated."""
+    found = {}
+    for key, words in PROBABILITIES.items():
+        stated = [float(entry[key]) for entry in entries if entry.get(key) is not None]
+        if stated:
+            found[words] = sum(stated) / len(stated)
+    return found
 
 
 def box_of(entry: dict[str, Any]) -> Box | None:

@@ -52,9 +52,11 @@ def test_each_vehicle_s_scans_are_fused_where_it_is_completed(found):
     report = report_from_drive(found.out)
     assert [shown.name for shown in report.objects] == list(CARS)
     assert [row[1] for row in report.index[0].rows] == ["standing", "moving"]
+    assert [row[2:6] for row in report.index[0].rows] == [("0.90", "0.97", "0.94", "0.99")] * 2
     assert "a strange thing" in report.notes
     assert ("completion", "2.5 s") in report.cost
     for shown in report.objects:
+        assert ("kind right", "0.99") in shown.details
         assert shown.box is not None
         for cloud in shown.clouds:
             reach = np.abs(cloud.points - np.asarray(shown.box.centre)).max(0)

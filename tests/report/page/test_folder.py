@@ -105,12 +105,33 @@ def test_what_is_not_to_be_trusted_says_why(tmp_path: Path) -> None:
     assert any("Results not to be trusted: 1;" in line for line in report.findings)
 
 
+def test_probabilities_of_the_least_sure_scan_are_shown(tmp_path: Path) -> None:
+    entries = [_entry(name) for name in NAMES]
+    for entry, chance in zip(entries, (0.9, 0.4, 0.8)):
+        entry |= {"confidence": chance, "p_pose": chance, "p_box": 0.95, "p_kind": None}
+    _completed(tmp_path / "car", _track(), {"input": "", "scans": entries})
+    report = report_from_folder(tmp_path)
+    columns = ("object", "scans", "least confidence", "heading right", "box right")
+    assert report.index[0].columns == columns
+    assert report.index[0].rows == (("car", 3, "0.40", "0.40", "0.95"),)
+    assert "within 10° of the truth" in report.index[0].caption
+    assert report.objects[0].details[:3] == (
+        ("confidence", "0.40"),
+        ("heading right", "0.40"),
+        ("box right", "0.95"),
+    )
+    (tmp_path / "car" / "objects.json").write_text(json.dumps({"scans": [{"p_pose": "high"}]}))
+    with pytest.raises(BadInputError, match=r"objects\.json"):
+        report_from_folder(tmp_path)
+
+
 def test_an_evaluation_s_objects_by_our_error(tmp_path: Path) -> None:
     def row(track: str, precision: float, degrees: float) -> dict[str, list]:
         where = {"track": track, "scan": "0"}
         error = {"precision": precision, "coverage": 0.1}
         turned = {"rotation_deg": degrees, "rotation_sym_deg": degrees, "translation_m": 0.1}
-        return {"completions": [{**where, "error": error}], "registrations": [{**where, **turned}]}
+        completion = {**where, "error": error, "p_pose": 0.9, "p_box": None}
+        return {"completions": [completion], "registrations": [{**where, **turned}]}
 
     def both(name: str, a: dict, b: dict) -> dict:
         return {"name": name, **{key: a[key] + b[key] for key in a}}
@@ -121,16 +142,19 @@ def test_an_evaluation_s_objects_by_our_error(tmp_path: Path) -> None:
     methods = {"identity": {"acc30": 0.31}, "dpc-lidar": {"acc30": 0.5}, "wildshape": {}}
     metrics = {"rotate": "yaw", "methods": methods}
     methods["wildshape"] = {"acc30": 0.82, "rot_median_deg": 3.0, "trans_median_m": 0.1}
+    trust = {"p_pose_error": 0.02, "p_pose_brier": 0.05, "p_pose_brier_constant": 0.08}
+    methods["wildshape"] |= trust
     (tmp_path / "metrics.json").write_text(json.dumps(metrics), encoding="utf-8")
     report = report_from_folder(tmp_path)
     assert report.index[0].rows == (
-        ("b", 1, "0.400", "0.400", "90.0", "0.10"),
-        ("a", 1, "0.200", "0.200", "3.0", "0.10"),
+        ("b", 1, "0.400", "0.400", "90.0", "0.10", "0.90"),
+        ("a", 1, "0.200", "0.200", "3.0", "0.10", "0.90"),
     )
     assert report.tables[0].emphasis == (2,)
     reading = report.findings[0]
     assert "wildshape brings 82 % of them within 30°" in reading
     assert "best of the others: dpc-lidar, 50 %" in reading
+    assert "a right heading that wildshape states is 2 % off" in report.findings[1]
 
 
 def test_without_the_scans_only_the_completed_shape_is_shown(tmp_path: Path) -> None:

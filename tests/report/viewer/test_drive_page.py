@@ -41,6 +41,7 @@ def test_vehicles_stand_at_their_places_and_the_chosen_one_shows_its_shape(found
         assert len(whole.points) == 800
         assert (np.abs(around.points).max(0) <= np.array(SIZE) / 2 + 0.01).all()
         assert "&lt;7&gt;" in page.text.content
+        assert "0.94" in page.text.content.partition("box right")[2]
         assert np.linalg.norm(page.server.initial_camera.look_at - [26.8, -2, -0.95]) < 0.01
         page.picker.value = NOTHING
         page.choose()

@@ -28,7 +28,7 @@ def _written(folder: Path, shown: Track, left_out: int) -> list[int]:
         assert box is not None
         assert points is not None
         write_ply(folder / "completed" / f"{name}.ply", points)
-        scans.append({"scan": name, "box": asdict(box), "confidence": 0.5})
+        scans.append({"scan": name, "box": asdict(box), "confidence": 0.5, "p_box": 0.6})
     poses = [pose for i in kept if (pose := made[i].pose) is not None]
     write_poses(folder / "poses.txt", stack(poses))
     said = {"track": shown.name, "input": str(folder.parent.parent / "data"), "scans": scans}
@@ -51,6 +51,7 @@ def test_results_come_back_scan_by_scan(tmp_path: Path, moved: bool) -> None:
     assert [number for number, _ in made] == [2, 0, 1, 3]
     for number, one in made:
         truth = perfect(shown, kept[number])
+        assert one.chances == {"box right": 0.6}
         assert one.pose is not None
         assert truth.pose is not None
         np.testing.assert_allclose(one.pose.matrix, truth.pose.matrix, atol=1e-5)

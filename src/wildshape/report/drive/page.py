@@ -13,11 +13,19 @@ from wildshape.drives.writing.playback.moments import readable_source
 from wildshape.inference.registration import fuse_scans, to_middle
 from wildshape.io.progress import counted, duration
 from wildshape.records import as_text
-from wildshape.report.content import Cloud, Report, ReportObject, SceneView, Table
+from wildshape.report.content import Cell, Cloud, Report, ReportObject, SceneView, Table
 from wildshape.report.drive.picture import picture_from_above
 from wildshape.report.drive.scene import drawn_scans, scene_data
 from wildshape.report.page.html import write_report
-from wildshape.report.results import Inputs, TrackResult, box_of, read_result
+from wildshape.report.results import (
+    MEANING,
+    PROBABILITIES,
+    Inputs,
+    TrackResult,
+    box_of,
+    chances_in,
+    read_result,
+)
 from wildshape.report.scene import thin
 
 MOST_OBJECTS = 150
@@ -29,6 +37,7 @@ _COLUMNS = (
     "vehicle",
     "",
     "confidence",
+    *PROBABILITIES.values(),
     "length, m",
     "width, m",
     "height, m",
@@ -110,24 +119,32 @@ def _index(found: FinishedDrive) -> Table:
         title=counted(len(rows), "vehicle"),
         columns=_COLUMNS,
         rows=rows,
-        caption="Click a row for its complete shape and its scans.",
+        caption=f"Click a row for its complete shape and its scans. {MEANING}",
         sortable=True,
         objects=tuple(i if i < MOST_OBJECTS else None for i in count),
     )
 
 
-def _row(found: FinishedDrive, one: FoundVehicle) -> tuple[str | int, ...]:
+def _row(found: FinishedDrive, one: FoundVehicle) -> tuple[Cell, ...]:
     first, last = (found.seconds[one.frames[i]] for i in (0, -1))
+    chances = _chances(found, one)
     return (
         one.name,
         "moving" if one.moving else "standing",
         f"{one.confidence:.2f}",
+        *(chances.get(words) for words in PROBABILITIES.values()),
         *(f"{side:.2f}" for side in one.size),
         len(one.frames),
         f"{first:.1f} to {last:.1f}",
         f"{one.nearest_m:.1f}",
         max(one.points),
     )
+
+
+def _chances(found: FinishedDrive, one: FoundVehicle) -> dict[str, str]:
+    """Its probabilities, the means over its completed scans."""
+    chances = chances_in(found.out / "objects" / one.name)
+    return {words: f"{chance:.2f}" for words, chance in chances.items()}
 
 
 def _object(found: FinishedDrive, one: FoundVehicle, where: Inputs) -> ReportObject:
@@ -148,6 +165,7 @@ def _object(found: FinishedDrive, one: FoundVehicle, where: Inputs) -> ReportObj
         details=(
             ("box", f"{size} m"),
             ("confidence", f"{one.confidence:.2f}"),
+            *_chances(found, one).items(),
             ("", "moving" if one.moving else "standing"),
             ("frames", f"{one.frames[0]} to {one.frames[-1]}"),
         ),

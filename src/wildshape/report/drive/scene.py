@@ -19,6 +19,7 @@ from wildshape.drives.writing.playback.moments import PALETTE
 from wildshape.geometry.box import box_axes
 from wildshape.records import Box, Points
 from wildshape.report.page.html import quantise
+from wildshape.report.results import chances_in
 from wildshape.report.scene import thin
 
 _AROUND_M, _FOOT_M = 0.15, 0.15  # a box that is a little small; the ground under it
@@ -179,6 +180,7 @@ def _vehicle(
         "size": [round(side, 3) for side in one.size],
         "moving": one.moving,
         "confidence": round(one.confidence, 3),
+        "chances": chances_in(found.out / "objects" / one.name),
         "places": [places.get(frame) for frame in frames],
         "points": [points.get(frame, 0) for frame in frames],
         "speeds": [speed.get(frame, 0.0) for frame in frames],

@@ -39,6 +39,7 @@ from wildshape.report.results import (
     MARKER,
     METRICS,
     OBJECTS,
+    PROBABILITIES,
     SCORES,
     Inputs,
     TrackResult,
@@ -50,6 +51,7 @@ from wildshape.report.results import (
 )
 
 MAX_OBJECTS, MAX_JUDGED = 24, 1000
+_LABELS = {"seconds": "time", **PROBABILITIES}
 Metrics = list[tuple[Path, dict[str, Any]]]
 
 
@@ -226,7 +228,7 @@ def _errors(judged: Judged) -> tuple[tuple[str, str], ...]:
 
 def _details(entry: dict[str, Any]) -> tuple[tuple[str, str], ...]:
     known = {
-        "confidence": lambda value: f"{value:.2f}",
+        **dict.fromkeys(("confidence", *PROBABILITIES), lambda value: f"{value:.2f}"),
         "box": lambda box: " x ".join(f"{side:.2f}" for side in box["size"]) + " m",
         "refined": lambda value: "yes" if value else "no",
         "seconds": lambda value: f"{1000 * value:.0f} ms",
@@ -234,4 +236,4 @@ def _details(entry: dict[str, Any]) -> tuple[tuple[str, str], ...]:
         "reasons": ", ".join,
     }
     wanted = [key for key in known if entry.get(key) not in (None, "", [])]
-    return tuple(("time" if k == "seconds" else k, known[k](entry[k])) for k in wanted)
+    return tuple((_LABELS.get(key, key), known[key](entry[key])) for key in wanted)

@@ -93,6 +93,16 @@ def _ours(
             f"the true heading, {_percent(figures['heading30_sym'])} if half turns are forgiven."
         )
 
+    for words, key in (("heading", "p_pose"), ("box", "p_box")):
+        parts = (f"{key}_error", f"{key}_brier", f"{key}_brier_constant")
+        if _known(figures, *parts):
+            error, brier, constant = (figures[part] for part in parts)
+            yield (
+                f"Trust: the chance of a right {words} that {name} states is {_percent(error)} off"
+                f" on average; its Brier score is {brier:.3f}, that of the best constant"
+                f" {constant:.3f}."
+            )
+
 
 def _known(figures: Mapping[str, Any], *keys: str) -> bool:
     return all(figures.get(key) is not None for key in keys)

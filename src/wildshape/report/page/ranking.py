@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects in the order in which to look at them: the largest error, or least confidence, first."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,15 @@ from wildshape.evaluation.metrics import completion_error, registration_error
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Track
 from wildshape.report.content import Cell, Table
-from wildshape.report.results import TrackResult, doubt_of, errors_of_scores
+from wildshape.report.results import (
+    MEANING,
+    PROBABILITIES,
+    TrackResult,
+    chances_of,
+    chances_of_scores,
+    doubt_of,
+    errors_of_scores,
+)
 from wildshape.report.scene import thin
 
 _TRUTH_POINTS = 4096
@@ -37,6 +45,12 @@ class Judged:
     cd: float | None = None
     rotation_deg: float | None = None
     confidence: float | None = None
+
+    @property
+    def chances(self) -> dict[str, float]:
+        """What the least confident of its scans states, by the words for it."""
+        entries = sorted(self.result.entries, key=_confidence)
+        return chances_of(entries[:1])
 
     @property
     def warning(self) -> str:
@@ -72,14 +86,19 @@ def index_of(ranked: Sequence[Judged], drawn: int) -> Table:
     by = "error" if any(_truth(one) != (None, None) for one in ranked) else "confidence"
     first = "the largest error" if by == "error" else "the least confidence"
     columns, rows = _without_empty(
-        ("object", "kind", "scans", "CD, m", "rotation, °", "least confidence", "warning"),
+        (
+            *("object", "kind", "scans", "CD, m", "rotation, °", "least confidence"),
+            *PROBABILITIES.values(),
+            "warning",
+        ),
         [_row(one) for one in ranked],
     )
     return Table(
         title=f"Objects, {first} first",
         columns=columns,
         rows=rows,
-        caption=f"Sorted by {by}; a heading sorts anew, a row leads to its pictures.",
+        caption=f"Sorted by {by}; a heading sorts anew, a row leads to its pictures."
+        f"{_meaning(columns)}",
         sortable=True,
         objects=tuple(i if i < drawn else None for i in range(len(ranked))),
     )
@@ -92,13 +111,14 @@ def scans_of(result: TrackResult) -> Table | None:
         return None
     points = _counts(result.track)
     columns, rows = _without_empty(
-        ("scan", "points", "confidence", "box, m", "warning"),
+        ("scan", "points", "confidence", *PROBABILITIES.values(), "box, m", "warning"),
         [
             (name := str(e["scan"]), points.get(name), _digits(e.get("confidence"), 2), *_more(e))
             for e in entries
         ],
     )
-    return Table(f"Scans of {result.folder.name}", columns, rows, sortable=True)
+    caption = _meaning(columns).strip()
+    return Table(f"Scans of {result.folder.name}", columns, rows, caption, sortable=True)
 
 
 def objects_of_scores(scores: Path, method: str) -> Table | None:
@@ -108,21 +128,29 @@ def objects_of_scores(scores: Path, method: str) -> Table | None:
         BadInputError: scores.json is damaged.
     """
     cds, turns, shifts = errors_of_scores(scores, method).values()
+    chances = chances_of_scores(scores, method)
     if not {**cds, **turns}:
         return None
     order = sorted(
         {**cds, **turns}, key=lambda name: (-_mean(cds.get(name)), -_mean(turns.get(name)))
     )
     columns, rows = _without_empty(
-        ("object", "scans", "CD, m", "worst CD, m", "rotation, °", "translation, m"),
-        [_score_row(name, cds, turns, shifts) for name in order],
+        (
+            *("object", "scans", "CD, m", "worst CD, m", "rotation, °", "translation, m"),
+            *PROBABILITIES.values(),
+        ),
+        [
+            (*_score_row(name, cds, turns, shifts), *_stated(chances.get(name, {})))
+            for name in order
+        ],
     )
     return Table(
         title=f"Objects by the error of {method}, the worst first",
         columns=columns,
         rows=rows,
         caption="CD: mean over an object's scans; rotation and translation: medians to its "
-        "middle scan. `wildshape view` on the same folder shows the objects in this order.",
+        "middle scan. `wildshape view` on the same folder shows the objects in this order."
+        f"{_meaning(columns)}",
         sortable=True,
     )
 
@@ -135,7 +163,22 @@ def _row(one: Judged) -> tuple[Cell, ...]:
     scans = len(one.result.scans) or len(one.result.completed_scans())
     errors = (_digits(one.cd, 3), _digits(one.rotation_deg, 1))
     named = (one.result.folder.name, one.category, scans)
-    return (*named, *errors, _digits(one.confidence, 2), one.warning)
+    return (*named, *errors, _digits(one.confidence, 2), *_stated(one.chances), one.warning)
+
+
+def _stated(chances: Mapping[str, float]) -> list[str | None]:
+    """A cell for each of the probabilities."""
+    return [_digits(chances.get(words), 2) for words in PROBABILITIES.values()]
+
+
+def _confidence(entry: Mapping[str, Any]) -> float:
+    stated = entry.get("confidence")
+    return 1.0 if stated is None else float(stated)
+
+
+def _meaning(columns: Sequence[str]) -> str:
+    """What the probabilities mean, where any are shown."""
+    return f" {MEANING}" if set(columns) & set(PROBABILITIES.values()) else ""
 
 
 def _without_empty(
@@ -178,11 +221,11 @@ def _counts(track: Track | None) -> dict[str, int]:
     return {name: len(scan) for name, scan in zip(track.scan_names, track.scans)}
 
 
-def _more(entry: dict[str, Any]) -> tuple[str, str]:
-    """Size of the box, and why the result is not to be trusted."""
+def _more(entry: dict[str, Any]) -> tuple[str | None, ...]:
+    """Its probabilities, size of the box, and why the result is not to be trusted."""
     box = entry.get("box") or {}
     size = " \N{MULTIPLICATION SIGN} ".join(f"{side:.2f}" for side in box.get("size") or ())
-    return size, doubt_of(entry)
+    return (*_stated(chances_of([entry])), size, doubt_of(entry))
 
 
 def _score_row(

@@ -48,6 +48,7 @@ def _completed_rows(done: CompletedScan | None) -> list[tuple[str, str]]:
     if done.confidence is not None:
         dot = f"<span style='color:{css(done.confidence)}'>\N{BLACK CIRCLE}</span>"
         rows.append(("confidence", f"{dot} {done.confidence:.2f}"))
+    rows += [(words, f"{chance:.2f}") for words, chance in done.chances.items()]
     if done.box is not None:
         size = " \N{MULTIPLICATION SIGN} ".join(f"{side:.2f}" for side in done.box.size)
         rows.append(("box", f"{size} m"))

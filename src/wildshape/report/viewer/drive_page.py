@@ -15,7 +15,7 @@ from wildshape.drives.writing.playback.moments import colour_of, readable_source
 from wildshape.io.boxes.detections import pose_of
 from wildshape.records import Box, Points
 from wildshape.report.drive.scene import NOBODY, SceneConfig, boxes_by_frame, thinned
-from wildshape.report.results import Inputs, box_of, read_result
+from wildshape.report.results import Inputs, box_of, chances_in, read_result
 from wildshape.report.scene import box_segments, thin
 from wildshape.report.viewer.details import row
 from wildshape.report.viewer.page import HOST, hosting
@@ -56,6 +56,7 @@ class DrivePage:
         self.boxes = boxes_by_frame(found)
         self.names = tuple(one.name for one in found.vehicles)
         self.places = [dict(zip(one.frames, found.placed(one))) for one in found.vehicles]
+        self.chances = [chances_in(found.out / "objects" / name) for name in self.names]
         self.shown: int | None = None
         self.extra: list[Any] = []
         self.closed = False
@@ -261,6 +262,8 @@ class DrivePage:
         yield "vehicle", one.name
         yield "box", " x ".join(f"{side:.2f}" for side in one.size) + " m"
         yield "confidence", f"{one.confidence:.2f}"
+        for words, chance in self.chances[number].items():
+            yield words, f"{chance:.2f}"
         yield "seen", f"{'moving' if one.moving else 'standing'}, {len(one.frames)} frames"
 
 

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the viewer shows and where it comes from: results on disk, or scans and a model."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
@@ -12,12 +12,14 @@ import numpy as np
 from wildshape.datasets.tracks.truth import shape_partial
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.folders.complete_folder import describe
 from wildshape.records import Box, Completion, Points, Sensor, Track, as_text
 from wildshape.report.results import (
     OBJECTS,
     Inputs,
     TrackResult,
     box_of,
+    chances_of,
     doubt_of,
     errors_of_scores,
     find,
@@ -34,6 +36,7 @@ class CompletedScan:
         box: around it.
         pose: `T_sensor_canonical`.
         confidence: 0 to 1.
+        chances: the probabilities that make it, by the words for them (`results.MEANING`).
         warning: why it is not to be trusted, or nothing.
         seconds: time spent on the scan.
     """
@@ -44,6 +47,7 @@ class CompletedScan:
     confidence: float | None = None
     warning: str = ""
     seconds: float | None = None
+    chances: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -158,8 +162,16 @@ def _complete(model: Completes, track: Track, first: int) -> Iterator[tuple[int,
 
 
 def _completed(done: Completion) -> CompletedScan:
-    doubt = doubt_of({"warning": done.warning, "reasons": done.reasons})
-    return CompletedScan(done.points, done.box, done.pose, done.confidence, doubt, done.seconds)
+    said = describe("", done)
+    return CompletedScan(
+        points=done.points,
+        box=done.box,
+        pose=done.pose,
+        confidence=done.confidence,
+        warning=doubt_of(said),
+        seconds=done.seconds,
+        chances=chances_of([said]),
+    )
 
 
 def _read(result: TrackResult, track: Track, first: int) -> Iterator[tuple[int, CompletedScan]]:
@@ -179,6 +191,7 @@ def _read(result: TrackResult, track: Track, first: int) -> Iterator[tuple[int, 
                 confidence=entry.get("confidence"),
                 warning=doubt_of(entry),
                 seconds=entry.get("seconds"),
+                chances=chances_of([entry]),
             ),
         )
 
