@@ -4,8 +4,9 @@
 
 The points are swollen until they touch, what is hidden from five of the six sides is filled (a
 LiDAR never sees an underside), and the solid is worn down again by as much as it was swollen: until
-its surface lies in the middle of the points around, which are a layer, not a sheet. That surface is
-a level set, which marching cubes closes whatever the points are.
+its smoothed surface lies in the middle of the points around, which are a layer, not a sheet. That
+surface is a level set, which marching cubes closes whatever the points are. Shapes that are alike
+on both sides of their mirror plane get a mesh that is.
 
 A place of the mesh is measured beside a scan's points, and guessed elsewhere.
 """
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 _MARGIN = 3  # cells around the swollen points
 _OFF_LEVEL = 1e-3  # of a cell: what keeps corners of the surface apart
+_ALIKE = 1e-3  # of the longest side: so near to a point its reflection is one, too
 # Blue to orange (Okabe & Ito's two, a light grey between): told apart by colour-blind readers.
 _SCALE = np.array([(0, 114, 178), (196, 200, 206), (213, 94, 0)], np.float64)
 
@@ -40,6 +42,7 @@ class MeshConfig:
         sides: from so many of six a place is hidden that lies inside: a LiDAR sees no underside.
         smallest_body: of all cells inside; smaller bodies are crumbs and left out.
         band: cells about the surface sought, in which depth is measured and not counted.
+        smooth: of the longest side: width of the Gaussian that takes out what single points make.
         around: of the longest side: the neighbourhood in whose mean the surface is centred.
         rounds: of centring.
         few: of the densest place: where there are fewer points, none are followed.
@@ -50,7 +53,8 @@ class MeshConfig:
     sides: int = 5
     smallest_body: float = 0.01
     band: int = 10
-    around: float = 0.015
+    smooth: float = 0.021
+    around: float = 0.021
     rounds: int = 3
     few: float = 0.02
 
@@ -85,6 +89,7 @@ def closed_mesh(
     extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
     if not extent > 0:
         raise BadInputError("a shape whose points are all equal has no surface.")
+    points = _on_both_sides(points, extent)
     reach = config.reach * extent
     grid = _grid_around(points, extent / config.cells, reach)
     depth = _depth(points, grid, reach, march, config)
@@ -107,6 +112,13 @@ def off_level(
     return np.where(np.abs(depth - level) < least, level + least, depth)
 
 
+def _on_both_sides(points: np.ndarray, extent: float) -> np.ndarray:
+    """The points and their reflections in y = 0, where a quarter of them are reflections."""
+    reflected = points * np.asarray((1, -1, 1), points.dtype)
+    apart = np.quantile(_distance(reflected, points), 0.25)
+    return np.concatenate((points, reflected)) if apart < _ALIKE * extent else points
+
+
 def _grid_around(points: np.ndarray, step: float, reach: float) -> _Grid:
     """A grid that holds the swollen points, the same on both sides of y = 0."""
     low, high = points.min(0).astype(np.float64), points.max(0).astype(np.float64)
@@ -121,8 +133,8 @@ def _grid_around(points: np.ndarray, step: float, reach: float) -> _Grid:
 def _depth(
     points: np.ndarray, grid: _Grid, reach: float, march: Any, config: MeshConfig
 ) -> np.ndarray:
-    """How far inside the filled, swollen solid each place is; 0 outside."""
-    from scipy.ndimage import binary_fill_holes, distance_transform_edt
+    """How far inside the filled, swollen solid each place is, smoothed; 0 outside."""
+    from scipy.ndimage import binary_fill_holes, distance_transform_edt, gaussian_filter
 
     apart = _distance(grid.places, points)
     swollen = apart < reach
@@ -132,7 +144,7 @@ def _depth(
     # Counted in cells near the surface that is sought would be stairs.
     close = solid & (np.abs(depth - reach) < config.band * grid.step)
     depth[close] = _distance(grid.places[close], skin * grid.step + grid.start)
-    return depth
+    return gaussian_filter(depth, config.smooth * config.cells)
 
 
 def _centred(
