@@ -11,6 +11,7 @@ import torch
 from tests.models import CONFIG, SETTINGS, scan
 
 from wildshape.geometry.projection.sight_lines import SightLines
+from wildshape.inference.confidence import odds_of
 from wildshape.inference.predictor import Predictor, load
 from wildshape.method.checkpoint import save_checkpoint
 from wildshape.method.network import Poses, ShapePoseNet
@@ -56,21 +57,23 @@ def test_the_confidence_is_the_product_and_says_what_is_unsure(tmp_path):
     assert far_too_large.confidence == far_too_large.p_kind == 0
 
 
-def test_a_track_has_its_own_and_keeps_its_poses():
-    """Probabilities change neither shapes nor poses: what they replace still weighs the scans."""
-    scans, made = [scan(seed) for seed in range(3)], trusting(bias=-2.0)
-    torch.manual_seed(0)
-    plain = Predictor(ShapePoseNet(CONFIG).eval(), FACING)
-    done, before = made.complete_track(scans), plain.complete_track(scans)
+def test_a_track_has_its_own():
+    made = trusting(bias=-2.0)
     trust = made.settings.trust
     assert trust is not None
-    for one, other in zip(done, before, strict=True):
-        np.testing.assert_array_equal(one.points, other.points)
-        torch.testing.assert_close(one.pose.matrix, other.pose.matrix, atol=0, rtol=0)
+    for one in made.complete_track([scan(seed) for seed in range(3)]):
         known = TrackFeatures(*one.evidence)
         assert (one.p_pose, one.p_box, one.p_kind) == tuple(trust.track(known._asdict()))
         assert known.log_scans == pytest.approx(math.log(3))
-        assert other.p_pose is None
+
+
+def test_what_a_scan_counts_in_its_track():
+    done = trusting().complete(scan())
+    sure = dataclasses.replace(done, p_pose=0.9, p_box=0.5, warning="")
+    assert odds_of(sure) == pytest.approx(0.45 / 0.55)
+    assert odds_of(dataclasses.replace(sure, p_pose=1.0, p_box=1.0)) < 50
+    assert odds_of(dataclasses.replace(sure, warning="too large")) < 0.01
+    assert odds_of(dataclasses.replace(sure, p_pose=None, confidence=0.3)) == 0.3
 
 
 def test_without_probabilities_or_refinement_it_is_as_before():

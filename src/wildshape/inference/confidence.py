@@ -35,6 +35,7 @@ from wildshape.method.trust import Calibrator, ScanFeatures, TrackFeatures
 from wildshape.records import Completion, Points, Registration, Sensor
 
 _RULE = ReasonRule()
+_LEAST_ODDS, _MOST_ODDS = 1e-3, 49.0
 _OF_RESULT = ("poor_fit", "low_confidence", "unsure_heading", "unsure_box", "other_kind")
 
 
@@ -170,11 +171,15 @@ def reasons_of_result(
     return tuple(reason for reason, held in holds.items() if held)
 
 
-def confidence_of_cost(done: Completion, settings: ModelSettings) -> float:
-    """What decides between the scans of a track: how good the network's look at a scan was."""
-    if done.p_pose is None or not done.features:
-        return done.confidence
-    return 0.0 if done.warning else confidence_of(ConfidenceFeatures(*done.features), settings)
+def odds_of(done: Completion) -> float:
+    """What a scan counts among those of its track: the odds that its heading and box are right.
+
+    Of weights without probabilities the confidence.
+    """
+    if done.p_pose is None or done.p_box is None:
+        return max(done.confidence, _LEAST_ODDS)
+    right = 0.0 if done.warning else done.p_pose * done.p_box
+    return min(max(right / max(1.0 - right, 1e-9), _LEAST_ODDS), _MOST_ODDS)
 
 
 def warning_of(

@@ -158,6 +158,7 @@ class TrackConfig:
         key_scans: of a longer track so many, evenly spread, are fitted to each other; with the
             points of more the fits are worse.
         onto: fit of each other scan to the key scans.
+        believed: scans whose odds are this share of the best are among the surest.
         within_m: fits that move a pose farther are not believed.
         within_rad: fits that turn a pose farther are not believed.
         most_points: of all scans, fused.
@@ -174,6 +175,7 @@ class TrackConfig:
     fine: JointIcpConfig = _FINE
     key_scans: int = 32
     onto: JointIcpConfig = _ONTO
+    believed: float = 0.2
     within_m: float = 1.5
     within_rad: float = 0.6
     most_points: int = 4096

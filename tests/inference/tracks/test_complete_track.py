@@ -77,12 +77,13 @@ def test_half_turns_are_voted_out_and_poses_come_nearer(turned):
     for shape in canonical[1:]:
         np.testing.assert_allclose(shape, canonical[0], atol=1e-4)
     assert all(0 <= item.confidence <= 1 for item in done)
+    assert len({item.box.size for item in done}) == 1, "one object has one size"
 
 
 def test_a_refinement_that_fits_worse_is_not_kept(monkeypatch):
     """True poses, and a refinement that spoils them: the vote stands, and says so."""
     scans, true = list(TRACK.scans), poses_of(TRACK)
-    worse = lambda _, poses, **__: spoilt(poses, seed=5, degrees=10.0, metres=0.4)  # noqa: E731
+    worse = lambda _, poses, *__, **___: spoilt(poses, seed=5, degrees=10.0, metres=0.4)  # noqa: E731
     monkeypatch.setattr(whole, "refine_jointly", worse)
     fit = whole.refine_checked(scans, true, mirror=True)
     assert not fit.refined
@@ -94,6 +95,34 @@ def test_a_refinement_that_leaves_the_vote_far_behind_is_not_kept(monkeypatch):
     start = turned_around(true, {2})
     monkeypatch.setattr(whole, "refine_jointly", lambda *_, **__: true)
     assert not whole.refine_checked(scans, start, mirror=True).refined
+
+
+def test_scans_sure_of_their_heading_outvote_those_with_the_better_shape():
+    true = poses_of(TRACK)
+    wrong = {0, 1, 2, 3}
+    done = [
+        replace(item, confidence=0.9, p_pose=0.1, p_box=0.9)
+        if i in wrong
+        else replace(item, confidence=0.01, p_pose=0.95, p_box=0.9)
+        for i, item in enumerate(completed(turned_around(true, wrong)))
+    ]
+    found = together(done, TRACK.scans)
+    for i, item in enumerate(found):
+        assert float(torch.rad2deg((true[i].inverse() @ item.pose).angle())) < 5.0
+
+
+def test_scans_that_agree_on_a_wrong_place_move_to_the_surer_ones():
+    true, hidden = poses_of(TRACK), [2, 3, 4]
+    ahead = SE3(torch.eye(3).double(), torch.tensor((0.8, 0.0, 0.0)).double())
+    start = stack([T @ ahead if i in hidden else T for i, T in enumerate(true)])
+    scans, odds = list(TRACK.scans), torch.tensor([9.0, 9, 0.1, 0.1, 0.1, 9, 9])
+
+    def off(poses):
+        return float((true.inverse() @ poses).translation.norm(dim=-1).max())
+
+    alike = whole.refine_checked(scans, start, mirror=True).T_sensor_object
+    told = whole.refine_checked(scans, start, odds, mirror=True).T_sensor_object
+    assert off(told) < 0.5 * off(alike)
 
 
 def test_a_better_refinement_is_kept():

@@ -21,7 +21,7 @@ from wildshape.geometry.surface import mirrored
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
 from wildshape.inference.choose_hypothesis import network_input
-from wildshape.inference.confidence import confidence_of_cost, judged
+from wildshape.inference.confidence import judged, odds_of
 from wildshape.inference.config import BoxConfig, InferenceConfig, TrackConfig
 from wildshape.inference.free_space import Rays, Sights, without_free_space
 from wildshape.inference.refine import denser, drawn_to, padded, partners
@@ -37,6 +37,7 @@ from wildshape.inference.tracks.joint_icp import (
     refine_jointly,
     refine_onto,
     stayed_near,
+    surest,
 )
 from wildshape.inference.tracks.pose_outliers import without_outliers
 from wildshape.method.checkpoint import ModelSettings
@@ -71,7 +72,7 @@ class Gathered:
     Attributes:
         done: each scan on its own, in time order, without points.
         scans: of one rigid object, sensor frames.
-        sure: how sure each is of its own pose, 0 to 1.
+        weights: what each counts, the odds that it is right.
     """
 
     def __init__(self, settings: ModelSettings) -> None:
@@ -79,30 +80,32 @@ class Gathered:
         self.settings = settings
         self.done: list[Completion] = []
         self.scans: list[Points] = []
-        self.sure: list[float] = []
+        self._odds: list[float] = []
         self._sum = torch.zeros(settings.network.points, 3, dtype=torch.float64)
 
     def add(self, done: Completion, scan: Points) -> None:
         """The next scan."""
         own = torch.from_numpy(done.points[: len(self._sum)]).double()
-        self.sure.append(confidence_of_cost(done, self.settings))
-        self._sum += self._weight(self.sure[-1]) * done.pose.inverse().apply(own)
+        self._odds.append(odds_of(done))
+        self._sum += self._odds[-1] * done.pose.inverse().apply(own)
         self.done.append(replace(done, points=done.points[:0].copy()))
         self.scans.append(scan)
 
     @property
     def weights(self) -> Float[Tensor, "V"]:
-        """What each scan counts."""
-        return torch.tensor([self._weight(one) for one in self.sure], dtype=torch.float64)
+        """What each scan counts: the odds that it is right."""
+        return torch.tensor(self._odds, dtype=torch.float64)
+
+    @property
+    def sure(self) -> Float[Tensor, "V"]:
+        """How sure each is of its heading, 0 to 1: `p_pose`, or the confidence without it."""
+        stated = [one.confidence if one.p_pose is None else one.p_pose for one in self.done]
+        return torch.tensor(stated, dtype=torch.float64).clamp_min(_LEAST_SURE)
 
     @property
     def shape(self) -> Float[Tensor, "P 3"]:
         """The mean of the canonical shapes."""
         return self._sum / self.weights.sum()
-
-    @staticmethod
-    def _weight(sure: float) -> float:
-        return max(sure, _LEAST_SURE)
 
 
 @torch.inference_mode()
@@ -120,12 +123,12 @@ def complete_together(
         One a scan; each has its points when it is taken.
     """
     done, scans, settings = gathered.done, gathered.scans, gathered.settings
-    shape, weights = gathered.shape, gathered.weights
+    shape = gathered.shape
     poses = stack([item.pose for item in done])
-    voted = _voted(poses, shape, weights, scans, settings, config.track)
+    voted = _voted(poses, shape, gathered.sure, scans, settings, config.track)
     mirror, unit = settings.network.mirror, unit_of(settings.extent_m[1])
     clouds, start = _in_units(scans, voted, unit)
-    fit = refine_checked(clouds, start, mirror=mirror, config=config.track)
+    fit = refine_checked(clouds, start, gathered.weights, mirror=mirror, config=config.track)
     seen = _seen(clouds, fit.T_sensor_object, mirror, config.track)
     shape = unit * drawn_to(shape[None] / unit, padded([seen]), config.track)[0]
     fit = fit._replace(T_sensor_object=_scaled(fit.T_sensor_object, unit))
@@ -137,7 +140,7 @@ def complete_together(
     fitted = _box(solid, scans, fit.T_sensor_object, config.box, mirror=mirror, body=body)
     whole = _denser(shape, config) if settings.facing else shape
     cost = track_cost(shape, fit.T_sensor_object, scans, settings)
-    mean = float(np.mean(gathered.sure))
+    mean = float(np.mean([item.confidence for item in done]))
     trust, evidence = settings.trust, _evidence(done, fit.T_sensor_object, fitted, cost)
 
     def together(i: int) -> Completion:
@@ -246,27 +249,50 @@ def track_cost(
 
 
 def refine_checked(
-    scans: list[Points], voted: SE3, *, mirror: bool, config: TrackConfig = _DEFAULT.track
+    scans: list[Points],
+    voted: SE3,
+    odds: Float[Tensor, "V"] | None = None,
+    *,
+    mirror: bool,
+    config: TrackConfig = _DEFAULT.track,
 ) -> TrackFit:
     """Refined poses, kept only if the scans then lie nearer to each other, and near the vote.
 
-    Of a long track the key scans are fitted to each other, and each other scan to them.
+    Scans are moved onto all others and, from the vote again, onto the surest alone: those that are
+    half hidden may agree on a wrong place. The better is kept. Of a long track the key scans are
+    fitted to each other, and each other scan to them.
+
+    Args:
+        scans: of one object.
+        voted: `T_sensor_object` to start from.
+        odds: of each scan being right, if known.
+        mirror: the object is symmetric in the plane y = 0 of its frame.
+        config: how they are refined.
     """
+    odds = torch.ones(len(scans)) if odds is None else odds
     if len(scans) > config.key_scans:
-        return _by_key_scans(scans, voted, mirror, config)
-    refined = refine_jointly(scans, voted, mirror=mirror, config=config.coarse)
-    refined = refine_jointly(scans, refined, mirror=False, config=config.fine)
-    before, after = (_disagreement(scans, T, mirror, config) for T in (voted, refined))
-    if bool(stayed_near(voted, refined, config).all()) and after < before:
-        return TrackFit(refined, refined=True)
-    return TrackFit(voted, refined=False)
+        return _by_key_scans(scans, voted, odds, mirror, config)
+    sure = surest(odds, config.believed)
+    found = [voted]
+    for onto in (None,) if len(sure) == len(scans) else (None, sure):
+        refined = refine_jointly(scans, voted, onto, mirror=mirror, config=config.coarse)
+        found.append(refine_jointly(scans, refined, onto, mirror=False, config=config.fine))
+    near = [poses for poses in found if bool(stayed_near(voted, poses, config).all())]
+    best = min(near, key=lambda poses: _disagreement(scans, poses, mirror, config))
+    return TrackFit(best, refined=best is not voted)
 
 
-def _by_key_scans(scans: list[Points], voted: SE3, mirror: bool, config: TrackConfig) -> TrackFit:
+def _by_key_scans(
+    scans: list[Points],
+    voted: SE3,
+    odds: Float[Tensor, "V"],
+    mirror: bool,
+    config: TrackConfig,
+) -> TrackFit:
     """A pose that would leave the vote far behind stays what it was."""
     rows = torch.linspace(0, len(scans) - 1, config.key_scans).round().long()
     keys = [scans[i] for i in rows.tolist()]
-    fit = refine_checked(keys, voted[rows], mirror=mirror, config=config)
+    fit = refine_checked(keys, voted[rows], odds[rows], mirror=mirror, config=config)
     if not fit.refined:
         return TrackFit(voted, refined=False)
     surface = fused_surface(keys, fit.T_sensor_object, config.onto, mirror=mirror)

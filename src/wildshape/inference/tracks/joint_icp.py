@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
 from wildshape.geometry.surface import mirrored, planes
@@ -37,6 +37,7 @@ class Surface(NamedTuple):
 def refine_jointly(
     scans: list[Points],
     T_sensor_object: SE3,
+    onto: Int64[Tensor, "U"] | None = None,
     *,
     mirror: bool,
     config: JointIcpConfig = _TRACK.coarse,
@@ -49,6 +50,7 @@ def refine_jointly(
     Args:
         scans: of one rigid object, sensor frames, metres.
         T_sensor_object: one pose a scan, good to about a metre and 30 degrees.
+        onto: the scans that all are moved onto; None: all.
         mirror: the object is symmetric in the plane y = 0 of its frame.
         config: how; `TrackConfig.fine` goes on where `coarse` has come to its end.
     """
@@ -57,16 +59,23 @@ def refine_jointly(
     points = torch.from_numpy(_sampled(scans, min(config.points, config.most // len(scans))))
     start = T_sensor_object.to(torch.float32).inverse()
     T_object_sensor = start
-    normals = torch.zeros_like(points)
+    onto = torch.arange(len(scans)) if onto is None else onto
+    normals = torch.zeros_like(points[onto])
     rounds = config.rounds
     for step in range(rounds):
         moved = T_object_sensor.apply(points)
         if step % 3 == 0 or step >= rounds - 2:
-            normals = surface_normals(moved.flatten(0, 1), config).view_as(moved)
-        onto = _counterparts(Surface(moved, normals), mirror)
-        T_object_sensor = _moved(T_object_sensor, moved, onto, _width(step, config), config)
-    T_object_sensor = _as_a_whole(start, T_object_sensor, points, mirror) @ T_object_sensor
-    return T_object_sensor.inverse().to(T_sensor_object.rotation.dtype)
+            normals = surface_normals(moved[onto].flatten(0, 1), config).view_as(normals)
+        found = _counterparts(moved, Surface(moved[onto], normals), onto, mirror)
+        T_object_sensor = _moved(T_object_sensor, moved, found, _width(step, config), config)
+    back = _as_a_whole(start[onto], T_object_sensor[onto], points[onto], mirror)
+    return (back @ T_object_sensor).inverse().to(T_sensor_object.rotation.dtype)
+
+
+def surest(odds: Float[Tensor, "V"], share: float = _TRACK.believed) -> Int64[Tensor, "U"]:
+    """The surer half of the scans, two at least, and all whose odds are this share of the best."""
+    middle = odds.sort(descending=True).values[max(2, -(-len(odds) // 2)) - 1]
+    return torch.nonzero(odds >= torch.minimum(middle, share * odds.max()))[:, 0]
 
 
 def fused_surface(
@@ -161,19 +170,24 @@ def _moved(
     return about @ T_object_sensor
 
 
-def _counterparts(surface: Surface, mirror: bool) -> Surface:
-    """The nearest point of the other scans to each point, and its normal."""
-    count, size, _ = surface.points.shape
-    points, normals = (part.flatten(0, 1) for part in surface)
+def _counterparts(
+    points: Float[Tensor, "V n 3"], surface: Surface, scans: Int64[Tensor, "U"], mirror: bool
+) -> Surface:
+    """The nearest point of the other scans to each point, and its normal.
+
+    `surface`: of some scans, `(U, n, 3)`; `scans`: which they are.
+    """
+    count, size, _ = points.shape
     own = torch.arange(count).repeat_interleave(size)
-    groups = own
+    groups = scans.repeat_interleave(size)
+    target, normals = (part.flatten(0, 1) for part in surface)
     if mirror:
-        points, normals = (mirrored(part[None])[0] for part in (points, normals))
-        groups = torch.cat((own, own))
-    query = surface.points.flatten(0, 1)[None]
-    found = nearest_k(query, points[None], 1, groups=(own[None], groups[None]))
+        target, normals = (mirrored(part[None])[0] for part in (target, normals))
+        groups = torch.cat((groups, groups))
+    query = points.flatten(0, 1)[None]
+    found = nearest_k(query, target[None], 1, groups=(own[None], groups[None]))
     index = found.index.view(count, size)
-    return Surface(points[index], normals[index])
+    return Surface(target[index], normals[index])
 
 
 def _as_a_whole(start: SE3, end: SE3, points: Tensor, mirror: bool) -> SE3:
