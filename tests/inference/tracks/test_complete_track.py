@@ -114,7 +114,7 @@ def test_scans_sure_of_their_heading_outvote_those_with_the_better_shape():
 def test_scans_that_agree_on_a_wrong_place_move_to_the_surer_ones():
     true, hidden = poses_of(TRACK), [2, 3, 4]
     ahead = SE3(torch.eye(3).double(), torch.tensor((0.8, 0.0, 0.0)).double())
-    start = stack([T @ ahead if i in hidden else T for i, T in enumerate(true)])
+    start = stack([true[i] @ ahead if i in hidden else true[i] for i in range(7)])
     scans, odds = list(TRACK.scans), torch.tensor([9.0, 9, 0.1, 0.1, 0.1, 9, 9])
 
     def off(poses):
