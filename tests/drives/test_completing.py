@@ -14,12 +14,14 @@ from wildshape.drives.completing.claims import claim
 from wildshape.drives.completing.completion import fullest_of_parts, keyframes, order_of_looks
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed
+from wildshape.drives.completing.surroundings import crowded
 from wildshape.drives.completing.vehicles import judge, stated, vehicle_confidence
 from wildshape.drives.config import (
     BoxConfig,
     CompletionConfig,
     DriveConfig,
     MergeConfig,
+    SurroundingsConfig,
     VehicleConfig,
 )
 from wildshape.drives.tracking.segmentation import cut_file
@@ -80,6 +82,45 @@ def test_little_or_slow_motion_is_none():
     assert moves(ticks, still + np.outer(ticks, (0.1, 0, 0, 0)), config)
 
 
+def stop_and_go(ticks):
+    """Metres: 10 m/s, from the second second on it brakes with 2.5 m/s^2, then it stands."""
+    braking = np.clip(ticks / 10 - 2.0, 0.0, 4.0)
+    return 10 * np.minimum(ticks / 10, 2.0) + 10 * braking - 1.25 * braking**2
+
+
+def test_who_stands_most_of_the_time_has_moved_and_one_jump_is_no_motion():
+    ticks = np.arange(0.0, 600.0, 4.0)
+    boxes = np.zeros((len(ticks), 4))
+    boxes[:, 0] = stop_and_go(ticks)
+    assert moves(ticks, boxes, BoxConfig())
+    boxes[:, 0] = 2.0 * (ticks > 100)
+    assert not moves(ticks, boxes, BoxConfig())
+
+
+def test_boxes_follow_a_vehicle_that_brakes_between_scans_a_second_apart():
+    frames = tuple(range(0, 91, 10))
+    boxes = [(float(stop_and_go(np.array(f))), 0.0, 0.0, 0.0) for f in frames]
+    way = smooth(completed(boxes, frames), tuple(range(91)), BoxConfig())
+    assert np.abs(way.boxes[:, 0] - stop_and_go(np.arange(91))).max() < 0.25
+
+
+def test_a_doubtful_vehicle_is_none_where_a_wall_goes_on_beyond_its_box():
+    rng = np.random.default_rng(0)
+    car = rng.uniform((-2.0, -0.9, -0.7), (2.0, 0.9, 0.7), (400, 3)).astype(np.float32)
+    wall = rng.uniform((-6.0, -0.9, -0.7), (6.0, -0.8, 2.0), (1200, 3)).astype(np.float32)
+    ground = rng.uniform((-6.0, -6.0, -0.8), (6.0, 6.0, -0.7), (900, 3)).astype(np.float32)
+    still = SE3(torch.eye(3).double().expand(2, 3, 3), torch.zeros(2, 3).double())
+    one = completed([(0.0, 0.0, 0.0, 0.0)] * 2)
+
+    def names(sure, *parts):
+        scan = np.concatenate(parts)
+        return crowded([one], [sure], lambda _: scan, still, SurroundingsConfig())
+
+    assert names(0.3, car, ground) == set()
+    assert names(0.3, car, ground, wall) == {"a"}
+    assert names(0.5, car, ground, wall) == set()
+
+
 def places():
     return Places(tuple(range(100)), MergeConfig(), BoxConfig())
 
@@ -122,7 +163,7 @@ def test_less_cost_usual_size_and_more_scans_speak_for_a_vehicle():
 def test_the_weights_own_probability_goes_before_what_was_added_up():
     here = [(0.0, 0.0, 0.0, 0.0)]
     likely = replace(completed(here, name="likely", cost=0.5), p_kind=0.6)
-    unlikely = replace(completed(here, frames=(90,), name="unlikely"), p_kind=0.4)
+    unlikely = replace(completed(here, frames=(90,), name="unlikely"), p_kind=0.2)
     other = completed([(30.0, 0.0, 0.0, 0.0)], name="other")
     said = {one.name: one for one in judge([likely, unlikely, other], places(), VehicleConfig())}
     assert (said["likely"].confidence, said["likely"].reasons) == (0.6, ())
@@ -185,7 +226,7 @@ def test_clusters_in_the_box_of_a_vehicle_are_its_own(tmp_path):
     again = replace(completed(at, name="again"), seen=Sightings("again", (2,), ((2,),), (20,)))
     still = SE3(torch.eye(3).double().expand(3, 3, 3), torch.zeros(3, 3).double())
     found = claim([whole, again], tmp_path, still, (0, 1, 2), DriveConfig())
-    assert found.parts == {"again": "whole"}
+    assert found.parts == {"again": "part_of_whole"}
     (only,) = found.vehicles
     assert only.seen.frames == (0, 1, 2)
     assert only.seen.rows == ((1, 2),) * 3

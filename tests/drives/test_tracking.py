@@ -114,6 +114,24 @@ def test_neighbours_are_apart_and_gaps_of_sparse_beams_are_bridged(away):
     assert len(find_clusters(joined, joined[:, 2] + 1.7, config)) == 1
 
 
+@pytest.mark.parametrize("degrees", [0, 90, 135, 180, 210, 300])
+def test_the_reach_is_the_same_all_around_the_sensor(degrees):
+    config, away = ClusterConfig(), 12.0
+    reach = config.reach_m + config.reach_per_m * away
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    turn = np.array(((c, s, 0), (-s, c, 0), (0, 0, 1)), np.float32)
+
+    def count(gap, along):
+        aside = np.roll((1.8 + gap, 0, 0), 0 if along else 1).astype(np.float32)
+        cars = block(away, 0, 1.8), block(away, 0, 1.8, seed=1) + aside
+        points = np.concatenate(cars) @ turn
+        return len(find_clusters(points, points[:, 2] + 1.7, config))
+
+    for along in (True, False):
+        assert count(0.5 * reach, along) == 1
+        assert count(1.6 * reach, along) == 2
+
+
 def test_what_is_no_vehicle_by_size_or_place_is_no_cluster():
     config = ClusterConfig()
     for wrong in (
@@ -156,6 +174,11 @@ def test_an_object_out_of_sight_goes_on_and_one_gone_too_long_does_not():
         seen(i) if 5 <= i < 6 + config.longest_gap else seen(i, (0.8 * i, 0)) for i in range(20)
     ]
     assert len(link(gone, config)) == 2
+
+
+def test_a_fast_one_is_followed_from_its_first_scan_on():
+    scans = [seen(i, (60.0 - 2.7 * i, 3.0), (5.0, -3.0)) for i in range(12)]  # 97 km/h
+    assert [one.frames for one in link(scans, LinkConfig())] == [list(range(12))] * 2
 
 
 def test_an_object_of_which_less_is_seen_stays_the_same():

@@ -8,6 +8,15 @@ They are written into `wildshape.json` of every result and can be set from Pytho
 
 from dataclasses import dataclass, field
 
+from wildshape.drives.completing.config import (
+    BoxConfig,
+    CarveConfig,
+    ClaimConfig,
+    CompletionConfig,
+    MergeConfig,
+    SurroundingsConfig,
+    VehicleConfig,
+)
 from wildshape.inference.config import InferenceConfig, JointIcpConfig, TrackConfig
 
 INFERENCE = InferenceConfig(
@@ -151,6 +160,7 @@ class LinkConfig:
 
     Attributes:
         gate_m: an object is looked for so far around where it is expected.
+        first_gate_m: the same of one that was seen once, whose speed is not known: 30 m/s at 10 Hz.
         gate_per_tick_m: and so much farther for each tick that it was not seen.
         longest_gap: ticks after which an object that was not seen is given up.
         size_weight: metres of distance that a metre of change in size counts.
@@ -159,174 +169,12 @@ class LinkConfig:
     """
 
     gate_m: float = 1.5
+    first_gate_m: float = 3.0
     gate_per_tick_m: float = 0.1
     longest_gap: int = 4
     size_weight: float = 0.15
     velocity_gain: float = 0.3
     fewest_scans: int = 4
-
-
-@dataclass(frozen=True)
-class CompletionConfig:
-    """Which scans of a track are completed (`completion.py`).
-
-    Attributes:
-        looks: scans of a track that the network sees first, the fullest of equal parts of those to
-            complete.
-        worst_cost_m: tracks whose best look costs more are no vehicles; those of a labelled street
-            cost less than 0.2 m.
-        hopeless_cost_m: nor are those whose fullest scan costs more.
-        hopeless_nats: nor those whose fullest scan says less for a vehicle.
-        least_nats: nor those whose looks say less on average, the fuller the heavier. No whole
-            vehicle of three streets said less than -1.9, though fragments may; half of all else do.
-        doubtful_nats: of those whose looks say less no other scans are completed.
-        worst_nats: no single look says less.
-        scans: of a track that are completed together.
-        ticks: between them; neighbours at 10 Hz are nearly the same scan.
-        fewest_points: scans of fewer are not completed where others are fuller.
-    """
-
-    looks: int = 3
-    worst_cost_m: float = 0.2
-    hopeless_cost_m: float = 0.22
-    hopeless_nats: float = -5.0
-    least_nats: float = -4.0
-    doubtful_nats: float = -2.0
-    worst_nats: float = -6.0
-    scans: int = 16
-    ticks: int = 4
-    fewest_points: int = 60
-
-
-@dataclass(frozen=True)
-class VehicleConfig:
-    """Which completed tracks are vehicles (`vehicles.py`).
-
-    Where the weights state no probability, what speaks for a vehicle is added up as log-odds. The
-    numbers were chosen by looking at two unlabelled drives.
-
-    Attributes:
-        kinds: usual length, width, height of cars, vans and lorries, metres.
-        spread: share of these by which they vary.
-        even_cost_m: a label-free cost that speaks neither for nor against a vehicle.
-        cost_scale_m: a nat for so much less.
-        usual_scans: a track of more scans speaks for a vehicle.
-        sure_of_parts: several tracks put together that are surer than this come before their
-            parts.
-        merged_nats: what several tracks of one shape in one place say for a vehicle.
-        usual_confidence: of the completions; more speaks for a vehicle.
-        least_confidence: objects of less are left out.
-        least_kind: the same where the weights state the probability.
-        length_m: from and to.
-        width_m: from and to.
-        height_m: from and to.
-        fewest_points: that the fullest scan must have.
-    """
-
-    kinds: tuple[tuple[float, float, float], ...] = (
-        (4.3, 1.9, 1.55),
-        (5.4, 2.2, 2.3),
-        (7.0, 2.5, 3.1),
-    )
-    spread: float = 0.15
-    even_cost_m: float = 0.15
-    cost_scale_m: float = 0.03
-    usual_scans: int = 8
-    sure_of_parts: float = 0.6
-    merged_nats: float = 1.0
-    usual_confidence: float = 0.1
-    least_confidence: float = 0.4
-    least_kind: float = 0.5
-    length_m: tuple[float, float] = (2.5, 9.0)
-    width_m: tuple[float, float] = (1.4, 3.2)
-    height_m: tuple[float, float] = (1.05, 3.6)
-    fewest_points: int = 60
-
-
-@dataclass(frozen=True)
-class MergeConfig:
-    """Which tracks are one object by their complete shapes (`merging.py`).
-
-    Attributes:
-        least_confidence: objects that are hardly vehicles are not asked.
-        overlap: share of the smaller footprint that one object's shapes have in common.
-        apart: objects that share less than this are beside each other.
-        beyond_ticks: a moving object is expected so long before and after it was seen; a standing
-            one always.
-    """
-
-    least_confidence: float = 0.05
-    overlap: float = 0.3
-    apart: float = 0.1
-    beyond_ticks: int = 15
-
-
-@dataclass(frozen=True)
-class ClaimConfig:
-    """Which clusters belong to a vehicle that was found (`claims.py`).
-
-    Attributes:
-        around_m: of its box; points so near belong to it.
-        inside: share of a cluster's points that must.
-        lost: a vehicle that surer ones take so much of its scans from is a part of them.
-        beyond_ticks: a moving vehicle is looked for so long before and after it was seen.
-    """
-
-    around_m: float = 0.2
-    inside: float = 0.8
-    lost: float = 0.5
-    beyond_ticks: int = 5
-
-
-@dataclass(frozen=True)
-class CarveConfig:
-    """Where rays say that a vehicle ends (`carving.py`).
-
-    Attributes:
-        slab_m: a box is looked at in slabs of this thickness, from each end inwards.
-        reach_m: so far inwards.
-        low_m: above the box's floor; lower rays pass under a vehicle.
-        high_m: above the box's floor; higher ones pass over a bonnet.
-        strip_m: rays are counted in this depth behind the side that the sensor sees: less is a
-            corner's rounding, of more nothing is seen.
-        behind_m: a ray passes where it goes on so far.
-        fewest_rays: through an empty slab.
-        corner_m: a vehicle reaches so far beyond where a side seen begins to turn.
-        far_corner_m: the same where the end itself looks away from the sensor.
-        most_m: no end is moved farther: some vehicles have pointed ends.
-        strays: share of a vehicle's points that may be left outside.
-    """
-
-    slab_m: float = 0.05
-    reach_m: float = 0.6
-    low_m: float = 0.3
-    high_m: float = 1.0
-    strip_m: tuple[float, float] = (0.15, 0.6)
-    behind_m: float = 0.3
-    fewest_rays: int = 3
-    corner_m: float = 0.1
-    far_corner_m: float = 0.25
-    most_m: float = 0.25
-    strays: float = 0.002
-
-
-@dataclass(frozen=True)
-class BoxConfig:
-    """How boxes are smoothed in time (`boxes.py`).
-
-    Attributes:
-        moving_m: an object that gets farther than this through its track may be moving.
-        moving_m_per_tick: and it must be as fast as this: 0.5 m/s at 10 Hz.
-        heading_m_per_tick: an object as fast as this looks where it goes: 1 m/s at 10 Hz.
-        smooth_ticks: over which the way of a moving object is smoothed, standard deviation.
-        longest_gap: ticks in which a vehicle was not seen and still has boxes.
-    """
-
-    moving_m: float = 1.0
-    moving_m_per_tick: float = 0.05
-    heading_m_per_tick: float = 0.1
-    smooth_ticks: float = 3.0
-    longest_gap: int = 10
 
 
 @dataclass(frozen=True)
@@ -343,5 +191,6 @@ class DriveConfig:
     vehicles: VehicleConfig = field(default_factory=VehicleConfig)
     merging: MergeConfig = field(default_factory=MergeConfig)
     claims: ClaimConfig = field(default_factory=ClaimConfig)
+    surroundings: SurroundingsConfig = field(default_factory=SurroundingsConfig)
     carving: CarveConfig = field(default_factory=CarveConfig)
     boxes: BoxConfig = field(default_factory=BoxConfig)

@@ -20,11 +20,12 @@ from wildshape.drives.completing.claims import claim
 from wildshape.drives.completing.completion import Completer
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed, level_poses, read_completed
+from wildshape.drives.completing.surroundings import crowded
 from wildshape.drives.completing.vehicles import (
     judge,
+    likely,
+    refused,
     stated,
-    vehicle_confidence,
-    without_parts,
     write_judged,
 )
 from wildshape.drives.config import INFERENCE, DriveConfig
@@ -299,15 +300,11 @@ class _Run:
 
     def fragments(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Sightings]:
         merging, vehicles = self.config.merging, self.config.vehicles
-        likely = [
-            one
-            for one in self.completed(objects, T_level_sensor)
-            if vehicle_confidence(one, vehicles) >= merging.least_confidence
-        ]
-        return Places(self.drive.ticks, merging, self.config.boxes).fragments(likely)
+        found = likely(self.completed(objects, T_level_sensor), merging.least_confidence, vehicles)
+        return Places(self.drive.ticks, merging, self.config.boxes).fragments(found)
 
     def vehicles(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Vehicle]:
-        ticks = self.drive.ticks
+        ticks, around = self.drive.ticks, self.config.surroundings
         places = Places(ticks, self.config.merging, self.config.boxes)
         with self.clock.stage("vehicles", 1) as at:
             completed = self.completed(objects, T_level_sensor)
@@ -317,7 +314,10 @@ class _Run:
             if not self.tracked:
                 found.sort(key=lambda one: -kept[one.seen.name])
                 claimed = claim(found, self.cuts, T_level_sensor, ticks, self.config)
-                found, said = claimed.vehicles, without_parts(said, claimed.parts)
+                sure = [stated(one, kept) for one in claimed.vehicles]
+                crowd = crowded(claimed.vehicles, sure, self.drive.scan, T_level_sensor, around)
+                found = [one for one in claimed.vehicles if one.seen.name not in crowd]
+                said = refused(said, claimed.parts | dict.fromkeys(crowd, "crowded"))
             write_judged(self.completing / "vehicles.json", objects, said)
             found = carve(found, self.drive.scan, T_level_sensor, self.config.carving)
             at(1)

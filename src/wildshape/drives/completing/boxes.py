@@ -3,8 +3,9 @@
 """The box of a vehicle in every frame in which it was seen, and in short gaps between them.
 
 A vehicle that stands has one box in the world: the middle of those of its completed scans. One
-that moves goes a smooth way through them: in each frame a straight line is fitted to the places
-around it, the nearer the heavier (local linear regression, Cleveland 1979).
+that moves goes a smooth way through them: in each frame a parabola is fitted to the places around
+it, the nearer the heavier (local regression, Cleveland 1979), for vehicles brake and set off.
+Before and after them it goes straight on.
 """
 
 from dataclasses import dataclass
@@ -12,8 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from wildshape.drives.completing.config import BoxConfig
 from wildshape.drives.completing.placing import Completed
-from wildshape.drives.config import BoxConfig
+
+_ENOUGH = 4  # completed scans for a parabola: through three one goes whatever they are
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,9 @@ def way_over(
     if not moves(at, one.boxes, config):
         return Way(frames, np.tile(_middle(one.boxes), (len(frames), 1)), moving=False)
     places, velocities = _lines(at, one.boxes[:, :3], wanted, config.smooth_ticks)
+    if len(at) >= _ENOUGH:
+        among = (wanted > at[0] - config.smooth_ticks) & (wanted < at[-1] + config.smooth_ticks)
+        places[among] = _parabolas(at, one.boxes[:, :3], wanted[among], config.smooth_ticks)
     yaws = _yaws(at, one.boxes, wanted, velocities, config)
     return Way(frames, np.column_stack((places, yaws)), moving=True)
 
@@ -74,14 +80,38 @@ def moves(
 ) -> bool:
     """Whether a vehicle gets far enough, and fast enough, to be moving and not only uncertain.
 
-    Its velocity is the middle one of those between any two of its scans (Theil 1950, Sen 1968): a
-    few wrong poses do not move it.
+    That is asked of its whole track, and of any few successive scans: it may have stood before and
+    after. Its velocity is the middle one of those between any two scans (Theil 1950, Sen 1968): a
+    few wrong poses do not move it. Of a few scans the middle step must be as fast, too: a single
+    jump is none.
     """
+    places, count = boxes[:, :2], config.moving_scans
+    if _gets_far(ticks, _velocity(ticks, places), config):
+        return True
+    for first in range(len(ticks) - count + 1):
+        at, way = ticks[first : first + count], places[first : first + count]
+        step = np.median(np.diff(way, axis=0) / np.diff(at)[:, None], axis=0)
+        fast = float(np.linalg.norm(step)) > config.moving_m_per_tick
+        if fast and _gets_far(at, _velocity(at, way), config):
+            return True
+    return False
+
+
+def _velocity(
+    ticks: Float[np.ndarray, "k"], places: Float[np.ndarray, "k 2"]
+) -> Float[np.ndarray, "2"]:
+    """The middle one of those between any two places; a single place does not move."""
     early, late = np.triu_indices(len(ticks), 1)
     if not len(early):
-        return False
-    steps = (boxes[late, :2] - boxes[early, :2]) / (ticks[late] - ticks[early])[:, None]
-    speed = float(np.linalg.norm(np.median(steps, axis=0)))
+        return np.zeros(2)
+    steps = (places[late] - places[early]) / (ticks[late] - ticks[early])[:, None]
+    return np.median(steps, axis=0)
+
+
+def _gets_far(
+    ticks: Float[np.ndarray, "k"], velocity: Float[np.ndarray, "2"], config: BoxConfig
+) -> bool:
+    speed = float(np.linalg.norm(velocity))
     return speed > config.moving_m_per_tick and speed * float(np.ptp(ticks)) > config.moving_m
 
 
@@ -120,6 +150,20 @@ def _lines(
     spread = (weights * (time - mean_time) ** 2).sum(1, keepdims=True)
     velocities = (weights * (time - mean_time)) @ places / spread
     return mean_place - mean_time * velocities, velocities
+
+
+def _parabolas(
+    at: Float[np.ndarray, "k"],
+    places: Float[np.ndarray, "k 3"],
+    wanted: Float[np.ndarray, "f"],
+    smooth_ticks: float,
+) -> Float[np.ndarray, "f 3"]:
+    """Place in each frame, of the parabola of weighted least squares around it."""
+    weights = _weights(at, wanted, smooth_ticks)
+    time = (at - wanted[:, None]) / smooth_ticks
+    powers = np.stack((np.ones_like(time), time, time**2), axis=-1)
+    weighted = np.swapaxes(powers * weights[..., None], 1, 2)
+    return np.linalg.solve(weighted @ powers, weighted @ places)[:, 0]
 
 
 def _yaws(

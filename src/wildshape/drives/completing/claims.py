@@ -28,7 +28,7 @@ class Claimed:
 
     Attributes:
         vehicles: with more frames and clusters, in the order given.
-        parts: names of those that are a part of another, and its name.
+        parts: names of those that are a part of another, and what is said of them.
     """
 
     vehicles: list[Completed]
@@ -118,7 +118,7 @@ def _shared_out(
         lost = [owner[key] for key in own[i] if owner[key] != i]
         if len(lost) >= config.claims.lost * len(own[i]):
             winner = max(set(lost), key=lost.count)
-            parts[one.seen.name] = vehicles[winner].seen.name
+            parts[one.seen.name] = f"part_of_{vehicles[winner].seen.name}"
     rows: list[dict[int, list[int]]] = [{} for _ in vehicles]
     for (frame, row), i in sorted(owner.items()):
         rows[i].setdefault(frame, []).append(row)

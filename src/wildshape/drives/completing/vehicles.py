@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from wildshape.drives.completing.config import VehicleConfig
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed
-from wildshape.drives.config import VehicleConfig
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.io.atomic import write_json
 
@@ -58,6 +58,11 @@ def judge(objects: list[Completed], places: Places, config: VehicleConfig) -> li
     return [Judged(name, sure[name], own[name]) for name in names]
 
 
+def likely(objects: list[Completed], least: float, config: VehicleConfig) -> list[Completed]:
+    """Those that are vehicles with at least this confidence."""
+    return [one for one in objects if vehicle_confidence(one, config) >= least]
+
+
 def vehicle_confidence(one: Completed, config: VehicleConfig) -> float:
     """How sure it is that an object is a vehicle: `p_kind`, where the weights state it.
 
@@ -98,12 +103,9 @@ def shape_nats(cost_m: float, size: tuple[float, float, float], config: VehicleC
     return cost + 1.0 - 0.5 * float((apart**2).sum(1).min())
 
 
-def without_parts(said: list[Judged], parts: dict[str, str]) -> list[Judged]:
-    """What was said, and that some are parts of others; `parts`: their names, and whose."""
-    return [
-        replace(one, reasons=(f"part_of_{parts[one.name]}",)) if one.name in parts else one
-        for one in said
-    ]
+def refused(said: list[Judged], why: Mapping[str, str]) -> list[Judged]:
+    """What was said, and that some are no vehicles after all; `why`: by their names."""
+    return [replace(one, reasons=(why[one.name],)) if one.name in why else one for one in said]
 
 
 def write_judged(path: Path, objects: list[Sightings], said: list[Judged]) -> None:

@@ -3,8 +3,9 @@
 """What stands on the ground of one scan and hangs together: where vehicles may be.
 
 Points nearer to each other than a reach hang together. The reach grows with range as beams spread:
-`e = a + b r`. Coordinates in which it is 1 everywhere are `ln(e / a) / b` along r (the integral of
-`dr / e`), `azimuth r / e` and `z / e`.
+`e = a + b r`. Coordinates in which it is 1 are `ln(e / a) / b` along r (the integral of `dr / e`),
+`azimuth r / e` and `z / e`. That holds near an azimuth of 0 alone, so azimuths are counted from the
+middle of a sector; sectors overlap, and parts that have a point in common are one.
 """
 
 from collections.abc import Iterator
@@ -18,6 +19,8 @@ from wildshape.ops.connected import connected_parts
 from wildshape.records import Points
 
 _SIZED_BY = 1000  # points of a cluster that tell its size
+_SECTORS, _OVERLAP = 6, np.deg2rad(12.0)  # at 2 m the reach is 9 degrees wide
+_FAR = 1000.0  # reaches
 _TURNS = np.deg2rad(np.arange(0.0, 90.0, 2.0))
 _AHEAD = np.stack((np.cos(_TURNS), np.sin(_TURNS)), axis=1)
 _ASIDE = np.stack((-np.sin(_TURNS), np.cos(_TURNS)), axis=1)
@@ -32,12 +35,10 @@ class _Above:
     Attributes:
         points: level frame.
         heights: above the ground.
-        scaled: coordinates in which the reach is 1.
     """
 
     points: Points
     heights: Float[np.ndarray, "n"]
-    scaled: Float[np.ndarray, "n 3"]
 
 
 def find_clusters(
@@ -56,25 +57,55 @@ def find_clusters(
     rows = np.flatnonzero(above & (away < config.range_m))
     if len(rows) < config.fewest_points:
         return []
-    scan = _Above(points[rows], heights[rows], _scaled(points[rows], config))
+    scan = _Above(points[rows], heights[rows])
     everything = np.arange(len(rows))
     found = [rows[part] for part in _vehicle_sized(scan, everything, (1.0, *config.finer), config)]
     return sorted(found, key=lambda part: float(away[part].min()))
 
 
-def _scaled(points: Points, config: ClusterConfig) -> Float[np.ndarray, "n 3"]:
+def _hanging_together(points: Points, reach: float, config: ClusterConfig) -> list[Rows]:
+    """Rows of each part of a scan, the larger first; `reach`: as a multiple of the usual one."""
+    azimuth = np.arctan2(points[:, 1], points[:, 0])
+    scaled, rows = [], []
+    for number in range(_SECTORS):
+        off = np.angle(np.exp(1j * (azimuth - number * 2 * np.pi / _SECTORS)))
+        own = np.flatnonzero(np.abs(off) < np.pi / _SECTORS + _OVERLAP)
+        apart = np.array((number * _FAR, 0.0, 0.0))  # sectors are joined by rows alone
+        scaled.append(_scaled(points[own], off[own], config) + apart)
+        rows.append(own)
+    row = np.concatenate(rows)
+    label = _labels(np.concatenate(scaled), reach, config.thin)
+    return _parts(_joined(label, row))
+
+
+def _scaled(
+    points: Points, azimuth: Float[np.ndarray, "n"], config: ClusterConfig
+) -> Float[np.ndarray, "n 3"]:
     away = np.hypot(points[:, 0], points[:, 1])
     reach = config.reach_m + config.reach_per_m * away
     outwards = np.log(reach / config.reach_m) / config.reach_per_m
-    sideways = np.arctan2(points[:, 1], points[:, 0]) * away / reach
-    return np.stack((outwards, sideways, config.upright * points[:, 2] / reach), axis=1)
+    return np.stack((outwards, azimuth * away / reach, config.upright * points[:, 2] / reach), 1)
+
+
+def _joined(label: Int[np.ndarray, "m"], row: Int[np.ndarray, "m"]) -> Int[np.ndarray, "n"]:
+    """A label for each row; labels that share a row are one."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    order = np.argsort(row, kind="stable")
+    first = np.flatnonzero(np.diff(row[order], prepend=-1))
+    of_row = label[order[first]]
+    ends = of_row[row], label
+    count = int(label.max()) + 1
+    links = coo_array((np.ones(len(row), bool), ends), shape=(count, count))
+    return connected_components(links, directed=False)[1][of_row]
 
 
 def _vehicle_sized(
     scan: _Above, rows: Rows, reaches: tuple[float, ...], config: ClusterConfig
 ) -> Iterator[Rows]:
     """Clusters of the size of vehicles; those too large are cut apart with the finer reaches."""
-    for part in connected(scan.scaled[rows], reaches[0], config.thin):
+    for part in _hanging_together(scan.points[rows], reaches[0], config):
         if len(part) < config.fewest_points:
             break
         members = _without_overhang(scan, rows[part], config)
@@ -107,10 +138,18 @@ def connected(points: Float[np.ndarray, "n 3"], reach: float, thin: float = 0.25
     Points are thinned first, to one a cell of `thin` times the reach: a step may be longer or
     shorter by as much.
     """
+    return _parts(_labels(points, reach, thin))
+
+
+def _labels(points: Float[np.ndarray, "n 3"], reach: float, thin: float) -> Int[np.ndarray, "n"]:
     cells = np.floor(points / (thin * reach)).astype(np.int64)
     number = np.ravel_multi_index(tuple((cells - cells.min(0)).T), np.ptp(cells, axis=0) + 1)
     _, first, cell = np.unique(number, return_index=True, return_inverse=True)
-    label = connected_parts(points[first].astype(np.float32), reach)[cell]
+    return connected_parts(points[first].astype(np.float32), reach)[cell]
+
+
+def _parts(label: Int[np.ndarray, "n"]) -> list[Rows]:
+    """The rows of each label, the more the earlier."""
     few = label.astype(np.min_scalar_type(label.max()))  # sorted by digits
     order = np.argsort(few, kind="stable")
     parts = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)

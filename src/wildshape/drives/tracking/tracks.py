@@ -85,7 +85,8 @@ def _assigned(live: list[Linked], seen: Seen, config: LinkConfig) -> dict[int, i
         _shift(expected[:, None], sizes[:, None], seen.centres, seen.sizes)[..., :2], axis=-1
     )
     unlike = np.abs(sizes[:, None] - seen.sizes).max(-1)
-    gate = config.gate_m + config.gate_per_tick_m * (gaps - 1)
+    once = np.array([len(one.frames) == 1 for one in live])  # its speed is not known yet
+    gate = np.where(once, config.first_gate_m, config.gate_m) + config.gate_per_tick_m * (gaps - 1)
     cost = apart + config.size_weight * unlike
     cost = np.where(cost < gate[:, None], cost, _FORBIDDEN)
     chosen = zip(*linear_sum_assignment(cost))

@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What stands close around a vehicle that may be none: walls and hedges go on beyond their box."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from wildshape.drives.completing.claims import in_box
+from wildshape.drives.completing.config import SurroundingsConfig
+from wildshape.drives.completing.placing import Completed
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.records import Points
+
+_Box = Float[np.ndarray, "4"]
+
+
+def crowded(
+    vehicles: Sequence[Completed],
+    sure: Sequence[float],
+    read: Callable[[int], Points],
+    T_level_sensor: SE3,
+    config: SurroundingsConfig,
+) -> set[str]:
+    """Names of doubtful ones whose completed scans show much close around them.
+
+    Args:
+        vehicles: completed.
+        sure: what is stated of each, 0 to 1.
+        read: the whole scan of a frame, sensor frame, metres.
+        T_level_sensor: of every frame.
+        config: see there.
+    """
+    doubtful = [one for one, said in zip(vehicles, sure, strict=True) if said < config.sure]
+    counts = {one.seen.name: np.zeros(2) for one in doubtful}
+    for frame in sorted({frame for one in doubtful for frame in one.frames}):
+        scan = T_level_sensor[frame].apply_numpy(read(frame))
+        for one in doubtful:
+            if frame in one.frames:
+                box = one.boxes[one.frames.index(frame)]
+                counts[one.seen.name] += _inside_and_around(scan, box, one.size, config)
+    return {name for name, (own, around) in counts.items() if around > config.share * own}
+
+
+def _inside_and_around(
+    scan: Points, box: _Box, size: tuple[float, float, float], config: SurroundingsConfig
+) -> tuple[int, int]:
+    """Points in a box, and beside its sides and ends: of what is neither ground nor above it."""
+    floor, top = box[2] - size[2] / 2, box[2] + size[2] / 2
+    points = scan[(scan[:, 2] > floor + config.low_m) & (scan[:, 2] < top)]
+    near = points[np.hypot(*(points[:, :2] - box[:2]).T) < size[0] / 2 + size[1]]
+
+    def within(ahead_m: float, aside_m: float) -> Bool[np.ndarray, "n"]:
+        wide = size[0] + 2 * ahead_m, size[1] + 2 * aside_m, size[2]
+        return in_box(near, box, wide, 0.0)
+
+    own = within(config.near_m, config.near_m)
+    around = within(config.far_m, 0.0) | within(0.0, config.far_m)
+    return int(own.sum()), int((around & ~own).sum())
