@@ -78,7 +78,7 @@ class VehicleConfig:
     least_kind: float = 0.3
     length_m: tuple[float, float] = (2.5, 12.0)
     width_m: tuple[float, float] = (1.4, 3.2)
-    height_m: tuple[float, float] = (1.05, 4.2)
+    height_m: tuple[float, float] = (1.05, 3.6)
     fewest_points: int = 60
 
 
