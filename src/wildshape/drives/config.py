@@ -8,7 +8,7 @@ They are written into `wildshape.json` of every result and can be set from Pytho
 
 from dataclasses import dataclass, field
 
-from wildshape.drives.completing.config import (
+from wildshape.drives.object_config import (
     BoxConfig,
     CarveConfig,
     ClaimConfig,

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from wildshape.drives.completing.config import BoxConfig
 from wildshape.drives.completing.placing import Completed
+from wildshape.drives.object_config import BoxConfig
 
 _ENOUGH = 4  # completed scans for a parabola: through three one goes whatever they are
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from wildshape.drives.completing.config import CarveConfig
 from wildshape.drives.completing.placing import Completed
+from wildshape.drives.object_config import CarveConfig
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 

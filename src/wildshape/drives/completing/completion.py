@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from wildshape.drives.completing.config import CompletionConfig, VehicleConfig
 from wildshape.drives.completing.looking import box_of, completed, looks_at
 from wildshape.drives.completing.vehicles import shape_nats
+from wildshape.drives.object_config import CompletionConfig, VehicleConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.se3 import SE3, stack

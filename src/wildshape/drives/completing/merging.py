@@ -12,8 +12,8 @@ from itertools import combinations, product
 import numpy as np
 
 from wildshape.drives.completing.boxes import Way, expected
-from wildshape.drives.completing.config import BoxConfig, MergeConfig
 from wildshape.drives.completing.placing import Completed
+from wildshape.drives.object_config import BoxConfig, MergeConfig
 from wildshape.drives.tracking.sightings import Sightings, merged
 from wildshape.geometry.footprint import footprint_overlap
 

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from wildshape.drives.completing.claims import in_box
-from wildshape.drives.completing.config import SurroundingsConfig
 from wildshape.drives.completing.placing import Completed
+from wildshape.drives.object_config import SurroundingsConfig
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 

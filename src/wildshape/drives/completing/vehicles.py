@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from wildshape.drives.completing.config import VehicleConfig
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed
+from wildshape.drives.object_config import VehicleConfig
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.io.atomic import write_json
 
