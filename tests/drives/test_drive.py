@@ -108,6 +108,7 @@ def test_tracks_and_objects_are_those_of_the_other_commands(found):
     for name in names:
         track = read_track(found.out / "tracks" / name)
         rows = [row for row in read_box_table(found.out / "boxes.csv") if row.track == name]
+        assert len({(row.length, row.width, row.height) for row in rows}) == 1
         seen = {f"{row.frame:06d}": row.points for row in rows if row.points}
         assert {n: len(s) for n, s in zip(track.scan_names, track.scans)} == seen
         completed = {path.stem for path in (found.out / "objects" / name / "completed").iterdir()}
