@@ -81,7 +81,7 @@ class Killed(Predictor):
         return self.strike.at(super().complete_many(*given, **known))
 
     def put_together(self, *given, **known):
-        return list(self.strike.at(super().put_together(*given, **known)))
+        return self.strike.at(super().put_together(*given, **known))
 
 
 @pytest.fixture(scope="module")
