@@ -257,3 +257,4 @@ def test_what_is_no_drive_is_refused(tmp_path):
     refused(wildshape.drive, folder, tmp_path / "out", match="single objects, cut out")
     (folder / "0.npy").write_bytes(b"damaged")
     refused(wildshape.drive, folder, tmp_path / "other", match="expected a numpy array")
+    refused(wildshape.drive, tmp_path / ("n" * 300), tmp_path / "more", match="name too long")

@@ -24,6 +24,7 @@ from wildshape.io.atomic import lock_folder, write_json
 from wildshape.io.progress import SILENT, Progress
 
 MARKER = "wildshape.json"
+_LONGEST_BYTES, _SHOWN = 251, 60  # of a name before `.ply`; file systems end at 255
 _LEFTOVER = ".*.part"  # as `io/atomic.py` names what it has not finished
 
 
@@ -167,10 +168,12 @@ def file_name(name: str) -> str:
     """The name itself.
 
     Raises:
-        BadInputError: it is no plain file name.
+        BadInputError: it is no plain file name, or leaves no room for a suffix.
     """
-    if not name or Path(name).name != name or name.startswith(".") or "\0" in name:
-        raise BadInputError(f"'{name}': a track or scan of this name cannot become a file; rename.")
+    long = len(name.encode(errors="replace")) > _LONGEST_BYTES
+    if not name or Path(name).name != name or name.startswith(".") or "\0" in name or long:
+        said = f"{name[:_SHOWN]}..." if long else name
+        raise BadInputError(f"'{said}': a track or scan of this name cannot become a file; rename.")
     return name
 
 

@@ -6,12 +6,18 @@ from pathlib import Path
 
 from wildshape.drives.source import Drive
 from wildshape.io.bags.reader import bag_files, open_bag
+from wildshape.io.guard import reading
 from wildshape.io.packets.reader import is_packet_file, open_packets
 
 
 def find_bag(path: Path) -> bool:
-    """Whether a path is such a recording."""
-    return bool(bag_files(path))
+    """Whether a path is such a recording.
+
+    Raises:
+        BadInputError: no file can have that name.
+    """
+    with reading(path, "a recording"):
+        return bool(bag_files(path))
 
 
 def open_recording(path: Path, topic: str | None = None) -> Drive:
