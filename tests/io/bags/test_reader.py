@@ -201,3 +201,21 @@ def test_rows_of_a_cloud_do_not_overlap():
     many: Any = replace(said, height=10_000_000, row_step=0)
     with pytest.raises(ValueError, match="rows of"):
         cloud_of(bytes(types.serialize_cdr(many, CLOUD)), cdr=True)
+
+
+def test_a_field_that_ends_beyond_its_point_is_refused():
+    types = message_types(True)
+    said: Any = types.deserialize_cdr(cloud(scans(1)[0], 1), CLOUD)
+    for offset in (said.point_step - 3, 2**31 - 1):
+        fields = [replace(field, offset=offset) for field in said.fields]
+        far: Any = replace(said, fields=fields)
+        with pytest.raises(ValueError, match="a field that ends at"):
+            cloud_of(bytes(types.serialize_cdr(far, CLOUD)), cdr=True)
+
+
+def test_a_cloud_that_promises_more_than_64_bits_count_is_refused():
+    types = message_types(True)
+    said: Any = types.deserialize_cdr(cloud(scans(1)[0], 1), CLOUD)
+    many: Any = replace(said, height=2**32 - 1, row_step=2**32 - 1)
+    with pytest.raises(ValueError, match="where it promises"):
+        cloud_of(bytes(types.serialize_cdr(many, CLOUD)), cdr=True)

@@ -18,7 +18,7 @@ import torch
 from jaxtyping import Float
 
 from wildshape.datasets.pandaset.pandas_pickle import read_pickled_table
-from wildshape.datasets.tracks.labelled_boxes import check_boxes
+from wildshape.datasets.tracks.labelled_boxes import WORLD_M, check_boxes
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
 from wildshape.geometry.transforms.se3 import SE3, between
@@ -159,8 +159,8 @@ def read_drive(scene: Path, frames: int) -> Drive:
             raise BadInputError(f"{scene / _POSES}: a heading is no unit quaternion; {_BRINGS}.")
         T = SE3(rotation_from_quaternion(quaternion), torch.tensor(place, dtype=torch.float64))
         times = [float(stamp) for stamp in stamps]
-    if not bool(T.translation.isfinite().all()):
-        raise BadInputError(f"{scene / _POSES}: a position is not finite; {_BRINGS}.")
+    if not bool((T.translation.abs() <= WORLD_M).all()):  # NaN is none either
+        raise BadInputError(f"{scene / _POSES}: a position is no place on a map; {_BRINGS}.")
     rise = all(earlier < later for earlier, later in pairwise(times))
     if not rise or not all(map(math.isfinite, times)):
         raise BadInputError(f"{scene / _STAMPS}: the times do not rise; {_BRINGS}.")

@@ -55,6 +55,11 @@ def cloud_of(data: bytes, *, cdr: bool) -> Cloud:
     cloud = types.deserialize_cdr(data, CLOUD) if cdr else types.deserialize_ros1(data, CLOUD)
     if cloud.height > 1 and cloud.row_step < cloud.width * cloud.point_step:
         raise ValueError(f"rows of {cloud.width} points in {cloud.row_step} bytes")
+    # numpy's own check of a view counts in 64 bits, which such numbers overflow.
+    height, width = int(cloud.height), int(cloud.width)
+    end = max(height - 1, 0) * int(cloud.row_step) + width * int(cloud.point_step)
+    if end > len(cloud.data):
+        raise ValueError(f"{len(cloud.data)} bytes of points, where it promises {end}")
     rows = np.ndarray(
         (cloud.height, cloud.width),
         _point(cloud),
@@ -78,10 +83,17 @@ def _point(cloud: Any) -> np.dtype:
     if not {"x", "y", "z"} <= fields.keys():
         raise ValueError(f"its points have the fields {', '.join(fields)}, but no x, y, z")
     names = [*"xyz", *[name for name in TIME_FIELDS if name in fields][:1]]
+    formats = [order + _DATATYPES[fields[name].datatype] for name in names]
+    # numpy's own check of a field's end counts in 32 bits.
+    ends = [int(fields[name].offset) + np.dtype(of).itemsize for name, of in zip(names, formats)]
+    if max(ends) > cloud.point_step:
+        raise ValueError(
+            f"points of {cloud.point_step} bytes with a field that ends at {max(ends)}"
+        )
     return np.dtype(
         {
             "names": names,
-            "formats": [order + _DATATYPES[fields[name].datatype] for name in names],
+            "formats": formats,
             "offsets": [fields[name].offset for name in names],
             "itemsize": cloud.point_step,
         }
