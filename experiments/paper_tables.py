@@ -10,15 +10,13 @@ goes on. `--plan` only says what is to be done.
 """
 
 import json
-import shlex
-import sys
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-import tyro
 from experiments.tables import ablations, vehicle, views
+from experiments.tables.command import begin
 from experiments.tables.given import Given
 from experiments.tables.make import Making, chosen_rows, make
 from experiments.tables.measure import measure, seeds_of
@@ -29,7 +27,7 @@ from experiments.tables.table import Block, Row, Table, Trained
 from experiments.tables.train import Workshop
 
 from wildshape.cli.terminal import say
-from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.errors import BadInputError
 from wildshape.io.atomic import write_json, write_text
 from wildshape.io.progress import duration
 
@@ -240,15 +238,4 @@ def _spent(record: Path) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    arguments = sys.argv[1:]
-    try:
-        run(
-            tyro.cli(Settings, args=arguments),
-            shlex.join(["python", "-m", "experiments.paper_tables", *arguments]),
-        )
-    except (BadInputError, MissingExtraError) as error:
-        print(error, file=sys.stderr)
-        sys.exit(2)
-    except KeyboardInterrupt as stopped:
-        print(stopped, file=sys.stderr)
-        sys.exit(130)
+    begin(run, Settings, "experiments.paper_tables")

@@ -5,8 +5,6 @@
 python -m experiments.tables vehicle --size tiny --cad CAD
 """
 
-import shlex
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -24,12 +22,11 @@ from experiments.tables import (
     vehicle,
     views,
 )
+from experiments.tables.command import begin
 from experiments.tables.given import Given
 from experiments.tables.make import chosen_protocols, chosen_rows, draw, make
 from experiments.tables.size import SIZES
 from experiments.tables.train import Workshop
-
-from wildshape.errors import BadInputError, MissingExtraError
 
 TABLES = {
     "views": views.table,
@@ -122,15 +119,4 @@ def _words(text: str) -> tuple[str, ...]:
 
 
 if __name__ == "__main__":
-    arguments = sys.argv[1:]
-    try:
-        main(
-            tyro.cli(Settings, args=arguments),
-            shlex.join(["python", "-m", "experiments.tables", *arguments]),
-        )
-    except (BadInputError, MissingExtraError) as error:
-        print(error, file=sys.stderr)
-        sys.exit(2)
-    except KeyboardInterrupt as stopped:
-        print(stopped, file=sys.stderr)
-        sys.exit(130)
+    begin(main, Settings, "experiments.tables")

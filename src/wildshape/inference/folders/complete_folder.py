@@ -44,11 +44,7 @@ MIDDLE, TUM, TRAJECTORY = "T_middle_scan.txt", "trajectory.tum", "trajectory.jso
 FILES = (
     *(f"*/{COMPLETED}/*.{kind}" for kind in CLOUD_FORMATS),
     *(f"*/{MESH}/*.{kind}" for kind in MESH_FORMATS),
-    f"*/{POSES}",
-    f"*/{MIDDLE}",
-    f"*/{TUM}",
-    f"*/{TRAJECTORY}",
-    f"*/{OBJECTS}",
+    *(f"*/{name}" for name in (POSES, MIDDLE, TUM, TRAJECTORY, OBJECTS)),
     *BOX_FILES,
 )
 
