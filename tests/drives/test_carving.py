@@ -8,6 +8,7 @@ import torch
 
 from wildshape.drives.completing.carving import carve
 from wildshape.drives.completing.placing import Completed
+from wildshape.drives.completing.turns import Turns
 from wildshape.drives.config import CarveConfig
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.se3 import SE3
@@ -52,7 +53,7 @@ def found(length):
 
 
 def carved(length, **scene):
-    still = SE3(torch.eye(3).double()[None], torch.zeros(1, 3).double())
+    still = Turns((0,), SE3(torch.eye(3).double()[None], torch.zeros(1, 3).double()))
     (one,) = carve([found(length)], lambda _: scan(**scene), still, CarveConfig())
     return one
 

@@ -15,6 +15,7 @@ from wildshape.drives.completing.completion import fullest_of_parts, keyframes, 
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed
 from wildshape.drives.completing.surroundings import crowded
+from wildshape.drives.completing.turns import Turns
 from wildshape.drives.completing.vehicles import judge, stated, vehicle_confidence
 from wildshape.drives.config import (
     BoxConfig,
@@ -40,6 +41,12 @@ def test_the_fullest_scan_of_each_part_is_completed():
     assert order_of_looks(one.part([3, 4]), 3) == [1, 0]
 
 
+def still(count):
+    """The turns of a sensor that does not move."""
+    poses = SE3(torch.eye(3).double().expand(count, 3, 3), torch.zeros(count, 3).double())
+    return Turns(tuple(range(count)), poses)
+
+
 def completed(boxes, frames=None, name="a", size=(4.0, 1.8, 1.5), cost=0.1, parts=()):
     frames = tuple(range(len(boxes))) if frames is None else frames
     whole = tuple(range(frames[0], frames[-1] + 1))
@@ -50,7 +57,7 @@ def completed(boxes, frames=None, name="a", size=(4.0, 1.8, 1.5), cost=0.1, part
 def test_a_moving_vehicle_goes_straight_on_between_its_completed_scans():
     frames = (0, 4, 8, 12)
     boxes = [(0.5 * f, -0.2 * f, 0.0, math.atan2(-0.2, 0.5)) for f in frames]
-    way = smooth(completed(boxes, frames), tuple(range(13)), BoxConfig())
+    way = smooth(completed(boxes, frames), still(13), BoxConfig())
     assert way.moving
     at = np.arange(13)
     expected = np.column_stack((0.5 * at, -0.2 * at, 0 * at, np.full(13, math.atan2(-0.2, 0.5))))
@@ -59,13 +66,13 @@ def test_a_moving_vehicle_goes_straight_on_between_its_completed_scans():
 
 def test_the_front_is_where_a_vehicle_drives_to():
     boxes = [(0.5 * f, 0.0, 0.0, math.pi if f < 3 else 0.0) for f in range(6)]
-    way = smooth(completed(boxes), tuple(range(6)), BoxConfig())
+    way = smooth(completed(boxes), still(6), BoxConfig())
     assert np.abs(way.boxes[:, 3]).max() < 1e-6
 
 
 def test_a_standing_vehicle_has_one_box_whatever_one_scan_says():
     boxes = [(5.0, 1.0, 0.0, 3.1), (5.1, 1.0, 0.0, -3.1), (9.0, 7.0, 0.0, 0.0), (5.0, 1.1, 0, 3.14)]
-    way = smooth(completed(boxes), tuple(range(4)), BoxConfig())
+    way = smooth(completed(boxes), still(4), BoxConfig())
     assert not way.moving
     assert (way.boxes == way.boxes[0]).all()
     assert way.boxes[0, :2] == pytest.approx((5.05, 1.0), abs=0.06)
@@ -100,7 +107,7 @@ def test_who_stands_most_of_the_time_has_moved_and_one_jump_is_no_motion():
 def test_boxes_follow_a_vehicle_that_brakes_between_scans_a_second_apart():
     frames = tuple(range(0, 91, 10))
     boxes = [(float(stop_and_go(np.array(f))), 0.0, 0.0, 0.0) for f in frames]
-    way = smooth(completed(boxes, frames), tuple(range(91)), BoxConfig())
+    way = smooth(completed(boxes, frames), still(91), BoxConfig())
     assert np.abs(way.boxes[:, 0] - stop_and_go(np.arange(91))).max() < 0.25
 
 
@@ -109,12 +116,11 @@ def test_a_doubtful_vehicle_is_none_where_a_wall_goes_on_beyond_its_box():
     car = rng.uniform((-2.0, -0.9, -0.7), (2.0, 0.9, 0.7), (400, 3)).astype(np.float32)
     wall = rng.uniform((-6.0, -0.9, -0.7), (6.0, -0.8, 2.0), (1200, 3)).astype(np.float32)
     ground = rng.uniform((-6.0, -6.0, -0.8), (6.0, 6.0, -0.7), (900, 3)).astype(np.float32)
-    still = SE3(torch.eye(3).double().expand(2, 3, 3), torch.zeros(2, 3).double())
     one = completed([(0.0, 0.0, 0.0, 0.0)] * 2)
 
     def names(sure, *parts):
         scan = np.concatenate(parts)
-        return crowded([one], [sure], lambda _: scan, still, SurroundingsConfig())
+        return crowded([one], [sure], lambda _: scan, still(2), SurroundingsConfig())
 
     assert names(0.3, car, ground) == set()
     assert names(0.3, car, ground, wall) == {"a"}
@@ -122,7 +128,7 @@ def test_a_doubtful_vehicle_is_none_where_a_wall_goes_on_beyond_its_box():
 
 
 def places():
-    return Places(tuple(range(100)), MergeConfig(), BoxConfig())
+    return Places(still(100), MergeConfig(), BoxConfig())
 
 
 def test_vehicles_are_told_by_cost_and_size_and_counted_once():
@@ -224,8 +230,7 @@ def test_clusters_in_the_box_of_a_vehicle_are_its_own(tmp_path):
     at = [(0.0, 0.0, 0.0, 0.0)]
     whole = replace(completed(at, name="whole"), seen=Sightings("whole", (0,), ((1,),), (20,)))
     again = replace(completed(at, name="again"), seen=Sightings("again", (2,), ((2,),), (20,)))
-    still = SE3(torch.eye(3).double().expand(3, 3, 3), torch.zeros(3, 3).double())
-    found = claim([whole, again], tmp_path, still, (0, 1, 2), DriveConfig())
+    found = claim([whole, again], tmp_path, still(3), DriveConfig())
     assert found.parts == {"again": "part_of_whole"}
     (only,) = found.vehicles
     assert only.seen.frames == (0, 1, 2)

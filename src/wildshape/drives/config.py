@@ -15,6 +15,7 @@ from wildshape.drives.object_config import (
     CompletionConfig,
     MergeConfig,
     SurroundingsConfig,
+    TurnConfig,
     VehicleConfig,
 )
 from wildshape.inference.config import InferenceConfig, JointIcpConfig, TrackConfig
@@ -188,6 +189,7 @@ class DriveConfig:
     detections: DetectionConfig = field(default_factory=DetectionConfig)
     tracks: LinkConfig = field(default_factory=LinkConfig)
     completion: CompletionConfig = field(default_factory=CompletionConfig)
+    turns: TurnConfig = field(default_factory=TurnConfig)
     vehicles: VehicleConfig = field(default_factory=VehicleConfig)
     merging: MergeConfig = field(default_factory=MergeConfig)
     claims: ClaimConfig = field(default_factory=ClaimConfig)

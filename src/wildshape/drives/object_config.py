@@ -172,6 +172,21 @@ class CarveConfig:
 
 
 @dataclass(frozen=True)
+class TurnConfig:
+    """Which way the beam turns (`turns.py`).
+
+    Attributes:
+        fewest_scans: completed, of an object that is asked.
+        standing_m: one that is nearer than this to its middle place stands.
+        clearer: those that stand must be nearer to it than without a turn by this factor.
+    """
+
+    fewest_scans: int = 4
+    standing_m: float = 0.3
+    clearer: float = 0.9
+
+
+@dataclass(frozen=True)
 class BoxConfig:
     """How boxes are smoothed in time (`boxes.py`).
 

@@ -5,7 +5,7 @@
 A stage whose files are in the output folder is not run again: a killed run goes on.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from wildshape.drives.completing.completion import Completer
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed, level_poses, read_completed
 from wildshape.drives.completing.surroundings import crowded
+from wildshape.drives.completing.turns import Turns, with_sense
 from wildshape.drives.completing.vehicles import (
     judge,
     likely,
@@ -43,7 +44,7 @@ from wildshape.drives.tracking.detections import (
 from wildshape.drives.tracking.mounting import Mounting, find_mounting
 from wildshape.drives.tracking.segmentation import Cutter, read_cuts
 from wildshape.drives.tracking.sightings import Sightings, read_sightings, write_sightings
-from wildshape.drives.tracking.tracks import Seen, link
+from wildshape.drives.tracking.tracks import linked_clusters
 from wildshape.drives.tracking.trajectory import Breaks, find_trajectory, jumps
 from wildshape.drives.writing.files import DriveFiles
 from wildshape.drives.writing.finished import read_finished
@@ -184,15 +185,16 @@ class _Run:
         T_level_sensor = level_poses(T_world_sensor, mounting)
         objects = self.tracks(T_level_sensor)
         self.complete("completion", objects, mounting)
-        parts = self.merged(objects, T_level_sensor)
+        turns = self.turns(objects, T_level_sensor)
+        parts = self.merged(objects, turns)
         self.complete("merging", parts, mounting)
-        vehicles = self.vehicles([*objects, *parts], T_level_sensor)
+        vehicles = self.vehicles([*objects, *parts], turns)
         return DriveResult(
             out=self.out,
             frames=len(self.drive),
             candidates=len(objects),
             vehicles=tuple(one.name for one in vehicles),
-            boxes=self.write(vehicles, T_level_sensor),
+            boxes=self.write(vehicles, turns),
             moving=sum(one.way.moving for one in vehicles),
             warnings=self.warnings(T_world_sensor),
             seconds=self.clock.seconds,
@@ -254,24 +256,8 @@ class _Run:
     def linked(self, T_level_sensor: SE3) -> list[Sightings]:
         if self.tracked:
             return given_tracks(read_cuts(self.cuts, len(self.drive)))
-        counts = []
-        usable = 0
         ticks = self.breaks.ticks(self.drive.ticks, self.config.tracks)
-
-        def seen() -> Iterator[Seen]:
-            nonlocal usable
-            for frame, cut in enumerate(read_cuts(self.cuts, len(self.drive))):
-                counts.append(cut.counts)
-                usable += cut.scanned > 0
-                moved = [T_level_sensor[frame].apply_numpy(part) for part in cut.clusters()]
-                yield Seen.of(ticks[frame], moved)
-
-        found = link(seen(), self.config.tracks)
-        fewest = min(self.config.tracks.fewest_scans, usable)
-        return [
-            Sightings.of(f"{number:04d}", one.frames, one.rows, counts)
-            for number, one in enumerate(one for one in found if len(one.frames) >= fewest)
-        ]
+        return linked_clusters(self.cuts, T_level_sensor, ticks, self.config.tracks)
 
     def folder(self, seen: Sightings) -> Path:
         return self.completing / "objects" / seen.name
@@ -283,56 +269,64 @@ class _Run:
         completer = Completer(self.predictor, self.drive, self.cuts, folder, level, *config)
         self.spread(stage, completer, completer.missing(objects), len(completer.groups(objects)))
 
-    def completed(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Completed]:
+    def turns(self, objects: list[Sightings], T_level_sensor: SE3) -> Turns:
+        """The sensor's turns, in their sense where points have no times."""
+        found = Turns(self.drive.ticks, T_level_sensor)
+        if self.drive.turn(0).seconds is not None:
+            return found
+        shown = ((one.frames, one.boxes) for one in self.completed(objects, found))
+        return with_sense(found, shown, self.config.turns)
+
+    def completed(self, objects: list[Sightings], turns: Turns) -> list[Completed]:
         """Those that were not ruled out."""
         return [
-            read_completed(seen, self.folder(seen), self.drive, T_level_sensor)
+            read_completed(seen, self.folder(seen), self.drive, turns)
             for seen in objects
             if (self.folder(seen) / OBJECTS).is_file()
         ]
 
-    def merged(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Sightings]:
+    def merged(self, objects: list[Sightings], turns: Turns) -> list[Sightings]:
         """Tracks that are one object by their shapes, put together."""
         path = self.completing / "merged.json"
         if not path.is_file():
-            write_sightings(path, [] if self.tracked else self.fragments(objects, T_level_sensor))
+            write_sightings(path, [] if self.tracked else self.fragments(objects, turns))
         return read_sightings(path)
 
-    def fragments(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Sightings]:
+    def fragments(self, objects: list[Sightings], turns: Turns) -> list[Sightings]:
         merging, vehicles = self.config.merging, self.config.vehicles
-        found = likely(self.completed(objects, T_level_sensor), merging.least_confidence, vehicles)
-        return Places(self.drive.ticks, merging, self.config.boxes).fragments(found)
+        found = likely(self.completed(objects, turns), merging.least_confidence, vehicles)
+        return Places(turns, merging, self.config.boxes).fragments(found)
 
-    def vehicles(self, objects: list[Sightings], T_level_sensor: SE3) -> list[Vehicle]:
-        ticks, around = self.drive.ticks, self.config.surroundings
-        places = Places(ticks, self.config.merging, self.config.boxes)
+    def vehicles(self, objects: list[Sightings], turns: Turns) -> list[Vehicle]:
+        around = self.config.surroundings
+        places = Places(turns, self.config.merging, self.config.boxes)
         with self.clock.stage("vehicles", 1) as at:
-            completed = self.completed(objects, T_level_sensor)
+            completed = self.completed(objects, turns)
             said = judge(completed, places, self.config.vehicles)
             kept = {one.name: one.confidence for one in said if not one.reasons}
             found = [one for one in completed if one.seen.name in kept]
             if not self.tracked:
                 found.sort(key=lambda one: -kept[one.seen.name])
-                claimed = claim(found, self.cuts, T_level_sensor, ticks, self.config)
+                claimed = claim(found, self.cuts, turns, self.config)
                 sure = [stated(one, kept) for one in claimed.vehicles]
-                crowd = crowded(claimed.vehicles, sure, self.drive.scan, T_level_sensor, around)
+                crowd = crowded(claimed.vehicles, sure, self.drive.scan, turns, around)
                 found = [one for one in claimed.vehicles if one.seen.name not in crowd]
                 said = refused(said, claimed.parts | dict.fromkeys(crowd, "crowded"))
             write_judged(self.completing / "vehicles.json", objects, said)
-            found = carve(found, self.drive.scan, T_level_sensor, self.config.carving)
+            found = carve(found, self.drive.scan, turns, self.config.carving)
             at(1)
             return [
-                Vehicle(one, smooth(one, ticks, self.config.boxes), stated(one, kept))
+                Vehicle(one, smooth(one, turns, self.config.boxes), stated(one, kept))
                 for one in sorted(found, key=lambda one: one.seen.name)
             ]
 
-    def write(self, vehicles: list[Vehicle], T_level_sensor: SE3) -> int:
+    def write(self, vehicles: list[Vehicle], turns: Turns) -> int:
         with self.clock.stage("outputs", len(vehicles)) as at:
             rows = []
             for number, one in enumerate(vehicles, 1):
                 folder = self.folder(one.completed.seen)
                 write_vehicle(self.results, one, folder, self.cuts, self.drive)
-                rows += rows_of(one, boxes_of(one, T_level_sensor), self.drive)
+                rows += rows_of(one, boxes_of(one, turns), self.drive)
                 at(number)
             write_box_table(self.results / BOXES, rows)
             return len(rows)

@@ -14,8 +14,10 @@ import numpy as np
 from jaxtyping import Float
 
 from wildshape.drives.completing.placing import Completed
+from wildshape.drives.completing.turns import Turns
 from wildshape.drives.object_config import BoxConfig
 
+_LEAST_APART = 0.5  # ticks
 _ENOUGH = 4  # completed scans for a parabola: through three one goes whatever they are
 
 
@@ -25,7 +27,7 @@ class Way:
 
     Attributes:
         frames: in which it has a box, rising.
-        boxes: `(f, 4)` centre x, y, z and yaw in each, metres and radians.
+        boxes: `(f, 4)` centre x, y, z and yaw when the beam meets it in each, metres and radians.
         moving: or standing.
     """
 
@@ -34,45 +36,52 @@ class Way:
     moving: bool
 
 
-def smooth(one: Completed, ticks: tuple[int, ...], config: BoxConfig) -> Way:
+def smooth(one: Completed, turns: Turns, config: BoxConfig) -> Way:
     """The way of one vehicle over the frames in which it was seen, and short gaps between.
 
     Args:
         one: completed.
-        ticks: when each frame of the drive was taken.
+        turns: of the drive's sensor.
         config: see there.
     """
     seen = one.seen.frames
     frames = [seen[0]]
     for frame in seen[1:]:
-        if ticks[frame] - ticks[frames[-1]] <= config.longest_gap:
+        if turns.ticks[frame] - turns.ticks[frames[-1]] <= config.longest_gap:
             frames.extend(range(frames[-1] + 1, frame))
         frames.append(frame)
-    return way_over(one, tuple(frames), ticks, config)
+    return way_over(one, tuple(frames), turns, config)
 
 
-def way_over(
-    one: Completed, frames: tuple[int, ...], ticks: tuple[int, ...], config: BoxConfig
-) -> Way:
+def way_over(one: Completed, frames: tuple[int, ...], turns: Turns, config: BoxConfig) -> Way:
     """The way of one vehicle over frames, seen or not; see `smooth`."""
-    at = np.array([ticks[frame] for frame in one.frames], np.float64)
-    wanted = np.array([ticks[frame] for frame in frames], np.float64)
+    at = np.take(turns.ticks, one.frames) + one.phases
     if not moves(at, one.boxes, config):
         return Way(frames, np.tile(_middle(one.boxes), (len(frames), 1)), moving=False)
+    middles = np.take(turns.ticks, frames).astype(np.float64)
+    boxes = _on_its_way(one, at, middles, config)
+    met = middles + turns.phases(frames, boxes)
+    return Way(frames, _on_its_way(one, at, met, config), moving=True)
+
+
+def _on_its_way(
+    one: Completed, at: Float[np.ndarray, "k"], wanted: Float[np.ndarray, "f"], config: BoxConfig
+) -> Float[np.ndarray, "f 4"]:
+    """Boxes of one that moves; `at`: the ticks of the completed ones, `wanted`: those asked for."""
     places, velocities = _lines(at, one.boxes[:, :3], wanted, config.smooth_ticks)
     if len(at) >= _ENOUGH:
         among = (wanted > at[0] - config.smooth_ticks) & (wanted < at[-1] + config.smooth_ticks)
         places[among] = _parabolas(at, one.boxes[:, :3], wanted[among], config.smooth_ticks)
-    yaws = _yaws(at, one.boxes, wanted, velocities, config)
-    return Way(frames, np.column_stack((places, yaws)), moving=True)
+    return np.column_stack((places, _yaws(at, one.boxes, wanted, velocities, config)))
 
 
-def expected(one: Completed, ticks: tuple[int, ...], beyond_ticks: int, config: BoxConfig) -> Way:
+def expected(one: Completed, turns: Turns, beyond_ticks: int, config: BoxConfig) -> Way:
     """Where one may be: standing, in every frame; moving, a little beyond its track."""
+    ticks = turns.ticks
     low, high = ticks[one.seen.frames[0]] - beyond_ticks, ticks[one.seen.frames[-1]] + beyond_ticks
-    way = way_over(one, (one.seen.frames[0],), ticks, config)
+    way = way_over(one, (one.seen.frames[0],), turns, config)
     frames = [i for i, tick in enumerate(ticks) if not way.moving or low <= tick <= high]
-    return way_over(one, tuple(frames), ticks, config)
+    return way_over(one, tuple(frames), turns, config)
 
 
 def moves(
@@ -90,7 +99,7 @@ def moves(
         return True
     for first in range(len(ticks) - count + 1):
         at, way = ticks[first : first + count], places[first : first + count]
-        step = np.median(np.diff(way, axis=0) / np.diff(at)[:, None], axis=0)
+        step = np.median(np.diff(way, axis=0) / _apart(np.diff(at)), axis=0)
         fast = float(np.linalg.norm(step)) > config.moving_m_per_tick
         if fast and _gets_far(at, _velocity(at, way), config):
             return True
@@ -104,8 +113,13 @@ def _velocity(
     early, late = np.triu_indices(len(ticks), 1)
     if not len(early):
         return np.zeros(2)
-    steps = (places[late] - places[early]) / (ticks[late] - ticks[early])[:, None]
+    steps = (places[late] - places[early]) / _apart(ticks[late] - ticks[early])
     return np.median(steps, axis=0)
+
+
+def _apart(ticks: Float[np.ndarray, "s"]) -> Float[np.ndarray, "s 1"]:
+    """Ticks between scans: a beam may end a turn and begin the next one on the same vehicle."""
+    return np.maximum(ticks, _LEAST_APART)[:, None]
 
 
 def _gets_far(

@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from wildshape.drives.completing.placing import Completed
+from wildshape.drives.completing.turns import Turns
 from wildshape.drives.object_config import CarveConfig
-from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 
 Box = Float[np.ndarray, "4"]
@@ -48,7 +48,7 @@ class _Slabs:
 def carve(
     vehicles: Sequence[Completed],
     read: Callable[[int], Points],
-    T_level_sensor: SE3,
+    turns: Turns,
     config: CarveConfig,
 ) -> list[Completed]:
     """The same vehicles in boxes no longer than rays leave room for.
@@ -56,17 +56,17 @@ def carve(
     Args:
         vehicles: completed.
         read: the whole scan of a frame, sensor frame, metres.
-        T_level_sensor: of every frame.
+        turns: of the drive's sensor.
         config: see there.
     """
     slabs = [_Slabs.empty(config) for _ in vehicles]
     present: dict[int, list[tuple[int, Box]]] = {}
     for i, one in enumerate(vehicles):
-        for frame, box in zip(one.frames, one.boxes):
+        for frame, box in zip(one.frames, turns.shown(one.frames, one.boxes)):
             present.setdefault(frame, []).append((i, box))
     for frame, boxes in sorted(present.items()):
-        scan = T_level_sensor[frame].apply_numpy(read(frame)).astype(np.float64)
-        sensor = T_level_sensor[frame].translation.numpy()
+        scan = turns.T_level_sensor[frame].apply_numpy(read(frame)).astype(np.float64)
+        sensor = turns.T_level_sensor[frame].translation.numpy()
         for i, box in boxes:
             _count(slabs[i], scan, sensor, box, vehicles[i].size, config)
     return [_cut(one, counted, config) for one, counted in zip(vehicles, slabs)]

@@ -15,10 +15,10 @@ from jaxtyping import Bool, Float
 
 from wildshape.drives.completing.boxes import Way, expected
 from wildshape.drives.completing.placing import Completed
+from wildshape.drives.completing.turns import Turns
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.tracking.segmentation import read_cuts
 from wildshape.drives.tracking.sightings import Sightings
-from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 
 
@@ -38,8 +38,7 @@ class Claimed:
 def claim(
     vehicles: list[Completed],
     cuts: Path,
-    T_level_sensor: SE3,
-    ticks: tuple[int, ...],
+    turns: Turns,
     config: DriveConfig,
 ) -> Claimed:
     """Give every cluster to the first vehicle in whose box it lies.
@@ -47,23 +46,28 @@ def claim(
     Args:
         vehicles: the surest first.
         cuts: folder of the clusters.
-        T_level_sensor: of every frame.
-        ticks: when each frame was taken.
+        turns: of the drive's sensor.
         config: see there.
     """
-    ways = [expected(one, ticks, config.claims.beyond_ticks, config.boxes) for one in vehicles]
+    ways = [_shown(one, turns, config) for one in vehicles]
     own = [
         {(frame, row): i for frame, rows in zip(one.seen.frames, one.seen.rows) for row in rows}
         for i, one in enumerate(vehicles)
     ]
     owner = {key: i for rows in reversed(own) for key, i in rows.items()}
     counts = []
-    for frame, cut in enumerate(read_cuts(cuts, len(ticks))):
+    for frame, cut in enumerate(read_cuts(cuts, len(turns.ticks))):
         counts.append(cut.counts)
-        clusters = [T_level_sensor[frame].apply_numpy(part) for part in cut.clusters()]
+        clusters = [turns.T_level_sensor[frame].apply_numpy(part) for part in cut.clusters()]
         for row, i in _claims(clusters, vehicles, ways, frame, config):
             owner[frame, row] = min(i, owner.get((frame, row), i))
     return _shared_out(vehicles, own, owner, counts, config)
+
+
+def _shown(one: Completed, turns: Turns, config: DriveConfig) -> Way:
+    """The boxes of one where frames show them."""
+    way = expected(one, turns, config.claims.beyond_ticks, config.boxes)
+    return replace(way, boxes=turns.shown(way.frames, way.boxes))
 
 
 def _claims(

@@ -13,6 +13,7 @@ import numpy as np
 
 from wildshape.drives.completing.boxes import Way, expected
 from wildshape.drives.completing.placing import Completed
+from wildshape.drives.completing.turns import Turns
 from wildshape.drives.object_config import BoxConfig, MergeConfig
 from wildshape.drives.tracking.sightings import Sightings, merged
 from wildshape.geometry.footprint import footprint_overlap
@@ -25,12 +26,12 @@ class Places:
     """Where completed objects of a drive are, and which of them are one.
 
     Attributes:
-        ticks: when each frame of the drive was taken.
+        turns: of the drive's sensor.
         config: see there.
         boxes: how objects move.
     """
 
-    ticks: tuple[int, ...]
+    turns: Turns
     config: MergeConfig
     boxes: BoxConfig
     _ways: dict[str, Way] = field(default_factory=dict)
@@ -84,7 +85,7 @@ class Places:
     def _way(self, one: Completed) -> Way:
         name = one.seen.name
         if name not in self._ways:
-            self._ways[name] = expected(one, self.ticks, self.config.beyond_ticks, self.boxes)
+            self._ways[name] = expected(one, self.turns, self.config.beyond_ticks, self.boxes)
         return self._ways[name]
 
 

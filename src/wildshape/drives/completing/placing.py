@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
+from wildshape.drives.completing.turns import Turns
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.drives.tracking.sightings import Sightings
@@ -36,6 +37,7 @@ class Completed:
         confidence: of the completions, 0 to 1.
         p_kind: probability that it is a vehicle; None for weights that state none.
         ahead_m: how far the boxes' middle was moved forward from that of the completed shape.
+        phases: `(k,)` when the beam met it, in turns since the middle of each frame's.
     """
 
     seen: Sightings
@@ -46,6 +48,7 @@ class Completed:
     confidence: float
     p_kind: float | None = None
     ahead_m: float = 0.0
+    phases: Float[np.ndarray, "k"] | float = 0.0
 
     @property
     def fullest(self) -> int:
@@ -58,14 +61,14 @@ def level_poses(T_world_sensor: SE3, mounting: Mounting) -> SE3:
     return mounting.levelling() @ T_world_sensor
 
 
-def read_completed(seen: Sightings, folder: Path, drive: Drive, T_level_sensor: SE3) -> Completed:
+def read_completed(seen: Sightings, folder: Path, drive: Drive, turns: Turns) -> Completed:
     """A completed object in the level world.
 
     Args:
         seen: the object.
         folder: where `completion.py` wrote it.
         drive: whose.
-        T_level_sensor: of every frame.
+        turns: of its sensor.
 
     Raises:
         BadInputError: the files are damaged.
@@ -77,14 +80,17 @@ def read_completed(seen: Sightings, folder: Path, drive: Drive, T_level_sensor: 
     costs = np.array([float(scan["cost_m"]) for scan in said["scans"]])
     points = dict(zip(seen.frames, seen.points))
     weights = np.array([points[frame] for frame in frames], float)
+    shown = [_placed(one, turns.T_level_sensor[frame]) for one, frame in zip(found, frames)]
+    boxes, phases = turns.met(frames, np.stack(shown))
     return Completed(
         seen=seen,
         frames=frames,
-        boxes=np.stack([_placed(one, T_level_sensor[frame]) for one, frame in zip(found, frames)]),
+        boxes=boxes,
         size=found[0].box.size,
         cost_m=weighted_median(costs, weights),
         confidence=float(np.mean([one.score for one in found])),
         p_kind=_mean([scan.get("p_kind") for scan in said["scans"]]),
+        phases=phases,
     )
 
 

@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float
 
 from wildshape.drives.completing.claims import in_box
 from wildshape.drives.completing.placing import Completed
+from wildshape.drives.completing.turns import Turns
 from wildshape.drives.object_config import SurroundingsConfig
-from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 
 _Box = Float[np.ndarray, "4"]
@@ -20,7 +20,7 @@ def crowded(
     vehicles: Sequence[Completed],
     sure: Sequence[float],
     read: Callable[[int], Points],
-    T_level_sensor: SE3,
+    turns: Turns,
     config: SurroundingsConfig,
 ) -> set[str]:
     """Names of doubtful ones whose completed scans show much close around them.
@@ -29,16 +29,17 @@ def crowded(
         vehicles: completed.
         sure: what is stated of each, 0 to 1.
         read: the whole scan of a frame, sensor frame, metres.
-        T_level_sensor: of every frame.
+        turns: of the drive's sensor.
         config: see there.
     """
     doubtful = [one for one, said in zip(vehicles, sure, strict=True) if said < config.sure]
     counts = {one.seen.name: np.zeros(2) for one in doubtful}
     for frame in sorted({frame for one in doubtful for frame in one.frames}):
-        scan = T_level_sensor[frame].apply_numpy(read(frame))
+        scan = turns.T_level_sensor[frame].apply_numpy(read(frame))
         for one in doubtful:
             if frame in one.frames:
-                box = one.boxes[one.frames.index(frame)]
+                place = one.frames.index(frame)
+                (box,) = turns.shown([frame], one.boxes[place : place + 1])
                 counts[one.seen.name] += _inside_and_around(scan, box, one.size, config)
     return {name for name, (own, around) in counts.items() if around > config.share * own}
 

@@ -6,13 +6,17 @@ Each object is expected where it went (a constant velocity, drawn to what was se
 give clusters to objects the one of least total distance is taken (Kuhn 1955).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
 from wildshape.drives.config import LinkConfig
+from wildshape.drives.tracking.segmentation import read_cuts
+from wildshape.drives.tracking.sightings import Sightings
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 
 _FORBIDDEN = 1e6
@@ -50,6 +54,36 @@ class Linked:
     velocity: Float[np.ndarray, "3"] = field(default_factory=lambda: np.zeros(3))
     frames: list[int] = field(default_factory=list)
     rows: list[int] = field(default_factory=list)
+
+
+def linked_clusters(
+    cuts: Path, T_level_sensor: SE3, ticks: Sequence[int], config: LinkConfig
+) -> list[Sightings]:
+    """The objects of a drive that were seen in enough scans.
+
+    Args:
+        cuts: folder of the clusters.
+        T_level_sensor: of every frame.
+        ticks: when each frame was taken.
+        config: see there.
+    """
+    counts = []
+    usable = 0
+
+    def seen() -> Iterator[Seen]:
+        nonlocal usable
+        for frame, cut in enumerate(read_cuts(cuts, len(ticks))):
+            counts.append(cut.counts)
+            usable += cut.scanned > 0
+            moved = [T_level_sensor[frame].apply_numpy(part) for part in cut.clusters()]
+            yield Seen.of(ticks[frame], moved)
+
+    found = link(seen(), config)
+    fewest = min(config.fewest_scans, usable)
+    return [
+        Sightings.of(f"{number:04d}", one.frames, one.rows, counts)
+        for number, one in enumerate(one for one in found if len(one.frames) >= fewest)
+    ]
 
 
 def link(scans: Iterable[Seen], config: LinkConfig) -> list[Linked]:

@@ -14,6 +14,7 @@ import numpy as np
 from wildshape.drives.completing.boxes import Way
 from wildshape.drives.completing.completion import CATEGORY
 from wildshape.drives.completing.placing import Completed, box_in_scan
+from wildshape.drives.completing.turns import Turns
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.se3 import SE3
@@ -115,12 +116,12 @@ def write_shape(path: Path, folder: Path, ahead_m: float = 0.0) -> None:
     write_ply(path, placed - np.array((ahead_m, 0.0, 0.0), placed.dtype))
 
 
-def boxes_of(vehicle: Vehicle, T_level_sensor: SE3) -> list[tuple[int, Box]]:
+def boxes_of(vehicle: Vehicle, turns: Turns) -> list[tuple[int, Box]]:
     """Frame and box in that frame's sensor frame, of all frames of a vehicle."""
     size, way = vehicle.completed.size, vehicle.way
     return [
-        (frame, box_in_scan(box, size, T_level_sensor[frame]))
-        for frame, box in zip(way.frames, way.boxes)
+        (frame, box_in_scan(box, size, turns.T_level_sensor[frame]))
+        for frame, box in zip(way.frames, turns.shown(way.frames, way.boxes))
     ]
 
 

@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A beam that turns meets what is beside a moving sensor before or after the turn's middle."""
+
+import numpy as np
+import pytest
+import torch
+
+from wildshape.drives.completing.boxes import smooth
+from wildshape.drives.completing.placing import Completed
+from wildshape.drives.completing.turns import Turns, with_sense
+from wildshape.drives.config import BoxConfig, TurnConfig
+from wildshape.drives.tracking.sightings import Sightings
+from wildshape.geometry.transforms.rotation import rotation_z
+from wildshape.geometry.transforms.se3 import SE3
+
+FRAMES = 20
+STANDING = np.array([(8.0, 4.0, -1.0, 0.1), (14.0, -5.0, -1.0, 3.0), (22.0, 3.5, -1.0, -0.4)])
+
+
+def sensor(ticks):
+    """`T_level_sensor`: 1 m a tick in a bend of 2 degrees a tick."""
+    turn = torch.tensor(np.deg2rad(2.0) * np.asarray(ticks, float))
+    radius = 1.0 / np.deg2rad(2.0)
+    place = radius * torch.stack((turn.sin(), 1 - turn.cos(), torch.zeros_like(turn)), -1)
+    return SE3(rotation_z(turn), place)
+
+
+def turns(sense=0):
+    return Turns(tuple(range(FRAMES)), sensor(range(FRAMES)), sense)
+
+
+def shown(place_at, sense):
+    """Where frames show something, and when the beam meets it: the exact motion, step by step."""
+    boxes, phases = [], []
+    for frame in range(FRAMES):
+        phase = 0.0
+        for _ in range(20):
+            box, T_level_sensor = place_at(frame + phase), sensor([frame + phase])[0]
+            seen = T_level_sensor.inverse().apply_numpy(box[None, :3])[0]
+            phase = sense * np.arctan2(seen[1], seen[0]) / (2 * np.pi)
+        ahead = sensor([frame])[0].apply_numpy(seen[None])[0]
+        boxes.append((*ahead, box[3] - np.deg2rad(2.0) * phase))
+        phases.append(phase)
+    return np.array(boxes), np.array(phases)
+
+
+@pytest.mark.parametrize("sense", [1, -1, 0])
+def test_what_stands_is_found_in_one_place_and_tells_the_sense(sense):
+    seen = [shown(lambda _, box=box: box, sense) for box in STANDING]
+    frames = tuple(range(FRAMES))
+    found = with_sense(turns(), [(frames, boxes) for boxes, _ in seen], TurnConfig())
+    assert found.sense == sense
+    assert not sense or np.ptp(seen[0][0][:, 0]) > 0.3
+    for box, (boxes, phases) in zip(STANDING, seen):
+        met, when = found.met(frames, boxes)
+        assert np.abs(met - box).max() < 0.03
+        assert when == pytest.approx(phases, abs=1e-9)
+        assert found.shown(frames, met) == pytest.approx(boxes, abs=0.01)
+
+
+def test_one_that_passes_fast_is_where_the_beam_meets_it():
+    def oncoming(tick):
+        return np.array((25.0 - 1.5 * tick, 4.0, -1.0, np.pi))
+
+    boxes, _ = shown(oncoming, 1)
+    frames = tuple(range(0, FRAMES, 2))
+    met, phases = turns(1).met(frames, boxes[list(frames)])
+    seen = Sightings("a", tuple(range(FRAMES)), ((0,),) * FRAMES, (200,) * FRAMES)
+    one = Completed(seen, frames, met, (4.0, 1.8, 1.5), 0.1, 0.5, phases=phases)
+    way = smooth(one, turns(1), BoxConfig())
+    found = turns(1).shown(way.frames, way.boxes)
+    assert np.abs(found - boxes)[:19, :2].max() < 0.06
