@@ -30,17 +30,27 @@ def turns(sense=0):
     return Turns(tuple(range(FRAMES)), sensor(range(FRAMES)), sense)
 
 
+def met(place_at, frame, sense):
+    """Where the beam meets something, sensor frame, and when: the exact motion, step by step."""
+
+    def seen(phase):
+        T_level_sensor = sensor([frame + phase])[0]
+        return T_level_sensor.inverse().apply_numpy(place_at(frame + phase)[None, :3])[0]
+
+    phase = 0.0
+    for _ in range(20):
+        x, y, _ = seen(phase)
+        phase = sense * np.arctan2(y, x) / (2 * np.pi)
+    return seen(phase), phase
+
+
 def shown(place_at, sense):
-    """Where frames show something, and when the beam meets it: the exact motion, step by step."""
+    """Where each frame shows something, as if met at the turn's middle, and when it was met."""
     boxes, phases = [], []
     for frame in range(FRAMES):
-        phase = 0.0
-        for _ in range(20):
-            box, T_level_sensor = place_at(frame + phase), sensor([frame + phase])[0]
-            seen = T_level_sensor.inverse().apply_numpy(box[None, :3])[0]
-            phase = sense * np.arctan2(seen[1], seen[0]) / (2 * np.pi)
-        ahead = sensor([frame])[0].apply_numpy(seen[None])[0]
-        boxes.append((*ahead, box[3] - np.deg2rad(2.0) * phase))
+        seen, phase = met(place_at, frame, sense)
+        yaw = place_at(frame + phase)[3] - np.deg2rad(2.0) * phase
+        boxes.append((*sensor([frame])[0].apply_numpy(seen[None])[0], yaw))
         phases.append(phase)
     return np.array(boxes), np.array(phases)
 
@@ -53,10 +63,10 @@ def test_what_stands_is_found_in_one_place_and_tells_the_sense(sense):
     assert found.sense == sense
     assert not sense or np.ptp(seen[0][0][:, 0]) > 0.3
     for box, (boxes, phases) in zip(STANDING, seen):
-        met, when = found.met(frames, boxes)
-        assert np.abs(met - box).max() < 0.03
+        stood, when = found.met(frames, boxes)
+        assert np.abs(stood - box).max() < 0.03
         assert when == pytest.approx(phases, abs=1e-9)
-        assert found.shown(frames, met) == pytest.approx(boxes, abs=0.01)
+        assert found.shown(frames, stood) == pytest.approx(boxes, abs=0.01)
 
 
 def test_one_that_passes_fast_is_where_the_beam_meets_it():
@@ -65,9 +75,9 @@ def test_one_that_passes_fast_is_where_the_beam_meets_it():
 
     boxes, _ = shown(oncoming, 1)
     frames = tuple(range(0, FRAMES, 2))
-    met, phases = turns(1).met(frames, boxes[list(frames)])
+    stood, phases = turns(1).met(frames, boxes[list(frames)])
     seen = Sightings("a", tuple(range(FRAMES)), ((0,),) * FRAMES, (200,) * FRAMES)
-    one = Completed(seen, frames, met, (4.0, 1.8, 1.5), 0.1, 0.5, phases=phases)
+    one = Completed(seen, frames, stood, (4.0, 1.8, 1.5), 0.1, 0.5, phases=phases)
     way = smooth(one, turns(1), BoxConfig())
     found = turns(1).shown(way.frames, way.boxes)
     assert np.abs(found - boxes)[:19, :2].max() < 0.06
