@@ -30,6 +30,7 @@ from wildshape.report.scene import thin
 
 MOST_OBJECTS = 150
 _POINTS = 2500  # of a panel
+_SHOWN_S = 0.05  # less of a stage reads 0.0
 _NOTES = (
     "Drift can be told only where true poses are known: `wildshape evaluate-drive` measures it.",
 )
@@ -104,12 +105,11 @@ def _facts(found: FinishedDrive) -> list[tuple[str, str]]:
 
 
 def _cost(seconds: dict[str, float]) -> list[tuple[str, str]]:
+    """All of it and each stage that took time: some are done along with the one before."""
     if not seconds:
         return []
-    return [
-        ("all of it", duration(sum(seconds.values()))),
-        *((stage, f"{spent:.1f} s") for stage, spent in seconds.items()),
-    ]
+    stages = [(stage, f"{spent:.1f} s") for stage, spent in seconds.items() if spent >= _SHOWN_S]
+    return [("all of it", duration(sum(seconds.values()))), *stages]
 
 
 def _index(found: FinishedDrive) -> Table:
