@@ -20,6 +20,7 @@ from wildshape.records import Points
 
 _SIZED_BY = 1000  # points of a cluster that tell its size
 _SECTORS, _OVERLAP = 6, np.deg2rad(12.0)  # at 2 m the reach is 9 degrees wide
+_SECTOR = 2 * np.pi / _SECTORS
 _FAR = 1000.0  # reaches
 _TURNS = np.deg2rad(np.arange(0.0, 90.0, 2.0))
 _AHEAD = np.stack((np.cos(_TURNS), np.sin(_TURNS)), axis=1)
@@ -35,10 +36,31 @@ class _Above:
     Attributes:
         points: level frame.
         heights: above the ground.
+        scaled: where a step of 1 is the reach: each point in its sector, then those that the next
+            sector has, too, in that one.
+        twin: the row in `scaled` of a point's second place; -1 where it has one alone.
     """
 
     points: Points
     heights: Float[np.ndarray, "n"]
+    scaled: Float[np.ndarray, "m 3"]
+    twin: Int[np.ndarray, "n"]
+
+    @classmethod
+    def of(cls, points: Points, heights: Float[np.ndarray, "n"], config: ClusterConfig) -> "_Above":
+        """With the places of its points in their sectors."""
+        azimuth = np.arctan2(points[:, 1], points[:, 0])
+        sector = np.rint(azimuth / _SECTOR)
+        off = azimuth - sector * _SECTOR
+        shared = np.flatnonzero(np.abs(off) > _SECTOR / 2 - _OVERLAP)
+        beside = np.sign(off[shared])
+        off = np.concatenate((off, off[shared] - beside * _SECTOR))
+        number = np.concatenate((sector, sector[shared] + beside)) % _SECTORS
+        scaled = _scaled(np.concatenate((points, points[shared])), off, config)
+        scaled[:, 0] += number * _FAR  # sectors are joined by rows alone
+        twin = np.full(len(points), -1)
+        twin[shared] = len(points) + np.arange(len(shared))
+        return cls(points, heights, scaled, twin)
 
 
 def find_clusters(
@@ -57,25 +79,21 @@ def find_clusters(
     rows = np.flatnonzero(above & (away < config.range_m))
     if len(rows) < config.fewest_points:
         return []
-    scan = _Above(points[rows], heights[rows])
+    scan = _Above.of(points[rows], heights[rows], config)
     everything = np.arange(len(rows))
     found = [rows[part] for part in _vehicle_sized(scan, everything, (1.0, *config.finer), config)]
     return sorted(found, key=lambda part: float(away[part].min()))
 
 
-def _hanging_together(points: Points, reach: float, config: ClusterConfig) -> list[Rows]:
-    """Rows of each part of a scan, the larger first; `reach`: as a multiple of the usual one."""
-    azimuth = np.arctan2(points[:, 1], points[:, 0])
-    scaled, rows = [], []
-    for number in range(_SECTORS):
-        off = np.angle(np.exp(1j * (azimuth - number * 2 * np.pi / _SECTORS)))
-        own = np.flatnonzero(np.abs(off) < np.pi / _SECTORS + _OVERLAP)
-        apart = np.array((number * _FAR, 0.0, 0.0))  # sectors are joined by rows alone
-        scaled.append(_scaled(points[own], off[own], config) + apart)
-        rows.append(own)
-    row = np.concatenate(rows)
-    label = _labels(np.concatenate(scaled), reach, config.thin)
-    return _parts(_joined(label, row))
+def _hanging_together(
+    scan: _Above, rows: Int[np.ndarray, "n"], reach: float, config: ClusterConfig
+) -> list[Rows]:
+    """Some rows of a scan by parts, the larger first; `reach`: as a multiple of the usual one."""
+    twins = scan.twin[rows]
+    doubled = np.flatnonzero(twins >= 0)
+    label = _labels(scan.scaled[np.concatenate((rows, twins[doubled]))], reach, config.thin)
+    own, again = label[: len(rows)], label[len(rows) :]
+    return [rows[part] for part in _parts(_joined(own, own[doubled], again))]
 
 
 def _scaled(
@@ -87,28 +105,28 @@ def _scaled(
     return np.stack((outwards, azimuth * away / reach, config.upright * points[:, 2] / reach), 1)
 
 
-def _joined(label: Int[np.ndarray, "m"], row: Int[np.ndarray, "m"]) -> Int[np.ndarray, "n"]:
-    """A label for each row; labels that share a row are one."""
+def _joined(
+    label: Int[np.ndarray, "n"], one: Int[np.ndarray, "m"], other: Int[np.ndarray, "m"]
+) -> Int[np.ndarray, "n"]:
+    """The labels after each of `one` became the same as its counterpart in `other`."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    order = np.argsort(row, kind="stable")
-    first = np.flatnonzero(np.diff(row[order], prepend=-1))
-    of_row = label[order[first]]
-    ends = of_row[row], label
-    count = int(label.max()) + 1
-    links = coo_array((np.ones(len(row), bool), ends), shape=(count, count))
-    return connected_components(links, directed=False)[1][of_row]
+    count = 1 + int(max(label.max(), other.max(initial=0)))
+    links = coo_array((np.ones(len(one), bool), (one, other)), shape=(count, count))
+    return connected_components(links, directed=False)[1][label]
 
 
 def _vehicle_sized(
     scan: _Above, rows: Rows, reaches: tuple[float, ...], config: ClusterConfig
 ) -> Iterator[Rows]:
     """Clusters of the size of vehicles; those too large are cut apart with the finer reaches."""
-    for part in _hanging_together(scan.points[rows], reaches[0], config):
+    for part in _hanging_together(scan, rows, reaches[0], config):
         if len(part) < config.fewest_points:
             break
-        members = _without_overhang(scan, rows[part], config)
+        if not _stands(scan.heights[part], config):
+            continue
+        members = _without_overhang(scan, part, config)
         if len(members) < config.fewest_points or not _stands(scan.heights[members], config):
             continue
         length, width = extents(scan.points[members])
@@ -144,8 +162,14 @@ def connected(points: Float[np.ndarray, "n 3"], reach: float, thin: float = 0.25
 def _labels(points: Float[np.ndarray, "n 3"], reach: float, thin: float) -> Int[np.ndarray, "n"]:
     cells = np.floor(points / (thin * reach)).astype(np.int64)
     number = np.ravel_multi_index(tuple((cells - cells.min(0)).T), np.ptp(cells, axis=0) + 1)
-    _, first, cell = np.unique(number, return_index=True, return_inverse=True)
-    return connected_parts(points[first].astype(np.float32), reach)[cell]
+    order = np.argsort(number)
+    ordered = number[order]
+    fresh = np.concatenate(([True], ordered[1:] != ordered[:-1]))
+    first = np.minimum.reduceat(order, np.flatnonzero(fresh))
+    label = connected_parts(points[first].astype(np.float32), reach)
+    found = np.empty_like(order)
+    found[order] = label[np.cumsum(fresh) - 1]
+    return found
 
 
 def _parts(label: Int[np.ndarray, "n"]) -> list[Rows]:
