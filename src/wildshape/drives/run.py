@@ -47,7 +47,6 @@ from wildshape.drives.tracking.sightings import Sightings, read_sightings, write
 from wildshape.drives.tracking.tracks import linked_clusters
 from wildshape.drives.tracking.trajectory import Breaks, find_trajectory, jumps
 from wildshape.drives.writing.files import DriveFiles
-from wildshape.drives.writing.finished import read_finished
 from wildshape.drives.writing.outputs import (
     BOXES,
     FRAMES,
@@ -137,7 +136,7 @@ def drive(
     if adapt is not None and adapt.model and not second_pass.is_done(out, adapt.model):
         with team(workers) as helpers:
             found = replace(run, helpers=helpers).again(adapt.model, found)
-    files.write(read_finished(out))
+    files.write(out)
     return found
 
 

@@ -67,13 +67,17 @@ def sorted_points(points: Float32[np.ndarray, "n 3"]) -> Float32[np.ndarray, "n 
 
     z and y are sorted as one whole number; x is looked at only where both are equal somewhere.
     """
-    bits = (points[:, 1:] + np.float32(0)).view(np.int32)  # no -0
-    y, z = (bits ^ ((bits >> 31) & 0x7FFFFFFF)).T.astype(np.int64)  # ordered as the floats are
-    key = (z << 32) + y
+    key = (ordered_bits(points[:, 2]) << 32) + ordered_bits(points[:, 1])
     order = np.argsort(key)
     ordered = key[order]
     tied = bool((ordered[1:] == ordered[:-1]).any())
     return points[np.lexsort(points.T)] if tied else points[order]
+
+
+def ordered_bits(values: Float32[np.ndarray, "n"]) -> Int64[np.ndarray, "n"]:
+    """Whole numbers of 32 bits, of either sign, in the order of the values."""
+    bits = (values + np.float32(0)).view(np.int32)  # no -0
+    return (bits ^ ((bits >> 31) & 0x7FFFFFFF)).astype(np.int64)
 
 
 def drawn(size: int, count: int) -> Int64[np.ndarray, "count"]:

@@ -67,8 +67,11 @@ def carve(
     for frame, boxes in sorted(present.items()):
         scan = turns.T_level_sensor[frame].apply_numpy(read(frame)).astype(np.float64)
         sensor = turns.T_level_sensor[frame].translation.numpy()
+        off = np.ascontiguousarray((scan[:, :2] - sensor[:2]).T)
         for i, box in boxes:
-            _count(slabs[i], scan, sensor, box, vehicles[i].size, config)
+            size = vehicles[i].size
+            towards = scan[_towards(off, box[:2] - sensor[:2], size)]
+            _count(slabs[i], towards, sensor, box, size, config)
     return [_cut(one, counted, config) for one, counted in zip(vehicles, slabs)]
 
 
@@ -80,8 +83,8 @@ def _count(
     size: Size,
     config: CarveConfig,
 ) -> None:
-    """Add what one scan says of one box; all in the level world."""
-    points = _in_box(scan[_towards(scan, sensor, box, size)], box)
+    """Add what the rays of one scan that go towards a box say of it; all in the level world."""
+    points = _in_box(scan, box)
     origin = _in_box(sensor[None], box)[0]
     floor = -size[2] / 2 + config.low_m
     inside = np.all(np.abs(points) < np.array(size) / 2, axis=1) & (points[:, 2] > floor)
@@ -99,13 +102,12 @@ def _count(
 
 
 def _towards(
-    scan: Points, sensor: Float[np.ndarray, "3"], box: Box, size: Size
+    off: Float[np.ndarray, "2 n"], ahead: Float[np.ndarray, "2"], size: Size
 ) -> Bool[np.ndarray, "n"]:
-    """Which rays go where a box is, seen from above, and reach it."""
-    ahead, off = box[:2] - sensor[:2], scan[:, :2] - sensor[:2]
+    """Which rays go where a box is, and reach it; both seen from above and from the sensor."""
     away, radius = float(np.hypot(*ahead)), float(np.hypot(*size[:2])) / 2
-    along = off @ ahead
-    across = np.abs(ahead[0] * off[:, 1] - ahead[1] * off[:, 0])
+    along = ahead[0] * off[0] + ahead[1] * off[1]
+    across = np.abs(ahead[0] * off[1] - ahead[1] * off[0])
     return (along > away * (away - radius)) & (across * max(away, radius) < along * radius)
 
 

@@ -113,18 +113,20 @@ def _placed(one: Detection, T_level_sensor: SE3) -> Float[np.ndarray, "4"]:
     return torch.cat((T.translation, yaw[None])).numpy()
 
 
-def box_in_scan(
-    box: Float[np.ndarray, "4"], size: tuple[float, float, float], T_level_sensor: SE3
-) -> Box:
-    """An upright box of the level world in the sensor frame of a frame.
+def boxes_in_scans(
+    boxes: Float[np.ndarray, "k 4"], size: tuple[float, float, float], T_level_sensor: SE3
+) -> list[Box]:
+    """Upright boxes of the level world, each in the sensor frame of its frame.
 
     Args:
-        box: centre x, y, z and yaw.
+        boxes: centre x, y, z and yaw.
         size: length, width, height.
-        T_level_sensor: of that frame.
+        T_level_sensor: `(k,)` of these frames.
     """
-    upright = SE3(rotation_z(torch.tensor(box[3])), torch.from_numpy(box[:3]))
+    upright = SE3(rotation_z(torch.from_numpy(boxes[:, 3])), torch.from_numpy(boxes[:, :3]))
     T_sensor_box = T_level_sensor.inverse() @ upright
-    x, y, z = T_sensor_box.translation.tolist()
-    qw, qx, qy, qz = quaternion_from_rotation(T_sensor_box.rotation).tolist()
-    return Box((x, y, z), size, (qw, qx, qy, qz))
+    turns = quaternion_from_rotation(T_sensor_box.rotation).tolist()
+    return [
+        Box((x, y, z), size, (qw, qx, qy, qz))
+        for (x, y, z), (qw, qx, qy, qz) in zip(T_sensor_box.translation.tolist(), turns)
+    ]

@@ -161,7 +161,8 @@ def connected(points: Float[np.ndarray, "n 3"], reach: float, thin: float = 0.25
 
 def _labels(points: Float[np.ndarray, "n 3"], reach: float, thin: float) -> Int[np.ndarray, "n"]:
     cells = np.floor(points / (thin * reach)).astype(np.int64)
-    number = np.ravel_multi_index(tuple((cells - cells.min(0)).T), np.ptp(cells, axis=0) + 1)
+    places = tuple((cells - cells.min(0)).T)
+    number = np.asarray(np.ravel_multi_index(places, np.ptp(cells, axis=0) + 1))
     order = np.argsort(number)
     ordered = number[order]
     fresh = np.concatenate(([True], ordered[1:] != ordered[:-1]))

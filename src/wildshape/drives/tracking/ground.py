@@ -17,6 +17,7 @@ from jaxtyping import Float, Int
 
 from wildshape.drives.config import GroundConfig
 from wildshape.errors import MissingExtraError
+from wildshape.geometry.sampling import ordered_bits
 from wildshape.records import Points
 
 _STDOUT = 1
@@ -80,7 +81,7 @@ def _floor(
         return np.full(len(points), -sensor_height_m)
     side = 2 * math.ceil(config.range_m / config.cell_m) + 1
     row = _cell(ground, side, config.cell_m)
-    order = np.lexsort((ground[:, 2], row))
+    order = np.argsort((row << 32) + ordered_bits(ground[:, 2]))
     counts = np.bincount(row, minlength=side * side)
     filled = np.flatnonzero(counts)
     middles = (np.cumsum(counts) - counts + counts // 2)[filled]

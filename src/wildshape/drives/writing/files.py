@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from wildshape.drives.completing.completion import CATEGORY
-from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
+from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle, read_finished
 from wildshape.drives.writing.outputs import MCAP, MESHES, RRD
 from wildshape.drives.writing.playback.mcap import check_mcap, write_mcap
 from wildshape.drives.writing.playback.rerun import load_rerun, write_rerun
@@ -49,8 +49,15 @@ class DriveFiles:
         if self.rerun:
             load_rerun()
 
-    def write(self, found: FinishedDrive) -> None:
-        """Write what is asked for into the drive's folder."""
+    def write(self, out: Path) -> None:
+        """Write what is asked for into the folder of a finished drive.
+
+        Raises:
+            BadInputError: the drive is damaged.
+        """
+        if self == DriveFiles():
+            return
+        found = read_finished(out)
         if self.boxes is not None:
             self.boxes.write_detections(found.out, list(detections_of(found)))
         if self.mesh is not None:

@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from jaxtyping import Float
 
-from wildshape.drives.completing.placing import box_in_scan, level_poses
+from wildshape.drives.completing.placing import boxes_in_scans, level_poses
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.mounting import Mounting
@@ -248,17 +249,20 @@ def _vehicle(rows: list[BoxRow], T_level_sensor: SE3) -> FoundVehicle:
         confidence=first.confidence,
         moving=first.moving,
         frames=tuple(row.frame for row in rows),
-        boxes=tuple(_upright(row, T_level_sensor[row.frame]) for row in rows),
+        boxes=tuple(_upright(rows, T_level_sensor)),
         points=tuple(row.points for row in rows),
     )
 
 
-def _upright(row: BoxRow, T_level_sensor: SE3) -> Box:
-    """The box of a line, upright in the level world, in its frame's sensor frame."""
-    rotation = T_level_sensor.rotation.numpy()
-    c, s = math.cos(row.yaw), math.sin(row.yaw)
-    rise = -(rotation[2, 0] * c + rotation[2, 1] * s) / rotation[2, 2]
-    ahead = rotation @ (c, s, rise)  # level, and along the yaw as the sensor sees it
-    place = T_level_sensor.apply_numpy(np.array([(row.x, row.y, row.z)]))[0]
-    upright = np.append(place, math.atan2(ahead[1], ahead[0]))
-    return box_in_scan(upright, (row.length, row.width, row.height), T_level_sensor)
+def _upright(rows: list[BoxRow], T_level_sensor: SE3) -> list[Box]:
+    """The boxes of lines, upright in the level world, each in its frame's sensor frame."""
+    T = T_level_sensor[torch.tensor([row.frame for row in rows])]
+    x, y, z = T.rotation.numpy()[:, 2].T
+    yaw = np.array([row.yaw for row in rows])
+    c, s = np.cos(yaw), np.sin(yaw)
+    level = np.stack((c, s, -(x * c + y * s) / z), axis=1)  # and along the yaw as the sensor sees
+    ahead = np.einsum("kij,kj->ki", T.rotation.numpy(), level)
+    places = T.apply(torch.tensor([[(row.x, row.y, row.z)] for row in rows]).double())[:, 0]
+    upright = np.column_stack((places.numpy(), np.arctan2(ahead[:, 1], ahead[:, 0])))
+    first = rows[0]
+    return boxes_in_scans(upright, (first.length, first.width, first.height), T)

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import torch
 
 from wildshape.drives.completing.boxes import Way
 from wildshape.drives.completing.completion import CATEGORY
-from wildshape.drives.completing.placing import Completed, box_in_scan
+from wildshape.drives.completing.placing import Completed, boxes_in_scans
 from wildshape.drives.completing.turns import Turns
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.sightings import Sightings
@@ -118,11 +119,10 @@ def write_shape(path: Path, folder: Path, ahead_m: float = 0.0) -> None:
 
 def boxes_of(vehicle: Vehicle, turns: Turns) -> list[tuple[int, Box]]:
     """Frame and box in that frame's sensor frame, of all frames of a vehicle."""
-    size, way = vehicle.completed.size, vehicle.way
-    return [
-        (frame, box_in_scan(box, size, turns.T_level_sensor[frame]))
-        for frame, box in zip(way.frames, turns.shown(way.frames, way.boxes))
-    ]
+    frames = vehicle.way.frames
+    boxes = turns.shown(frames, vehicle.way.boxes)
+    T_level_sensor = turns.T_level_sensor[torch.tensor(frames)]
+    return list(zip(frames, boxes_in_scans(boxes, vehicle.completed.size, T_level_sensor)))
 
 
 def rows_of(vehicle: Vehicle, boxes: list[tuple[int, Box]], drive: Drive) -> list[BoxRow]:
