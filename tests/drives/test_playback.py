@@ -26,7 +26,7 @@ def found(tmp_path_factory):
     lines = table.read_text().splitlines()
     table.write_text("\n".join(line for line in lines if not line.startswith("5,0.5,<7>")) + "\n")
     drive = read_finished(drive.out)
-    DriveFiles(mcap=True, rerun=find_spec("rerun") is not None).write(drive)
+    DriveFiles(mcap=True, rerun=find_spec("rerun") is not None).write(drive.out)
     return drive
 
 
@@ -118,7 +118,7 @@ def test_a_library_that_is_absent_is_named_before_any_work(monkeypatch, module, 
 
 def test_without_the_recording_there_are_no_scans(found, tmp_path):
     kept = shutil.move(found.source, tmp_path / "moved")
-    DriveFiles(mcap=True).write(found)
+    DriveFiles(mcap=True).write(found.out)
     shutil.move(kept, found.source)
     with (found.out / "drive.mcap").open("rb") as file:
         topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}

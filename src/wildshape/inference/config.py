@@ -7,9 +7,7 @@ They are written into every result (`objects.json`) and can be set from Python:
 of five metres or more; for smaller ones they shrink with the object.
 """
 
-from dataclasses import asdict, dataclass, field
-from functools import cache
-from typing import Any
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
@@ -306,9 +304,3 @@ class InferenceConfig:
     reasons: ReasonRule = field(default_factory=ReasonRule)
     inliers: InlierRule = field(default_factory=InlierRule)
     ground_share: float = 0.05
-
-
-@cache
-def as_values(config: InferenceConfig) -> dict[str, Any]:
-    """As JSON values; made once, for they are written with every track."""
-    return asdict(config)

@@ -16,7 +16,6 @@ from typing import Any
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.confidence import ReasonCounts
-from wildshape.inference.config import as_values
 from wildshape.inference.folders.box_files import BOX_FILES, BoxFiles
 from wildshape.inference.predictor import BATCH, Predictor, load
 from wildshape.inference.registration import to_middle
@@ -326,7 +325,7 @@ def objects_of(
         "category": track.category,
         "sensor": track.sensor.kind,
         "model": {name: predictor.settings.provenance.get(name) for name in _MODEL},
-        "inference": as_values(predictor.config),
+        "inference": asdict(predictor.config),
         "scans": [describe(name, one) for name, one in zip(track.scan_names, done)],
         "skipped": [{"scan": scan, "reason": reason} for scan, reason in skipped],
     }
