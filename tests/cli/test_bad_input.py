@@ -204,13 +204,15 @@ def test_output_that_exists(wildshape, refused, dataset, trained, tmp_path):
     assert "exists" in refused("simulate", foreign, "--tracks", 1)
 
 
-def test_another_half_finished_output_is_not_mixed_in(refused, dataset, trained, tmp_path):
+def test_output_of_other_settings_is_not_mixed_in(refused, dataset, trained, tmp_path):
     out = tmp_path / "c"
     out.mkdir()
     marker = {"command": "complete", "status": "running", "settings": {"input": "other"}}
     (out / "wildshape.json").write_text(json.dumps(marker))
-    said = refused("complete", dataset, "--out", out, "--model", trained)
-    assert "unfinished output" in said
+    command = ("complete", dataset, "--out", out, "--model", trained)
+    assert "unfinished output" in refused(*command)
+    (out / "wildshape.json").write_text(json.dumps(marker | {"status": "finished"}))
+    assert "with other settings" in refused(*command)
 
 
 def test_full_disk(wildshape, dataset, trained, tmp_path, monkeypatch):

@@ -197,9 +197,10 @@ def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: 
         return False
     same = record.get("command") == command and record.get("settings") == settings
     if record.get("status") == "finished":
+        other = "" if same else " with other settings"
         raise BadInputError(
-            f"{path}: holds the output of an earlier `{record.get('command')}`; pass --overwrite"
-            " to replace it, or choose another --out."
+            f"{path}: holds the output of an earlier `{record.get('command')}`{other}; pass"
+            " --overwrite to replace it, or choose another --out."
         )
     if not same:
         raise BadInputError(
