@@ -28,13 +28,14 @@ from wildshape.geometry.box import FittedBox
 from wildshape.inference.boxes import carried
 from wildshape.inference.predictor import Predictor
 from wildshape.io.inputs import open_tracks
-from wildshape.records import Box, Track
+from wildshape.records import Box, Points, Track
 
 COLUMNS = (
     "length", "width", "roof", "floor", "near end", "far end", "near side", "far side",
     "away", "BEV IoU", "3D IoU", "heading off, %",
 )  # fmt: skip
 _HEADING_DEG = 10.0
+_OUTERMOST = 99.0  # percent; points farther out are strays
 
 
 @dataclass(frozen=True)
@@ -83,9 +84,37 @@ def _spread(track: Track, scans: int) -> Track:
 def _methods(models: dict[str, Predictor]) -> Iterator[tuple[str, Callable[[Track], list]]]:
     yield "smallest rectangle", lambda track: [smallest_rectangle(scan) for scan in track.scans]
     yield "L-shape", lambda track: [l_shape(scan) for scan in track.scans]
+    yield "label put on the points", _labels_on_points
     for name, model in models.items():
         yield f"{name}, one scan", lambda track, m=model: _boxes(m.complete_many(track.scans))
         yield f"{name}, track", lambda track, m=model: _boxes(m.complete_track(track.scans))
+
+
+def _labels_on_points(track: Track) -> list[UprightBox]:
+    """The label, moved until the scan touches its near end and its near side.
+
+    What a box of the true size and heading reaches, if it holds to the points.
+    """
+    return [_on_points(*pair) for pair in zip(upright_labels(track), track.scans)]
+
+
+def _on_points(label: UprightBox, scan: Points) -> UprightBox:
+    turn = _axes(label)
+    near = _near(label)
+    reach = np.percentile(near * ((scan[:, :2] - label[:2]) @ turn.T), _OUTERMOST, axis=0)
+    moved = turn.T @ (near * (reach - np.array(label[3:5]) / 2))
+    return label._replace(x=label.x + moved[0], y=label.y + moved[1])
+
+
+def _axes(box: UprightBox) -> Float[np.ndarray, "2 2"]:
+    """Its directions ahead and to the left, as rows."""
+    c, s = math.cos(box.yaw), math.sin(box.yaw)
+    return np.array(((c, s), (-s, c)))
+
+
+def _near(label: UprightBox) -> Float[np.ndarray, "2"]:
+    """Which end and which side face the sensor: signs along its axes."""
+    return np.sign(_axes(label) @ (-label.x, -label.y))
 
 
 def _boxes(done) -> list[UprightBox]:
@@ -121,10 +150,8 @@ def _labels(track: Track) -> list[Box]:
 
 
 def _error(found: UprightBox, label: UprightBox) -> tuple[float, ...]:
-    c, s = math.cos(label.yaw), math.sin(label.yaw)
-    turn = np.array(((c, s), (-s, c)))
-    off = turn @ (found.x - label.x, found.y - label.y)
-    near = np.sign(turn @ (-label.x, -label.y))  # which end and which side face the sensor
+    off = _axes(label) @ (found.x - label.x, found.y - label.y)
+    near = _near(label)
     grown = (np.array(found[3:5]) - label[3:5]) / 2
     at_near, at_far = near * off + grown, grown - near * off
     away = np.array((found.x - label.x, found.y - label.y)) @ (label.x, label.y)
