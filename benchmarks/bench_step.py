@@ -125,7 +125,7 @@ class Stepper:
 
     def __init__(self, held: Trained, recipe: Recipe, sampler: ViewSampler) -> None:
         self.held, self.recipe, self.sampler = held, recipe, sampler
-        self.optimiser = torch.optim.Adam(held.network.parameters(), lr=recipe.optim.lr)
+        self.optimiser = torch.optim.Adam(held.network.parameters(), lr=recipe.optim.lr, fused=True)
         self.mean, self.done = copy.deepcopy(held.network), 0
 
     def step(self) -> float:

@@ -18,7 +18,7 @@ from jaxtyping import Float, Int, Int64
 from torch import Tensor
 
 from wildshape.geometry.centring import scan_centre
-from wildshape.geometry.projection.line_of_sight import face, roll, roll_angle
+from wildshape.geometry.projection.line_of_sight import face_each, roll, roll_angle
 from wildshape.geometry.projection.ray_points import KINDS
 from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.projection.visibility import Projection
@@ -89,9 +89,7 @@ def network_input(
     sizes = torch.tensor([min(len(scan), count) for scan in ordered])
     unseen = torch.zeros(len(scans), 0, 3 + KINDS)
     if facing:
-        frames = [face(scan, sensor_kind=sensor) for scan in ordered]
-        turn = torch.stack([frame.turn for frame in frames])
-        centres = torch.stack([frame.centre for frame in frames])
+        turn, centres = face_each(ordered, sensor)
         return NetworkInput(sampled @ turn.mT - centres[:, None], centres, turn, sizes, unseen)
     centres = torch.stack([scan_centre(scan, sensor) for scan in ordered])
     turn = torch.eye(3).repeat(len(scans), 1, 1)

@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from tests.strategies import clouds, rotations
 
-from wildshape.geometry.projection.line_of_sight import face, roll, roll_angle
+from wildshape.geometry.projection.line_of_sight import face, face_each, roll, roll_angle
 from wildshape.geometry.transforms.rotation import rotation_z
 
 AHEAD = torch.tensor((1.0, 0.0, 0.0), dtype=torch.float64)
@@ -140,3 +140,14 @@ def facing_rotation_of(direction):
     first = torch.linalg.cross(DOWN, third)
     first = first / first.norm()
     return torch.stack((first, torch.linalg.cross(third, first), third))
+
+
+@pytest.mark.parametrize("sensor", ["lidar", "camera"])
+def test_scans_of_different_sizes_are_faced_as_each_alone(sensor):
+    generator = torch.Generator().manual_seed(4)
+    ahead = torch.tensor((9.0, 3.0, -1.0))
+    scans = [torch.randn(count, 3, generator=generator) + ahead for count in (16, 5, 300)]
+    together = face_each(scans, sensor)
+    for scan, turn, centre in zip(scans, *together, strict=True):
+        alone = face(scan, sensor_kind=sensor)
+        assert torch.equal(turn, alone.turn) and torch.equal(centre, alone.centre)

@@ -8,6 +8,7 @@ become the same scan, and of a free rotation nothing is left but the roll about 
 So it is worth knowing whether a sensor can have stood at the origin at all.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -51,15 +52,31 @@ def face(
         counted: which of them the scan has; others repeat one of those. All by default.
         sensor_kind: `lidar` or `camera`: says which way is up.
     """
-    exact = points.double()
-    distance = exact.norm(dim=-1)
-    unit = exact / distance[..., None].clamp_min(_SMALLEST_M)
+    distance, unit = _seen(points)
     if counted is not None:
         unit = unit * counted[..., None]
     middle = (distance.amin(-1) + distance.amax(-1)) / 2
     turn = _towards(unit.mean(-2).reshape(-1, 3), sensor_kind).view(*middle.shape, 3, 3)
-    centre = middle[..., None] * exact.new_tensor(_AHEAD)
+    centre = middle[..., None] * distance.new_tensor(_AHEAD)
     return Facing(turn.to(points.dtype), centre.to(points.dtype))
+
+
+def face_each(scans: Sequence[Float[Tensor, "_ 3"]], sensor_kind: str = "lidar") -> Facing:
+    """`face` of scans of different sizes, with few operations a scan."""
+    distance, unit = _seen(torch.cat(list(scans)))
+    sizes = [len(scan) for scan in scans]
+    ranges = [part.aminmax() for part in distance.split(sizes)]
+    middle = torch.stack([(nearest + farthest) / 2 for nearest, farthest in ranges])
+    turn = _towards(torch.stack([part.mean(0) for part in unit.split(sizes)]), sensor_kind)
+    centre = middle[:, None] * distance.new_tensor(_AHEAD)
+    return Facing(turn.to(scans[0].dtype), centre.to(scans[0].dtype))
+
+
+def _seen(points: Float[Tensor, "*batch 3"]) -> tuple[Tensor, Tensor]:
+    """Distance `(*batch)` and direction `(*batch 3)` of points from the sensor, float64."""
+    exact = points.double()
+    distance = exact.norm(dim=-1)
+    return distance, exact / distance[..., None].clamp_min(_SMALLEST_M)
 
 
 def _towards(direction: Float[Tensor, "B 3"], sensor_kind: str) -> Float[Tensor, "B 3 3"]:

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.centring import scan_centre
-from wildshape.geometry.projection.line_of_sight import Facing, face, roll
+from wildshape.geometry.projection.line_of_sight import Facing, face, face_each, roll
 from wildshape.geometry.transforms.rotation import random_rotation, random_yaw
 from wildshape.io.store.store import Store
 from wildshape.records import SensorKind
@@ -157,9 +157,7 @@ class ViewSampler:
         """As `gather`, but turned as a scan to be posed is: towards its object, or not at all."""
         if self.config.turn != "facing":
             return *self.gather(scans, rng), torch.eye(3).repeat(len(scans), 1, 1)
-        faced = [self._facing(scan) for scan in scans]
-        turn = torch.stack([found.turn for found in faced])
-        centres = torch.stack([found.centre for found in faced])
+        turn, centres = self._facing(scans)
         clouds = torch.stack([self.picked(scan, rng) for scan in scans])
         return clouds @ turn.mT - centres[:, None], centres, turn
 
@@ -196,13 +194,14 @@ class ViewSampler:
         chosen = rng.integers(len(points), size=self.config.points)
         return torch.from_numpy(points.take(chosen, axis=0))  # 8 times as fast as points[chosen]
 
-    def _facing(self, scan: int) -> Facing:
-        """The facing frame of a scan, found once."""
-        frame = self._frames[scan]
-        if np.isnan(frame[0, 0]):
-            turn, centre = face(self._points(scan), sensor_kind=self.config.sensor)
-            frame[:3], frame[3] = turn.numpy(), centre.numpy()
-        return Facing(torch.from_numpy(frame[:3]), torch.from_numpy(frame[3]))
+    def _facing(self, scans: list[int]) -> Facing:
+        """The facing frames of scans, each found once."""
+        new = [scan for scan in dict.fromkeys(scans) if np.isnan(self._frames[scan, 0, 0])]
+        if new:
+            found = face_each([self._points(scan) for scan in new], self.config.sensor)
+            self._frames[new, :3], self._frames[new, 3] = found.turn.numpy(), found.centre.numpy()
+        known = torch.from_numpy(self._frames[scans])
+        return Facing(known[:, :3], known[:, 3])
 
     def _centre(self, scan: int) -> Tensor:
         """The label-free centre of a scan, found once."""
