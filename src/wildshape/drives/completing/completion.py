@@ -148,18 +148,25 @@ class Completer:
         asked = [(one, i) for one in every for i in one.order[len(one.looks) : count]]
         found = looks_at([one.clouds[i] for one, i in asked], self.predictor)
         for (one, _), look in zip(asked, found):
-            cost, size = float(look.found.cost), box_of(look, self.predictor).size
-            said = shape_nats(cost, size, self.vehicles)
             one.looks.append(look)
-            one.nats.append(max(said, self.config.worst_nats))
 
     def _may_be_a_vehicle(self, one: _Candidate, worst_cost_m: float, least_nats: float) -> bool:
         """Whether its looks do not speak against it; if they do, that is written."""
-        if one.cost <= worst_cost_m and one.said >= least_nats:
-            return True
-        said = {"cost_m": one.cost, "nats": one.said}
+        said: dict[str, float] = {"cost_m": one.cost}
+        if one.cost <= worst_cost_m:  # only then is it worth fitting boxes
+            self._listen(one)
+            if one.said >= least_nats:
+                return True
+            said["nats"] = one.said
         write_json(self.folder / one.chosen.name / RULED_OUT, said)
         return False
+
+    def _listen(self, one: _Candidate) -> None:
+        """What the looks say for a vehicle, of those that were not asked yet."""
+        for look in one.looks[len(one.nats) :]:
+            cost, size = float(look.found.cost), box_of(look, self.predictor).size
+            said = shape_nats(cost, size, self.vehicles)
+            one.nats.append(max(said, self.config.worst_nats))
 
     def _write(self, chosen: Sightings, done: list[Completion]) -> None:
         if self.T_level_sensor is not None:

@@ -20,7 +20,7 @@ from wildshape.geometry.sampling import voxel_thin
 from wildshape.geometry.surface import mirrored
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
-from wildshape.inference.choose_hypothesis import network_input
+from wildshape.inference.choose_hypothesis import NetworkInput
 from wildshape.inference.confidence import judged, odds_of
 from wildshape.inference.config import BoxConfig, InferenceConfig, TrackConfig
 from wildshape.inference.free_space import Rays, Sights, without_free_space
@@ -40,8 +40,8 @@ from wildshape.inference.tracks.joint_icp import (
     surest,
 )
 from wildshape.inference.tracks.pose_outliers import without_outliers
+from wildshape.inference.tracks.track_cost import network_inputs, track_cost
 from wildshape.method.checkpoint import ModelSettings
-from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.trust import TrackFeatures
 from wildshape.method.trust_features import track_features
 from wildshape.ops.nearest import nearest
@@ -125,7 +125,8 @@ def complete_together(
     done, scans, settings = gathered.done, gathered.scans, gathered.settings
     shape = gathered.shape
     poses = stack([item.pose for item in done])
-    voted = _voted(poses, shape, gathered.sure, scans, settings, config.track)
+    inputs = network_inputs(scans, settings)
+    voted = _voted(poses, shape, gathered, inputs, config.track)
     mirror, unit = settings.network.mirror, unit_of(settings.extent_m[1])
     clouds, start = _in_units(scans, voted, unit)
     fit = refine_checked(clouds, start, gathered.weights, mirror=mirror, config=config.track)
@@ -139,7 +140,7 @@ def complete_together(
         solid = without_free_space(shape, fit.T_sensor_object, sights)
     fitted = _box(solid, scans, fit.T_sensor_object, config.box, mirror=mirror, body=body)
     whole = _denser(shape, config) if settings.facing else shape
-    cost = track_cost(shape, fit.T_sensor_object, scans, settings)
+    cost = track_cost(shape, fit.T_sensor_object, inputs, settings)
     mean = float(np.mean([item.confidence for item in done]))
     trust, evidence = settings.trust, _evidence(done, fit.T_sensor_object, fitted, cost)
 
@@ -202,24 +203,24 @@ def _box(
 def _voted(
     T_sensor_can: SE3,
     shape: Float[Tensor, "P 3"],
-    weights: Float[Tensor, "V"],
-    scans: list[Points],
-    settings: ModelSettings,
+    gathered: Gathered,
+    inputs: list[NetworkInput],
     config: TrackConfig,
 ) -> SE3:
     """The same poses, all looking one way and no outlier among them."""
+    settings = gathered.settings
     middle = float(shape[:, 0].amin() + shape[:, 0].amax()) / 2
     turned = T_sensor_can @ half_turn(middle)
-    stands = track_cost(shape, T_sensor_can, scans, settings)
-    gain = track_cost(shape, turned, scans, settings) - stands
+    stands = track_cost(shape, T_sensor_can, inputs, settings)
+    gain = track_cost(shape, turned, inputs, settings) - stands
     unit = unit_of(settings.extent_m[1])
     if settings.sensor == "lidar":
         links = nearness_of_next(T_sensor_can.inverse().translation, middle, config.vote)
     else:
-        clouds = _some_of_each(scans, T_sensor_can, config.voting_points) / unit
+        clouds = _some_of_each(gathered.scans, T_sensor_can, config.voting_points) / unit
         mirror = settings.network.mirror
         links = likeness_of_next(clouds, middle / unit, mirror=mirror, config=config.vote)
-    signs = voted_signs(T_sensor_can.rotation, gain / unit, links, weights, config.vote)
+    signs = voted_signs(T_sensor_can.rotation, gain / unit, links, gathered.sure, config.vote)
     return without_outliers(turned_where(T_sensor_can, signs, middle), config)
 
 
@@ -229,23 +230,6 @@ def _some_of_each(scans: list[Points], T_sensor_object: SE3, count: int) -> Floa
     rows = [rng.permutation(len(s))[np.arange(count) % len(s)] for s in scans]
     picked = torch.stack([torch.from_numpy(s[row]) for s, row in zip(scans, rows)])
     return T_sensor_object.inverse().apply(picked.double()).float()
-
-
-def track_cost(
-    shape: Float[Tensor, "P 3"], T_sensor_object: SE3, scans: list[Points], settings: ModelSettings
-) -> Float[Tensor, "V"]:
-    """The label-free cost of one shape in every scan, metres (METHOD 6)."""
-    found = []
-    for start in range(0, len(scans), _BATCH):
-        part = slice(start, start + _BATCH)
-        inputs = network_input(scans[part], settings.input_points, settings.sensor, settings.facing)
-        posed = T_sensor_object[part].apply(shape.expand(len(inputs.scans), -1, -1)).float()
-        posed = posed @ inputs.turn.mT - inputs.centres[:, None]
-        scores = score_hypotheses(
-            inputs.scans, inputs.centres, posed[:, None], settings.projection, inputs.sizes
-        )
-        found.append(scores.cost(settings.beta)[:, 0])
-    return torch.cat(found).double()
 
 
 def refine_checked(
