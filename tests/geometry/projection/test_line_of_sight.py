@@ -150,4 +150,5 @@ def test_scans_of_different_sizes_are_faced_as_each_alone(sensor):
     together = face_each(scans, sensor)
     for scan, turn, centre in zip(scans, *together, strict=True):
         alone = face(scan, sensor_kind=sensor)
-        assert torch.equal(turn, alone.turn) and torch.equal(centre, alone.centre)
+        assert torch.equal(turn, alone.turn)
+        assert torch.equal(centre, alone.centre)
