@@ -81,9 +81,9 @@ def trained(variant: str, recipe: Recipe, *, exact: bool = False) -> Trained:
 
 def in_double(held: Trained) -> Trained:
     """The same with its encoder in float64; the code goes on in float32."""
-    network: Any = held.network  # its `encode` is another from here on
+    network: Any = held.network
     encode = network.encode
-    layers = [network.encoder] if isinstance(network, ShapePoseNet) else network.children()
+    layers = [network.encoder] if isinstance(held.network, ShapePoseNet) else network.children()
     for layer in layers:
         if not isinstance(layer, torch.nn.Sequential | torch.nn.ModuleList):
             layer.double()
