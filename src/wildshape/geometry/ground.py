@@ -49,5 +49,8 @@ def skirt(
     if body.shape[1] < rule.fewest:
         return np.zeros(len(points), dtype=bool)
     near, far = np.quantile(body.copy(), (rule.ends, 1 - rule.ends), axis=1)
-    beside = (points[:, :2] < near - rule.beyond_m) | (points[:, :2] > far + rule.beyond_m)
-    return (points[:, 2] < low + rule.low_m) & beside.any(axis=1)
+    found = points[:, 2] < low + rule.low_m
+    lows = points[found, :2]
+    beside = (lows < near - rule.beyond_m) | (lows > far + rule.beyond_m)
+    found[found] = beside.any(axis=1)
+    return found

@@ -10,6 +10,7 @@ import numpy as np
 from torch import Tensor
 
 from wildshape.errors import BadInputError
+from wildshape.geometry.box import spans
 from wildshape.io.rays import read_rays
 from wildshape.io.scans.points import LEAST_POINTS, check_near, drop_nonfinite, read_scan
 from wildshape.records import Points, SightLines
@@ -49,7 +50,7 @@ def as_points(scan: object, name: str = "scan") -> Points:
         raise BadInputError(
             f"{name}: {len(points)} finite points; at least {LEAST_POINTS} are needed."
         )
-    if float(np.ptp(points, axis=0).max()) == 0.0:
+    if not spans(points).any():
         raise BadInputError(f"{name}: all {len(points)} points are equal; is the file damaged?")
     return points
 

@@ -260,12 +260,13 @@ class Predictor:
         found = self._found(scans, sights)
         seen = self._off_their_ground(scans, found)
         least = 1 - self.config.ground_share
-        much = [len(kept) < least * len(scan) for kept, scan in zip(seen, scans)]
-        if any(much):  # the network has seen the ground, too: once more without it
-            rows = torch.tensor(much).nonzero()[:, 0]
-            again = self._found([seen[int(row)] for row in rows], sights and sights.part(rows))
+        much = [i for i, kept in enumerate(seen) if len(kept) < least * len(scans[i])]
+        if much:  # the network has seen the ground, too: once more without it
+            rows = torch.tensor(much)
+            again = self._found([seen[i] for i in much], sights and sights.part(rows))
             found = found.replaced(rows, again)
-            seen = self._off_their_ground(scans, found)
+            for i, kept in zip(much, self._off_their_ground([scans[i] for i in much], again)):
+                seen[i] = kept
         return Looked(scans, seen, found, sights)
 
     @torch.inference_mode()

@@ -16,6 +16,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from wildshape.geometry.box import extent
 from wildshape.geometry.projection.visibility import facing_rotation
 
 _AHEAD, _SMALLEST_M = (1.0, 0.0, 0.0), 1e-6
@@ -112,7 +113,7 @@ def surrounded(points: Float[np.ndarray, "n 3"], near: float = 0.01) -> bool:
         near: of the extent: no sensor comes as near to the hull of what it sees.
     """
     exact = points.astype(np.float64)
-    reach = near * float(np.linalg.norm(np.ptp(exact, axis=0)))
+    reach = near * extent(exact)
     place = exact.mean(0)
     for _ in range(_STEPS):
         if float(place @ place) <= reach**2:
