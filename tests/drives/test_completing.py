@@ -16,7 +16,13 @@ from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed
 from wildshape.drives.completing.surroundings import crowded
 from wildshape.drives.completing.turns import Turns
-from wildshape.drives.completing.vehicles import judge, stated, vehicle_confidence
+from wildshape.drives.completing.vehicles import (
+    judge,
+    stated,
+    surer_if_driving,
+    vehicle_confidence,
+    vehicle_sized,
+)
 from wildshape.drives.config import (
     BoxConfig,
     CompletionConfig,
@@ -125,6 +131,30 @@ def test_a_doubtful_vehicle_is_none_where_a_wall_goes_on_beyond_its_box():
     assert names(0.3, car, ground) == set()
     assert names(0.3, car, ground, wall) == {"a"}
     assert names(0.5, car, ground, wall) == set()
+
+
+def test_what_drives_where_it_looks_is_a_vehicle_whatever_its_shape():
+    config, frames = VehicleConfig(), tuple(range(0, 20, 4))
+
+    def kind(step, yaw, p_kind):
+        boxes = [(step * frame, 0.0, 0.0, yaw) for frame in frames]
+        one = replace(completed(boxes, frames), p_kind=p_kind, confidence=0.1)
+        found = surer_if_driving(one, still(20), BoxConfig(), config)
+        assert (found.confidence > one.confidence) == (found.p_kind > p_kind)
+        return found.p_kind
+
+    assert kind(0.5, 0.1, 0.2) == kind(0.5, math.pi, 0.2) == config.driving_kind
+    assert kind(0.5, math.pi / 2, 0.2) == 0.2  # sideways
+    assert kind(0.0, 0.1, 0.2) == 0.2
+    assert kind(0.5, 0.1, 0.02) == 0.02
+
+
+def test_points_of_a_lorry_are_as_large_as_a_vehicle_and_those_of_a_wall_are_not():
+    rng = np.random.default_rng(0)
+    lorry = rng.uniform((-4.4, -1.2, 0.0), (4.4, 1.2, 3.0), (400, 3))
+    wall = rng.uniform((-4.4, -0.1, 0.0), (4.4, 0.1, 3.0), (400, 3))
+    assert vehicle_sized([lorry, lorry, wall], VehicleConfig())
+    assert not vehicle_sized([lorry, wall, wall], VehicleConfig())
 
 
 def places():

@@ -15,6 +15,9 @@ class CompletionConfig:
         worst_cost_m: tracks whose best look costs more are no vehicles; those of a labelled street
             cost less than 0.2 m.
         hopeless_cost_m: nor are those whose fullest scan costs more.
+        solid_scans: seen in so many scans with points as long, wide and high as a vehicle's, an
+            object may cost more.
+        solid_cost_m: but no more than this.
         hopeless_nats: nor those whose fullest scan says less for a vehicle.
         least_nats: nor those whose looks say less on average, the fuller the heavier. No whole
             vehicle of three streets said less than -1.9, though fragments may; half of all else do.
@@ -28,6 +31,8 @@ class CompletionConfig:
     looks: int = 3
     worst_cost_m: float = 0.2
     hopeless_cost_m: float = 0.22
+    solid_scans: int = 15
+    solid_cost_m: float = 0.3
     hopeless_nats: float = -5.0
     least_nats: float = -4.0
     doubtful_nats: float = -2.0
@@ -56,6 +61,11 @@ class VehicleConfig:
         usual_confidence: of the completions; more speaks for a vehicle.
         least_confidence: objects of less are left out.
         least_kind: the same where the weights state the probability.
+        least_driving: no object of a smaller one is made surer by its motion.
+        driving_m: what gets so far drives if it looks the way it goes.
+        driving_deg: to so many degrees.
+        driving_kind: the probability of those that drive is at least this.
+        driving_confidence: and so is what is stated of them: their heading is known.
         length_m: from and to.
         width_m: from and to.
         height_m: from and to.
@@ -76,6 +86,11 @@ class VehicleConfig:
     usual_confidence: float = 0.1
     least_confidence: float = 0.4
     least_kind: float = 0.3
+    least_driving: float = 0.1
+    driving_m: float = 3.5
+    driving_deg: float = 15.0
+    driving_kind: float = 0.9
+    driving_confidence: float = 0.5
     length_m: tuple[float, float] = (2.5, 12.0)
     width_m: tuple[float, float] = (1.4, 3.2)
     height_m: tuple[float, float] = (1.05, 3.6)

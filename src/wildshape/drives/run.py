@@ -27,6 +27,7 @@ from wildshape.drives.completing.vehicles import (
     likely,
     refused,
     stated,
+    surer_if_driving,
     write_judged,
 )
 from wildshape.drives.config import INFERENCE, DriveConfig
@@ -300,7 +301,10 @@ class _Run:
         around = self.config.surroundings
         places = Places(turns, self.config.merging, self.config.boxes)
         with self.clock.stage("vehicles", 1) as at:
-            completed = self.completed(objects, turns)
+            completed = [
+                surer_if_driving(one, turns, self.config.boxes, self.config.vehicles)
+                for one in self.completed(objects, turns)
+            ]
             said = judge(completed, places, self.config.vehicles)
             kept = {one.name: one.confidence for one in said if not one.reasons}
             found = [one for one in completed if one.seen.name in kept]

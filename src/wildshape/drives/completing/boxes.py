@@ -95,18 +95,18 @@ def moves(
     jump is none.
     """
     places, count = boxes[:, :2], config.moving_scans
-    if _gets_far(ticks, _velocity(ticks, places), config):
+    if _gets_far(ticks, velocity_of(ticks, places), config):
         return True
     for first in range(len(ticks) - count + 1):
         at, way = ticks[first : first + count], places[first : first + count]
         step = np.median(np.diff(way, axis=0) / _apart(np.diff(at)), axis=0)
         fast = float(np.linalg.norm(step)) > config.moving_m_per_tick
-        if fast and _gets_far(at, _velocity(at, way), config):
+        if fast and _gets_far(at, velocity_of(at, way), config):
             return True
     return False
 
 
-def _velocity(
+def velocity_of(
     ticks: Float[np.ndarray, "k"], places: Float[np.ndarray, "k 2"]
 ) -> Float[np.ndarray, "2"]:
     """The middle one of those between any two places; a single place does not move."""

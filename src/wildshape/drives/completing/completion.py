@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from wildshape.drives.completing.looking import box_of, completed, looks_at
-from wildshape.drives.completing.vehicles import shape_nats
+from wildshape.drives.completing.vehicles import shape_nats, vehicle_sized
 from wildshape.drives.object_config import CompletionConfig, VehicleConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.sightings import Sightings
@@ -44,6 +44,7 @@ class _Candidate:
     """An object that may be a vehicle.
 
     Attributes:
+        scans: in which it was seen.
         chosen: in the frames that may be completed.
         clouds: its points in them, level frames.
         order: in which they are looked at.
@@ -51,6 +52,7 @@ class _Candidate:
         nats: what each of these says for a vehicle.
     """
 
+    scans: int
     chosen: Sightings
     clouds: list[Points]
     order: list[int]
@@ -120,10 +122,7 @@ class Completer:
         all where these do not speak against a vehicle.
         """
         began, of = time.perf_counter(), self.config
-        chosen = [keyframes(seen, of) for seen in group]
-        every = [
-            _Candidate(one, self._clouds(one), order_of_looks(one, of.looks)) for one in chosen
-        ]
+        every = [self._candidate(seen) for seen in group]
         for count, cost_m, nats in (
             (1, of.hopeless_cost_m, of.hopeless_nats),
             (of.looks, of.worst_cost_m, of.least_nats),
@@ -136,6 +135,11 @@ class Completer:
         seconds = (time.perf_counter() - began) / max(sum(map(len, together)), 1)
         for one, done in zip(every, together):
             self._write(one.looked_at, [replace(scan, seconds=seconds) for scan in done])
+
+    def _candidate(self, seen: Sightings) -> _Candidate:
+        chosen = keyframes(seen, self.config)
+        order = order_of_looks(chosen, self.config.looks)
+        return _Candidate(len(seen.frames), chosen, self._clouds(chosen), order)
 
     def _together(self, alone: Iterator[Completion], one: _Candidate) -> list[Completion]:
         """The next of those completed alone are of this object."""
@@ -153,13 +157,19 @@ class Completer:
     def _may_be_a_vehicle(self, one: _Candidate, worst_cost_m: float, least_nats: float) -> bool:
         """Whether its looks do not speak against it; if they do, that is written."""
         said: dict[str, float] = {"cost_m": one.cost}
-        if one.cost <= worst_cost_m:  # only then is it worth fitting boxes
+        if one.cost <= worst_cost_m or self._is_solid(one):  # only then is it worth fitting boxes
             self._listen(one)
             if one.said >= least_nats:
                 return True
             said["nats"] = one.said
         write_json(self.folder / one.chosen.name / RULED_OUT, said)
         return False
+
+    def _is_solid(self, one: _Candidate) -> bool:
+        """Whether its own points are of a vehicle's size, long enough to be believed."""
+        if one.scans < self.config.solid_scans or one.cost > self.config.solid_cost_m:
+            return False
+        return vehicle_sized(one.clouds, self.vehicles)
 
     def _listen(self, one: _Candidate) -> None:
         """What the looks say for a vehicle, of those that were not asked yet."""

@@ -3,17 +3,23 @@
 """Which of the completed objects are vehicles, by the network's own word; and none twice."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from wildshape.drives.completing.boxes import moves, velocity_of
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed
-from wildshape.drives.object_config import VehicleConfig
+from wildshape.drives.completing.turns import Turns
+from wildshape.drives.object_config import BoxConfig, VehicleConfig
+from wildshape.drives.tracking.clusters import extents
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.io.atomic import write_json
+from wildshape.records import Points
+
+_FEWEST_OF_A_WAY = 3  # completed scans
 
 
 @dataclass(frozen=True)
@@ -56,6 +62,37 @@ def judge(objects: list[Completed], places: Places, config: VehicleConfig) -> li
             own[name] = (f"same_place_as_{rival.seen.name}",)
     names = (one.seen.name for one in objects)
     return [Judged(name, sure[name], own[name]) for name in names]
+
+
+def surer_if_driving(
+    one: Completed, turns: Turns, boxes: BoxConfig, config: VehicleConfig
+) -> Completed:
+    """What gets far and looks the way it goes is a vehicle, whatever the weights make of its shape.
+
+    Args:
+        one: completed.
+        turns: of the drive's sensor.
+        boxes: what counts as moving.
+        config: see there.
+    """
+    kind = one.p_kind
+    if kind is None or kind < config.least_driving:
+        return one
+    if len(one.frames) < _FEWEST_OF_A_WAY or not _drives(one, turns, boxes, config):
+        return one
+    surer = max(kind, config.driving_kind)
+    stated = max(one.confidence * surer / kind, config.driving_confidence)
+    return replace(one, p_kind=surer, confidence=min(stated, 1.0))
+
+
+def _drives(one: Completed, turns: Turns, boxes: BoxConfig, config: VehicleConfig) -> bool:
+    at = np.take(turns.ticks, one.frames) + one.phases
+    velocity = velocity_of(at, one.boxes[:, :2])
+    if not moves(at, one.boxes, boxes) or np.hypot(*velocity) * np.ptp(at) < config.driving_m:
+        return False
+    course = np.arctan2(velocity[1], velocity[0])
+    off = np.abs(np.arcsin(np.sin(one.boxes[:, 3] - course)))  # front or rear ahead
+    return bool(np.median(off) <= np.deg2rad(config.driving_deg))
 
 
 def likely(objects: list[Completed], least: float, config: VehicleConfig) -> list[Completed]:
@@ -101,6 +138,17 @@ def shape_nats(cost_m: float, size: tuple[float, float, float], config: VehicleC
     cost = (config.even_cost_m - cost_m) / config.cost_scale_m
     apart = (np.array(size) / np.array(config.kinds) - 1.0) / config.spread
     return cost + 1.0 - 0.5 * float((apart**2).sum(1).min())
+
+
+def vehicle_sized(clouds: Sequence[Points], config: VehicleConfig) -> bool:
+    """Whether the points alone are as long, wide and high as a vehicle, in the middle one of scans.
+
+    Args:
+        clouds: of one object, level frames.
+        config: see there.
+    """
+    sides = np.median([(*extents(cloud), np.ptp(cloud[:, 2])) for cloud in clouds], axis=0)
+    return all(low <= side <= high for side, (low, high) in zip(sides, _sizes(config)))
 
 
 def refused(said: list[Judged], why: Mapping[str, str]) -> list[Judged]:
