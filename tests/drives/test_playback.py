@@ -5,6 +5,7 @@
 import shutil
 import sys
 from collections import defaultdict
+from dataclasses import replace
 from importlib.util import find_spec
 from typing import Any
 
@@ -14,8 +15,9 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from tests.drives.finished_drive import CARS, FRAMES, HEIGHT, SIZE, finished_drive
 
-from wildshape.drives.writing.files import DriveFiles
+from wildshape.drives.writing.files import DriveFiles, detections_of
 from wildshape.drives.writing.finished import read_finished
+from wildshape.drives.writing.playback.mcap import write_mcap
 from wildshape.errors import MissingExtraError
 
 
@@ -88,6 +90,21 @@ def test_mcap_boxes_and_shapes_stand_where_the_cars_are(messages):
         assert len(np.unique(shapes[["red", "green", "blue"]])) == len(there)
         scan = cloud(messages["/scan"][frame][1])
         assert scan["z"].min() == np.float32(-HEIGHT)
+
+
+def test_mcap_rises_from_0_where_times_begin_before_it(found, tmp_path):
+    early = replace(found, times=tuple(time - 3.05 for time in found.times))
+    write_mcap(early, tmp_path / "early.mcap")
+    with (tmp_path / "early.mcap").open("rb") as file:
+        scans = [message.log_time for *_, message in make_reader(file).iter_messages("/scan")]
+    assert scans == [10**8 * frame for frame in range(FRAMES)]
+
+
+def test_a_scan_named_by_its_time_keeps_it_to_the_nanosecond(found):
+    stamps = [315966265259836000 + 99_999_999 * frame for frame in range(FRAMES)]
+    names, times = tuple(map(str, stamps)), tuple(stamp / 1e9 for stamp in stamps)
+    named = replace(found, scan_names=names, times=times)
+    assert {one.time_ns for one in detections_of(named)} == set(stamps)
 
 
 def test_rerun_holds_boxes_shapes_scans_and_the_way(found):

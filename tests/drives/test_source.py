@@ -7,8 +7,12 @@ import pytest
 from tests.refusal import refused
 
 from wildshape.drives.recordings.opening import open_drive
+from wildshape.drives.source import Drive
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.poses import write_poses
+from wildshape.records import Turn
+
+NO_POINTS = Turn(np.empty((0, 3), np.float32))
 
 
 @pytest.fixture
@@ -37,6 +41,25 @@ def test_a_missing_scan_is_counted_and_leaves_its_time_out(tmp_path):
     drive = open_drive(tmp_path)
     assert drive.ticks == (0, 1, 4)
     assert drive.warnings == ("2 scans are missing between the others",)
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        (10, 20, 30, 60),
+        tuple(1700000000123456789 + late for late in (0, 100_000_321, 199_999_876, 500_000_000)),
+    ],
+)
+def test_names_that_count_by_tens_or_are_stamps_of_a_clock(tmp_path, numbers):
+    write_scans(tmp_path, numbers)
+    drive = open_drive(tmp_path)
+    assert (drive.ticks, drive.scan_names) == ((0, 1, 2, 5), tuple(f"{n:06d}" for n in numbers))
+
+
+def test_no_scan_is_missing_where_the_mean_step_is_not_the_middle_one():
+    times = np.cumsum([0.1, 0.1, 0.1, 0.101] * 200).tolist()
+    drive = Drive.of("drive", [f"{n:06d}" for n in range(800)], lambda _: NO_POINTS, times)
+    assert (drive.ticks, drive.warnings) == (tuple(range(800)), ())
 
 
 def test_times_beside_the_scans_are_seconds(folder):
@@ -88,6 +111,8 @@ def test_what_cannot_be_a_drive_is_refused_in_a_sentence(folder, tmp_path):
     refused(open_drive, folder, match=r"time 3 \(1.5\) is not after")
     (folder / "times.txt").write_text("1\n2\nnan\n3\n")
     refused(open_drive, folder, match="not finite")
+    (folder / "times.txt").write_text("100\n200\n300\n500\n")
+    refused(open_drive, folder, match="100 s from one scan to the next; write its times in seconds")
     (folder / "times.txt").unlink()
     (folder / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
     refused(open_drive, folder, match="1 lines of poses for 4 scans")

@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from jaxtyping import Float, Int
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import Twist
 from wildshape.records import Points, Turn
 
+_LONGEST_PAUSE = 1e9  # scans; more are no count
 _NOTHING = Turn(np.empty((0, 3), np.float32))
 
 
@@ -126,17 +128,31 @@ def _ticks(
     names: tuple[str, ...], times: Sequence[float] | None
 ) -> tuple[tuple[int, ...], tuple[str, ...]]:
     """When each scan was taken, in scans since the first, and a sentence if some are missing."""
-    count = len(names)
-    if times is not None and count > 1:
-        since = np.array(times) - times[0]
-        ticks = np.rint(since / np.median(np.diff(since))).astype(int)
-        ticks = np.maximum.accumulate(np.maximum(ticks - np.arange(count), 0)) + np.arange(count)
+    if times is not None:
+        ticks = _counted(np.diff(times))
     elif all(name.isascii() and name.isdigit() for name in names):
-        ticks = np.array([int(name) for name in names]) - int(names[0])
+        ticks = _numbered(names)
     else:
-        ticks = np.arange(count)
-    if (np.diff(ticks) < 1).any():
-        raise BadInputError(f"{names[0]} to {names[-1]}: scans share a number; rename them.")
-    missing = int(ticks[-1]) + 1 - count
+        ticks = np.arange(len(names))
+    missing = int(ticks[-1]) + 1 - len(names)
     told = (f"{missing} scans are missing between the others",) if missing else ()
     return tuple(ticks.tolist()), told
+
+
+def _numbered(names: tuple[str, ...]) -> Int[np.ndarray, "n"]:
+    """Names that count scans one by one, or by tens, or are stamps of a clock.
+
+    Raises:
+        BadInputError: they do not rise.
+    """
+    steps = np.array([int(after) - int(before) for before, after in pairwise(names)], np.float64)
+    if (steps < 1).any():
+        raise BadInputError(f"{names[0]} to {names[-1]}: scans share a number; rename them.")
+    return _counted(steps, 1.0 if (steps == 1).any() else None)
+
+
+def _counted(steps: Float[np.ndarray, "m"], one: float | None = None) -> Int[np.ndarray, "n"]:
+    """Scans since the first; `one`: the step from a scan to the next, by default the middle one."""
+    one = one or float(np.median(steps)) if len(steps) else 1.0
+    whole = np.clip(np.rint(steps / one), 1, _LONGEST_PAUSE).astype(int)
+    return np.concatenate(([0], np.cumsum(whole)))

@@ -19,6 +19,7 @@ from wildshape.records import Turn
 _BESIDE = ("poses.txt", "times.txt", "timestamps.txt", "calib.txt")
 _RAW, _ODOMETRY = Path("velodyne_points") / "data", "velodyne"
 _TEXT = (".txt", ".csv")
+_LONGEST_STEP_S = 20.0  # more are milliseconds, or smaller units
 _OBJECTS = "velodyne_objects_xyz0"  # a drive of KITTI raw cut down to its vehicles
 
 
@@ -116,6 +117,11 @@ def _drive(
         if len(times) != len(files):
             raise BadInputError(
                 f"{path}: {len(times)} times for {len(files)} scans; give a line a scan."
+            )
+        step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+        if step > _LONGEST_STEP_S:
+            raise BadInputError(
+                f"{path}: {step:.6g} s from one scan to the next; write its times in seconds."
             )
     return Drive.of(
         name=path.name or path.resolve().name,

@@ -17,6 +17,7 @@ from wildshape.io.boxes.detections import Detection, number_of
 from wildshape.io.scans.writers import MeshFormat, write_mesh
 
 _LONGEST_NUMBER = 10  # digits: longer names of scans are times
+_ROUNDED_NS = 1000  # more than what a float of seconds since 1970 loses
 
 
 @dataclass(frozen=True)
@@ -86,10 +87,17 @@ def detections_of(found: FinishedDrive) -> Iterator[Detection]:
                 score=one.confidence,
                 box=box,
                 sequence=found.name,
-                time_ns=None if times is None else round(times[frame] * 1e9),
+                time_ns=None if times is None else _time_ns(times[frame], scan),
                 points=points,
                 velocity=None if times is None else (round(x, 3), round(y, 3)),
             )
+
+
+def _time_ns(seconds: float, scan: str) -> int:
+    """A scan's time; its name, where that is its time, for a float of seconds is coarser."""
+    time_ns = round(seconds * 1e9)
+    named = scan.isascii() and scan.isdigit() and abs(int(scan) - time_ns) < _ROUNDED_NS
+    return int(scan) if named else time_ns
 
 
 def _write_mesh(found: FinishedDrive, one: FoundVehicle, kind: MeshFormat) -> None:

@@ -54,12 +54,13 @@ _DECIMALS = 4
 
 
 def write_box_table(path: Path, rows: Iterable[BoxRow]) -> None:
-    """Write rows by frame, then track, to a tenth of a millimetre, atomically."""
+    """Write rows by frame, then track, to a tenth of a millimetre, times in full, atomically."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(HEADER)
     for row in sorted(rows, key=lambda row: (row.frame, row.track)):
-        table.writerow([_word(value) for value in astuple(row)])
+        frame, time, *others = astuple(row)
+        table.writerow([frame, "" if time is None else time, *map(_word, others)])
     write_text(path, text.getvalue())
 
 
@@ -68,7 +69,7 @@ def _word(value: object) -> object:
         return int(value)
     if isinstance(value, float):
         return round(value, _DECIMALS)
-    return "" if value is None else value
+    return value
 
 
 def read_box_table(path: Path | str) -> list[BoxRow]:

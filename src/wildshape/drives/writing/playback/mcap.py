@@ -60,7 +60,7 @@ def write_mcap(found: FinishedDrive, path: Path) -> None:
     check_mcap()
     from mcap_protobuf.writer import Writer
 
-    zero = found.times[0] if found.times else 0.0
+    zero = max(found.times[0], 0.0) if found.times else 0.0  # its clock knows no time before 0
     shapes = {one.name: thinned(found.shape(one), SHAPE_POINTS) for one in found.vehicles}
     with atomic_write(path) as file:
         writer = Writer(file)
@@ -74,7 +74,7 @@ def write_mcap(found: FinishedDrive, path: Path) -> None:
 
 
 def _put(writer: Any, topic: str, message: Any, time_ns: int) -> None:
-    writer.write_message(topic, message, log_time=max(time_ns, 0), publish_time=max(time_ns, 0))
+    writer.write_message(topic, message, log_time=time_ns, publish_time=time_ns)
 
 
 @dataclass(frozen=True)
