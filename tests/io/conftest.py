@@ -71,7 +71,7 @@ def _write_all(folder: Path, cloud: np.ndarray) -> dict[str, Path]:
     np.savez_compressed(folder / "named.npz", points=cloud, other=cloud[:3])
     np.savetxt(folder / "rows.xyz", cloud)
     np.savetxt(folder / "header.csv", cloud, delimiter=",", header="x,y,z", comments="")
-    np.hstack([cloud, cloud[:, :1]]).tofile(folder / "kitti.bin")
+    np.hstack([cloud, np.abs(cloud[:, :1])]).tofile(folder / "kitti.bin")
     _write_las(folder, cloud)
     return {path.name: path for path in sorted(folder.iterdir())}
 

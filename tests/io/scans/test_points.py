@@ -58,6 +58,15 @@ def test_a_full_turn_of_a_sensor_is_read_as_points_and_refused_as_an_object(
         read_scan(full_formats[name])
 
 
+def test_bare_numbers_of_another_row_are_no_kitti_scan(tmp_path: Path, cloud: np.ndarray) -> None:
+    five = np.hstack([cloud, np.ones((len(cloud), 2), np.float32)])[: len(cloud) // 4 * 4]
+    five.tofile(tmp_path / "scan.pcd.bin")  # nuScenes
+    np.testing.assert_array_equal(read_points(tmp_path / "scan.pcd.bin"), five[:, :3])
+    five.tofile(tmp_path / "scan.bin")
+    with pytest.raises(BadInputError, match="are no intensities"):
+        read_points(tmp_path / "scan.bin")
+
+
 def test_a_full_scan_of_a_map_is_brought_to_its_sensor(tmp_path: Path, full_scan) -> None:
     np.save(tmp_path / "mm.npy", 1000 * (full_scan + np.array((4e5, 5e6, 30.0))))
     place = Coordinates("mm", (4e8, 5e9, 3e4))

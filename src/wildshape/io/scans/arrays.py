@@ -18,6 +18,7 @@ from wildshape.io.guard import check_promise, check_unpacked, reading
 _Unpacking = Any  # a zipfile.ZipExtFile; zipfile itself says IO[bytes]
 _PIECE_BYTES = 4_000_000
 _MOST_COLUMNS = 1000
+_LEAST_INTENSITY = -1.0  # some write -1 where there is none
 _ROWS = 16  # an array of so many columns and 3 or 4 rows is no scan, but one on its side
 _NAMES = ("points", "xyz", "pcd", "arr_0", "data")
 
@@ -25,10 +26,21 @@ _NAMES = ("points", "xyz", "pcd", "arr_0", "data")
 def read_kitti_bin(path: Path) -> Float32[np.ndarray, "n 3"]:
     """KITTI's velodyne scans: float32 x y z intensity, little endian, nothing else.
 
+    Of nuScenes (`.pcd.bin`) float32 x y z intensity ring.
+
     Raises:
-        BadInputError: the size is no multiple of 16 bytes.
+        BadInputError: the size is no multiple of a row's, or the rows have another length.
     """
-    return read_rows(path, "x y z intensity")
+    if path.name.lower().endswith(".pcd.bin"):
+        return read_rows(path, "x y z intensity ring")
+    rows = _rows(path, "x y z intensity")
+    least = float(rows[:, 3].min())
+    if least < _LEAST_INTENSITY:
+        raise BadInputError(
+            f"{path}: its fourth numbers, {least:.3g} for example, are no intensities: its rows are"
+            " not float32 x y z intensity; write it as .npy."
+        )
+    return rows[:, :3]
 
 
 def read_rows(path: Path, columns: str) -> Float32[np.ndarray, "n 3"]:
@@ -41,6 +53,10 @@ def read_rows(path: Path, columns: str) -> Float32[np.ndarray, "n 3"]:
     Raises:
         BadInputError: missing, or its size is no multiple of a row's, or 0.
     """
+    return _rows(path, columns)[:, :3]
+
+
+def _rows(path: Path, columns: str) -> Float32[np.ndarray, "n c"]:
     with reading(path, f"float32 {columns}"), path.open("rb") as file:
         size, width = os.fstat(file.fileno()).st_size, 4 * len(columns.split())
         if size % width or not size:
@@ -49,7 +65,7 @@ def read_rows(path: Path, columns: str) -> Float32[np.ndarray, "n 3"]:
                 " a row): truncated or another format; copy or download it again."
             )
         check_promise(path, "points", size // width, size, size)
-        return np.fromfile(file, "<f4").reshape(size // width, -1)[:, :3]
+        return np.fromfile(file, "<f4").reshape(size // width, -1)
 
 
 def read_npy(path: Path) -> Float[np.ndarray, "n 3"]:
