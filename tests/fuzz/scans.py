@@ -83,7 +83,7 @@ def _build_pcd(folder: Path) -> None:
 
 
 def _build_bin(folder: Path) -> None:
-    rows = np.hstack([CLOUD, CLOUD[:, :1]]).astype("<f4")
+    rows = np.hstack([CLOUD, np.abs(CLOUD[:, :1])]).astype("<f4")
     _put(folder / "kitti", "scan.bin", rows.tobytes())
 
 
