@@ -211,7 +211,7 @@ def _read_finished(folder: Path) -> Arrays:
         yield found.velocities(one)
         yield found.shape(one)
     list(detections_of(found))
-    DriveFiles(BoxFiles(("json", "nuscenes", "kitti", "argoverse2"))).write(found)
+    DriveFiles(BoxFiles(("json", "nuscenes", "kitti", "argoverse2"))).write(folder)
 
 
 TARGETS = (
