@@ -117,6 +117,16 @@ def test_boxes_follow_a_vehicle_that_brakes_between_scans_a_second_apart():
     assert np.abs(way.boxes[:, 0] - stop_and_go(np.arange(91))).max() < 0.25
 
 
+def test_poses_that_slip_beside_the_way_of_a_vehicle_do_not_move_it():
+    frames = tuple(range(0, 61, 4))
+    bend = [(100 * math.sin(f / 100), 100 * (1 - math.cos(f / 100)), 0, f / 100) for f in range(61)]
+    boxes = [bend[f] for f in frames]
+    for row in (6, 7, 12):
+        boxes[row] = (boxes[row][0] - 2.0, boxes[row][1] + 1.5, 0.0, 1.2)
+    way = smooth(completed(boxes, frames), still(61), BoxConfig())
+    assert np.abs(way.boxes - bend).max() < 0.05
+
+
 def test_a_doubtful_vehicle_is_none_where_a_wall_goes_on_beyond_its_box():
     rng = np.random.default_rng(0)
     car = rng.uniform((-2.0, -0.9, -0.7), (2.0, 0.9, 0.7), (400, 3)).astype(np.float32)

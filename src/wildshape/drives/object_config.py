@@ -211,6 +211,8 @@ class BoxConfig:
         moving_scans: or through so many successive ones of its completed scans.
         heading_m_per_tick: an object as fast as this looks where it goes: 1 m/s at 10 Hz.
         smooth_ticks: over which the way of a moving object is smoothed, standard deviation.
+        stray_m: completed scans that lie this far from the way of those around are left out.
+        stray_ticks: around, standard deviation.
         longest_gap: ticks in which a vehicle was not seen and still has boxes.
     """
 
@@ -219,4 +221,6 @@ class BoxConfig:
     moving_scans: int = 6
     heading_m_per_tick: float = 0.1
     smooth_ticks: float = 3.0
+    stray_m: float = 0.6
+    stray_ticks: float = 8.0
     longest_gap: int = 10

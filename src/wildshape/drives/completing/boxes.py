@@ -11,13 +11,14 @@ Before and after them it goes straight on.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from wildshape.drives.completing.placing import Completed
 from wildshape.drives.completing.turns import Turns
 from wildshape.drives.object_config import BoxConfig
 
 _LEAST_APART = 0.5  # ticks
+_ROUNDS = 10
 _ENOUGH = 4  # completed scans for a parabola: through three one goes whatever they are
 
 
@@ -58,21 +59,43 @@ def way_over(one: Completed, frames: tuple[int, ...], turns: Turns, config: BoxC
     at = np.take(turns.ticks, one.frames) + one.phases
     if not moves(at, one.boxes, config):
         return Way(frames, np.tile(_middle(one.boxes), (len(frames), 1)), moving=False)
+    kept = _believed(at, one.boxes[:, :2], config)
+    at, completed = at[kept], one.boxes[kept]
     middles = np.take(turns.ticks, frames).astype(np.float64)
-    boxes = _on_its_way(one, at, middles, config)
+    boxes = _on_its_way(at, completed, middles, config)
     met = middles + turns.phases(frames, boxes)
-    return Way(frames, _on_its_way(one, at, met, config), moving=True)
+    return Way(frames, _on_its_way(at, completed, met, config), moving=True)
+
+
+def _believed(
+    at: Float[np.ndarray, "k"], places: Float[np.ndarray, "k 2"], config: BoxConfig
+) -> Bool[np.ndarray, "k"]:
+    """Which completed scans lie near a smooth way of most around them: half seen, some slip.
+
+    The way is a wider parabola, fitted anew with less weight on what lay far from it (Geman and
+    McClure 1987).
+    """
+    off = np.zeros(len(at))
+    if len(at) > _ENOUGH:
+        for _ in range(_ROUNDS):
+            trust = 1 / (1 + (off / config.stray_m) ** 2) ** 2
+            way = _parabolas(at, places, at, config.stray_ticks, trust)
+            off = np.linalg.norm(places - way, axis=1)
+    return off <= config.stray_m
 
 
 def _on_its_way(
-    one: Completed, at: Float[np.ndarray, "k"], wanted: Float[np.ndarray, "f"], config: BoxConfig
+    at: Float[np.ndarray, "k"],
+    boxes: Float[np.ndarray, "k 4"],
+    wanted: Float[np.ndarray, "f"],
+    config: BoxConfig,
 ) -> Float[np.ndarray, "f 4"]:
     """Boxes of one that moves; `at`: the ticks of the completed ones, `wanted`: those asked for."""
-    places, velocities = _lines(at, one.boxes[:, :3], wanted, config.smooth_ticks)
+    places, velocities = _lines(at, boxes[:, :3], wanted, config.smooth_ticks)
     if len(at) >= _ENOUGH:
         among = (wanted > at[0] - config.smooth_ticks) & (wanted < at[-1] + config.smooth_ticks)
-        places[among] = _parabolas(at, one.boxes[:, :3], wanted[among], config.smooth_ticks)
-    return np.column_stack((places, _yaws(at, one.boxes, wanted, velocities, config)))
+        places[among] = _parabolas(at, boxes[:, :3], wanted[among], config.smooth_ticks)
+    return np.column_stack((places, _yaws(at, boxes, wanted, velocities, config)))
 
 
 def expected(one: Completed, turns: Turns, beyond_ticks: int, config: BoxConfig) -> Way:
@@ -168,12 +191,13 @@ def _lines(
 
 def _parabolas(
     at: Float[np.ndarray, "k"],
-    places: Float[np.ndarray, "k 3"],
+    places: Float[np.ndarray, "k d"],
     wanted: Float[np.ndarray, "f"],
     smooth_ticks: float,
-) -> Float[np.ndarray, "f 3"]:
+    trust: Float[np.ndarray, "k"] | float = 1.0,
+) -> Float[np.ndarray, "f d"]:
     """Place in each frame, of the parabola of weighted least squares around it."""
-    weights = _weights(at, wanted, smooth_ticks)
+    weights = trust * _weights(at, wanted, smooth_ticks)
     time = (at - wanted[:, None]) / smooth_ticks
     powers = np.stack((np.ones_like(time), time, time**2), axis=-1)
     weighted = np.swapaxes(powers * weights[..., None], 1, 2)
