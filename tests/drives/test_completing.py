@@ -119,8 +119,9 @@ def test_boxes_follow_a_vehicle_that_brakes_between_scans_a_second_apart():
 
 def test_poses_that_slip_beside_the_way_of_a_vehicle_do_not_move_it():
     frames = tuple(range(0, 61, 4))
-    bend = [(100 * math.sin(f / 100), 100 * (1 - math.cos(f / 100)), 0, f / 100) for f in range(61)]
-    boxes = [bend[f] for f in frames]
+    turned = np.arange(61) / 100
+    bend = 100 * np.column_stack((np.sin(turned), 1 - np.cos(turned), 0 * turned, turned / 100))
+    boxes = bend[list(frames)]
     for row in (6, 7, 12):
         boxes[row] = (boxes[row][0] - 2.0, boxes[row][1] + 1.5, 0.0, 1.2)
     way = smooth(completed(boxes, frames), still(61), BoxConfig())
