@@ -15,10 +15,14 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from tests.drives.finished_drive import CARS, FRAMES, HEIGHT, SIZE, finished_drive
 
+from wildshape.drives.source import Drive
+from wildshape.drives.tracking.detections import DetectionFile, find_detections
 from wildshape.drives.writing.files import DriveFiles, detections_of
 from wildshape.drives.writing.finished import read_finished
 from wildshape.drives.writing.playback.mcap import write_mcap
 from wildshape.errors import MissingExtraError
+from wildshape.inference.folders.box_files import BoxFiles
+from wildshape.records import Turn
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +109,20 @@ def test_a_scan_named_by_its_time_keeps_it_to_the_nanosecond(found):
     names, times = tuple(map(str, stamps)), tuple(stamp / 1e9 for stamp in stamps)
     named = replace(found, scan_names=names, times=times)
     assert {one.time_ns for one in detections_of(named)} == set(stamps)
+
+
+@pytest.mark.parametrize("first", ["000000000007", "1700000000123456"])
+def test_kitti_labels_of_a_drive_are_found_again(found, tmp_path, first):
+    names = [f"{int(first) + frame:012d}" for frame in range(FRAMES)]
+    named = replace(found, scan_names=tuple(names))
+    drive = Drive.of("drive", names, lambda _: Turn(np.empty((0, 3), np.float32)))
+    BoxFiles(("kitti",)).write_detections(tmp_path, list(detections_of(named)))
+    again = find_detections(DetectionFile(tmp_path / "boxes" / "kitti"), drive)
+    for frame, boxes in enumerate(again.frames):
+        seen = [one for one in found.vehicles if frame in one.frames]
+        for box, one in zip(boxes, seen, strict=True):
+            true = one.boxes[one.frames.index(frame)].centre
+            assert box.box.centre == pytest.approx(true, abs=1e-5)
 
 
 def test_rerun_holds_boxes_shapes_scans_and_the_way(found):

@@ -13,10 +13,9 @@ from wildshape.drives.writing.playback.mcap import check_mcap, write_mcap
 from wildshape.drives.writing.playback.rerun import load_rerun, write_rerun
 from wildshape.geometry.meshing import closed_mesh
 from wildshape.inference.folders.box_files import BoxFiles
-from wildshape.io.boxes.detections import Detection, number_of
+from wildshape.io.boxes.detections import Detection, frame_number
 from wildshape.io.scans.writers import MeshFormat, write_mesh
 
-_LONGEST_NUMBER = 10  # digits: longer names of scans are times
 _ROUNDED_NS = 1000  # more than what a float of seconds since 1970 loses
 
 
@@ -81,7 +80,7 @@ def detections_of(found: FinishedDrive) -> Iterator[Detection]:
                 track=one.name,
                 track_number=number,
                 scan=scan,
-                scan_number=number_of(scan, frame) if len(scan) <= _LONGEST_NUMBER else frame,
+                scan_number=frame_number(scan, frame),
                 category=CATEGORY,
                 sensor="lidar",
                 score=one.confidence,

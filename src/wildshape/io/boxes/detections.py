@@ -28,6 +28,7 @@ FRAME = (
 _IF_KNOWN = ("sequence", "time_ns", "points", "velocity")
 
 _MOST_DIGITS = 18  # of a number that data sets hold
+_LARGEST_COUNT = 10**10  # larger numbers are times
 
 
 @dataclass(frozen=True)
@@ -81,6 +82,12 @@ def number_of(scan: str, place: int) -> int:
     """What a scan's name counts, or else its place in the track."""
     counts = scan.isascii() and scan.isdigit() and len(scan) <= _MOST_DIGITS
     return int(scan) if counts else place
+
+
+def frame_number(scan: str, frame: int) -> int:
+    """The number of a drive's scan: what its name counts, or its frame if that is a time."""
+    number = number_of(scan, frame)
+    return number if number < _LARGEST_COUNT else frame
 
 
 def read_detections(out: Path) -> list[Detection]:
