@@ -38,7 +38,14 @@ def test_a_run_killed_at_any_stage_goes_on_to_the_same_boxes(
     def killed(*_, **__):
         raise Killed
 
-    for stage in ("find_trajectory", "Cutter", "link", "write_sightings", "judge", "rows_of"):
+    for stage in (
+        "find_trajectory",
+        "Cutter",
+        "linked_clusters",
+        "write_sightings",
+        "judge",
+        "rows_of",
+    ):
         with monkeypatch.context() as patched:
             patched.setattr(run, stage, killed)
             with pytest.raises(Killed):
