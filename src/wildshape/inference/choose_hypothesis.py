@@ -316,7 +316,7 @@ def look_twice(
     rows = torch.nonzero(angle.abs() > rule.upright_rad)[:, 0]
     if len(rows) == 0:
         return first
-    again = None if sights is None else sights.part(rows)
+    again = None if sights is None else sights.part(rows.tolist())
     second = look(network, settings, inputs.part(rows).rolled(angle[rows]), again)
     cheaper = torch.nonzero(second.cost < first.cost[rows])[:, 0]
     return first.replaced(rows[cheaper], second.part(cheaper))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, Int64
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from wildshape.geometry.projection.sight_lines import SightLines, Standing, standing
@@ -39,10 +39,9 @@ class Sights(NamedTuple):
     rays: Rays
     config: FreeSpaceConfig
 
-    def part(self, rows: Int64[Tensor, "b"]) -> "Sights":
+    def part(self, rows: Sequence[int]) -> "Sights":
         """Some of the scans."""
-        chosen = rows.tolist()
-        scans, rays = [self.scans[i] for i in chosen], [self.rays[i] for i in chosen]
+        scans, rays = [self.scans[i] for i in rows], [self.rays[i] for i in rows]
         return Sights(scans, rays, self.config)
 
     def of(self, points: Points, i: int) -> Standing | None:

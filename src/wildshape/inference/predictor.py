@@ -262,9 +262,8 @@ class Predictor:
         least = 1 - self.config.ground_share
         much = [i for i, kept in enumerate(seen) if len(kept) < least * len(scans[i])]
         if much:  # the network has seen the ground, too: once more without it
-            rows = torch.tensor(much)
-            again = self._found([seen[i] for i in much], sights and sights.part(rows))
-            found = found.replaced(rows, again)
+            again = self._found([seen[i] for i in much], sights and sights.part(much))
+            found = found.replaced(torch.tensor(much), again)
             for i, kept in zip(much, self._off_their_ground([scans[i] for i in much], again)):
                 seen[i] = kept
         return Looked(scans, seen, found, sights)
@@ -318,7 +317,7 @@ class Predictor:
         exact = self.settings.sensor == "camera"
         whole, solid, standing = points.numpy(), shape, None
         if sights is not None:
-            alone = sights.part(torch.tensor([i]))
+            alone = sights.part([i])
             solid = without_free_space(shape, stack([T_sensor_can]), alone)
             standing = alone.of(whole, 0)
         done = Completion(
