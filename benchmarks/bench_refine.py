@@ -63,8 +63,8 @@ def measure_clusters(outcome: Outcome, seconds: float) -> None:
     rng = np.random.default_rng(0)
     middles = rng.normal(size=(400, 1, 3)) * (10.0, 10.0, 0.6)
     points = (middles + rng.normal(scale=0.8, size=(400, 40, 3))).reshape(-1, 3).astype(np.float32)
-    works = {"ours": partial(connected_parts, points, 1.0)}
-    works["trees"] = partial(connected_trees, points, 1.0)
+    works = {"ours": partial(connected_parts, points, 1.0, 0.25)}
+    works["trees"] = partial(connected_trees, points, 1.0, 0.25)
     case = f"clusters of {len(points)} points"
     outcome.add(case, take_turns(works, seconds))
     outcome.at_least(case, "ours", "trees", CLUSTERS_FASTER)

@@ -15,7 +15,7 @@ from wildshape.drives.config import (
     MountingConfig,
     TrajectoryConfig,
 )
-from wildshape.drives.tracking.clusters import connected, extents, find_clusters
+from wildshape.drives.tracking.clusters import extents, find_clusters
 from wildshape.drives.tracking.ground import height_above_ground
 from wildshape.drives.tracking.mounting import Mounting, ground_plane
 from wildshape.drives.tracking.sightings import Sightings, merged
@@ -80,18 +80,6 @@ def test_heights_are_above_the_ground_under_each_point():
 def test_the_ground_stage_says_nothing_on_stdout(capfd):
     height_above_ground(road(np.random.default_rng(0)), 1.7, GroundConfig())
     assert capfd.readouterr().out == ""
-
-
-def test_connected_is_the_components_of_all_pairs():
-    rng = np.random.default_rng(0)
-    points = rng.uniform(0, 6, (300, 3))
-    found = connected(points, 0.7, thin=1e-3)
-    near = np.linalg.norm(points[:, None] - points, axis=-1) <= 0.7
-    label = np.arange(300)
-    for _ in range(300):
-        label = np.where(near, label, 300).min(1)
-    expected = sorted((frozenset(np.flatnonzero(label == k)) for k in set(label)), key=sorted)
-    assert sorted((frozenset(part) for part in found), key=sorted) == expected
 
 
 def block(x, y, length=4.0, width=1.8, height=1.5, count=600, seed=0):

@@ -22,26 +22,48 @@ def by_steps(points, reach):
     return part
 
 
-@pytest.mark.parametrize("reach", [0.05, 0.3, 1.0])
-@pytest.mark.parametrize("trees", [False, True])
-def test_parts_are_what_steps_reach(monkeypatch, reach, trees):
-    if trees:
-        monkeypatch.setattr("wildshape.ops.connected.connected_kernel", lambda: None)
-    rng = np.random.default_rng(3)
+def some_groups(seed=3):
+    rng = np.random.default_rng(seed)
     centres = rng.uniform(-4, 4, (12, 1, 3))
     points = (centres + rng.normal(scale=0.3, size=(12, 25, 3))).reshape(-1, 3).astype(np.float32)
     rng.shuffle(points)
-    np.testing.assert_array_equal(connected_parts(points, reach), by_steps(points, reach))
+    return points
+
+
+@pytest.fixture(params=[False, True], ids=["kernel", "trees"])
+def either(request, monkeypatch):
+    if request.param:
+        monkeypatch.setattr("wildshape.ops.connected.connected_kernel", lambda: None)
+
+
+@pytest.mark.parametrize("reach", [0.05, 0.3, 1.0])
+@pytest.mark.usefixtures("either")
+def test_parts_are_what_steps_reach(reach):
+    points = some_groups()
+    found = connected_parts(points, reach, 1e-3 * reach)
+    np.testing.assert_array_equal(found, by_steps(points, reach))
+
+
+@pytest.mark.usefixtures("either")
+def test_pairs_are_one_part_and_so_are_the_points_of_a_cell():
+    points = np.array([[9.9, 0, 0], [0, 0, 0], [5, 0, 0], [9, 0, 0]], np.float32)
+    pairs = np.array([[2, 1]])
+    assert connected_parts(points, 0.1, 0.01).tolist() == [0, 1, 2, 3]
+    assert connected_parts(points, 0.1, 0.01, pairs).tolist() == [0, 1, 1, 2]
+    assert connected_parts(points, 0.1, 1.0).tolist() == [0, 1, 2, 0]
 
 
 @pytest.mark.skipif(connected_kernel() is None, reason="native library not built")
-def test_many_points_as_trees_have_it():
+@pytest.mark.parametrize("cell", [0.002, 0.1, 0.3])
+def test_many_points_as_trees_have_it(cell):
     rng = np.random.default_rng(0)
-    points = rng.uniform(0, 10, (20_000, 3)).astype(np.float32)
-    own, trees = connected_parts(points, 0.4), connected_trees(points, 0.4)
-    assert len(np.unique(own)) == len(np.unique(trees)) == len(np.unique(own * 20_000 + trees))
+    points = rng.uniform(-5, 5, (20_000, 3)).astype(np.float32)
+    pairs = rng.integers(20_000, size=(9, 2))
+    own, trees = (of(points, 0.4, cell, pairs) for of in (connected_parts, connected_trees))
+    np.testing.assert_array_equal(own, trees)
+    assert own.max() > 100
 
 
 def test_none_and_one():
-    assert connected_parts(np.zeros((0, 3), np.float32), 1.0).shape == (0,)
-    assert connected_parts(np.zeros((1, 3), np.float32), 1.0).tolist() == [0]
+    assert connected_parts(np.zeros((0, 3), np.float32), 1.0, 0.1).shape == (0,)
+    assert connected_parts(np.zeros((1, 3), np.float32), 1.0, 0.1).tolist() == [0]

@@ -7,13 +7,22 @@ from jaxtyping import Float32, Int64
 
 from wildshape.ops.library import connected_kernel
 
+_NO_PAIRS = np.empty((0, 2), np.int64)
 
-def connected_parts(points: Float32[np.ndarray, "n 3"], reach: float) -> Int64[np.ndarray, "n"]:
+
+def connected_parts(
+    points: Float32[np.ndarray, "n 3"],
+    reach: float,
+    cell: float,
+    pairs: Int64[np.ndarray, "m 2"] = _NO_PAIRS,
+) -> Int64[np.ndarray, "n"]:
     """A number for each point's part; parts are numbered by the first of their points.
 
     Args:
         points: all finite.
         reach: points of one part are joined by steps of at most this.
+        cell: edge of cells of which the first point stands for all.
+        pairs: rows of points that are one part however far apart they are.
 
     Raises:
         MemoryError: no room.
@@ -21,21 +30,32 @@ def connected_parts(points: Float32[np.ndarray, "n 3"], reach: float) -> Int64[n
     if not len(points):
         return np.zeros(0, dtype=np.int64)
     kernel = connected_kernel()
-    part = connected_trees(points, reach) if kernel is None else np.empty(len(points), np.int64)
-    if kernel is not None:
-        dense = np.ascontiguousarray(points)
-        if kernel(dense.ctypes.data, len(dense), reach, part.ctypes.data):
-            raise MemoryError(f"no room to join {len(points)} points.")
-    _, first, number = np.unique(part, return_index=True, return_inverse=True)
-    return np.argsort(np.argsort(first))[number]
+    if kernel is None:
+        return connected_trees(points, reach, cell, pairs)
+    part = np.empty(len(points), np.int64)
+    dense, joined = np.ascontiguousarray(points), np.ascontiguousarray(pairs)
+    given = dense.ctypes.data, len(dense), reach, cell, joined.ctypes.data, len(joined)
+    if kernel(*given, part.ctypes.data):
+        raise MemoryError(f"no room to join {len(points)} points.")
+    return part
 
 
-def connected_trees(points: Float32[np.ndarray, "n 3"], reach: float) -> Int64[np.ndarray, "n"]:
-    """The same by all pairs in reach; the parts' numbers are in no order."""
+def connected_trees(
+    points: Float32[np.ndarray, "n 3"],
+    reach: float,
+    cell: float,
+    pairs: Int64[np.ndarray, "m 2"] = _NO_PAIRS,
+) -> Int64[np.ndarray, "n"]:
+    """The same by all pairs in reach."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import KDTree
 
-    pairs = KDTree(points).query_pairs(reach, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs), bool), tuple(pairs.T)), shape=(len(points),) * 2)
-    return connected_components(links, directed=False)[1].astype(np.int64)
+    cells = np.floor(points / np.float32(cell))
+    _, first, place = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+    near = KDTree(points[first]).query_pairs(reach, output_type="ndarray")
+    links = np.concatenate((near, place[pairs]))
+    graph = coo_array((np.ones(len(links), bool), tuple(links.T)), shape=(len(first),) * 2)
+    part = connected_components(graph, directed=False)[1][place]
+    _, first, number = np.unique(part, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[number]

@@ -33,7 +33,7 @@ _SIGNATURES = {
 
 _NEAREST_K = (_P, _P, _P, _P, _P, _P, _I64, _I64, _I64, _I64, _F32, _P, _P, _INT, _INT)
 
-_CONNECTED = (_P, _I64, _F32, _P)
+_PARTS = (_P, _I64, _F32, _F32, _P, _I64, _P)
 
 
 @cache
@@ -62,7 +62,7 @@ def nearest_k_kernel() -> Callable[..., int] | None:
 
 def connected_kernel() -> Callable[..., int] | None:
     """Points that hang together; None as above."""
-    return _added("wildshape_connected", _CONNECTED)
+    return _added("wildshape_parts", _PARTS)
 
 
 @cache

@@ -91,9 +91,10 @@ def _hanging_together(
     """Some rows of a scan by parts, the larger first; `reach`: as a multiple of the usual one."""
     twins = scan.twin[rows]
     doubled = np.flatnonzero(twins >= 0)
-    label = _labels(scan.scaled[np.concatenate((rows, twins[doubled]))], reach, config.thin)
-    own, again = label[: len(rows)], label[len(rows) :]
-    return [rows[part] for part in _parts(_joined(own, own[doubled], again))]
+    points = scan.scaled[np.concatenate((rows, twins[doubled]))]
+    pairs = np.stack((doubled, len(rows) + np.arange(len(doubled))), axis=1)
+    label = connected_parts(points, reach, config.thin * reach, pairs)[: len(rows)]
+    return [rows[part] for part in _parts(label, config.fewest_points)]
 
 
 def _scaled(
@@ -105,25 +106,11 @@ def _scaled(
     return np.stack((outwards, azimuth * away / reach, config.upright * points[:, 2] / reach), 1)
 
 
-def _joined(
-    label: Int[np.ndarray, "n"], one: Int[np.ndarray, "m"], other: Int[np.ndarray, "m"]
-) -> Int[np.ndarray, "n"]:
-    """The labels after each of `one` became the same as its counterpart in `other`."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    count = 1 + int(max(label.max(), other.max(initial=0)))
-    links = coo_array((np.ones(len(one), bool), (one, other)), shape=(count, count))
-    return connected_components(links, directed=False)[1][label]
-
-
 def _vehicle_sized(
     scan: _Above, rows: Rows, reaches: tuple[float, ...], config: ClusterConfig
 ) -> Iterator[Rows]:
     """Clusters of the size of vehicles; those too large are cut apart with the finer reaches."""
     for part in _hanging_together(scan, rows, reaches[0], config):
-        if len(part) < config.fewest_points:
-            break
         if not _stands(scan.heights[part], config):
             continue
         members = _without_overhang(scan, part, config)
@@ -150,34 +137,14 @@ def _without_overhang(scan: _Above, rows: Rows, config: ClusterConfig) -> Int[np
     return rows[low] if (beyond > config.beyond_m).mean() > config.beyond else rows
 
 
-def connected(points: Float[np.ndarray, "n 3"], reach: float, thin: float = 0.25) -> list[Rows]:
-    """Rows of the points that hang together over steps of at most `reach`, the larger first.
-
-    Points are thinned first, to one a cell of `thin` times the reach: a step may be longer or
-    shorter by as much.
-    """
-    return _parts(_labels(points, reach, thin))
-
-
-def _labels(points: Float[np.ndarray, "n 3"], reach: float, thin: float) -> Int[np.ndarray, "n"]:
-    cells = np.floor(points / (thin * reach)).astype(np.int64)
-    places = tuple((cells - cells.min(0)).T)
-    number = np.asarray(np.ravel_multi_index(places, np.ptp(cells, axis=0) + 1))
-    order = np.argsort(number)
-    ordered = number[order]
-    fresh = np.concatenate(([True], ordered[1:] != ordered[:-1]))
-    first = np.minimum.reduceat(order, np.flatnonzero(fresh))
-    label = connected_parts(points[first].astype(np.float32), reach)
-    found = np.empty_like(order)
-    found[order] = label[np.cumsum(fresh) - 1]
-    return found
-
-
-def _parts(label: Int[np.ndarray, "n"]) -> list[Rows]:
-    """The rows of each label, the more the earlier."""
-    few = label.astype(np.min_scalar_type(label.max()))  # sorted by digits
+def _parts(label: Int[np.ndarray, "n"], fewest: int) -> list[Rows]:
+    """The rows of each label that has so many, the more the earlier."""
+    counts = np.bincount(label)
+    few = label.astype(np.min_scalar_type(len(counts)))  # sorted by digits
     order = np.argsort(few, kind="stable")
-    parts = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+    ends = np.cumsum(counts)
+    enough = np.flatnonzero(counts >= fewest)
+    parts = [order[ends[one] - counts[one] : ends[one]] for one in enough]
     return sorted(parts, key=len, reverse=True)
 
 

@@ -1,25 +1,82 @@
 /* SPDX-FileCopyrightText: 2026 The Wildshape developers
  * SPDX-License-Identifier: Apache-2.0
  *
- * Which points hang together over steps of at most a reach. Points are sorted along a Z-curve;
- * blocks whose boxes are apart are left out, many at a time, as are blocks that are one part already.
+ * Which points hang together over steps of at most a reach. The first point of each cell stands for
+ * all in it. Cells are put into cubes so small that what is in one hangs together; cubes with two
+ * points in reach are joined. Cells and cubes are found in hash tables.
  */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
-
-#include "cloud.h"
-
-typedef struct {
-    float low[3], high[3];
-} box;
+#include <string.h>
 
 typedef struct {
-    cloud held;
-    int32_t *parent; /* of each sorted point, towards the first of its part */
-    uint8_t *whole;  /* of each block: it is one part */
-    box *wide;       /* of each `BLOCK` blocks */
+    int64_t x, y, z;
+} place;
+
+/* Occupied places of a grid, numbered in the order in which they were first seen. */
+typedef struct {
+    place *places;
+    int32_t *slots; /* numbers by hash, -1 where there is none */
+    int32_t count;
+    int bits;
+} grid;
+
+typedef struct {
+    const float *points;
+    grid cells, cubes;
+    int32_t *cell;   /* of each point */
+    int32_t *first;  /* the first point of each cell */
+    int32_t *cube;   /* of each cell */
+    int32_t *next;   /* another cell of its cube, -1 after the last */
+    int32_t *head;   /* a cell of each cube */
+    int32_t *parent; /* of each cube, towards the first of its part */
 } parts;
+
+static int grid_allocate(grid *made, int64_t most)
+{
+    made->bits = 1;
+    while (((int64_t)1 << made->bits) < 2 * most)
+        made->bits++;
+    const size_t bytes = ((size_t)1 << made->bits) * sizeof *made->slots;
+    made->places = malloc((size_t)most * sizeof *made->places);
+    made->slots = malloc(bytes);
+    if (made->slots)
+        memset(made->slots, 0xff, bytes);
+    return made->places && made->slots;
+}
+
+static void grid_free(grid *made)
+{
+    free(made->places);
+    free(made->slots);
+}
+
+static int32_t *slot_of(const grid *in, place at)
+{
+    const uint64_t mixed = (uint64_t)at.x * 0x9E3779B97F4A7C15u ^
+                           (uint64_t)at.y * 0xC2B2AE3D27D4EB4Fu ^
+                           (uint64_t)at.z * 0x165667B19E3779F9u;
+    const uint64_t last = ((uint64_t)1 << in->bits) - 1;
+    uint64_t slot = (mixed * 0x9E3779B97F4A7C15u) >> (64 - in->bits);
+    for (; in->slots[slot] >= 0; slot = (slot + 1) & last) {
+        const place held = in->places[in->slots[slot]];
+        if (held.x == at.x && held.y == at.y && held.z == at.z)
+            break;
+    }
+    return in->slots + slot;
+}
+
+/* The number of a place, a new one if it was not seen before. */
+static int32_t number_of(grid *in, place at)
+{
+    int32_t *slot = slot_of(in, at);
+    if (*slot < 0) {
+        in->places[in->count] = at;
+        *slot = in->count++;
+    }
+    return *slot;
+}
 
 static int32_t root(parts *of, int32_t at)
 {
@@ -38,139 +95,141 @@ static void join(parts *of, int32_t a, int32_t b)
         of->parent[a] = b;
 }
 
-static int is_whole(parts *of, int64_t block)
+static int64_t floored(float value)
 {
-    const int32_t first = root(of, (int32_t)(block * BLOCK));
-    for (int i = 1; !of->whole[block] && i < BLOCK; i++) {
-        const int64_t at = block * BLOCK + i;
-        if (at < of->held.count && root(of, (int32_t)at) != first)
-            return 0;
+    const int64_t whole = (int64_t)value;
+    return whole - ((float)whole > value);
+}
+
+static void fill_cells(parts *of, int64_t count, float edge)
+{
+    for (int64_t i = 0; i < count; i++) {
+        const float *point = of->points + 3 * i;
+        const place at = {floored(point[0] / edge), floored(point[1] / edge),
+                          floored(point[2] / edge)};
+        const int32_t before = of->cells.count, number = number_of(&of->cells, at);
+        if (number == before)
+            of->first[number] = (int32_t)i;
+        of->cell[i] = number;
     }
-    return of->whole[block] = 1;
 }
 
-/* Whether two blocks are each one part. */
-static int are_whole(parts *of, int64_t a, int64_t b)
+static int64_t floor_divided(int64_t value, int64_t by)
 {
-    return is_whole(of, a) && is_whole(of, b);
+    return value / by - (value % by < 0);
 }
 
-/* Whether both are one and the same. */
-static int are_one(parts *of, int64_t a, int64_t b)
+/* `side`: cells along an edge of a cube. */
+static void fill_cubes(parts *of, int64_t side)
 {
-    const int32_t first = (int32_t)(a * BLOCK), other = (int32_t)(b * BLOCK);
-    return are_whole(of, a, b) && root(of, first) == root(of, other);
+    for (int32_t k = 0; k < of->cells.count; k++) {
+        const place cell = of->cells.places[k];
+        const place at = {floor_divided(cell.x, side), floor_divided(cell.y, side),
+                          floor_divided(cell.z, side)};
+        const int32_t before = of->cubes.count, number = number_of(&of->cubes, at);
+        of->next[k] = number == before ? -1 : of->head[number];
+        of->head[number] = k;
+        of->cube[k] = number;
+        of->parent[number] = number;
+    }
 }
 
-static box box_of(const cloud *held, int64_t block)
+static int in_reach(const float *a, const float *b, float reach_squared)
 {
-    box made;
+    const float dx = a[0] - b[0], dy = a[1] - b[1], dz = a[2] - b[2];
+    return dx * dx + dy * dy + dz * dz <= reach_squared;
+}
+
+static int are_in_reach(const parts *of, int32_t a, int32_t b, float reach_squared)
+{
+    for (int32_t i = of->head[a]; i >= 0; i = of->next[i])
+        for (int32_t j = of->head[b]; j >= 0; j = of->next[j])
+            if (in_reach(of->points + 3 * (int64_t)of->first[i],
+                         of->points + 3 * (int64_t)of->first[j], reach_squared))
+                return 1;
+    return 0;
+}
+
+/* Whether cubes that are so many apart along an axis may hold points in reach of each other. */
+static int may_reach(int64_t dx, int64_t dy, int64_t dz, double edge, double reach)
+{
+    const int64_t apart[3] = {dx, dy, dz};
+    double sum = 0;
     for (int c = 0; c < 3; c++) {
-        made.low[c] = held->low[c][block];
-        made.high[c] = held->high[c][block];
+        const double gap = apart[c] ? edge * (double)(llabs(apart[c]) - 1) : 0;
+        sum += gap * gap;
     }
-    return made;
+    return sum <= reach * reach;
 }
 
-static void widen(parts *of)
+/* Join every cube with those one step away, (dx, dy, dz) cubes. */
+static void join_over(parts *of, int64_t dx, int64_t dy, int64_t dz, float reach_squared)
 {
-    for (int64_t b = 0; b < of->held.blocks; b++) {
-        const box one = box_of(&of->held, b);
-        box *wide = of->wide + b / BLOCK;
-        for (int c = 0; c < 3; c++) {
-            if (b % BLOCK == 0 || one.low[c] < wide->low[c])
-                wide->low[c] = one.low[c];
-            if (b % BLOCK == 0 || one.high[c] > wide->high[c])
-                wide->high[c] = one.high[c];
-        }
+    for (int32_t a = 0; a < of->cubes.count; a++) {
+        const place own = of->cubes.places[a];
+        const place at = {own.x + dx, own.y + dy, own.z + dz};
+        const int32_t b = *slot_of(&of->cubes, at);
+        if (b >= 0 && root(of, a) != root(of, b) && are_in_reach(of, a, b, reach_squared))
+            join(of, a, b);
     }
 }
 
-static float squared_gap(const box *a, const box *b)
+/* Over half of all steps, the shorter first: the other half are their opposites. */
+static void join_all(parts *of, double edge, float reach)
 {
-    float sum = 0;
-    for (int c = 0; c < 3; c++) {
-        const float under = a->low[c] - b->high[c], over = b->low[c] - a->high[c];
-        const float gap = under > over ? under : over;
-        sum += gap > 0 ? gap * gap : 0;
-    }
-    return sum;
+    const int64_t most = (int64_t)ceil((double)reach / edge);
+    for (int64_t far = 1; far <= most; far++)
+        for (int64_t dx = 0; dx <= far; dx++)
+            for (int64_t dy = dx ? -far : 0; dy <= far; dy++)
+                for (int64_t dz = dx || dy ? -far : 1; dz <= far; dz++)
+                    if ((dx == far || llabs(dy) == far || llabs(dz) == far) &&
+                        may_reach(dx, dy, dz, edge, reach))
+                        join_over(of, dx, dy, dz, reach * reach);
 }
 
-/* Join what is in reach between two blocks; one pair is enough where each is one part. */
-static void join_blocks(parts *of, int64_t a, int64_t b, float reach_squared)
+/* Parts are numbered by the first of their points. */
+static void number_parts(parts *of, int64_t count, int64_t *part)
 {
-    const cloud *held = &of->held;
-    const int whole = a != b && are_whole(of, a, b);
-    const float *x = held->axes[0] + b * BLOCK, *y = held->axes[1] + b * BLOCK;
-    const float *z = held->axes[2] + b * BLOCK;
-    for (int64_t i = a * BLOCK; i < (a + 1) * BLOCK && i < held->count; i++) {
-        const float px = held->axes[0][i], py = held->axes[1][i], pz = held->axes[2][i];
-        float squared[BLOCK];
-        int near = 0;
-        for (int j = 0; j < BLOCK; j++) {
-            const float dx = x[j] - px, dy = y[j] - py, dz = z[j] - pz;
-            squared[j] = dx * dx + dy * dy + dz * dz;
-            near |= squared[j] <= reach_squared;
-        }
-        for (int j = 0; near && j < BLOCK && b * BLOCK + j < held->count; j++) {
-            const int32_t other = (int32_t)(b * BLOCK + j);
-            if (!(squared[j] <= reach_squared) || of->parent[other] == of->parent[i])
-                continue;
-            join(of, (int32_t)i, other);
-            if (whole)
-                return;
-        }
+    int32_t *name = of->head, parts_seen = 0; /* no longer needed */
+    memset(name, 0xff, (size_t)of->cubes.count * sizeof *name);
+    for (int64_t i = 0; i < count; i++) {
+        const int32_t own = root(of, of->cube[of->cell[i]]);
+        if (name[own] < 0)
+            name[own] = parts_seen++;
+        part[i] = name[own];
     }
 }
 
-/* Join a block with those that follow it. */
-static void join_after(parts *of, int64_t a, float reach_squared)
+/* A number for the part of each of `count` finite row-major points; `edge`: of the cells. The points
+ * of each of `pairs` pairs are one part. Returns how many points were too many or lacked memory: 0
+ * or 1. */
+int wildshape_parts(const float *points, int64_t count, float reach, float edge,
+                    const int64_t *pair, int64_t pairs, int64_t *part)
 {
-    const box own = box_of(&of->held, a);
-    for (int64_t b = a + 1; b < of->held.blocks; b++) {
-        const box *wide = of->wide + b / BLOCK, other = box_of(&of->held, b);
-        if (b % BLOCK == 0 && !(squared_gap(&own, wide) <= reach_squared))
-            b += BLOCK - 1; /* none of them */
-        else if (squared_gap(&own, &other) <= reach_squared && !are_one(of, a, b))
-            join_blocks(of, a, b, reach_squared);
-    }
-}
-
-static void join_all(parts *of, float reach_squared)
-{
-    widen(of);
-    for (int64_t a = 0; a < of->held.blocks; a++)
-        join_blocks(of, a, a, reach_squared);
-    for (int64_t a = 0; a < of->held.blocks; a++)
-        join_after(of, a, reach_squared);
-}
-
-/* A number for the part of each of `count` row-major points. Returns how many points were too many
- * or lacked memory: 0 or 1. A point that is not finite is a part by itself. */
-int wildshape_connected(const float *points, int64_t count, float reach, int64_t *part)
-{
-    parts of = {0};
+    parts of = {.points = points};
     if (count == 0)
         return 0;
     if (count > (int64_t)1 << 28)
         return 1;
-    cloud_allocate(&of.held, count);
-    of.parent = malloc((size_t)count * sizeof *of.parent);
-    of.whole = calloc((size_t)in_blocks(count), 1);
-    of.wide = malloc((size_t)in_blocks(in_blocks(count)) * sizeof *of.wide);
-    const int failed = !(of.held.axes[0] && of.parent && of.whole && of.wide);
+    int32_t *room = malloc((size_t)count * 6 * sizeof *room);
+    int failed = !room || !grid_allocate(&of.cells, count);
     if (!failed) {
-        cloud_fill(&of.held, points, count);
-        for (int64_t i = 0; i < count; i++)
-            of.parent[i] = (int32_t)i;
-        join_all(&of, reach * reach);
-        for (int64_t i = 0; i < count; i++)
-            part[of.held.order[i]] = root(&of, (int32_t)i);
+        int32_t **held[6] = {&of.cell, &of.first, &of.cube, &of.next, &of.head, &of.parent};
+        for (int k = 0; k < 6; k++)
+            *held[k] = room + k * count;
+        fill_cells(&of, count, edge);
+        failed = !grid_allocate(&of.cubes, of.cells.count);
     }
-    free(of.held.axes[0]);
-    free(of.parent);
-    free(of.whole);
-    free(of.wide);
+    if (!failed) {
+        const int64_t whole = (int64_t)(reach / (edge * sqrtf(3))), side = whole > 1 ? whole : 1;
+        fill_cubes(&of, side);
+        join_all(&of, (double)edge * (double)side, reach);
+        for (int64_t k = 0; k < pairs; k++)
+            join(&of, of.cube[of.cell[pair[2 * k]]], of.cube[of.cell[pair[2 * k + 1]]]);
+        number_parts(&of, count, part);
+    }
+    grid_free(&of.cells);
+    grid_free(&of.cubes);
+    free(room);
     return failed;
 }
