@@ -5,6 +5,7 @@ import pytest
 
 from wildshape.geometry.sampling import (
     drawn,
+    quantiles,
     radius_inliers,
     sorted_points,
     statistical_inliers,
@@ -106,3 +107,10 @@ def test_points_are_ordered_by_z_then_y_then_x(ties):
         points[:40, 1] = np.where(np.arange(40) % 3 == 0, np.float32(-0.0), np.float32(0.0))
     expected = sorted(points.tolist(), key=lambda p: (p[2], p[1], p[0]))
     assert resample(points, 60).tolist() == expected
+
+
+@pytest.mark.parametrize("count", [1, 2, 17, 300])
+def test_quantiles_are_those_of_numpy(count):
+    rows = np.random.default_rng(0).normal(size=(3, count))
+    expected = np.quantile(rows, (0.0, 0.02, 0.5, 1.0), axis=1)
+    assert quantiles(rows, (0.0, 0.02, 0.5, 1.0)) == pytest.approx(expected)

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from wildshape.geometry.sampling import quantiles
+
 
 @dataclass(frozen=True)
 class SkirtRule:
@@ -44,11 +46,12 @@ def skirt(
         rule: see there.
     """
     whole = points if shape is None else shape
-    low = np.quantile(whole[:, 2], rule.ends)
-    body = whole[whole[:, 2] > low + rule.above_m, :2].T
+    height = whole[:, 2]
+    low = quantiles(height[None], (rule.ends,)).item()
+    body = whole[height > low + rule.above_m, :2].T
     if body.shape[1] < rule.fewest:
         return np.zeros(len(points), dtype=bool)
-    near, far = np.quantile(body.copy(), (rule.ends, 1 - rule.ends), axis=1)
+    near, far = quantiles(body.copy(), (rule.ends, 1 - rule.ends))
     found = points[:, 2] < low + rule.low_m
     lows = points[found, :2]
     beside = (lows < near - rule.beyond_m) | (lows > far + rule.beyond_m)

@@ -85,3 +85,17 @@ def drawn(size: int, count: int) -> Int64[np.ndarray, "count"]:
     if size > count:
         return np.random.default_rng(0).choice(size, count, replace=False)
     return np.arange(count) % size
+
+
+def quantiles(
+    rows: Float[np.ndarray, "k n"], shares: tuple[float, ...]
+) -> Float[np.ndarray, "s k"]:
+    """Those of each row at some shares of its length, between two values in proportion.
+
+    What `numpy.quantile` gives, in a fraction of its time for some hundred values.
+    """
+    at = np.array(shares) * (rows.shape[1] - 1)
+    below, above = np.floor(at).astype(int), np.ceil(at).astype(int)
+    ordered = np.partition(rows, sorted({*below.tolist(), *above.tolist()}), axis=1)
+    low, high = ordered[:, below], ordered[:, above]
+    return (low + (high - low) * (at - below)).T

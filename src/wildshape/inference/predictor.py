@@ -298,8 +298,7 @@ class Predictor:
         on_device = (part.to(self.device) for part in found[:3])
         up = None if self.up is None else torch.tensor(self.up, dtype=torch.float64).to(self.device)
         mirror, config = self.settings.network.mirror, self.config.refine
-        ordered = [sorted_points(one) for one in seen]
-        done = refine(ordered, *on_device, mirror=mirror, up=up, config=config)
+        done = refine(seen, *on_device, mirror=mirror, up=up, config=config)
         done = Refined(*(part.cpu() for part in done))
         T_sensor_canonical = SE3(done.rotation, done.translation)
         posed = T_sensor_canonical.to(torch.float32).apply(done.shapes)

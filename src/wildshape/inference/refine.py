@@ -231,11 +231,13 @@ def fit_to_scans(
     start = Fit(rotation.double(), translation.double(), torch.ones_like(translation).double())
     found, motion = start, scans.points.new_zeros(len(scans.points), 9)
     matched = scans.points, scans.points
+    whole, apart = shapes.float(), []  # squared, at each match
     for step in range(config.iterations):
         if step in config.matched_at:
             local = found.unstretched(scans.points).float()
-            around = nearest_k(local, shapes.float(), config.plane_points, scans.sizes).index
-            matched = planes(shapes, around)
+            near = nearest_k(local, whole, config.plane_points, scans.sizes)
+            matched = planes(shapes, near.index)
+            apart.append(near.distance_squared[..., 0])
         A, b = _equations(found.seen(scans.points), *matched, found.stretch, scans.counted, config)
         A, b = _with_prior(A, b, motion, config)
         if up is not None:
@@ -245,24 +247,25 @@ def fit_to_scans(
         R = found.rotation @ rotation_from_vector(change[:, :3]).mT
         t = found.translation - (R @ change[:, 3:6, None])[..., 0]
         found = Fit(R, t, motion[:, 6:].exp())
-    worse = _off(scans, shapes, found, config) > _allowed(scans, shapes, start, up, config)
+    local = found.unstretched(scans.points).float()
+    apart.append(nearest(local, whole, scans.sizes).distance_squared)
+    before, after = (_off(squared, scans, config) for squared in (apart[0], apart[-1]))
+    worse = after > _allowed(before, start, up, config)
     return Fit(
         *(torch.where(worse.view(-1, *[1] * (a.ndim - 1)), b, a) for a, b in zip(found, start))
     )
 
 
-def _off(scans: Clouds, shapes: Tensor, fit: Fit, config: RefineConfig) -> Float[Tensor, "B"]:
-    """Mean distance of scan points to the shape, each at most `kernel_m`."""
-    found = nearest(fit.unstretched(scans.points).float(), shapes.float(), scans.sizes)
-    apart = found.distance_squared.sqrt().clamp_max(config.kernel_m)  # of padding 0
+def _off(squared: Float[Tensor, "B n"], scans: Clouds, config: RefineConfig) -> Float[Tensor, "B"]:
+    """Mean of distances of scan points to the shape, each at most `kernel_m`; of padding 0."""
+    apart = squared.sqrt().clamp_max(config.kernel_m)
     return apart.double().sum(1) / scans.sizes
 
 
 def _allowed(
-    scans: Clouds, shapes: Tensor, start: Fit, up: Tensor | None, config: RefineConfig
+    before: Float[Tensor, "B"], start: Fit, up: Tensor | None, config: RefineConfig
 ) -> Float[Tensor, "B"]:
     """How far from the shape a scan may lie: no farther than before, or than a level one may."""
-    before = _off(scans, shapes, start, config)
     if up is None:
         return before
     askew = (start.rotation[:, 2] - up).norm(dim=-1) > math.radians(config.level_deg)

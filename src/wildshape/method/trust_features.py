@@ -12,6 +12,7 @@ from torch import Tensor
 
 from wildshape.geometry.box import box_axes
 from wildshape.geometry.projection.sight_lines import Standing
+from wildshape.geometry.sampling import quantiles
 from wildshape.geometry.transforms.rotation import rotation_angle
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.method.confidence import SMALLEST_M, ConfidenceFeatures
@@ -26,7 +27,7 @@ from wildshape.method.trust import (
 )
 from wildshape.records import Completion, Points
 
-_OUTERMOST, _UNTURNED_DEG, _MOST_POINTS = 2.0, 0.3, 500
+_OUTERMOST, _UNTURNED_DEG, _MOST_POINTS = 0.02, 0.3, 500
 
 
 def rival_margin(poses: Poses, believed: Float[Tensor, "B H"]) -> Float[Tensor, "B 1"]:
@@ -63,7 +64,7 @@ def scan_features(
     known, box = ConfidenceFeatures(*done.features), done.box
     half = np.maximum(box.size, SMALLEST_M) / 2
     inside = (scan - np.asarray(box.centre)) @ box_axes(box.quaternion_wxyz)
-    low, high = np.percentile(inside, (_OUTERMOST, 100 - _OUTERMOST), axis=0)
+    low, high = quantiles(inside.T, (_OUTERMOST, 1 - _OUTERMOST))
     seen_length, seen_width, _ = ((high - low) / (2 * half)).tolist()
     turn = R_sensor_canonical.double().mT @ done.pose.rotation
     moved = math.degrees(float(rotation_angle(turn)))
