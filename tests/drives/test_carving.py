@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import torch
 
-from wildshape.drives.completing.carving import carve
+from wildshape.drives.completing.carving import Carving
 from wildshape.drives.completing.placing import Completed
 from wildshape.drives.completing.turns import Turns
+from wildshape.drives.completing.whole_scans import show_scans
 from wildshape.drives.config import CarveConfig
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.se3 import SE3
@@ -54,7 +55,9 @@ def found(length):
 
 def carved(length, **scene):
     still = Turns((0,), SE3(torch.eye(3).double()[None], torch.zeros(1, 3).double()))
-    (one,) = carve([found(length)], lambda _: scan(**scene), still, CarveConfig())
+    carving = Carving([found(length)], still, CarveConfig())
+    show_scans(lambda _: scan(**scene), still, carving)
+    (one,) = carving.carved()
     return one
 
 

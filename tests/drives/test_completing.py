@@ -14,7 +14,7 @@ from wildshape.drives.completing.claims import claim
 from wildshape.drives.completing.completion import fullest_of_parts, keyframes, order_of_looks
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed
-from wildshape.drives.completing.surroundings import crowded
+from wildshape.drives.completing.surroundings import Surroundings
 from wildshape.drives.completing.turns import Turns
 from wildshape.drives.completing.vehicles import (
     judge,
@@ -23,6 +23,7 @@ from wildshape.drives.completing.vehicles import (
     vehicle_confidence,
     vehicle_sized,
 )
+from wildshape.drives.completing.whole_scans import show_scans
 from wildshape.drives.config import (
     BoxConfig,
     CompletionConfig,
@@ -135,13 +136,14 @@ def test_a_doubtful_vehicle_is_none_where_a_wall_goes_on_beyond_its_box():
     ground = rng.uniform((-6.0, -6.0, -0.8), (6.0, 6.0, -0.7), (900, 3)).astype(np.float32)
     one = completed([(0.0, 0.0, 0.0, 0.0)] * 2)
 
-    def names(sure, *parts):
+    def names(*parts):
         scan = np.concatenate(parts)
-        return crowded([one], [sure], lambda _: scan, still(2), SurroundingsConfig())
+        around = Surroundings([one], still(2), SurroundingsConfig())
+        show_scans(lambda _: scan, still(2), around)
+        return around.crowded()
 
-    assert names(0.3, car, ground) == set()
-    assert names(0.3, car, ground, wall) == {"a"}
-    assert names(0.5, car, ground, wall) == set()
+    assert names(car, ground) == set()
+    assert names(car, ground, wall) == {"a"}
 
 
 def test_what_drives_where_it_looks_is_a_vehicle_whatever_its_shape():

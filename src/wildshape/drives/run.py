@@ -15,12 +15,10 @@ from wildshape.drives.adapting.adapt import Adaptation, adapt_to, like
 from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.clock import Clock, Watch, silent
 from wildshape.drives.completing.boxes import smooth
-from wildshape.drives.completing.carving import carve
 from wildshape.drives.completing.claims import claim
 from wildshape.drives.completing.completion import Completer
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed, level_poses, read_completed
-from wildshape.drives.completing.surroundings import crowded
 from wildshape.drives.completing.turns import Turns, with_sense
 from wildshape.drives.completing.vehicles import (
     judge,
@@ -30,6 +28,7 @@ from wildshape.drives.completing.vehicles import (
     surer_if_driving,
     write_judged,
 )
+from wildshape.drives.completing.whole_scans import held_against
 from wildshape.drives.config import INFERENCE, DriveConfig
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.result import FILES, DriveResult, earlier_result, line_of, settings_of
@@ -298,7 +297,6 @@ class _Run:
         return Places(turns, merging, self.config.boxes).fragments(found)
 
     def vehicles(self, objects: list[Sightings], turns: Turns) -> list[Vehicle]:
-        around = self.config.surroundings
         places = Places(turns, self.config.merging, self.config.boxes)
         with self.clock.stage("vehicles", 1) as at:
             completed = [
@@ -308,15 +306,16 @@ class _Run:
             said = judge(completed, places, self.config.vehicles)
             kept = {one.name: one.confidence for one in said if not one.reasons}
             found = [one for one in completed if one.seen.name in kept]
+            parts, doubtful = {}, []
             if not self.tracked:
                 found.sort(key=lambda one: -kept[one.seen.name])
                 claimed = claim(found, self.cuts, turns, self.config)
-                sure = [stated(one, kept) for one in claimed.vehicles]
-                crowd = crowded(claimed.vehicles, sure, self.drive.scan, turns, around)
-                found = [one for one in claimed.vehicles if one.seen.name not in crowd]
-                said = refused(said, claimed.parts | dict.fromkeys(crowd, "crowded"))
+                found, parts = claimed.vehicles, claimed.parts
+                sure = self.config.surroundings.sure
+                doubtful = [one for one in found if stated(one, kept) < sure]
+            found, crowd = held_against(self.drive.scan, found, doubtful, turns, self.config)
+            said = refused(said, parts | dict.fromkeys(crowd, "crowded"))
             write_judged(self.completing / "vehicles.json", objects, said)
-            found = carve(found, self.drive.scan, turns, self.config.carving)
             at(1)
             return [
                 Vehicle(one, smooth(one, turns, self.config.boxes), stated(one, kept))

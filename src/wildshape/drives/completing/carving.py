@@ -7,7 +7,7 @@ vehicle and what is beyond its corner, an end of the box that lies further out i
 Widths stay: mirrors are wider than what is behind them.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -45,34 +45,32 @@ class _Slabs:
         return cls(np.zeros((2, bins)), np.zeros((2, bins)), np.zeros(2))
 
 
-def carve(
-    vehicles: Sequence[Completed],
-    read: Callable[[int], Points],
-    turns: Turns,
-    config: CarveConfig,
-) -> list[Completed]:
-    """The same vehicles in boxes no longer than rays leave room for.
+class Carving:
+    """What the rays of whole scans say of the lengths of vehicles."""
 
-    Args:
-        vehicles: completed.
-        read: the whole scan of a frame, sensor frame, metres.
-        turns: of the drive's sensor.
-        config: see there.
-    """
-    slabs = [_Slabs.empty(config) for _ in vehicles]
-    present: dict[int, list[tuple[int, Box]]] = {}
-    for i, one in enumerate(vehicles):
-        for frame, box in zip(one.frames, turns.shown(one.frames, one.boxes)):
-            present.setdefault(frame, []).append((i, box))
-    for frame, boxes in sorted(present.items()):
-        scan = turns.T_level_sensor[frame].apply_numpy(read(frame)).astype(np.float64)
-        sensor = turns.T_level_sensor[frame].translation.numpy()
-        off = np.ascontiguousarray((scan[:, :2] - sensor[:2]).T)
-        for i, box in boxes:
-            size = vehicles[i].size
-            towards = scan[_towards(off, box[:2] - sensor[:2], size)]
-            _count(slabs[i], towards, sensor, box, size, config)
-    return [_cut(one, counted, config) for one, counted in zip(vehicles, slabs)]
+    def __init__(self, vehicles: Sequence[Completed], turns: Turns, config: CarveConfig) -> None:
+        """`turns`: of the drive's sensor."""
+        self.vehicles, self.turns, self.config = vehicles, turns, config
+        self._slabs = [_Slabs.empty(config) for _ in vehicles]
+        self._present: dict[int, list[tuple[int, Box]]] = {}
+        for i, one in enumerate(vehicles):
+            for frame, box in zip(one.frames, turns.shown(one.frames, one.boxes)):
+                self._present.setdefault(frame, []).append((i, box))
+        self.frames = frozenset(self._present)
+
+    def see(self, frame: int, scan: Points) -> None:
+        """Count the rays of a scan, level world."""
+        exact = scan.astype(np.float64)
+        sensor = self.turns.T_level_sensor[frame].translation.numpy()
+        off = np.ascontiguousarray((exact[:, :2] - sensor[:2]).T)
+        for i, box in self._present.get(frame, ()):
+            size = self.vehicles[i].size
+            towards = exact[_towards(off, box[:2] - sensor[:2], size)]
+            _count(self._slabs[i], towards, sensor, box, size, self.config)
+
+    def carved(self) -> list[Completed]:
+        """The same vehicles in boxes no longer than rays leave room for."""
+        return [_cut(one, slabs, self.config) for one, slabs in zip(self.vehicles, self._slabs)]
 
 
 def _count(

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What stands close around a vehicle that may be none: walls and hedges go on beyond their box."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -16,32 +16,30 @@ from wildshape.records import Points
 _Box = Float[np.ndarray, "4"]
 
 
-def crowded(
-    vehicles: Sequence[Completed],
-    sure: Sequence[float],
-    read: Callable[[int], Points],
-    turns: Turns,
-    config: SurroundingsConfig,
-) -> set[str]:
-    """Names of doubtful ones whose completed scans show much close around them.
+class Surroundings:
+    """What whole scans show of vehicles and around them."""
 
-    Args:
-        vehicles: completed.
-        sure: what is stated of each, 0 to 1.
-        read: the whole scan of a frame, sensor frame, metres.
-        turns: of the drive's sensor.
-        config: see there.
-    """
-    doubtful = [one for one, said in zip(vehicles, sure, strict=True) if said < config.sure]
-    counts = {one.seen.name: np.zeros(2) for one in doubtful}
-    for frame in sorted({frame for one in doubtful for frame in one.frames}):
-        scan = turns.T_level_sensor[frame].apply_numpy(read(frame))
-        for one in doubtful:
+    def __init__(
+        self, vehicles: Sequence[Completed], turns: Turns, config: SurroundingsConfig
+    ) -> None:
+        """`vehicles`: doubtful ones; `turns`: of the drive's sensor."""
+        self.vehicles, self.turns, self.config = vehicles, turns, config
+        self.frames = frozenset(frame for one in vehicles for frame in one.frames)
+        self._counts = {one.seen.name: np.zeros(2) for one in vehicles}
+
+    def see(self, frame: int, scan: Points) -> None:
+        """Count what a scan shows, level world."""
+        for one in self.vehicles:
             if frame in one.frames:
                 place = one.frames.index(frame)
-                (box,) = turns.shown([frame], one.boxes[place : place + 1])
-                counts[one.seen.name] += _inside_and_around(scan, box, one.size, config)
-    return {name for name, (own, around) in counts.items() if around > config.share * own}
+                (box,) = self.turns.shown([frame], one.boxes[place : place + 1])
+                inside_and_around = _inside_and_around(scan, box, one.size, self.config)
+                self._counts[one.seen.name] += inside_and_around
+
+    def crowded(self) -> set[str]:
+        """Names of those whose completed scans show much close around them."""
+        share = self.config.share
+        return {name for name, (own, around) in self._counts.items() if around > share * own}
 
 
 def _inside_and_around(
