@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wildshape.geometry.projection.sight_lines import MOST_RAYS, SightLines, thinned
+from wildshape.geometry.projection.full_scan import MOST_RAYS, thinned
+from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.io.write_tracks import write_tracks
 from wildshape.records import Points, Track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wildshape.geometry.projection.sight_lines import FullScan, SightLines, sight_lines
+from wildshape.geometry.projection.full_scan import FullScan, sight_lines
+from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.simulate.raycast import Hits, Scene
 from wildshape.simulate.sensor import SpinningLidar
 from wildshape.simulate.shapes.solid import Solid

@@ -148,7 +148,7 @@ def _drive(settings: Settings) -> None:
 def _tracks(settings: Settings) -> None:
     from wildshape.cli.terminal import TERMINAL, answer
     from wildshape.errors import BadInputError
-    from wildshape.geometry.projection.sight_lines import MOST_RAYS
+    from wildshape.geometry.projection.full_scan import MOST_RAYS
     from wildshape.io.progress import counted, duration
     from wildshape.io.write_tracks import write_tracks
     from wildshape.simulate.generate import SimulationConfig, simulate_tracks

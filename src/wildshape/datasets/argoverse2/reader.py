@@ -29,7 +29,7 @@ from wildshape.datasets.tracks.labelled_boxes import (
 from wildshape.datasets.tracks.parts import found_in, part_name
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
-from wildshape.geometry.projection.sight_lines import FullScan
+from wildshape.geometry.projection.full_scan import FullScan
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Sensor, Track
 

@@ -25,7 +25,7 @@ from wildshape.datasets.tracks.labelled_boxes import Crop, rows_in_box
 from wildshape.datasets.tracks.parts import found_in, part_name
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
-from wildshape.geometry.projection.sight_lines import FullScan, sight_lines
+from wildshape.geometry.projection.full_scan import FullScan, sight_lines
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor, SightLines, Track
 

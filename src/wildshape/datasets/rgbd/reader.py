@@ -27,7 +27,7 @@ from wildshape.datasets.tracks.gathering import Gathering
 from wildshape.datasets.tracks.parts import found_in
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
-from wildshape.geometry.projection.sight_lines import FullScan, sight_lines
+from wildshape.geometry.projection.full_scan import FullScan, sight_lines
 from wildshape.records import Intrinsics, Points, Sensor, SightLines, Track
 
 

@@ -30,7 +30,7 @@ from wildshape.datasets.tracks.gathering import Gathering
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.datasets.tracks.stationary import stand
 from wildshape.errors import BadInputError
-from wildshape.geometry.projection.sight_lines import FullScan, sight_lines
+from wildshape.geometry.projection.full_scan import FullScan, sight_lines
 from wildshape.records import Track
 
 Split = Literal["train", "test", "all"]
@@ -142,12 +142,13 @@ class SemanticKitti:
         if found is None:
             return
         labels, points = found
+        full = FullScan(points)
         for visit in wanted:
             poses = sequence.T_velo_world
             pose = None if poses is None or sequence.kind(visit).moved else poses[frame]
             name = sequence.words(visit)["name"]
             rows = np.flatnonzero(labels == visit.label)
-            rays = partial(sight_lines, FullScan(points), rows)
+            rays = partial(sight_lines, full, rows)
             to.add(name, sequence.scan_file(frame).stem, points[rows], pose, rays=rays)
 
     def _finished(self, gathering: Gathering, frame: int) -> Iterator[Track]:

@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 
 from wildshape.datasets.tracks.gathering import Gathering
 from wildshape.errors import BadInputError
-from wildshape.geometry.projection.sight_lines import FullScan, sight_lines
+from wildshape.geometry.projection.full_scan import FullScan, sight_lines
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 

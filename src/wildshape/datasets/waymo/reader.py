@@ -34,7 +34,7 @@ from wildshape.datasets.waymo.tables import (
     read_vehicle_poses,
 )
 from wildshape.errors import BadInputError
-from wildshape.geometry.projection.sight_lines import FullScan
+from wildshape.geometry.projection.full_scan import FullScan
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor, Track
 

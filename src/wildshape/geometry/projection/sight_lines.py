@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The rays of a frame around an object: which to keep, and what they say of a shape.
+"""The rays of a frame around an object, and what they say of a shape.
 
 A ray that ended before a point hides it. A ray that went on says that nothing stands there.
 """
@@ -14,10 +14,6 @@ from jaxtyping import Bool, Float, Int
 
 from wildshape.errors import BadInputError
 
-MOST_RAYS = 2048
-"""Rays that are kept with a scan at most."""
-
-_MARGIN_M, _NEAREST_M = 1.0, 1.0
 _UNIT = 1e-3  # how far from 1 the length of a direction may be
 
 
@@ -137,90 +133,6 @@ class Standing(NamedTuple):
 
     free: Bool[np.ndarray, "n"]
     hidden: Bool[np.ndarray, "n"]
-
-
-@dataclass(frozen=True)
-class FullScan:
-    """All that a frame's sensor says, sensor frame, metres.
-
-    Attributes:
-        points: `(s, 3)` its returns.
-        origins: `(s, 3)` where the ray of each began, where several sensors are merged.
-        lost: `(k, 3)` unit directions of rays of which the sensor's grid says that nothing came
-            back; only of a single sensor.
-    """
-
-    points: np.ndarray
-    origins: np.ndarray | None = None
-    lost: np.ndarray | None = None
-
-
-def sight_lines(
-    full: FullScan, rows: Int[np.ndarray, "k"], most: int = MOST_RAYS
-) -> SightLines | None:
-    """The rays of a frame beside those of one object, at most `most`; see `rays_near`.
-
-    Args:
-        full: the frame.
-        rows: of the object's own returns; none for none.
-        most: rays returned at most.
-    """
-    if not len(rows):
-        return None
-    count, lost = len(full.points), full.lost
-    ends = full.points if lost is None else np.concatenate((full.points, lost))
-    near = rays_near(ends, rows, most)
-    rays = SightLines.of_returns(ends[near], None if full.origins is None else full.origins[near])
-    rays.ranges[near >= count] = np.inf
-    return rays
-
-
-def rays_near(
-    frame: Float[np.ndarray, "s 3"], rows: Int[np.ndarray, "k"], most: int = MOST_RAYS
-) -> Int[np.ndarray, "m"]:
-    """The returns of a frame beside those of one object, as rows of it in rising order.
-
-    They lie in the object's frustum widened by 1 m at its nearest point. Of more than `most` every
-    so many-th is taken.
-
-    Args:
-        frame: all returns, sensor frame, metres.
-        rows: of the object's own returns; at least one.
-        most: rows returned at most.
-    """
-    points = frame[rows].astype(np.float64)
-    axes = _facing(points)
-    own = _angles(points @ axes)
-    nearest = max(float(np.linalg.norm(points, axis=1).min()), _NEAREST_M)
-    low, high = own.min(0) - _MARGIN_M / nearest, own.max(0) + _MARGIN_M / nearest
-    ahead = np.flatnonzero(frame @ axes[:, 0].astype(frame.dtype) > 0)
-    angles = _angles(frame[ahead] @ axes.astype(frame.dtype))
-    inside = np.zeros(len(frame), bool)
-    inside[ahead[((angles >= low) & (angles <= high)).all(1)]] = True
-    inside[rows] = False
-    found = np.flatnonzero(inside & (frame != 0).any(1))
-    return thinned(found, most)
-
-
-def thinned(rows: Int[np.ndarray, "k"], most: int) -> Int[np.ndarray, "m"]:
-    """Every so many-th, so that at most `most` are left."""
-    return rows if len(rows) <= most else rows[np.arange(most) * len(rows) // most]
-
-
-def _facing(points: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "3 3"]:
-    """Axes as columns: along the mean direction of points, to its left and up."""
-    away = points / np.maximum(np.linalg.norm(points, axis=1, keepdims=True), 1e-9)
-    forward = away.mean(0) / max(float(np.linalg.norm(away.mean(0))), 1e-9)
-    up = np.array((0.0, 0.0, 1.0) if abs(forward[2]) < 0.9 else (1.0, 0.0, 0.0))
-    left = np.cross(up, forward)
-    left /= np.linalg.norm(left)
-    return np.stack((forward, left, np.cross(forward, left)), axis=1)
-
-
-def _angles(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:
-    """Azimuth and pitch, radians, in axes x forward, y left, z up."""
-    x, y, z = points.T
-    return np.stack((np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))), axis=1)
 
 
 def standing(
