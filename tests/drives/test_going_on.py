@@ -20,6 +20,7 @@ from wildshape.drives.completing.completion import Completer
 from wildshape.drives.config import INFERENCE, ClusterConfig, DriveConfig
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.tracking.sightings import read_sightings
+from wildshape.drives.writing import outputs
 from wildshape.io.boxes.table import read_box_table
 from wildshape.method.checkpoint import SHIPPED, load_checkpoint, save_checkpoint
 
@@ -38,21 +39,24 @@ def test_a_run_killed_at_any_stage_goes_on_to_the_same_boxes(
     def killed(*_, **__):
         raise Killed
 
-    for stage in (
-        "find_trajectory",
-        "Cutter",
-        "linked_clusters",
-        "write_sightings",
-        "judge",
-        "rows_of",
+    for place, stage in (
+        (run, "find_trajectory"),
+        (run, "Cutter"),
+        (run, "linked_clusters"),
+        (run, "write_sightings"),
+        (run, "judge"),
+        (outputs, "write_rays"),
+        (outputs, "rows_of"),
     ):
         with monkeypatch.context() as patched:
-            patched.setattr(run, stage, killed)
+            patched.setattr(place, stage, killed)
             with pytest.raises(Killed):
                 wildshape.drive(recording, tmp_path / "out")
     again = wildshape.drive(recording, tmp_path / "out")
     assert again.seconds["trajectory"] < 1.0
-    for name in ("boxes.csv", "trajectory.txt", "frames.csv", "stages/tracks.json"):
+    rays = [path.relative_to(found.out) for path in found.out.glob("tracks/*/rays/*.npz")]
+    assert rays
+    for name in ("boxes.csv", "trajectory.txt", "frames.csv", "stages/tracks.json", *rays):
         assert (tmp_path / "out" / name).read_bytes() == (found.out / name).read_bytes(), name
 
 
@@ -69,7 +73,7 @@ def test_adapted_weights_complete_a_drive_again(found, recording, tmp_path, monk
     def killed(*_, **__):
         raise KeyboardInterrupt
 
-    for place, name in ((run, "rows_of"), (second_pass, "write_json"), (second_pass, "_move")):
+    for place, name in ((outputs, "rows_of"), (second_pass, "write_json"), (second_pass, "_move")):
         assert (out / "boxes.csv").read_bytes() == before
         with monkeypatch.context() as patched:
             patched.setattr(place, name, killed)

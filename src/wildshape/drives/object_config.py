@@ -26,6 +26,8 @@ class CompletionConfig:
         scans: of a track that are completed together.
         ticks: between them; neighbours at 10 Hz are nearly the same scan.
         fewest_points: scans of fewer are not completed where others are fuller.
+        rays: whole tracks are put together with the rays beside the object.
+        rays_in_looks: the network sees them in each look, too.
     """
 
     looks: int = 3
@@ -40,6 +42,8 @@ class CompletionConfig:
     scans: int = 16
     ticks: int = 4
     fewest_points: int = 60
+    rays: bool = True
+    rays_in_looks: bool = False
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,7 @@ FILES = (
     TRAJECTORY,
     TUM,
     "tracks/*/track.json",
+    "tracks/*/rays/*.npz",
     "tracks/*/scans/*.ply",
     "objects/*/objects.json",
     "objects/*/poses.txt",

@@ -51,18 +51,16 @@ from wildshape.drives.writing.outputs import (
     BOXES,
     FRAMES,
     TRAJECTORY,
+    RayWriter,
     Vehicle,
-    boxes_of,
-    rows_of,
     write_frames,
     write_trajectories,
-    write_vehicle,
+    write_vehicles,
 )
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import OBJECTS
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import write_json
-from wildshape.io.boxes.table import write_box_table
 from wildshape.io.guard import read_record
 from wildshape.io.output import begin, finished, keep_apart
 from wildshape.io.poses import read_poses
@@ -180,7 +178,12 @@ class _Run:
     def perform(self) -> DriveResult:
         mounting = self.mounting()
         T_world_sensor = self.trajectory(mounting)
-        self.cut(mounting, T_world_sensor)
+        moved = replace(self, drive=self.drive.moved_by(T_world_sensor))
+        return moved.find(mounting, T_world_sensor)
+
+    def find(self, mounting: Mounting, T_world_sensor: SE3) -> DriveResult:
+        """All that follows from the sensor's way: scans are corrected by it."""
+        self.cut(mounting)
         T_level_sensor = level_poses(T_world_sensor, mounting)
         objects = self.tracks(T_level_sensor)
         self.complete("completion", objects, mounting)
@@ -212,7 +215,7 @@ class _Run:
         path = self.out / TRAJECTORY
         with self.clock.stage("trajectory", len(self.drive)) as at:
             if not path.is_file():
-                cutter = self.cutter(self.drive, mounting)
+                cutter = self.cutter(mounting)
                 turns = self.helpers.in_order(cutter.landmarks, range(len(self.drive)))
                 found = find_trajectory(self.drive, mounting, self.config, at, turns)
                 write_json(self.stages / "breaks.json", asdict(found.breaks))
@@ -223,14 +226,14 @@ class _Run:
     def breaks(self) -> Breaks:
         return Breaks.read(self.stages / "breaks.json")
 
-    def cut(self, mounting: Mounting, T_world_sensor: SE3) -> None:
-        cutter = self.cutter(self.drive.moved_by(T_world_sensor), mounting)
+    def cut(self, mounting: Mounting) -> None:
+        cutter = self.cutter(mounting)
         self.spread("clusters", cutter, cutter.missing(), len(self.drive))
         if self.detections is not None:
             check_cut(self.detections, read_cuts(self.cuts, len(self.drive)))
 
-    def cutter(self, drive: Drive, mounting: Mounting) -> Cutter:
-        known = drive, mounting, self.cuts, self.config
+    def cutter(self, mounting: Mounting) -> Cutter:
+        known = self.drive, mounting, self.cuts, self.config
         return Cutter(*known) if self.detections is None else BoxCutter(*known, self.detections)
 
     @property
@@ -323,15 +326,11 @@ class _Run:
             ]
 
     def write(self, vehicles: list[Vehicle], turns: Turns) -> int:
+        writer = RayWriter.of(self.results, vehicles, self.drive, self.cuts)
+        self.spread("rays", writer, writer.missing(), len(writer.files))
         with self.clock.stage("outputs", len(vehicles)) as at:
-            rows = []
-            for number, one in enumerate(vehicles, 1):
-                folder = self.folder(one.completed.seen)
-                write_vehicle(self.results, one, folder, self.cuts, self.drive)
-                rows += rows_of(one, boxes_of(one, turns), self.drive)
-                at(number)
-            write_box_table(self.results / BOXES, rows)
-            return len(rows)
+            folders = self.completing / "objects"
+            return write_vehicles(self.results, vehicles, folders, self.cuts, self.drive, turns, at)
 
     def warnings(self, T_world_sensor: SE3) -> tuple[str, ...]:
         """What is odd about the drive; writes `frames.csv` on the way."""

@@ -26,7 +26,7 @@ from wildshape.geometry.sampling import drawn, sorted_points
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.confidence import look_features
 from wildshape.inference.config import HypothesisRule
-from wildshape.inference.free_space import SeenScores, Sights
+from wildshape.inference.free_space import Rays, SeenScores, Sights
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.network import Poses, ShapePoseNet
@@ -240,17 +240,27 @@ class Looked(NamedTuple):
 
     @classmethod
     def joined(cls, parts: Sequence["Looked"]) -> "Looked":
-        """All scans; those of no part have rays."""
+        """All scans, with the rays of those that have any."""
         found = Found(*(torch.cat(rows) for rows in zip(*[part.found for part in parts])))
         scans = [one for part in parts for one in part.scans]
         seen = [one for part in parts for one in part.seen]
-        return cls(scans, seen, found)
+        known = [part.sights for part in parts if part.sights is not None]
+        if not known:
+            return cls(scans, seen, found)
+        rays = [one for part in parts for one in part.rays]
+        return cls(scans, seen, found, known[0]._replace(scans=scans, rays=rays))
+
+    @property
+    def rays(self) -> Rays:
+        """One set a scan, None for a scan without."""
+        return [None] * len(self.scans) if self.sights is None else self.sights.rays
 
     def each(self) -> list["Looked"]:
-        """Each scan by itself, without rays."""
+        """Each scan by itself."""
         rows = torch.arange(len(self.scans))[:, None]
-        both = zip(self.scans, self.seen, rows)
-        return [Looked([scan], [seen], self.found.part(row)) for scan, seen, row in both]
+        parts = [self.sights and self.sights.part([i]) for i in range(len(self.scans))]
+        every = zip(self.scans, self.seen, rows, parts)
+        return [Looked([scan], [seen], self.found.part(row), own) for scan, seen, row, own in every]
 
 
 class Posed(NamedTuple):

@@ -4,6 +4,7 @@
 
 import math
 import shutil
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -288,7 +289,7 @@ def write_track(folder: Path | str, track: Track) -> None:
     if track.label_size_m is not None:
         info["label_size_m"] = list(track.label_size_m)
     write_json(folder / "track.json", sensor_to_json(track.sensor) | info)
-    for name, rays in zip(_file_names(track), track.rays):
+    for name, rays in zip(file_names(track.scan_names), track.rays):
         if rays is not None:
             write_rays(folder / "rays" / f"{name}.npz", rays)
     _write_scans(folder, track)
@@ -299,13 +300,13 @@ def _write_scans(folder: Path, track: Track) -> None:
     aside = folder / ".scans.part"
     shutil.rmtree(aside, ignore_errors=True)  # of a writer that was killed
     aside.mkdir()
-    for name, points in zip(_file_names(track), track.scans):
+    for name, points in zip(file_names(track.scan_names), track.scans):
         (aside / f"{name}.ply").write_bytes(ply_bytes(points))
     aside.replace(folder / "scans")
 
 
-def _file_names(track: Track) -> list[str]:
-    """Names that sort in time order: the scans' own if they do, else their numbers."""
-    names = list(track.scan_names)
+def file_names(scans: Sequence[str]) -> list[str]:
+    """Names of a track's files that sort in time order: the scans' own if they do, else numbers."""
+    names = list(scans)
     usable = names == sorted(set(names)) and all(Path(n).name == n and n for n in names)
     return names if usable else [f"{i:06d}" for i in range(len(names))]

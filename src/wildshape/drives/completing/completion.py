@@ -18,7 +18,9 @@ from wildshape.drives.completing.looking import box_of, completed, looks_at
 from wildshape.drives.completing.vehicles import shape_nats, vehicle_sized
 from wildshape.drives.object_config import CompletionConfig, VehicleConfig
 from wildshape.drives.source import Drive
+from wildshape.drives.tracking.rays import RayCutter
 from wildshape.drives.tracking.sightings import Sightings
+from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.choose_hypothesis import Looked
 from wildshape.inference.folders.complete_folder import (
@@ -27,6 +29,7 @@ from wildshape.inference.folders.complete_folder import (
     POSES,
     objects_of,
 )
+from wildshape.inference.free_space import Rays
 from wildshape.inference.predictor import Predictor
 from wildshape.io.atomic import write_json
 from wildshape.io.boxes.detections import moved
@@ -48,6 +51,7 @@ class _Candidate:
         chosen: in the frames that may be completed.
         clouds: its points in them, level frames.
         order: in which they are looked at.
+        rays: beside it in these frames, level frames too, by place; those that were asked for.
         looks: the network's, in that order.
         nats: what each of these says for a vehicle.
     """
@@ -56,13 +60,19 @@ class _Candidate:
     chosen: Sightings
     clouds: list[Points]
     order: list[int]
+    rays: dict[int, SightLines | None] = field(default_factory=dict)
     looks: list[Looked] = field(default_factory=list)
     nats: list[float] = field(default_factory=list)
 
     @property
     def looked_at(self) -> Sightings:
         """The object in the frames that were looked at."""
-        return self.chosen.part(sorted(self.order[: len(self.looks)]))
+        return self.chosen.part(self.places)
+
+    @property
+    def places(self) -> list[int]:
+        """Of the frames that were looked at, in time order."""
+        return sorted(self.order[: len(self.looks)])
 
     @property
     def in_time(self) -> list[Looked]:
@@ -130,6 +140,8 @@ class Completer:
             self._look(every, count)
             every = [one for one in every if self._may_be_a_vehicle(one, cost_m, nats)]
         self._look([one for one in every if one.said >= of.doubtful_nats], None)
+        if self.config.rays:
+            self._cut_rays([(one, i) for one in every if len(one.looks) > 1 for i in one.places])
         alone = completed([look for one in every for look in one.in_time], self.predictor)
         together = [self._together(alone, one) for one in every]
         seconds = (time.perf_counter() - began) / max(sum(map(len, together)), 1)
@@ -145,14 +157,32 @@ class Completer:
         """The next of those completed alone are of this object."""
         done = list(islice(alone, len(one.looks)))
         scans = [look.scans[0] for look in one.in_time]
-        return list(self.predictor.put_together(done, scans))
+        rays = [one.rays.get(i) for i in one.places] if self.config.rays else ()
+        return list(self.predictor.put_together(done, scans, rays))
 
     def _look(self, every: list[_Candidate], count: int | None) -> None:
         """Look at the first so many scans of each."""
         asked = [(one, i) for one in every for i in one.order[len(one.looks) : count]]
-        found = looks_at([one.clouds[i] for one, i in asked], self.predictor)
+        rays: Rays = ()
+        if self.config.rays_in_looks:
+            self._cut_rays(asked)
+            rays = [one.rays[i] for one, i in asked]
+        found = looks_at([one.clouds[i] for one, i in asked], self.predictor, rays)
         for (one, _), look in zip(asked, found):
             one.looks.append(look)
+
+    def _cut_rays(self, asked: list[tuple[_Candidate, int]]) -> None:
+        """The rays beside objects in some of their frames, by place, as far as they are missing."""
+        missing = [(one, i) for one, i in asked if i not in one.rays]
+        cut = RayCutter(self.drive, self.cuts).of([(one.chosen, i) for one, i in missing])
+        for (one, i), rays in zip(missing, cut):
+            one.rays[i] = self._level(rays)
+
+    def _level(self, rays: SightLines | None) -> SightLines | None:
+        T_level_sensor = self.T_level_sensor
+        if rays is None or T_level_sensor is None:
+            return rays
+        return rays.moved(T_level_sensor.rotation.numpy(), T_level_sensor.translation.numpy())
 
     def _may_be_a_vehicle(self, one: _Candidate, worst_cost_m: float, least_nats: float) -> bool:
         """Whether its looks do not speak against it; if they do, that is written."""

@@ -213,14 +213,15 @@ def cut_boxes(
         as_measured: the scan that the detector saw, if this one was corrected for motion.
     """
     stands = np.nan_to_num(heights, nan=0.0) > config.clusters.lowest_m
-    above, seen = scan[stands], as_measured[stands]
-    rows = points_in_boxes(seen, [one.box for one in boxes], config.detections)
-    full = [
-        (one, own) for one, own in zip(boxes, rows) if own.sum() >= config.detections.fewest_points
-    ]
+    above = np.flatnonzero(stands)
+    inside = points_in_boxes(as_measured[above], [one.box for one in boxes], config.detections)
+    found = [(one, above[own]) for one, own in zip(boxes, inside)]
+    full = [(one, own) for one, own in found if len(own) >= config.detections.fewest_points]
+    rows = np.concatenate([above[:0], *(own for _, own in full)])
     return CutScan(
-        points=np.concatenate([above[:0], *(above[own] for _, own in full)]),
-        counts=np.array([own.sum() for _, own in full], np.int64),
+        points=scan[rows],
+        rows=rows.astype(np.int32),
+        counts=np.array([len(own) for _, own in full], np.int64),
         scanned=len(scan),
         tracks=tuple(one.track for one, _ in full if one.track is not None),
     )

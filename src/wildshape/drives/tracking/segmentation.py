@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each scan of a drive cut: its ground taken away, what stands on it kept in a file a scan."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -29,12 +29,14 @@ class CutScan:
 
     Attributes:
         points: of all clusters, one after the other, sensor frame, metres.
+        rows: of each of them in the whole scan.
         counts: points of each cluster.
         scanned: points of the whole scan.
         tracks: the object that each cluster is, if known (`detections.py`).
     """
 
     points: Points
+    rows: Int[np.ndarray, "n"]
     counts: Int[np.ndarray, "k"]
     scanned: int
     tracks: tuple[str, ...] = ()
@@ -45,8 +47,15 @@ class CutScan:
 
     def cluster(self, row: int) -> Points:
         """The points of one."""
+        return self.points[self._of(row)]
+
+    def rows_of(self, clusters: Sequence[int]) -> Int[np.ndarray, "k"]:
+        """The rows of the points of some in the whole scan."""
+        return np.concatenate([self.rows[self._of(row)] for row in clusters])
+
+    def _of(self, row: int) -> slice:
         end = int(self.counts[: row + 1].sum())
-        return self.points[end - int(self.counts[row]) : end]
+        return slice(end - int(self.counts[row]), end)
 
 
 @dataclass(frozen=True)
@@ -100,16 +109,23 @@ class Cutter:
         del frame, as_measured
         parts = find_clusters(self.mounting.level(scan), heights, self.config.clusters)
         rows = np.concatenate(parts) if parts else np.empty(0, np.int64)
-        return CutScan(scan[rows], np.array([len(part) for part in parts], np.int64), len(scan))
+        counts = np.array([len(part) for part in parts], np.int64)
+        return CutScan(scan[rows], rows.astype(np.int32), counts, len(scan))
 
     def _heights(self, scan: Points) -> Float[np.ndarray, "n"]:
         level = self.mounting.level(scan)
         return height_above_ground(level, self.mounting.height_m, self.config.ground)
 
     def _write(self, frame: int, found: CutScan) -> None:
-        scanned, tracks = np.array(found.scanned), np.array(found.tracks, np.str_)
+        arrays = {
+            "points": found.points,
+            "rows": found.rows,
+            "counts": found.counts,
+            "scanned": np.array(found.scanned),
+            "tracks": np.array(found.tracks, np.str_),
+        }
         with atomic_write(cut_file(self.folder, frame)) as file:
-            np.savez(file, points=found.points, counts=found.counts, scanned=scanned, tracks=tracks)
+            np.savez(file, **arrays)
 
 
 def cut_file(folder: Path, frame: int) -> Path:
@@ -133,8 +149,8 @@ def _read_cut(path: Path, written_ns: int) -> CutScan:
     """As it was then: objects that are neighbours in time are in the same frames."""
     del written_ns
     with np.load(path, allow_pickle=False) as found:
-        points, counts = found["points"], found["counts"]
-        return CutScan(points, counts, int(found["scanned"]), tuple(found["tracks"].tolist()))
+        arrays = found["points"], found["rows"], found["counts"]
+        return CutScan(*arrays, int(found["scanned"]), tuple(found["tracks"].tolist()))
 
 
 def read_cuts(folder: Path, count: int) -> Iterator[CutScan]:

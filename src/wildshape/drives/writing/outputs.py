@@ -5,7 +5,7 @@
 import csv
 import io
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,20 +17,23 @@ from wildshape.drives.completing.completion import CATEGORY
 from wildshape.drives.completing.placing import Completed, boxes_in_scans
 from wildshape.drives.completing.turns import Turns
 from wildshape.drives.source import Drive
+from wildshape.drives.tracking.rays import RayCutter
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import COMPLETED, OBJECTS
 from wildshape.io.atomic import write_text
 from wildshape.io.boxes.detections import detections_of, pose_of
-from wildshape.io.boxes.table import BoxRow
+from wildshape.io.boxes.table import BoxRow, write_box_table
 from wildshape.io.guard import read_json
 from wildshape.io.poses import write_poses, write_tum
+from wildshape.io.rays import write_rays
 from wildshape.io.scans.points import read_points, write_ply
-from wildshape.io.tracks import write_track
+from wildshape.io.tracks import file_names, write_track
 from wildshape.records import Box
 
 TRAJECTORY, TUM, FRAMES, BOXES = "trajectory.txt", "trajectory.tum", "frames.csv", "boxes.csv"
 SHAPES, MESHES, MCAP, RRD = "shapes", "meshes", "drive.mcap", "drive.rrd"
+TRACKS = "tracks"
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,80 @@ def write_frames(path: Path, drive: Drive, points: Sequence[int]) -> None:
     write_text(path, text.getvalue())
 
 
+@dataclass(frozen=True)
+class RayWriter:
+    """Writes the rays beside vehicles into their track folders, a frame at a time.
+
+    Attributes:
+        cutter: of the drive.
+        files: by frame: where each vehicle's go, and its clusters.
+    """
+
+    cutter: RayCutter
+    files: dict[int, list[tuple[Path, tuple[int, ...]]]]
+
+    @classmethod
+    def of(cls, out: Path, vehicles: Sequence[Vehicle], drive: Drive, cuts: Path) -> "RayWriter":
+        """For the vehicles whose track folders are not there yet; arguments as `write_vehicle`."""
+        files: dict[int, list[tuple[Path, tuple[int, ...]]]] = {}
+        for seen in (one.completed.seen for one in vehicles):
+            track = out / TRACKS / seen.name
+            if _is_written(track):
+                continue
+            scans = file_names([drive.scan_names[frame] for frame in seen.frames])
+            for frame, rows, scan in zip(seen.frames, seen.rows, scans):
+                files.setdefault(frame, []).append((track / "rays" / f"{scan}.npz", rows))
+        return cls(RayCutter(drive, cuts), files)
+
+    def missing(self) -> list[int]:
+        """The frames of which a file is not there yet."""
+        return [
+            frame
+            for frame, files in sorted(self.files.items())
+            if not all(path.is_file() for path, _ in files)
+        ]
+
+    def __call__(self, frame: int) -> None:
+        """Cut and write those of one frame."""
+        files = self.files[frame]
+        found = self.cutter.in_frame(frame, [rows for _, rows in files])
+        for (path, _), rays in zip(files, found):
+            if rays is not None:
+                write_rays(path, rays)
+
+
+def write_vehicles(
+    out: Path,
+    vehicles: Sequence[Vehicle],
+    folders: Path,
+    cuts: Path,
+    drive: Drive,
+    turns: Turns,
+    at: Callable[[int], None],
+) -> int:
+    """`boxes.csv`, and of each vehicle what `write_vehicle` writes.
+
+    Args:
+        out: folder of the results.
+        vehicles: of the drive.
+        folders: of the completed objects.
+        cuts: folder of the clusters.
+        drive: whose.
+        turns: of its sensor.
+        at: told how many vehicles are done.
+
+    Returns:
+        Lines of `boxes.csv`.
+    """
+    rows = []
+    for number, one in enumerate(vehicles, 1):
+        write_vehicle(out, one, folders / one.name, cuts, drive)
+        rows += rows_of(one, boxes_of(one, turns), drive)
+        at(number)
+    write_box_table(out / BOXES, rows)
+    return len(rows)
+
+
 def write_vehicle(out: Path, one: Vehicle, folder: Path, cuts: Path, drive: Drive) -> None:
     """A vehicle's track, completed object and shape, as far as they are not there yet.
 
@@ -79,15 +156,19 @@ def write_vehicle(out: Path, one: Vehicle, folder: Path, cuts: Path, drive: Driv
         cuts: folder of the clusters.
         drive: whose.
     """
-    write_vehicle_track(out / "tracks", one.completed.seen, cuts, drive)
+    write_vehicle_track(out / TRACKS, one.completed.seen, cuts, drive)
     copy_object(folder, out / "objects" / one.name)
     write_shape(out / SHAPES / f"{one.name}.ply", folder, one.completed.ahead_m)
 
 
 def write_vehicle_track(out: Path, seen: Sightings, cuts: Path, drive: Drive) -> None:
     """All scans of a vehicle as a track folder, if it is not there yet."""
-    if not (out / seen.name / "scans").is_dir():
+    if not _is_written(out / seen.name):
         write_track(out / seen.name, seen.track(cuts, drive, CATEGORY))
+
+
+def _is_written(track: Path) -> bool:
+    return (track / "scans").is_dir()
 
 
 def copy_object(folder: Path, target: Path) -> None:
