@@ -266,10 +266,11 @@ def test_clusters_in_the_box_of_a_vehicle_are_its_own(tmp_path):
 
     front, rear, beside = piece(1.5, 0.0), piece(-1.5, 0.0), piece(0.0, 1.4)
     for frame in range(3):
-        counts = np.array([20, 20, 20])
+        counts, rows = np.array([20, 20, 20]), np.arange(60)
         points = np.concatenate((beside, front, rear)).astype(np.float32)
         with cut_file(tmp_path, frame).open("wb") as file:
-            np.savez(file, points=points, counts=counts, scanned=90, tracks=np.array([], str))
+            known = {"points": points, "rows": rows, "counts": counts}
+            np.savez(file, **known, scanned=90, tracks=np.array([], str))
     at = [(0.0, 0.0, 0.0, 0.0)]
     whole = replace(completed(at, name="whole"), seen=Sightings("whole", (0,), ((1,),), (20,)))
     again = replace(completed(at, name="again"), seen=Sightings("again", (2,), ((2,),), (20,)))

@@ -111,6 +111,7 @@ def test_tracks_and_objects_are_those_of_the_other_commands(found):
         assert len({(row.length, row.width, row.height) for row in rows}) == 1
         seen = {f"{row.frame:06d}": row.points for row in rows if row.points}
         assert {n: len(s) for n, s in zip(track.scan_names, track.scans)} == seen
+        assert all(rays is not None and len(rays) > 100 for rays in track.rays)
         completed = {path.stem for path in (found.out / "objects" / name / "completed").iterdir()}
         assert completed == {one.scan for one in boxes if one.track == name} <= set(seen)
 
@@ -229,8 +230,9 @@ def test_a_scan_is_read_once_for_the_way_and_its_clusters(recording, tmp_path):
     assert torch.equal(found.T_world_sensor.matrix, alone.T_world_sensor.matrix)
     again = replace(cutter, folder=tmp_path / "again")
     again(3)
-    cut, other = (read_cut(one.folder, 3).points for one in (cutter, again))
-    assert np.array_equal(cut, other)
+    cut, other = (read_cut(one.folder, 3) for one in (cutter, again))
+    assert np.array_equal(cut.points, other.points)
+    assert np.array_equal(cut.points, drive.scan(3)[cut.rows])
 
 
 def test_three_scans_an_empty_and_a_damaged_one_are_warnings(recording, tmp_path):

@@ -45,7 +45,7 @@ def test_a_run_killed_at_any_stage_goes_on_to_the_same_boxes(
         (run, "linked_clusters"),
         (run, "write_sightings"),
         (run, "judge"),
-        (outputs, "write_rays"),
+        (outputs, "rays_bytes"),
         (outputs, "rows_of"),
     ):
         with monkeypatch.context() as patched:

@@ -327,7 +327,7 @@ class _Run:
 
     def write(self, vehicles: list[Vehicle], turns: Turns) -> int:
         writer = RayWriter.of(self.results, vehicles, self.drive, self.cuts)
-        self.spread("rays", writer, writer.missing(), len(writer.files))
+        self.spread("rays", writer, sorted(writer.files), len(writer.files))
         with self.clock.stage("outputs", len(vehicles)) as at:
             folders = self.completing / "objects"
             return write_vehicles(self.results, vehicles, folders, self.cuts, self.drive, turns, at)

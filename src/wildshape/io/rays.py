@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sight lines on disk: `rays/<scan>.npz` of a track folder (docs/formats.md)."""
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,14 @@ def read_rays(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> Sig
 
 def write_rays(path: Path | str, rays: SightLines) -> None:
     """Write rays as `.npz`, atomically, metres."""
+    with atomic_write(path) as file:
+        file.write(rays_bytes(rays))
+
+
+def rays_bytes(rays: SightLines) -> bytes:
+    """What a `.npz` of rays holds, metres."""
     known = {"directions": rays.directions, "ranges": rays.ranges, _OPTIONAL: rays.origins}
     arrays: dict[str, Any] = {name: value for name, value in known.items() if value is not None}
-    with atomic_write(path) as file:
-        np.savez(file, **arrays)
+    file = BytesIO()
+    np.savez(file, **arrays)
+    return file.getvalue()

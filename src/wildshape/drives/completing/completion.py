@@ -9,6 +9,7 @@ what costs too much or has no size of a vehicle is left there. The others are co
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 
@@ -112,6 +113,11 @@ class Completer:
     config: CompletionConfig
     vehicles: VehicleConfig
 
+    @cached_property
+    def rays(self) -> RayCutter:
+        """Cuts those beside the objects."""
+        return RayCutter(self.drive, self.cuts)
+
     def groups(self, objects: list[Sightings]) -> list[list[Sightings]]:
         """The objects in groups that are worked on together, whatever was done before."""
         return [objects[i : i + _GROUP] for i in range(0, len(objects), _GROUP)]
@@ -174,7 +180,7 @@ class Completer:
     def _cut_rays(self, asked: list[tuple[_Candidate, int]]) -> None:
         """The rays beside objects in some of their frames, by place, as far as they are missing."""
         missing = [(one, i) for one, i in asked if i not in one.rays]
-        cut = RayCutter(self.drive, self.cuts).of([(one.chosen, i) for one, i in missing])
+        cut = self.rays.of([(one.chosen, i) for one, i in missing])
         for (one, i), rays in zip(missing, cut):
             one.rays[i] = self._level(rays)
 

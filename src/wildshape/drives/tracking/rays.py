@@ -3,27 +3,28 @@
 """The rays beside the objects of a drive, cut out of its whole scans."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.segmentation import read_cut
 from wildshape.drives.tracking.sightings import Sightings
-from wildshape.geometry.projection.full_scan import sight_lines
+from wildshape.geometry.projection.full_scan import FullScan, sight_lines
 from wildshape.geometry.projection.sight_lines import SightLines
 
+_HELD = 32  # scans that are kept in memory: objects that are neighbours in time share them
 
-@dataclass(frozen=True)
+
 class RayCutter:
-    """Cuts rays out of the scans of a drive.
+    """Cuts rays out of the scans of a drive."""
 
-    Attributes:
-        drive: its scans are read one by one.
-        cuts: folder of its clusters.
-    """
+    def __init__(self, drive: Drive, cuts: Path) -> None:
+        """`cuts`: folder of the drive's clusters."""
+        self.drive, self.cuts = drive, cuts
+        self._held: dict[int, FullScan] = {}
 
-    drive: Drive
-    cuts: Path
+    def __reduce__(self) -> tuple[type["RayCutter"], tuple[Drive, Path]]:
+        """Scans do not go along to another process."""
+        return RayCutter, (self.drive, self.cuts)
 
     def in_frame(self, frame: int, objects: Sequence[tuple[int, ...]]) -> list[SightLines | None]:
         """Those beside each of some objects, sensor frame; None for all if the scan is not there.
@@ -32,19 +33,27 @@ class RayCutter:
             frame: which.
             objects: the clusters of each.
         """
-        full, cut = self.drive.full_scan(frame), read_cut(self.cuts, frame)
+        full, cut = self._scan(frame), read_cut(self.cuts, frame)
         if len(full.points) != cut.scanned:
             return [None] * len(objects)
         return [sight_lines(full, cut.rows_of(clusters)) for clusters in objects]
 
     def of(self, asked: Sequence[tuple[Sightings, int]]) -> list[SightLines | None]:
-        """Those beside objects in one of their frames each, by place; a scan is read once."""
+        """Those beside objects, each in one of its frames, by place; scans held come first."""
         by_frame: dict[int, list[int]] = {}
         for number, (seen, place) in enumerate(asked):
             by_frame.setdefault(seen.frames[place], []).append(number)
         found: list[SightLines | None] = [None] * len(asked)
-        for frame, numbers in by_frame.items():
+        for frame in sorted(by_frame, key=lambda frame: (frame not in self._held, frame)):
+            numbers = by_frame[frame]
             objects = [asked[number][0].rows[asked[number][1]] for number in numbers]
             for number, rays in zip(numbers, self.in_frame(frame, objects)):
                 found[number] = rays
         return found
+
+    def _scan(self, frame: int) -> FullScan:
+        """A frame's; the one not asked for longest is given up for it."""
+        self._held[frame] = self._held.pop(frame, None) or self.drive.full_scan(frame)
+        if len(self._held) > _HELD:
+            del self._held[next(iter(self._held))]
+        return self._held[frame]

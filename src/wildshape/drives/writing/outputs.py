@@ -26,7 +26,7 @@ from wildshape.io.boxes.detections import detections_of, pose_of
 from wildshape.io.boxes.table import BoxRow, write_box_table
 from wildshape.io.guard import read_json
 from wildshape.io.poses import write_poses, write_tum
-from wildshape.io.rays import write_rays
+from wildshape.io.rays import rays_bytes
 from wildshape.io.scans.points import read_points, write_ply
 from wildshape.io.tracks import file_names, write_track
 from wildshape.records import Box
@@ -97,21 +97,14 @@ class RayWriter:
                 files.setdefault(frame, []).append((track / "rays" / f"{scan}.npz", rows))
         return cls(RayCutter(drive, cuts), files)
 
-    def missing(self) -> list[int]:
-        """The frames of which a file is not there yet."""
-        return [
-            frame
-            for frame, files in sorted(self.files.items())
-            if not all(path.is_file() for path, _ in files)
-        ]
-
     def __call__(self, frame: int) -> None:
-        """Cut and write those of one frame."""
+        """Cut and write those of one frame; half a file is written again, for no track has it."""
         files = self.files[frame]
         found = self.cutter.in_frame(frame, [rows for _, rows in files])
         for (path, _), rays in zip(files, found):
             if rays is not None:
-                write_rays(path, rays)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(rays_bytes(rays))
 
 
 def write_vehicles(

@@ -62,10 +62,10 @@ class FullScan:
         frustum = _Frustum.around(self.points[rows])
         span = frustum.azimuths()
         some = np.arange(len(self.ends)) if span is None else self._sorted.between(*span)
-        own = np.zeros(len(self.ends), bool)
-        own[rows] = True
-        found = some[frustum.rows_within(self.ends[some])]
-        return thinned(np.sort(found[~own[found]]), most)
+        beside = np.zeros(len(self.ends), bool)
+        beside[some[frustum.rows_within(self.ends[some])]] = True
+        beside[rows] = False
+        return thinned(np.flatnonzero(beside), most)
 
 
 def sight_lines(
@@ -107,7 +107,7 @@ class _Sorted(NamedTuple):
     def of(cls, ends: Float[np.ndarray, "n 3"]) -> "_Sorted":
         bins = np.floor(_bins(np.arctan2(ends[:, 1], ends[:, 0]))).astype(np.int64)
         bins = (bins % _BINS).astype(np.uint16)
-        order = np.argsort(bins, kind="stable")
+        order = np.argsort(bins, kind="stable").astype(np.int32)
         return cls(order, bins[order])
 
     def between(self, low: float, high: float) -> Int[np.ndarray, "k"]:
@@ -138,9 +138,10 @@ class _Frustum(NamedTuple):
     @classmethod
     def around(cls, points: Float[np.ndarray, "k 3"]) -> "_Frustum":
         points = points.astype(np.float64)
-        axes = _facing(points)
+        away = np.linalg.norm(points, axis=1)
+        axes = _facing(points / np.maximum(away, 1e-9)[:, None])
         own = _angles(points @ axes)
-        nearest = max(float(np.linalg.norm(points, axis=1).min()), _NEAREST_M)
+        nearest = max(float(away.min()), _NEAREST_M)
         return cls(axes, own.min(0) - _MARGIN_M / nearest, own.max(0) + _MARGIN_M / nearest)
 
     def rows_within(self, ends: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, "k"]:
@@ -178,10 +179,10 @@ def _bins(azimuth: Float[np.ndarray, "*any"] | float) -> Float[np.ndarray, "*any
     return np.asarray((azimuth + np.pi) * (_BINS / (2 * np.pi)))
 
 
-def _facing(points: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "3 3"]:
-    """Axes as columns: along the mean direction of points, to its left and up."""
-    away = points / np.maximum(np.linalg.norm(points, axis=1, keepdims=True), 1e-9)
-    forward = away.mean(0) / max(float(np.linalg.norm(away.mean(0))), 1e-9)
+def _facing(directions: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "3 3"]:
+    """Axes as columns: along the mean of directions, to its left and up."""
+    mean = directions.mean(0)
+    forward = mean / max(float(np.linalg.norm(mean)), 1e-9)
     x, y, z = forward.tolist()
     left = np.array((-y, x, 0.0) if abs(z) < 0.9 else (0.0, -z, y))  # across z, else across x
     left /= np.linalg.norm(left)
