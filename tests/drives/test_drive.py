@@ -111,7 +111,7 @@ def test_tracks_and_objects_are_those_of_the_other_commands(found):
         assert len({(row.length, row.width, row.height) for row in rows}) == 1
         seen = {f"{row.frame:06d}": row.points for row in rows if row.points}
         assert {n: len(s) for n, s in zip(track.scan_names, track.scans)} == seen
-        assert all(rays is not None and len(rays) > 100 for rays in track.rays)
+        assert track.rays == ()
         completed = {path.stem for path in (found.out / "objects" / name / "completed").iterdir()}
         assert completed == {one.scan for one in boxes if one.track == name} <= set(seen)
 

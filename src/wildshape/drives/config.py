@@ -180,7 +180,11 @@ class LinkConfig:
 
 @dataclass(frozen=True)
 class DriveConfig:
-    """Everything that decides what a drive gives besides the checkpoint."""
+    """Everything that decides what a drive gives besides the checkpoint.
+
+    Attributes:
+        rays: those beside each vehicle are written into its track, too. The others: of each stage.
+    """
 
     mounting: MountingConfig = field(default_factory=MountingConfig)
     trajectory: TrajectoryConfig = field(default_factory=TrajectoryConfig)
@@ -196,3 +200,4 @@ class DriveConfig:
     surroundings: SurroundingsConfig = field(default_factory=SurroundingsConfig)
     carving: CarveConfig = field(default_factory=CarveConfig)
     boxes: BoxConfig = field(default_factory=BoxConfig)
+    rays: bool = False

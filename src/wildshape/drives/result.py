@@ -98,11 +98,19 @@ def settings_of(
     }
 
 
-def line_of(source: Path, out: Path, topic: str | None, detections: DetectionFile | None) -> str:
+def line_of(
+    source: Path,
+    out: Path,
+    topic: str | None,
+    config: DriveConfig,
+    detections: DetectionFile | None,
+) -> str:
     """The command that finds the same; arguments as of `drive`."""
     chosen = [] if topic is None else ["--topic", topic]
     if detections is not None:
         chosen += ["--detections", str(detections.path)]
+    if config.rays:
+        chosen.append("--rays")
     return shlex.join(("wildshape", "drive", str(source), "--out", str(out), *chosen))
 
 

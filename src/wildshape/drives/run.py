@@ -118,7 +118,7 @@ def drive(
     predictor = load(config=INFERENCE) if predictor is None else predictor
     keep_apart(source, out)
     settings = settings_of(source, recording, topic, config, predictor, detections)
-    line = line_of(source, out, topic, detections)
+    line = line_of(source, out, topic, config, detections)
     second_pass.put_in_place(out)
     run = _Run(recording, out, config, predictor, ALONE, given, Clock(watch))
     done = None if overwrite else finished(out, "drive", settings, parts=(BOXES, FRAMES))
@@ -326,8 +326,9 @@ class _Run:
             ]
 
     def write(self, vehicles: list[Vehicle], turns: Turns) -> int:
-        writer = RayWriter.of(self.results, vehicles, self.drive, self.cuts)
-        self.spread("rays", writer, sorted(writer.files), len(writer.files))
+        if self.config.rays:
+            writer = RayWriter.of(self.results, vehicles, self.drive, self.cuts)
+            self.spread("rays", writer, sorted(writer.files), len(writer.files))
         with self.clock.stage("outputs", len(vehicles)) as at:
             folders = self.completing / "objects"
             return write_vehicles(self.results, vehicles, folders, self.cuts, self.drive, turns, at)

@@ -95,6 +95,9 @@ class Settings:
     rerun: Annotated[
         bool, arg(help="also write DIR/drive.rrd, to play in Rerun (extra `rerun`)")
     ] = False
+    rays: Annotated[
+        bool, arg(help="keep the rays around each vehicle that did not hit it, too, in tracks/")
+    ] = False
     detections: Annotated[
         Path | None,
         option(
@@ -132,7 +135,7 @@ def run(settings: Settings) -> None:
     """
     from wildshape.cli.terminal import say
     from wildshape.drives.adapting.adapt import adapt_to
-    from wildshape.drives.config import INFERENCE
+    from wildshape.drives.config import INFERENCE, DriveConfig
     from wildshape.drives.writing.files import DriveFiles
     from wildshape.inference.predictor import load
     from wildshape.report.drive.many import DriveAndPage
@@ -145,6 +148,7 @@ def run(settings: Settings) -> None:
     task = DriveAndPage(
         predictor=load(settings.network.model, settings.network.device, config=INFERENCE),
         topic=settings.topic,
+        config=DriveConfig(rays=settings.rays),
         files=files,
         detections=detections,
         report=not settings.no_report,

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from wildshape.drives.adapting.adapt import Adaptation
 from wildshape.drives.clock import Watch, silent
+from wildshape.drives.config import DriveConfig
 from wildshape.drives.result import REPORT, DriveResult
 from wildshape.drives.run import drive
 from wildshape.drives.tracking.detections import DetectionFile
@@ -18,7 +19,7 @@ from wildshape.io.progress import SILENT, Progress
 from wildshape.parallel.team import cores, team
 from wildshape.report.drive.page import write_drive_report
 
-_NO_FILES = DriveFiles()
+_CONFIG, _NO_FILES = DriveConfig(), DriveFiles()
 
 
 @dataclass(frozen=True)
@@ -27,13 +28,14 @@ class DriveAndPage:
 
     Attributes:
         predictor: completes the objects.
-        topic: see `drive`, as `files`, `detections`, `adapt` and `overwrite`.
+        topic: see `drive`, as `config`, `files`, `detections`, `adapt` and `overwrite`.
         report: write the page, too, where there is none.
         workers: processes for one drive.
     """
 
     predictor: Predictor
     topic: str | None = None
+    config: DriveConfig = _CONFIG
     files: DriveFiles = _NO_FILES
     detections: DetectionFile | None = None
     adapt: Adaptation | None = None
@@ -51,6 +53,7 @@ class DriveAndPage:
         found = drive(
             source,
             out,
+            self.config,
             topic=self.topic,
             predictor=self.predictor,
             workers=self.workers,
