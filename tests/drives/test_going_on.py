@@ -22,6 +22,7 @@ from wildshape.drives.config import INFERENCE, ClusterConfig, DriveConfig
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.tracking.sightings import read_sightings
 from wildshape.drives.writing import outputs
+from wildshape.inference.predictor import Predictor
 from wildshape.io.boxes.table import read_box_table
 from wildshape.io.tracks import read_track
 from wildshape.method.checkpoint import SHIPPED, load_checkpoint, save_checkpoint
@@ -116,7 +117,8 @@ def test_other_settings_do_not_go_on_with_an_output(found, recording):
     refused(wildshape.drive, recording, found.out, other, match="--overwrite")
 
 
-def test_what_is_missing_of_a_group_is_completed_as_it_was(found, recording, tmp_path):
+def test_what_is_missing_of_a_group_is_completed_as_it_was(found, recording, tmp_path, monkeypatch):
+    """From the scans and the rays beside the object, whole tracks alone."""
     of, stages = DriveConfig(), found.out / "stages"
     completer = Completer(
         wildshape.load(config=INFERENCE),
@@ -135,5 +137,16 @@ def test_what_is_missing_of_a_group_is_completed_as_it_was(found, recording, tmp
     lost = next(iter(before)).parents[1]
     shutil.rmtree(lost)
     assert completer.missing(objects)[0] == group
+    predictor, asked = completer.predictor, []
+
+    def together(alone, scans, rays):
+        asked.append((scans, rays))
+        return Predictor.put_together(predictor, alone, scans, rays)
+
+    monkeypatch.setattr(predictor, "put_together", together)
     completer(group)
+    assert any(len(scans) > 1 for scans, _ in asked)
+    for scans, rays in asked:
+        assert len(rays) == len(scans)
+        assert (None in rays) == (len(scans) == 1)
     assert {file: file.read_bytes() for file in tmp_path.rglob("*.ply")} == before

@@ -12,6 +12,7 @@ from tests.refusal import refused
 import wildshape
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.as_points import as_rays
+from wildshape.inference.choose_hypothesis import Looked
 from wildshape.inference.config import FreeSpaceConfig
 from wildshape.inference.free_space import SeenScores, Sights, without_free_space
 from wildshape.io.rays import write_rays
@@ -62,6 +63,20 @@ def test_shape_in_free_space_costs_and_what_is_hidden_does_not(track: Track) -> 
     # The nearer half, y > 0, was nearer to the scan: without it the mean is larger.
     assert float(seen.projection) > float(plain.projection) + 0.5
     assert float(plain.cost(0.25)) == float(plain.observation + 0.25 * plain.projection)
+
+
+def test_looks_one_by_one_keep_their_rays(track: Track) -> None:
+    model = wildshape.load()
+    rays = [track.rays[0], None]
+    looked = model.look(track.scans, rays)
+    again = Looked.joined([*looked.each()])
+    assert list(again.rays) == rays
+    pairs = zip(model.complete_looked(looked), model.complete_looked(again), strict=True)
+    assert all(one.box == same.box for one, same in pairs)
+    apart = [one.sights for one in looked.each()]
+    assert [None if one is None else list(one.rays) for one in apart] == [rays[:1], rays[1:]]
+    without = Looked.joined([*model.look(track.scans).each()])
+    assert without.sights is None
 
 
 def test_rays_may_be_handed_in_in_any_form_and_none_change_nothing(track: Track, tmp_path) -> None:
