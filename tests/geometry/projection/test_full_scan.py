@@ -61,8 +61,11 @@ def test_rays_that_did_not_come_back_and_where_rays_began_are_kept():
     starts = np.array([[0.0, 1, 0]] * 4, np.float32)
     own, lost = np.array([0]), np.array([[1.0, 0.0, 0.05]], np.float32)
     rays = sight_lines(FullScan(points, lost=lost), own)
+    assert rays is not None
     assert np.isinf(rays.ranges).tolist() == [False, False, True]
     moved = sight_lines(FullScan(points, starts), own)
+    assert moved is not None
+    assert moved.origins is not None
     assert moved.origins.tolist() == [[0, 1, 0], [0, 1, 0]]
     assert np.allclose(moved.ends, points[[1, 2]])
     assert sight_lines(FullScan(points), own[:0]) is None
