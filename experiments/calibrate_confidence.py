@@ -8,23 +8,22 @@
 Fitted to simulated streets, whose other objects are no vehicles, and to simulated tracks behind
 things, with rays and without. Nothing real is fitted to: `--check` names labelled tracks that the
 figures are also of. Those of simulated data are of streets and sets of tracks left out in turn.
-What was completed is kept in OUT. Prints tables and writes OUT/trust.json.
+What was completed is kept in OUT, a file a street or set of tracks, by several processes with
+`--workers 2`: new weights need a new OUT. Prints tables and writes OUT/trust.json.
 """
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
 import tyro
 from experiments.confidence import rewrite
-from experiments.trust_data import Both, Known, of_street, of_tracks
+from experiments.trust_data import Both, Known
+from experiments.trust_parts import STREETS, Parts
 
 from wildshape.evaluation.calibration import auroc, calibration
-from wildshape.inference.predictor import Predictor, load
-from wildshape.io.atomic import atomic_write, write_json
-from wildshape.io.inputs import open_tracks
+from wildshape.io.atomic import write_json
 from wildshape.io.output import provenance
 from wildshape.method.checkpoint import SHIPPED, weights_file
 from wildshape.method.trust import (
@@ -38,22 +37,11 @@ from wildshape.method.trust import (
     Trust,
     fit_logistic,
 )
-from wildshape.simulate.config import SimulationConfig
-from wildshape.simulate.generate import simulate_tracks
-from wildshape.simulate.street.drive_folder import write_drive
-from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
 
 _FITTED_ON = "simulated streets and tracks with their truth: procedural vehicles"
-_STREET = StreetConfig(scans=60)
-_BEHIND = SimulationConfig(scans=6, occlusion=0.6, rays=2048)
-_TRACKS = {
-    "hdl64": replace(_BEHIND, tracks=60, varied=True),
-    "hdl32": replace(_BEHIND, tracks=30, varied=True, sensor="hdl32"),
-    "os1-128": replace(_BEHIND, tracks=25, varied=True, sensor="os1-128"),
-}
-STREETS = (5, 6, 7, 8, 9, 10, 11, 12)
-_SEED, _RIDGE = 7301, 20.0  # scans of one object err alike
+_RIDGE = 20.0  # scans of one object err alike
 _KINDS = ("pose", "box", "kind")
+_ALIKE = "alike"
 
 
 @dataclass(frozen=True)
@@ -67,6 +55,7 @@ class Settings:
         streets: seeds of the simulated streets.
         share: of the simulated tracks; below 1 to try it.
         check: folders of labelled tracks.
+        workers: processes that complete streets and sets of tracks, one each at a time.
     """
 
     out: Path
@@ -75,23 +64,25 @@ class Settings:
     streets: tuple[int, ...] = STREETS
     share: float = 1.0
     check: tuple[Path, ...] = ()
+    workers: int = 1
 
 
 def main(settings: Settings) -> None:
     """Complete, fit, hold, write."""
     settings.out.mkdir(parents=True, exist_ok=True)
     model = weights_file(settings.model)
-    predictor = load(model)
-    fitted = _simulated(predictor, settings)
-    real = {path.name: _real(predictor, path, settings.out) for path in settings.check}
+    parts = Parts(settings.out, model, settings.streets, settings.share)
+    fitted = parts.simulated(settings.workers)
+    real = {path.name: parts.real(path) for path in settings.check}
+    scans, tracks = _scans(fitted), _tracks(fitted)
     trust = Trust(
-        scan=fit([part.scan for part in fitted.values()], OF_SCAN, ScanFeatures._fields),
-        track=fit([part.track for part in fitted.values()], OF_TRACK, TrackFeatures._fields),
+        scan=fit(list(scans.values()), OF_SCAN, ScanFeatures._fields),
+        track=fit(list(tracks.values()), OF_TRACK, TrackFeatures._fields),
         fitted_on=_FITTED_ON,
     )
     said = {
-        "scan": held(trust.scan, _part(fitted, "scan"), _part(real, "scan"), OF_SCAN),
-        "track": held(trust.track, _part(fitted, "track"), _part(real, "track"), OF_TRACK),
+        "scan": held(trust.scan, scans, _scans(real), OF_SCAN),
+        "track": held(trust.track, tracks, _tracks(real), OF_TRACK),
     }
     line = "python -m experiments.calibrate_confidence --out OUT"
     report = {"trust": asdict(trust), "held": said, "provenance": provenance(line)}
@@ -100,53 +91,14 @@ def main(settings: Settings) -> None:
         rewrite(model, settings.write, trust=trust)
 
 
-def _part(known: dict[str, Both], name: str) -> dict[str, Known]:
-    return {key: getattr(both, name) for key, both in known.items()}
+def _scans(known: dict[str, Both]) -> dict[str, Known]:
+    return {name: both.scan for name, both in known.items()}
 
 
-def _simulated(predictor: Predictor, settings: Settings) -> dict[str, Both]:
-    out, found = settings.out, {}
-    for seed in settings.streets:
-        drive, cuts = out / f"street{seed}", out / f"clusters{seed}"
-
-        def street(drive: Path = drive, cuts: Path = cuts, seed: int = seed) -> Both:
-            write_drive(WholeDrive(_STREET, seed), drive)
-            cuts.mkdir(exist_ok=True)
-            return of_street(predictor, drive, cuts, seed)
-
-        found[f"street{seed}"] = _kept(out / f"street{seed}.npz", street)
-    for number, (name, config) in enumerate(_TRACKS.items()):
-        config = replace(config, tracks=max(round(settings.share * config.tracks), 4))
-
-        def behind(config: SimulationConfig = config, number: int = number) -> Both:
-            tracks = list(simulate_tracks(config, _SEED + number, workers=1))
-            parts = [of_tracks(predictor, tracks, rays) for rays in (False, True)]
-            return Both(*map(Known.joined, zip(*parts)))
-
-        found[name] = _kept(out / f"{name}.npz", behind)
-    return found
-
-
-def _real(predictor: Predictor, path: Path, out: Path) -> Both:
-    source = open_tracks(path)
-    tracks = [source[i] for i in range(len(source)) if source[i].label_size_m]
-    return _kept(out / f"{path.name}.npz", lambda: of_tracks(predictor, tracks, rays=False))
-
-
-def _kept(path: Path, make: Callable[[], Both]) -> Both:
-    """What was completed before, or is now."""
-    if not path.is_file():
-        made = make()
-        columns = {
-            f"{part}_{name}": values
-            for part, known in made._asdict().items()
-            for name, values in known._asdict().items()
-        }
-        with atomic_write(path) as file:
-            np.savez(file, **columns)
-        print(f"{path.stem}: {len(made.scan.pose)} scans", flush=True)
-    with np.load(path) as found:
-        return Both(*(Known(*(found[f"{p}_{n}"] for n in Known._fields)) for p in Both._fields))
+def _tracks(known: dict[str, Both]) -> dict[str, Known]:
+    tracks = {name: both.track for name, both in known.items()}
+    alike = {f"{name} {_ALIKE}": both.alike for name, both in known.items()}
+    return tracks | {name: part for name, part in alike.items() if len(part.kind)}
 
 
 def fit(parts: list[Known], chosen: Chosen, names: tuple[str, ...]) -> Calibrator:
@@ -177,14 +129,16 @@ def held(
     names = ScanFeatures._fields if chosen is OF_SCAN else TrackFeatures._fields
     found: dict[str, tuple[Known, np.ndarray]] = {}
     for left, known in simulated.items():
-        others = [part for name, part in simulated.items() if name != left]
+        others = [part for name, part in simulated.items() if name.split()[0] != left.split()[0]]
         found[left] = (known, stated(fit(others, chosen, names), known, names))
     for name, known in real.items():
         found[name] = (known, stated(calibrator, known, names))
-    streets = [name for name in simulated if name.startswith("street")]
+    alike = [name for name in simulated if name.endswith(_ALIKE)]
+    streets = [name for name in simulated if name.startswith("street") and name not in alike]
     sets = {
         "streets": streets,
-        "tracks": [name for name in simulated if name not in streets],
+        "streets, views alike": alike,
+        "tracks": [name for name in simulated if name not in (*streets, *alike)],
         **{name: [name] for name in real},
         "streets and real": [*streets, *real],
     }

@@ -7,7 +7,8 @@ whose points lie in a vehicle's box is one; one of few such points is none.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,9 +30,10 @@ from wildshape.evaluation.calibration import HEADING_DEG, LEAST_BEV
 from wildshape.evaluation.drives.labels import LabelledFrame, read_labels
 from wildshape.evaluation.drives.overlap import UprightBox, overlaps
 from wildshape.inference.predictor import Predictor
+from wildshape.method.trust import ScanFeatures, TrackFeatures
 from wildshape.records import Completion, Points, Track
 
-_SCANS, _TICKS, _OBJECTS = 6, 4, 60
+_SCANS, _TICKS, _OBJECTS, _ALIKE = 6, 4, 60, 3
 _IS, _IS_NOT, _AROUND_M = 0.7, 0.3, 0.1
 _NONE, _UNCLEAR = 0.0, math.nan
 
@@ -70,19 +72,24 @@ class Known(NamedTuple):
 
 
 class Both(NamedTuple):
-    """The same scans completed alone, and as a track."""
+    """The same scans completed alone, and as a track; and tracks of which all views are alike."""
 
     scan: Known
     track: Known
+    alike: Known
 
 
 class _Case(NamedTuple):
-    """An object's scans, the label of each if it is a vehicle, and whether it is one."""
+    """An object's scans, the label of each if it is a vehicle, and whether it is one.
+
+    `alike`: they were taken one after another, from nearly the same place.
+    """
 
     scans: list[Points]
     labels: list[UprightBox | None]
     kind: float
     rays: tuple = ()
+    alike: bool = False
 
 
 def of_street(predictor: Predictor, drive: Path, cuts: Path, seed: int) -> Both:
@@ -114,10 +121,26 @@ def _objects(folder: Path, cuts: Path, seed: int) -> Iterator[_Case]:
         parts = min(_SCANS, (one.frames[-1] - one.frames[0]) // _TICKS + 1)
         case = _case(fullest_of_parts(one, parts), cuts, labels)
         if not math.isnan(case.kind):
-            (vehicles if case.kind else others).append(case)
+            (vehicles if case.kind else others).append((one, case))
     rng = np.random.default_rng(seed)
     for found in (vehicles, others):
-        yield from (found[i] for i in rng.permutation(len(found))[:_OBJECTS])
+        for i in rng.permutation(len(found))[:_OBJECTS]:
+            one, case = found[i]
+            yield case
+            yield from _alike(one, cuts, labels, rng)
+
+
+def _alike(
+    one: Sightings, cuts: Path, labels: Sequence[LabelledFrame], rng: np.random.Generator
+) -> Iterator[_Case]:
+    """Some scans of an object that follow each other, if it was seen so often."""
+    later = len(one.frames) - _ALIKE
+    if later < 0:
+        return
+    start = int(rng.integers(later + 1))
+    case = _case(one.part(list(range(start, start + _ALIKE))), cuts, labels)
+    if not math.isnan(case.kind):
+        yield case._replace(alike=True)
 
 
 def _linked(scans: Path, cuts: Path) -> list[Sightings]:
@@ -164,17 +187,32 @@ def _label(points: Points, frame: LabelledFrame) -> tuple[float, UprightBox | No
     return best
 
 
-def _completed(predictor: Predictor, cases: Iterator[_Case] | list[_Case]) -> Both:
-    rows: tuple[list, list] = ([], [])
+def _completed(predictor: Predictor, cases: Iterable[_Case]) -> Both:
+    cases = list(cases)
+    scans = [scan for case in cases for scan in case.scans]
+    rays = [one for case in cases for one in case.rays or (None,) * len(case.scans)]
+    each = predictor.complete_many(scans, rays=rays)
+    rows: tuple[list, list, list] = ([], [], [])
     for number, case in enumerate(cases):
-        alone = list(predictor.complete_many(case.scans, rays=case.rays))
-        answers = [alone]
+        alone = list(islice(each, len(case.scans)))
+        if not case.alike:
+            rows[0].extend(_rows(alone, case, number))
         if len(alone) > 1:
-            answers.append(predictor.complete_track(case.scans, rays=case.rays))
-        for into, done in zip(rows, answers):
-            for one, label, scan in zip(done, case.labels, case.scans):
-                into.append((one.evidence, *_truth(one, label), case.kind, number, len(scan)))
-    return Both(*(Known(*map(np.array, zip(*part))) for part in rows))
+            together = predictor.put_together(alone, case.scans, case.rays)
+            rows[2 if case.alike else 1].extend(_rows(together, case, number))
+    widths = (ScanFeatures, TrackFeatures, TrackFeatures)
+    return Both(*(_known(part, len(width._fields)) for part, width in zip(rows, widths)))
+
+
+def _rows(done: Iterable[Completion], case: _Case, number: int) -> Iterator[tuple]:
+    for one, label, scan in zip(done, case.labels, case.scans):
+        yield one.evidence, *_truth(one, label), case.kind, number, len(scan)
+
+
+def _known(rows: list[tuple], width: int) -> Known:
+    if not rows:
+        return Known(np.empty((0, width)), *np.empty((len(Known._fields) - 1, 0)))
+    return Known(*map(np.array, zip(*rows)))
 
 
 def _truth(done: Completion, label: UprightBox | None) -> tuple[float, float]:

@@ -11,6 +11,7 @@ import torch
 from tests.models import CONFIG, SETTINGS, scan
 
 from wildshape.geometry.projection.sight_lines import SightLines
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.confidence import odds_of
 from wildshape.inference.predictor import Predictor, load
 from wildshape.method.checkpoint import save_checkpoint
@@ -24,7 +25,7 @@ from wildshape.method.trust import (
     TrackFeatures,
     Trust,
 )
-from wildshape.method.trust_features import rival_margin
+from wildshape.method.trust_features import rival_margin, surfaces, views_apart
 
 FACING = dataclasses.replace(SETTINGS, facing=True)
 
@@ -104,3 +105,37 @@ def test_the_rival_looks_another_way():
     poses = Poses(rows.view(1, 3, 3, 3), torch.zeros(1, 3, 3), torch.zeros(1, 3))
     assert rival_margin(poses, torch.tensor([[0.10, 0.11, 0.16]])).item() == pytest.approx(0.06)
     assert rival_margin(poses, torch.tensor([[0.10, 0.11, 9.0]])).item() == pytest.approx(0.3)
+
+
+def test_how_far_apart_views_are():
+    """A sensor 10 m from an object that it sees from 20 degrees left and right of its front."""
+    angle = torch.deg2rad(torch.tensor((-20.0, 20.0, 20.0, -20.0)))
+    c, s, zero = angle.cos(), angle.sin(), torch.zeros(4)
+    rotation = torch.stack((c, -s, zero, s, c, zero, zero, zero, zero + 1), -1).view(4, 3, 3)
+    seen = SE3(rotation, torch.tensor((-10.0, 0.0, 0.0)).repeat(4, 1))
+    assert views_apart(seen) == pytest.approx(20, abs=1e-3)
+    assert views_apart(seen[1:3]) == pytest.approx(0, abs=1e-3)
+
+
+def patch(bend, turn_deg, noise, seed=0):
+    """Points on a square metre that faces along x, bent to this curvature, turned about z."""
+    rng = np.random.default_rng(seed)
+    y, z = rng.uniform(-0.5, 0.5, (2, 300))
+    x = bend * y**2 / 2 + rng.normal(0, noise, 300)
+    angle = math.radians(turn_deg)
+    turned = (x * math.cos(angle) - y * math.sin(angle), x * math.sin(angle) + y * math.cos(angle))
+    return np.stack((*turned, z), 1).astype(np.float32)
+
+
+def test_what_a_surface_is_like():
+    """Square to the box or not, flat, gently bent or rough; each scan for itself."""
+    scans = [patch(0, 0, 0.002), patch(0, 45, 0.002), patch(2, 0, 0.002), patch(0, 0, 0.05)]
+    upright = torch.eye(3).repeat(4, 1, 1)
+    wall, askew, bent, rough = found = surfaces(scans, upright)
+    assert wall.square == pytest.approx(1, abs=0.01)
+    assert askew.square == pytest.approx(0.5, abs=0.01)
+    assert wall.bent < 0.05 < 0.2 < bent.bent
+    assert wall.rough < bent.rough < rough.rough
+    few = scans[2][:40]
+    assert surfaces([few, *scans], torch.eye(3).repeat(5, 1, 1))[1:] == found
+    assert surfaces([few], upright[:1]) == surfaces([few, *scans], torch.eye(3).repeat(5, 1, 1))[:1]

@@ -42,13 +42,19 @@ def planes(
         points: clouds.
         around: places in the cloud of the k points of each neighbourhood.
     """
+    middle, spread = moments(points, around)
+    return middle, thinnest_axis(spread.double()).to(points.dtype)
+
+
+def moments(
+    points: Float[Tensor, "B P 3"], around: Int64[Tensor, "B n k"]
+) -> tuple[Float[Tensor, "B n 3"], Float[Tensor, "6 B n"]]:
+    """The middle of each neighbourhood, and the sums xx, xy, xz, yy, yz, zz around it."""
     axes = [gathered_axis(points[..., c], around) for c in range(3)]
     middle = [axis.mean(-1) for axis in axes]
     off = [axis - mean[..., None] for axis, mean in zip(axes, middle)]
     pairs = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-    moments = torch.stack([(off[i] * off[j]).sum(-1) for i, j in pairs])
-    normal = thinnest_axis(moments.double()).to(points.dtype)
-    return torch.stack(middle, dim=-1), normal
+    return torch.stack(middle, -1), torch.stack([(off[i] * off[j]).sum(-1) for i, j in pairs])
 
 
 def gathered_axis(values: Float[Tensor, "B P"], around: Int64[Tensor, "B n k"]) -> Tensor:

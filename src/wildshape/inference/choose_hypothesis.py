@@ -31,6 +31,7 @@ from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.network import Poses, ShapePoseNet
 from wildshape.method.ray_encoder import RayConfig
+from wildshape.method.trust import Surface
 from wildshape.method.trust_features import rival_margin
 from wildshape.records import Points, SensorKind
 
@@ -270,11 +271,13 @@ class Posed(NamedTuple):
         shapes: the network's points, canonical frame.
         T_sensor_canonical: their poses.
         points: of the complete shapes, sensor frames, those of `shapes` first.
+        surfaces: of the scans, for weights that tell how far they are to be trusted.
     """
 
     shapes: Float[Tensor, "B P 3"]
     T_sensor_canonical: SE3
     points: Float[Tensor, "B Q 3"]
+    surfaces: Sequence[Surface] = ()
 
     @classmethod
     def of(cls, found: Found) -> "Posed":

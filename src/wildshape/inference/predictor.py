@@ -39,7 +39,7 @@ from wildshape.inference.tracks.complete_track import Gathered, complete_togethe
 from wildshape.io.scans.points import LEAST_POINTS
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint, weights_file
 from wildshape.method.network import ShapePoseNet
-from wildshape.method.trust_features import scan_features
+from wildshape.method.trust_features import scan_features, surfaces
 from wildshape.ops.device import choose_device
 from wildshape.records import Completion, Points, Registration, Sensor
 
@@ -302,7 +302,8 @@ class Predictor:
         done = Refined(*(part.cpu() for part in done))
         T_sensor_canonical = SE3(done.rotation, done.translation)
         posed = T_sensor_canonical.to(torch.float32).apply(done.shapes)
-        return Posed(done.shapes, T_sensor_canonical, denser(posed, done.partner))
+        looks = surfaces(seen, done.rotation) if self.settings.sensor == "lidar" else ()
+        return Posed(done.shapes, T_sensor_canonical, denser(posed, done.partner), looks)
 
     def _completion(
         self, looked: Looked, i: int, posed: Posed, sensor: Sensor | None
@@ -336,7 +337,7 @@ class Predictor:
         if not self.refines or exact:
             return judged(done, None, None, self.settings, rule)
         rival = float(found.features[i, -1])
-        evidence = scan_features(done, seen, rival, found.rotation[i], standing)
+        evidence = scan_features(done, seen, posed.surfaces[i], rival, found.rotation[i], standing)
         trust = self.settings.trust
         return judged(done, trust and trust.scan, evidence, self.settings, rule)
 

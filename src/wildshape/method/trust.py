@@ -30,7 +30,29 @@ FAR_M = 0.3
 DEEP_M = 0.25
 """Points of a scan so far inside its box came through a window, or the box is wrong, metres."""
 
+SURFACE_POINTS, PATCH_POINTS = 128, 12
+"""Of so many points of a scan the neighbourhoods are looked at, of so many points each."""
+
+BENT = (0.003, 0.01)
+"""Where a neighbourhood is gently bent: what of its variance lies across it."""
+
 _STEPS, _LARGEST = 50, 30.0
+
+
+class Surface(NamedTuple):
+    """What the surface of a scan is like where it was seen.
+
+    Attributes:
+        square: how far it stands square to the box's sides, 1/2 to 1: the mean over neighbourhoods
+            of (x^4 + y^4) / (x^2 + y^2)^2 of their normals.
+        rough: how thick a neighbourhood is, standard deviation across it: of ten the second most,
+            logarithm of metres.
+        bent: share of the neighbourhoods that are gently bent (`BENT`).
+    """
+
+    square: float
+    rough: float
+    bent: float
 
 
 class ScanFeatures(NamedTuple):
@@ -50,6 +72,9 @@ class ScanFeatures(NamedTuple):
         size_off: how far the box is from the nearest usual size, standard deviations.
         free: share of the shape where rays passed; NaN without rays.
         hidden: share of it that something else hides; NaN without rays.
+        square: of its `Surface`.
+        rough: of it.
+        bent: of it.
     """
 
     log_cost: float
@@ -65,6 +90,9 @@ class ScanFeatures(NamedTuple):
     size_off: float
     free: float
     hidden: float
+    square: float
+    rough: float
+    bent: float
 
 
 class TrackFeatures(NamedTuple):
@@ -77,12 +105,20 @@ class TrackFeatures(NamedTuple):
         scan_cost: the same in this scan.
         rival: mean.
         log_moved: mean.
+        seen_length: mean.
         seen_width: mean.
+        square: mean.
+        rough: mean.
+        bent: mean.
         own_off: mean of the scans' own `size_off`.
         agree: share of the scans whose own heading is within 10 degrees of the track's.
         length_spread: standard deviation of the lengths of the scans' own boxes, logarithms.
         log_points: of the fullest scan.
+        log_range: mean.
         log_scans: logarithm of their number.
+        log_apart: how far apart the views are, as an angle at the object: root mean square from
+            their mean direction, logarithm of degrees. Scans from one place tell little more than
+            one of them.
         log_length: of the track's box.
         size_off: of the track's box.
     """
@@ -91,12 +127,18 @@ class TrackFeatures(NamedTuple):
     scan_cost: float
     rival: float
     log_moved: float
+    seen_length: float
     seen_width: float
+    square: float
+    rough: float
+    bent: float
     own_off: float
     agree: float
     length_spread: float
     log_points: float
+    log_range: float
     log_scans: float
+    log_apart: float
     log_length: float
     size_off: float
 
@@ -116,8 +158,8 @@ OF_SCAN = Chosen(
         "size_off", "free", "hidden",
     ),
     kind=(
-        "log_cost", "size_off", "rival", "entropy", "seen_length", "seen_width", "log_length",
-        "log_points", "log_range",
+        "log_cost", "size_off", "rival", "seen_length", "seen_width", "log_points", "log_range",
+        "square", "rough", "bent",
     ),
 )  # fmt: skip
 OF_TRACK = Chosen(

@@ -7,27 +7,34 @@ from collections.abc import Sequence
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from wildshape.geometry.box import box_axes
 from wildshape.geometry.projection.sight_lines import Standing
-from wildshape.geometry.sampling import quantiles
+from wildshape.geometry.sampling import drawn, quantiles
+from wildshape.geometry.surface import moments, thinnest_axis
 from wildshape.geometry.transforms.rotation import rotation_angle
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.method.confidence import SMALLEST_M, ConfidenceFeatures
 from wildshape.method.network import Poses
 from wildshape.method.trust import (
+    BENT,
     DEEP_M,
     FAR_M,
+    PATCH_POINTS,
     RIVAL_DEG,
+    SURFACE_POINTS,
     ScanFeatures,
+    Surface,
     TrackFeatures,
     size_off,
 )
+from wildshape.ops.nearest import nearest_k
 from wildshape.records import Completion, Points
 
-_OUTERMOST, _UNTURNED_DEG, _MOST_POINTS = 0.02, 0.3, 500
+_OUTERMOST, _UNTURNED_DEG, _ALIKE_DEG, _MOST_POINTS = 0.02, 0.3, 3.0, 500
+_THICKER, _LEAST_THICK_M, _TINY = 0.9, 1e-3, 1e-6
 
 
 def rival_margin(poses: Poses, believed: Float[Tensor, "B H"]) -> Float[Tensor, "B 1"]:
@@ -45,9 +52,52 @@ def rival_margin(poses: Poses, believed: Float[Tensor, "B H"]) -> Float[Tensor, 
     return torch.where(alike, FAR_M, behind).amin(-1, keepdim=True)
 
 
+def surfaces(scans: Sequence[Points], R_sensor_canonical: Float[Tensor, "B 3 3"]) -> list[Surface]:
+    """What the surfaces of scans are like: walls are flatter than a vehicle, leaves rougher.
+
+    Args:
+        scans: in a fixed order, at least `PATCH_POINTS` each.
+        R_sensor_canonical: of their poses.
+    """
+    some = [scan[drawn(len(scan), min(len(scan), SURFACE_POINTS))] for scan in scans]
+    points = torch.zeros(len(some), SURFACE_POINTS, 3)
+    for row, part in zip(points, some):
+        row[: len(part)] = torch.from_numpy(part)
+    sizes = torch.tensor([len(part) for part in some])
+    around = nearest_k(points, points, PATCH_POINTS, sizes, sizes).index
+    spread = moments(points, around)[1].double()
+    normal = thinnest_axis(spread)
+    thin = _across(spread, normal)
+    share = thin / (spread[0] + spread[3] + spread[5]).clamp_min(_TINY)
+    used = torch.arange(SURFACE_POINTS) < sizes[:, None]
+    thick = (thin / PATCH_POINTS).sqrt().masked_fill(~used, math.nan)
+    rough = thick.nanquantile(_THICKER, dim=1).clamp_min(_LEAST_THICK_M).log()
+    square = _mean(_square(normal @ R_sensor_canonical.double()), used)
+    bent = _mean(((share > BENT[0]) & (share < BENT[1])).double(), used)
+    return [Surface(*row) for row in torch.stack((square, rough, bent), dim=-1).tolist()]
+
+
+def _across(spread: Float[Tensor, "6 B n"], normal: Float[Tensor, "B n 3"]) -> Tensor:
+    """What of neighbourhoods' `moments` lies along their normals."""
+    xx, xy, xz, yy, yz, zz = spread
+    x, y, z = normal.unbind(-1)
+    found = x * (xx * x + 2 * (xy * y + xz * z)) + y * (yy * y + 2 * yz * z) + zz * z * z
+    return found.clamp_min(0)
+
+
+def _square(normal: Float[Tensor, "B n 3"]) -> Float[Tensor, "B n"]:
+    ahead, aside, _ = normal.square().unbind(-1)
+    return (ahead.square() + aside.square()) / (ahead + aside).clamp_min(_TINY).square()
+
+
+def _mean(values: Float[Tensor, "B n"], used: Bool[Tensor, "B n"]) -> Float[Tensor, "B"]:
+    return (values * used).sum(1) / used.sum(1)
+
+
 def scan_features(
     done: Completion,
     scan: Points,
+    surface: Surface,
     rival: float,
     R_sensor_canonical: Float[Tensor, "3 3"],
     standing: Standing | None,
@@ -57,6 +107,7 @@ def scan_features(
     Args:
         done: with its pose refined.
         scan: without the ground, sensor frame, metres.
+        surface: of it.
         rival: see `rival_margin`.
         R_sensor_canonical: as the network said.
         standing: what rays say of the shape's points, if any are known.
@@ -85,6 +136,9 @@ def scan_features(
         size_off=size_off(box.size),
         free=shares[0],
         hidden=shares[1],
+        square=surface.square,
+        rough=surface.rough,
+        bent=surface.bent,
     )
 
 
@@ -112,18 +166,39 @@ def track_features(
     def mean(values: Sequence[float] | np.ndarray) -> float:
         return float(np.average(values, weights=weights))
 
+    def mean_of(name: str) -> float:
+        return mean([getattr(one, name) for one in own])
+
     together = TrackFeatures(
         log_cost=mean(costs),
         scan_cost=0.0,
-        rival=mean([one.rival for one in own]),
-        log_moved=mean([one.log_moved for one in own]),
-        seen_width=mean([one.seen_width for one in own]),
-        own_off=mean([one.size_off for one in own]),
+        rival=mean_of("rival"),
+        log_moved=mean_of("log_moved"),
+        seen_length=mean_of("seen_length"),
+        seen_width=mean_of("seen_width"),
+        square=mean_of("square"),
+        rough=mean_of("rough"),
+        bent=mean_of("bent"),
+        own_off=mean_of("size_off"),
         agree=mean(alike > math.cos(math.radians(RIVAL_DEG))),
         length_spread=float(np.std([one.log_length for one in own])),
         log_points=max(one.log_points for one in own),
+        log_range=mean_of("log_range"),
         log_scans=math.log(len(own)),
+        log_apart=math.log(views_apart(T_sensor_object) + _ALIKE_DEG),
         log_length=math.log(max(size[0], SMALLEST_M)),
         size_off=size_off(size),
     )
     return [together._replace(scan_cost=float(one)) for one in costs]
+
+
+def views_apart(T_sensor_object: SE3) -> float:
+    """How far apart the views of a track are, an angle at the object, degrees.
+
+    The root mean square from the mean of the directions in which the sensor stands.
+    """
+    seen_from = torch.nn.functional.normalize(T_sensor_object.inverse().translation, dim=-1)
+    middle = torch.nn.functional.normalize(seen_from.mean(0), dim=0)
+    across = torch.linalg.cross(seen_from, middle.expand_as(seen_from)).norm(dim=-1)
+    angles = torch.atan2(across, seen_from @ middle)
+    return math.degrees(float(angles.square().mean().sqrt()))
