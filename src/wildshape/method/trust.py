@@ -163,10 +163,12 @@ OF_SCAN = Chosen(
     ),
 )  # fmt: skip
 OF_TRACK = Chosen(
-    pose=("rival", "scan_cost", "log_moved", "log_scans", "log_points", "log_length"),
-    box=("scan_cost", "rival", "log_moved", "agree", "length_spread", "log_length"),
-    kind=("log_cost", "size_off", "own_off", "rival", "seen_width", "length_spread"),
-)
+    pose=("rival", "log_moved", "log_range", "size_off", "log_apart"),
+    box=(
+        "scan_cost", "rival", "log_moved", "length_spread", "size_off", "seen_length", "log_apart",
+    ),
+    kind=("own_off", "rival", "square", "rough", "bent", "log_range", "log_points"),
+)  # fmt: skip
 
 
 def size_off(size_m: tuple[float, float, float]) -> float:
