@@ -60,20 +60,17 @@ def visible(points, centre, projection):
 
 
 def in_image(points, centre, projection):
-    """Where points lie in the sensor's image, scaled to lengths at the centre; with a graph."""
+    """Where centred points lie when seen from far along the line of sight; with a graph."""
     if not isinstance(projection, PolarBins | FacingBins):
-        return torch.stack([p[:2] / p[2] * centre[2] for p in points])
-    far, level = math.hypot(*centre.tolist()), math.hypot(*centre[:2].tolist())
+        return points[:, :2]
+    level = math.hypot(*centre[:2].tolist())
     yaw, pitch = math.atan2(centre[1], centre[0]), math.atan2(centre[2], level)
     places = []
     for x, y, z in points:
         ahead = math.cos(yaw) * x + math.sin(yaw) * y
         left = -math.sin(yaw) * x + math.cos(yaw) * y
-        forward = math.cos(pitch) * ahead + math.sin(pitch) * z
-        up = -math.sin(pitch) * ahead + math.cos(pitch) * z
-        length = (x * x + y * y + z * z).sqrt()
-        places.append(torch.stack((torch.atan2(left, forward), torch.asin(up / length))))
-    return far * torch.stack(places)
+        places.append(torch.stack((left, -math.sin(pitch) * ahead + math.cos(pitch) * z)))
+    return torch.stack(places)
 
 
 def multiview_loss(scans, centres, shapes, rotation, translation, beta, projection):
@@ -90,8 +87,8 @@ def multiview_loss(scans, centres, shapes, rotation, translation, beta, projecti
             seen = visible(posed.detach() + centres[b], centres[b], projection)
             given, made = scan, posed
             if projection.flat:
-                given = in_image(scan + centres[b], centres[b], projection)
-                made = in_image(posed + centres[b], centres[b], projection)
+                given = in_image(scan, centres[b], projection)
+                made = in_image(posed, centres[b], projection)
             apart = torch.cdist(given, made, compute_mode="donot_use_mm_for_euclid_dist")
             costs.append(apart.amin(1).mean() + beta * apart.amin(0)[seen].mean())
         cost, index = torch.stack(costs).min(0)
