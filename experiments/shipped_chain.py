@@ -11,6 +11,7 @@ The same command goes on with a run that was stopped; what is finished is not ma
 """
 
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from shutil import copyfile
 from tempfile import TemporaryDirectory
@@ -68,13 +69,16 @@ ROUNDS = {
     "taught": Round(data=1, steps=12_000, teacher="first"),
     "chained": Round(data=2, steps=8_000, lr=6e-4, teacher="taught", start="taught"),
     "again": Round(data=3, steps=8_000, lr=6e-4, teacher="chained", start="chained"),
-    "last": Round(data=3, steps=6_000, lr=6e-4, teacher="again", start="again", rays=True),
+    "rays": Round(data=3, steps=6_000, lr=6e-4, teacher="again", start="again", rays=True),
+    "last": Round(data=4, steps=16_000, lr=6e-4, teacher="rays", start="rays", rays=True),
 }
 """In their order; the last one is shipped."""
 
-OCCLUSION, RAYS = {1: 0.3, 2: 0.6, 3: 0.6}, {1: 0, 2: 0, 3: 512}
+OCCLUSION, RAYS = {1: 0.3, 2: 0.6, 3: 0.6, 4: 0.5}, {1: 0, 2: 0, 3: 512, 4: 512}
 """By the seed of the data: the share of the tracks past something that stands in the way, and the
 rays kept with a scan."""
+VARIED = {1: (True,), 2: (True,), 3: (True,), 4: (True, False)}
+"""By the seed of the data: forms and sensors varied, or as they are, as many tracks of each."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +88,7 @@ class Settings:
     Attributes:
         out: folder of the run.
         cad: folder of CAD meshes with a manifest.
-        tracks: of each data set, an eighth for each pair of sensor and source.
+        tracks: of each data set, as many for each sensor and source.
         share: of all tracks and steps; below 1 to try the chain, not to ship what comes out.
     """
 
@@ -145,7 +149,8 @@ def _data(seed: int, settings: Settings) -> Store:
 
 def _add_drives(store: StoreWriter, number: int, seed: int, settings: Settings) -> None:
     """Those of one sensor."""
-    share = settings.part(settings.tracks // (2 * len(_SENSORS)), least=4)
+    sets = 2 * len(VARIED[seed])
+    share = settings.part(settings.tracks // (sets * len(_SENSORS)), least=4)
     config = SimulationConfig(
         tracks=share,
         scans=_SCANS,
@@ -154,13 +159,14 @@ def _add_drives(store: StoreWriter, number: int, seed: int, settings: Settings) 
         rays=RAYS[seed],
         ground=number == _GROUND,
         shape_points=_SHAPE_POINTS,
-        varied=True,
     )
     own = 1000 * seed + 100 * number
     with TemporaryDirectory() as folder:
         road_vehicles(settings.cad, Path(folder), share, own)
-        for place, meshes in enumerate((None, Path(folder))):
-            for track in simulate_tracks(replace(config, meshes=meshes), own + place):
+        sources = product(VARIED[seed], (None, Path(folder)))
+        for place, (varied, meshes) in enumerate(sources):
+            drives = replace(config, meshes=meshes, varied=varied)
+            for track in simulate_tracks(drives, own + place):
                 store.add(replace(track, name=f"{config.sensor}-{own + place}-{track.name}"))
 
 
