@@ -54,11 +54,11 @@ static void grid_free(grid *made)
 
 static int32_t *slot_of(const grid *in, place at)
 {
-    const uint64_t mixed = (uint64_t)at.x * 0x9E3779B97F4A7C15u ^
-                           (uint64_t)at.y * 0xC2B2AE3D27D4EB4Fu ^
-                           (uint64_t)at.z * 0x165667B19E3779F9u;
+    const uint64_t mixed = (uint64_t)at.x * 0x9E3779B97F4A7C15u +
+                           (uint64_t)at.y * 0xC2B2AE3D27D4EB4Fu +
+                           (uint64_t)at.z * 0xD6E8FEB86659FD93u;
     const uint64_t last = ((uint64_t)1 << in->bits) - 1;
-    uint64_t slot = (mixed * 0x9E3779B97F4A7C15u) >> (64 - in->bits);
+    uint64_t slot = mixed >> (64 - in->bits);
     for (; in->slots[slot] >= 0; slot = (slot + 1) & last) {
         const place held = in->places[in->slots[slot]];
         if (held.x == at.x && held.y == at.y && held.z == at.z)
