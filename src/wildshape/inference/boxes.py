@@ -74,7 +74,7 @@ def fit_to_scans(
             rows[1].abs_()
         near = rows[:, ((rows > (low - reach)[:, None]) & (rows < (high + reach)[:, None])).all(0)]
         if near.shape[1]:
-            begins, ends = _without_outermost(near, int(config.seen_share * near.shape[1]))
+            begins, ends = _seen_ends(near, config)
             highs.append(ends)
             lows.append(_reflected(begins, ends) if mirror else begins)
     rank = min(scans // config.scans_a_witness, len(lows) - 1)
@@ -121,6 +121,13 @@ def _ends(rows: Float[Tensor, "3 n"], config: BoxConfig) -> tuple[Tensor, Tensor
     """Where a shape begins and ends; beside it more stands out than above it."""
     count = max(int(config.shape_share * rows.shape[1]), config.strays)
     low, high = _without_outermost(rows, count)
+    bottom, top = _without_outermost(rows[2:], config.strays)
+    return torch.cat((low[:2], bottom)), torch.cat((high[:2], top))
+
+
+def _seen_ends(rows: Float[Tensor, "3 n"], config: BoxConfig) -> tuple[Tensor, Tensor]:
+    """Where what a scan saw begins and ends; beside it more stands out than above it."""
+    low, high = _without_outermost(rows, int(config.seen_share * rows.shape[1]))
     bottom, top = _without_outermost(rows[2:], config.strays)
     return torch.cat((low[:2], bottom)), torch.cat((high[:2], top))
 
