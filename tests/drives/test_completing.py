@@ -270,7 +270,13 @@ def test_clusters_in_the_box_of_a_vehicle_are_its_own(tmp_path):
         points = np.concatenate((beside, front, rear)).astype(np.float32)
         with cut_file(tmp_path, frame).open("wb") as file:
             known = {"points": points, "rows": rows, "counts": counts}
-            np.savez(file, **known, scanned=90, tracks=np.array([], str))
+            np.savez(
+                file,
+                **known,
+                scanned=90,
+                tracks=np.array([], str),
+                grounds=np.zeros((3, 3)),
+            )
     at = [(0.0, 0.0, 0.0, 0.0)]
     whole = replace(completed(at, name="whole"), seen=Sightings("whole", (0,), ((1,),), (20,)))
     again = replace(completed(at, name="again"), seen=Sightings("again", (2,), ((2,),), (20,)))

@@ -13,6 +13,7 @@ import pytest
 import torch
 import trimesh
 from pyarrow import feather
+from tests.drives.street import HEIGHT
 from tests.refusal import refused
 
 import wildshape
@@ -73,6 +74,15 @@ def test_every_car_is_one_track_and_nothing_else_is(found, truth):
         "far": False,
         "moving": True,
     }
+
+
+def test_boxes_stand_on_the_road_and_are_as_high_as_the_cars(found, truth):
+    heights = dict[str, float]()
+    for row in read_box_table(found.out / "boxes.csv"):
+        assert row.z - row.height / 2 == pytest.approx(-HEIGHT, abs=0.05), row
+        heights[row.track] = row.height
+    known = sorted(size[2] for size in truth.sizes.values())
+    assert sorted(heights.values()) == pytest.approx(known, abs=0.12)
 
 
 def test_a_moving_car_looks_where_it_drives(found, truth):

@@ -218,6 +218,7 @@ class BoxConfig:
         stray_m: completed scans that lie this far from the way of those around are left out.
         stray_ticks: around, standard deviation.
         longest_gap: ticks in which a vehicle was not seen and still has boxes.
+        ground_gap_m: boxes that end so near the ground, above or below, end there.
     """
 
     moving_m: float = 1.0
@@ -228,3 +229,4 @@ class BoxConfig:
     stray_m: float = 0.6
     stray_ticks: float = 8.0
     longest_gap: int = 10
+    ground_gap_m: float = 0.5

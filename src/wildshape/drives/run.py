@@ -18,7 +18,7 @@ from wildshape.drives.completing.boxes import smooth
 from wildshape.drives.completing.claims import claim
 from wildshape.drives.completing.completion import Completer
 from wildshape.drives.completing.merging import Places
-from wildshape.drives.completing.placing import Completed, level_poses, read_completed
+from wildshape.drives.completing.placing import Completed, level_poses, on_ground, read_completed
 from wildshape.drives.completing.turns import Turns, with_sense
 from wildshape.drives.completing.vehicles import (
     judge,
@@ -319,6 +319,7 @@ class _Run:
             found, crowd = held_against(self.drive.scan, found, doubtful, turns, self.config)
             said = refused(said, parts | dict.fromkeys(crowd, "crowded"))
             write_judged(self.completing / "vehicles.json", objects, said)
+            found = [on_ground(one, self.cuts, turns, self.config.boxes) for one in found]
             at(1)
             return [
                 Vehicle(one, smooth(one, turns, self.config.boxes), stated(one, kept))

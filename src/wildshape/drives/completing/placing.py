@@ -5,7 +5,7 @@
 The world is the sensor frame of the first frame; the level world is it with z vertical.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +13,10 @@ import torch
 from jaxtyping import Float
 
 from wildshape.drives.completing.turns import Turns
+from wildshape.drives.object_config import BoxConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.mounting import Mounting
+from wildshape.drives.tracking.segmentation import read_cut
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation, rotation_z
 from wildshape.geometry.transforms.se3 import SE3
@@ -92,6 +94,31 @@ def read_completed(seen: Sightings, folder: Path, drive: Drive, turns: Turns) ->
         p_kind=_mean([scan.get("p_kind") for scan in said["scans"]]),
         phases=phases,
     )
+
+
+def on_ground(one: Completed, cuts: Path, turns: Turns, config: BoxConfig) -> Completed:
+    """The same vehicle, its boxes from the ground up, as data sets label them.
+
+    What a scan holds of wheels is cut with the ground, and so are the shapes that networks learn.
+
+    Args:
+        one: completed.
+        cuts: folder of the clusters.
+        turns: of the drive's sensor.
+        config: how much of a gap is believed.
+    """
+    rows = dict(zip(one.seen.frames, one.seen.rows))
+    length, width, height = one.size
+    gaps = []
+    for frame, box in zip(one.frames, one.boxes):
+        grounds = read_cut(cuts, frame).grounds[list(rows[frame])]
+        ground = turns.T_level_sensor[frame].apply_numpy(grounds)[:, 2]
+        gaps.append(box[2] - height / 2 - np.median(ground))
+    gap = float(np.median(gaps))
+    if abs(gap) > config.ground_gap_m:
+        return one
+    boxes = one.boxes - (0.0, 0.0, gap / 2, 0.0)
+    return replace(one, boxes=boxes, size=(length, width, height + gap))
 
 
 def _mean(values: list[float | None]) -> float | None:

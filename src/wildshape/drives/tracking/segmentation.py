@@ -3,7 +3,7 @@
 """Each scan of a drive cut: its ground taken away, what stands on it kept in a file a scan."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
@@ -33,6 +33,7 @@ class CutScan:
         counts: points of each cluster.
         scanned: points of the whole scan.
         tracks: the object that each cluster is, if known (`detections.py`).
+        grounds: `(k, 3)` a point of the ground under each cluster, sensor frame, metres.
     """
 
     points: Points
@@ -40,6 +41,7 @@ class CutScan:
     counts: Int[np.ndarray, "k"]
     scanned: int
     tracks: tuple[str, ...] = ()
+    grounds: Float[np.ndarray, "k 3"] = field(default_factory=lambda: np.empty((0, 3)))
 
     def clusters(self) -> list[Points]:
         """The points of each cluster."""
@@ -82,7 +84,7 @@ class Cutter:
         """Cut one scan and write its file."""
         turn = self.drive.turn(frame)
         scan = self.drive.corrected(frame, turn)
-        self._write(frame, self.cut(frame, scan, self._heights(scan), turn.points))
+        self._write(frame, scan, self._heights(scan), turn.points)
 
     def landmarks(self, frame: int) -> Turn:
         """What odometry sees of a frame, which is cut on the way.
@@ -92,7 +94,7 @@ class Cutter:
         turn = self.drive.turn(frame)
         heights = self._heights(turn.points)
         if turn.seconds is None:
-            self._write(frame, self.cut(frame, turn.points, heights, turn.points))
+            self._write(frame, turn.points, heights, turn.points)
         return landmarks(turn, heights, self.mounting, self.config)
 
     def cut(
@@ -116,16 +118,36 @@ class Cutter:
         level = self.mounting.level(scan)
         return height_above_ground(level, self.mounting.height_m, self.config.ground)
 
-    def _write(self, frame: int, found: CutScan) -> None:
+    def _write(
+        self,
+        frame: int,
+        scan: Points,
+        heights: Float[np.ndarray, "n"],
+        as_measured: Points,
+    ) -> None:
+        found = self.cut(frame, scan, heights, as_measured)
         arrays = {
             "points": found.points,
             "rows": found.rows,
             "counts": found.counts,
             "scanned": np.array(found.scanned),
             "tracks": np.array(found.tracks, np.str_),
+            "grounds": self._grounds(found, heights),
         }
         with atomic_write(cut_file(self.folder, frame)) as file:
             np.savez(file, **arrays)
+
+    def _grounds(self, found: CutScan, heights: Float[np.ndarray, "n"]) -> Points:
+        """A point of the ground under the middle of each cluster, sensor frame."""
+        ends = np.cumsum(found.counts)[:-1]
+        grounds = np.zeros((len(found.counts), 3))
+        clusters = zip(found.clusters(), np.split(heights[found.rows], ends), strict=False)
+        for row, (points, above) in enumerate(clusters):
+            level = self.mounting.level(points)
+            middle = level.mean(0)
+            middle[2] = np.median(level[:, 2] - above)
+            grounds[row] = middle
+        return self.mounting.levelling().inverse().apply_numpy(grounds)
 
 
 def cut_file(folder: Path, frame: int) -> Path:
@@ -150,7 +172,8 @@ def _read_cut(path: Path, written_ns: int) -> CutScan:
     del written_ns
     with np.load(path, allow_pickle=False) as found:
         arrays = found["points"], found["rows"], found["counts"]
-        return CutScan(*arrays, int(found["scanned"]), tuple(found["tracks"].tolist()))
+        tracks = tuple(found["tracks"].tolist())
+        return CutScan(*arrays, int(found["scanned"]), tracks, found["grounds"])
 
 
 def read_cuts(folder: Path, count: int) -> Iterator[CutScan]:
