@@ -51,7 +51,7 @@ def moving(tmp_path):
                 rows=np.arange(6, dtype=np.int32),
                 counts=np.array((3, 3)),
                 scanned=POINTS,
-                grounds=np.zeros((1, 3)),
+                grounds=np.zeros((2, 3)),
                 tracks=np.array([], str),
             )
     drive = Drive.of("street", ["a", "b", "c"], turns.__getitem__, [0.0, 0.1, 0.2])

@@ -33,7 +33,8 @@ class CutScan:
         counts: points of each cluster.
         scanned: points of the whole scan.
         tracks: the object that each cluster is, if known (`detections.py`).
-        grounds: `(k, 3)` a point of the ground under each cluster, sensor frame, metres.
+        grounds: `(k, 3)` a point of the ground under each cluster, sensor frame, metres; none before
+            it is written.
     """
 
     points: Points
@@ -41,7 +42,7 @@ class CutScan:
     counts: Int[np.ndarray, "k"]
     scanned: int
     tracks: tuple[str, ...] = ()
-    grounds: Float[np.ndarray, "k 3"] = field(default_factory=lambda: np.empty((0, 3)))
+    grounds: Float[np.ndarray, "_ 3"] = field(default_factory=lambda: np.empty((0, 3)))
 
     def clusters(self) -> list[Points]:
         """The points of each cluster."""
