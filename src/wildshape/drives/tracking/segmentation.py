@@ -33,8 +33,8 @@ class CutScan:
         counts: points of each cluster.
         scanned: points of the whole scan.
         tracks: the object that each cluster is, if known (`detections.py`).
-        grounds: `(k, 3)` a point of the ground under each cluster, sensor frame, metres; none before
-            it is written.
+        grounds: `(k, 3)` a point of the ground under each cluster, sensor frame, metres; none
+            before it is written.
     """
 
     points: Points
