@@ -7,6 +7,7 @@
 CAD holds `manifest.csv` (columns category, file, split, tier, licence, source, name) and the meshes
 it names. Simulated scans alone are trained on, of procedural shapes and of meshes of split `train`
 that an Apache-2.0 file may be made from. RUN/weights holds what is shipped, and its NOTICE.
+With `--start WEIGHTS` the last round alone is trained: they teach it, and it goes on from them.
 The same command goes on with a run that was stopped; what is finished is not made again.
 """
 
@@ -27,7 +28,7 @@ from wildshape.io.atomic import write_text
 from wildshape.io.output import provenance
 from wildshape.io.store.store import Store, is_store, open_store
 from wildshape.io.store.writer import StoreWriter
-from wildshape.method.checkpoint import MODEL, load_checkpoint, save_checkpoint
+from wildshape.method.checkpoint import MODEL, load_checkpoint, save_checkpoint, weights_file
 from wildshape.method.ray_encoder import RayConfig
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.loop import fit
@@ -90,16 +91,36 @@ class Settings:
         cad: folder of CAD meshes with a manifest.
         tracks: of each data set, as many for each sensor and source.
         share: of all tracks and steps; below 1 to try the chain, not to ship what comes out.
+        start: checkpoint, or the name of weights shipped, that teach the last round and that it
+            goes on from; the rounds before are left out.
     """
 
     out: Path
     cad: Path
     tracks: int = 2400
     share: float = 1.0
+    start: Path | None = None
+
+    @property
+    def rounds(self) -> tuple[str, ...]:
+        """Their names, in order."""
+        names = tuple(ROUNDS)
+        return names if self.start is None else names[-1:]
+
+    @property
+    def command(self) -> str:
+        """That makes such weights."""
+        return _COMMAND if self.start is None else f"{_COMMAND} --start {self.start.name}"
 
     def part(self, count: int, least: int = 1) -> int:
         """So many tracks or steps of `count`."""
         return max(round(count * self.share), least)
+
+    def checkpoint(self, name: str | None) -> Path | None:
+        """Of a round, or the one that takes its place."""
+        if name is None:
+            return None
+        return self.out / name / MODEL if self.start is None else weights_file(self.start)
 
 
 def main(settings: Settings) -> None:
@@ -108,7 +129,7 @@ def main(settings: Settings) -> None:
     weights = settings.out / "weights"
     weights.mkdir(parents=True, exist_ok=True)
     write_text(weights / "NOTICE", notice(settings.cad))
-    for name in ROUNDS:
+    for name in settings.rounds:
         trained(name, settings)
     _shipped(settings.out / tuple(ROUNDS)[-1] / MODEL, settings, "vehicle")
     for category in VIEWS:
@@ -128,9 +149,9 @@ def trained(name: str, settings: Settings) -> Path:
         folder,
         seed=of.data,
         resume=True,
-        teacher=None if of.teacher is None else settings.out / of.teacher / MODEL,
-        start=None if of.start is None else settings.out / of.start / MODEL,
-        provenance=provenance(_COMMAND) | {"round": name},
+        teacher=settings.checkpoint(of.teacher),
+        start=settings.checkpoint(of.start),
+        provenance=provenance(settings.command) | {"round": name},
     )
     if run.state.step < steps:  # else it is there; made anew, it would teach others
         fit(run, lambda step, values: print(name, step, values, flush=True))
@@ -197,7 +218,7 @@ def _shipped(
         return
     halved = settings.out / f"{name}-half.safetensors"
     network, found = load_checkpoint(model)
-    described = replace(found, provenance=found.provenance | {"command": _COMMAND})
+    described = replace(found, provenance=found.provenance | {"command": settings.command})
     save_checkpoint(halved, network, described, half=True)
     calibrated = settings.out / f"{name}-calibrated.safetensors"
     tracks = settings.part(_CALIBRATION_TRACKS if category != "vehicle" else 20, least=4)
