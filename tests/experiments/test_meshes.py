@@ -13,23 +13,6 @@ from experiments.meshes import COPY_STRETCH, ROAD_SIZES, road_vehicles, stretche
 from wildshape.errors import BadInputError
 
 
-@pytest.fixture(scope="module")
-def cad(tmp_path_factory):
-    """A car and a bus to train on, and a car of the test split."""
-    folder = tmp_path_factory.mktemp("cad")
-    rows = ["category,file,split,tier,licence,source,name"]
-    for category, name, split, tier, licence, size in (
-        ("car", "red", "train", "A", "CC-BY-3.0", (4.5, 2.9, 3.1)),
-        ("bus", "big", "train", "A?", "CC0-1.0", (9.0, 5.0, 2.0)),
-        ("car", "gnu", "train", "B", "GPL-2.0", (4.0, 1.8, 1.5)),
-        ("car", "blue", "test", "C", "none stated", (4.0, 1.8, 1.5)),
-    ):
-        trimesh.creation.box(size).export(folder / f"{name}.ply")
-        rows.append(f"{category},{name}.ply,{split},{tier},{licence},gazebo_models,{name}")
-    (folder / "manifest.csv").write_text("\n".join(rows), encoding="utf-8")
-    return folder
-
-
 def boxes(folder: Path) -> dict[str, list[np.ndarray]]:
     """Sizes of the meshes in a folder, by the mesh they come from, in order."""
     found: dict[str, list[np.ndarray]] = {}

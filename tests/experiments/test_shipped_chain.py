@@ -1,0 +1,29 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The command that makes the shipped weights: a few tracks and steps of its rounds."""
+
+from dataclasses import replace
+
+import torch
+from experiments.shipped_chain import ROUNDS, Settings, trained
+
+from experiments import shipped_chain
+from wildshape.method.checkpoint import load_checkpoint
+
+LAST = tuple(ROUNDS)[-1]
+
+
+def test_the_last_round_goes_on_from_weights_that_teach_it(cad, tmp_path, monkeypatch):
+    monkeypatch.setattr(shipped_chain, "_SENSORS", ("hdl64",))
+    monkeypatch.setattr(shipped_chain, "_SCANS", 5)
+    few = Settings(tmp_path, cad, tracks=4, share=1e-4)
+    first = trained("first", few)
+    again = replace(few, start=first)
+    assert again.rounds == (LAST,)
+    last = trained(LAST, again)
+    (one, of_one), (other, of_other) = (load_checkpoint(path) for path in (first, last))
+    assert one.rays is None
+    assert other.rays is not None
+    assert not torch.equal(next(one.parameters()), next(other.parameters()))
+    assert [of.provenance["round"] for of in (of_one, of_other)] == ["first", LAST]
+    assert of_other.provenance["command"].endswith(f"--start {first.name}")
