@@ -76,7 +76,7 @@ def test_the_command_table_runs_from_top_to_bottom_in_one_folder(tmp_path, monke
     for row in TABLE:
         words = shlex.split(row)
         if words[0] == "export":  # our types, checked under pytest, cannot be traced
-            subprocess.run([sys.executable, "-m", "wildshape.cli", *words], check=True)
+            subprocess.run([sys.executable, "-m", "wildshape", *words], check=True)
         else:
             main([*words, *(_FEW_STEPS if words[0] == "train" else ())])
     for made in ("done/report.html", "figures/table.md", "fused.ply", "model.onnx", "info.html"):
