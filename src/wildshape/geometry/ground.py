@@ -9,9 +9,11 @@ anything above it. Fused scans must not teach it as shape, and a shape must not 
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+import torch
+from jaxtyping import Bool, Float, Float32
 
 from wildshape.geometry.sampling import quantiles
+from wildshape.geometry.transforms.se3 import SE3
 
 
 @dataclass(frozen=True)
@@ -57,3 +59,15 @@ def skirt(
     beside = (lows < near - rule.beyond_m) | (lows > far + rule.beyond_m)
     found[found] = beside.any(axis=1)
     return found
+
+
+def without_skirt(
+    scan: Float32[np.ndarray, "n 3"],
+    shape: Float[np.ndarray, "m 3"],
+    T_sensor_canonical: SE3,
+    fewest: int,
+) -> Float32[np.ndarray, "k 3"]:
+    """A scan without the ground beside its object, or as it is if fewer points would be left."""
+    T_canonical_sensor = T_sensor_canonical.to(torch.float64).inverse()
+    kept = scan[~skirt(T_canonical_sensor.apply_numpy(scan), shape)]
+    return kept if len(kept) >= fewest else scan

@@ -223,6 +223,11 @@ class Found(NamedTuple):
         """With other answers for some of the scans."""
         return Found(*(old.index_copy(0, rows, part) for old, part in zip(self, new)))
 
+    def said(self, i: int) -> tuple[SE3, float, int, Tensor]:
+        """Of scan `i` its pose, the cost, the branch and what `look_features` tells."""
+        pose = SE3(self.rotation[i].double(), self.translation[i].double())
+        return pose, float(self.cost[i]), int(self.branch[i]), self.features[i, :-1]
+
 
 class Looked(NamedTuple):
     """Scans, and what a network says of them.

@@ -16,7 +16,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -25,6 +25,7 @@ from torch import Tensor
 
 from wildshape.geometry.box import extent
 from wildshape.geometry.projection.line_of_sight import surrounded
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import ReasonRule
 from wildshape.io.progress import counted
 from wildshape.method.checkpoint import ModelSettings
@@ -98,6 +99,41 @@ def confidence_of(features: ConfidenceFeatures, settings: ModelSettings) -> floa
     if settings.calibration is not None:
         return settings.calibration.confidence(features)
     return 1.0 / (1.0 + (math.exp(features.log_cost) / settings.cost_m[1]) ** 2)
+
+
+class Glance(NamedTuple):
+    """What a network's look says of a scan besides its shape; as in `Completion`."""
+
+    pose: SE3
+    confidence: float
+    branch: int
+    warning: str
+    reasons: tuple[str, ...]
+    features: ConfidenceFeatures
+    p_pose: None = None
+
+
+def glance_of(
+    scan: Points,
+    sensor: Sensor | None,
+    pose: SE3,
+    cost: float,
+    branch: int,
+    seen: Float[Tensor, "6"],
+    settings: ModelSettings,
+    rule: ReasonRule = _RULE,
+) -> Glance:
+    """What is to be said of a scan, from what a look found (`Found.said`)."""
+    features = features_of(scan, cost, seen)
+    warning = warning_of(scan, sensor, settings, rule)
+    return Glance(
+        pose=pose,
+        confidence=0.0 if warning else confidence_of(features, settings),
+        branch=branch,
+        warning=warning,
+        reasons=reasons_of_scan(scan, sensor, settings, rule),
+        features=features,
+    )
 
 
 def reasons_of_scan(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import torch
 
-from wildshape.geometry.ground import skirt
+from wildshape.geometry.ground import without_skirt
 from wildshape.geometry.sampling import sorted_points
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.as_points import all_as_points, as_points, rays_of_each
@@ -24,18 +24,13 @@ from wildshape.inference.choose_hypothesis import (
     network_input,
 )
 from wildshape.inference.compiled import compiled
-from wildshape.inference.confidence import (
-    confidence_of,
-    features_of,
-    judged,
-    reasons_of_scan,
-    warning_of,
-)
+from wildshape.inference.confidence import glance_of, judged
 from wildshape.inference.config import InferenceConfig
 from wildshape.inference.free_space import Rays, Sights, without_free_space
 from wildshape.inference.refine import Refined, denser, refine, with_scan
-from wildshape.inference.registration import fuse_scans, inlier_ratio, to_middle
+from wildshape.inference.registration import fuse_scans, registered, to_middle
 from wildshape.inference.tracks.complete_track import Gathered, complete_together
+from wildshape.inference.tracks.joint_icp import key_scans
 from wildshape.io.scans.points import LEAST_POINTS
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint, weights_file
 from wildshape.method.network import ShapePoseNet
@@ -173,10 +168,7 @@ class Predictor:
         track: bool = False,
         rays: Rays = (),
     ) -> Iterable[Completion]:
-        """`complete_many`, or with `track` `complete_track`, of scans that are known to be such.
-
-        What `io` reads has passed `check_scan`; it is not checked again.
-        """
+        """`complete_many`, or with `track` `complete_track`, of scans that `io` has checked."""
         return self._together(scans, sensor, rays) if track else self._each(scans, sensor, rays)
 
     def _each(
@@ -193,9 +185,25 @@ class Predictor:
         self, scans: Sequence[Points], sensor: Sensor | None, rays: Rays = ()
     ) -> Iterator[Completion]:
         began = time.perf_counter()
-        done = self.put_together(self._each(scans, sensor, rays), scans, rays)
+        if len(scans) > self.config.track.key_scans:
+            done = complete_together(self._gathered(scans, sensor, rays), self.config, rays)
+        else:
+            done = self.put_together(self._each(scans, sensor, rays), scans, rays)
         seconds = (time.perf_counter() - began) / max(len(scans), 1)
         return (replace(item, seconds=seconds) for item in done)
+
+    def _gathered(self, scans: Sequence[Points], sensor: Sensor | None, rays: Rays) -> Gathered:
+        """A long track: key scans are completed each on its own, the others looked at alone."""
+        gathered = Gathered(self.settings)
+        keys = set(key_scans(len(scans), self.config.track).tolist())
+        for start in range(0, len(scans), BATCH):
+            part = slice(start, start + BATCH)
+            for i, looked in enumerate(self.look(list(scans[part]), rays[part]).each(), start):
+                if i in keys:
+                    self._add(gathered, scans[i], self.complete_looked(looked, sensor)[0])
+                else:
+                    gathered.pass_by(looked, sensor, self.config.reasons)
+        return gathered
 
     def put_together(
         self, alone: Iterable[Completion], scans: Sequence[Points], rays: Rays = ()
@@ -205,22 +213,19 @@ class Predictor:
             return iter(alone)
         gathered = Gathered(self.settings)
         for cloud, done in zip(scans, alone):
-            shape = done.pose.inverse().apply_numpy(done.points)
-            gathered.add(done, self._off_ground(cloud, shape, done.pose))
+            self._add(gathered, cloud, done)
         return complete_together(gathered, self.config, rays)
+
+    def _add(self, gathered: Gathered, scan: Points, done: Completion) -> None:
+        shape = done.pose.inverse().apply_numpy(done.points)
+        gathered.add(done, self._off_ground(scan, shape, done.pose))
 
     def register(
         self, source: object, target: object, sensor: Sensor | None = None
     ) -> Registration:
         """`T_target_source = T_target_can inv(T_source_can)` (METHOD 7)."""
         pair = (as_points(source, "source"), as_points(target, "target"))
-        done_source, done_target = self._each(pair, sensor)
-        T_target_source = done_target.pose @ done_source.pose.inverse()
-        ratio = inlier_ratio(T_target_source, *pair, self.config.inliers)
-        confidence = min(done_source.confidence, done_target.confidence)
-        warning = done_source.warning or done_target.warning
-        reasons = tuple(dict.fromkeys((*done_source.reasons, *done_target.reasons)))
-        return Registration(T_target_source, ratio, confidence, warning, reasons)
+        return registered(*pair, self._each(pair, sensor), self.config.inliers)
 
     def register_track(
         self, scans: Sequence[object], sensor: Sensor | None = None, *, track: bool = False
@@ -244,13 +249,9 @@ class Predictor:
     def fuse(
         self, scans: Sequence[object], sensor: Sensor | None = None, *, track: bool = False
     ) -> Points:
-        """All points of a track's scans in the middle scan's sensor frame, metres.
-
-        `track` as in `register_track`.
-        """
+        """All points of a track in its middle scan's frame, metres; `track`: see above."""
         clouds = all_as_points(scans)
-        done = self.complete_checked(clouds, sensor, track=track)
-        return fuse_scans(clouds, to_middle(stack([item.pose for item in done])))
+        return fuse_scans(clouds, self.register_track(clouds, sensor, track=track))
 
     @torch.inference_mode()
     def look(self, scans: Sequence[Points], rays: Rays = ()) -> Looked:
@@ -310,9 +311,8 @@ class Predictor:
     ) -> Completion:
         """Scan `i` of those looked at."""
         scan, seen, found, sights = looked.scans[i], looked.seen[i], looked.found, looked.sights
-        mirror, cost, rule = self.settings.network.mirror, float(found.cost[i]), self.config.reasons
-        features = features_of(scan, cost, found.features[i, :-1])
-        warning = warning_of(scan, sensor, self.settings, rule)
+        mirror, config = self.settings.network.mirror, self.config
+        said = glance_of(scan, sensor, *found.said(i), self.settings, config.reasons)
         shape, T_sensor_can, points = posed.shapes[i], posed.T_sensor_canonical[i], posed.points[i]
         exact = self.settings.sensor == "camera"
         whole, solid, standing = points.numpy(), shape, None
@@ -324,27 +324,25 @@ class Predictor:
             points=with_scan(whole, len(shape), scan) if exact and self.refines else whole,
             pose=T_sensor_can.to(torch.float64),
             box=box_seen(
-                solid, T_sensor_can, seen, mirror=mirror, body=not exact, config=self.config.box
+                solid, T_sensor_can, seen, mirror=mirror, body=not exact, config=config.box
             ),
-            confidence=0.0 if warning else confidence_of(features, self.settings),
-            branch=int(found.branch[i]),
-            cost=cost,
+            confidence=said.confidence,
+            branch=said.branch,
+            cost=float(found.cost[i]),
             refined=self.refines,
-            warning=warning,
-            reasons=reasons_of_scan(scan, sensor, self.settings, rule),
-            features=features,
+            warning=said.warning,
+            reasons=said.reasons,
+            features=said.features,
         )
         if not self.refines or exact:
-            return judged(done, None, None, self.settings, rule)
+            return judged(done, None, None, self.settings, config.reasons)
         rival = float(found.features[i, -1])
         evidence = scan_features(done, seen, posed.surfaces[i], rival, found.rotation[i], standing)
         trust = self.settings.trust
-        return judged(done, trust and trust.scan, evidence, self.settings, rule)
+        return judged(done, trust and trust.scan, evidence, self.settings, config.reasons)
 
     def _off_ground(self, scan: Points, shape: Points, T_sensor_canonical: SE3) -> Points:
         """The scan without the ground beside its object, for networks that do not complete it."""
         if not self.refines or self.settings.sensor != "lidar":
             return scan
-        T_canonical_sensor = T_sensor_canonical.to(torch.float64).inverse()
-        kept = scan[~skirt(T_canonical_sensor.apply_numpy(scan), shape)]
-        return kept if len(kept) >= LEAST_POINTS else scan
+        return without_skirt(scan, shape, T_sensor_canonical, LEAST_POINTS)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scans registered through the poses of one object (METHOD 7)."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import torch
@@ -11,7 +11,7 @@ from wildshape.geometry.box import extent
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import InlierRule
 from wildshape.ops.nearest import nearest
-from wildshape.records import Points
+from wildshape.records import Completion, Points, Registration
 
 _RULE = InlierRule()
 
@@ -26,6 +26,22 @@ def fuse_scans(scans: Sequence[Points], T_middle_scan: SE3) -> Points:
     """The scans' points, moved and joined."""
     moved = [T_middle_scan[i].apply_numpy(scan) for i, scan in enumerate(scans)]
     return np.concatenate(moved).astype(np.float32)
+
+
+def registered(
+    source: Points,
+    target: Points,
+    done: Iterable[Completion],
+    rule: InlierRule = _RULE,
+) -> Registration:
+    """`T_target_source = T_target_can inv(T_source_can)`; `done`: both scans completed."""
+    done_source, done_target = done
+    T_target_source = done_target.pose @ done_source.pose.inverse()
+    ratio = inlier_ratio(T_target_source, source, target, rule)
+    confidence = min(done_source.confidence, done_target.confidence)
+    warning = done_source.warning or done_target.warning
+    reasons = tuple(dict.fromkeys((*done_source.reasons, *done_target.reasons)))
+    return Registration(T_target_source, ratio, confidence, warning, reasons)
 
 
 def inlier_ratio(

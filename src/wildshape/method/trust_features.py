@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
 from wildshape.geometry.box import box_axes
@@ -144,6 +144,7 @@ def scan_features(
 
 def track_features(
     done: Sequence[Completion],
+    rows: Int64[Tensor, "U"],
     T_sensor_object: SE3,
     size: tuple[float, float, float],
     cost: Float[Tensor, "V"],
@@ -151,8 +152,9 @@ def track_features(
     """All features of a track, a record a scan.
 
     Args:
-        done: each scan on its own, with its features.
-        T_sensor_object: the track's poses.
+        done: scans completed each on its own, with their features; all, or of a long track some.
+        rows: which scans these are.
+        T_sensor_object: of every scan, the track's poses.
         size: of the track's box, metres.
         cost: label-free, of the track's shape in every scan, metres.
     """
@@ -160,7 +162,8 @@ def track_features(
     points = np.exp([one.log_points for one in own])
     weights = np.sqrt(np.minimum(points, _MOST_POINTS))
     ahead = torch.stack([item.pose.rotation[:, 0] for item in done])
-    alike = (ahead * T_sensor_object.rotation[:, :, 0]).sum(-1).numpy()
+    poses = T_sensor_object[rows]
+    alike = (ahead * poses.rotation[:, :, 0]).sum(-1).numpy()
     costs = np.log(np.maximum(cost.numpy(), SMALLEST_M))
 
     def mean(values: Sequence[float] | np.ndarray) -> float:
@@ -170,7 +173,7 @@ def track_features(
         return mean([getattr(one, name) for one in own])
 
     together = TrackFeatures(
-        log_cost=mean(costs),
+        log_cost=mean(costs[rows.numpy()]),
         scan_cost=0.0,
         rival=mean_of("rival"),
         log_moved=mean_of("log_moved"),
@@ -185,7 +188,7 @@ def track_features(
         log_points=max(one.log_points for one in own),
         log_range=mean_of("log_range"),
         log_scans=math.log(len(own)),
-        log_apart=math.log(views_apart(T_sensor_object) + _ALIKE_DEG),
+        log_apart=math.log(views_apart(poses) + _ALIKE_DEG),
         log_length=math.log(max(size[0], SMALLEST_M)),
         size_off=size_off(size),
     )

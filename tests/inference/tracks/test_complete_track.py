@@ -14,12 +14,14 @@ from tests.models import CONFIG, SETTINGS
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
-from wildshape.inference.config import TrackConfig
+from wildshape.inference.config import InferenceConfig, TrackConfig
 from wildshape.inference.predictor import Predictor
 from wildshape.inference.refine import drawn_to, padded
 from wildshape.inference.tracks import complete_track as whole
+from wildshape.inference.tracks import joint_icp
 from wildshape.inference.tracks.heading_vote import (
     continuous_signs,
+    followed_signs,
     half_turn,
     likeness_of_next,
     nearness_of_next,
@@ -84,8 +86,8 @@ def test_a_refinement_that_fits_worse_is_not_kept(monkeypatch):
     """True poses, and a refinement that spoils them: the vote stands, and says so."""
     scans, true = list(TRACK.scans), poses_of(TRACK)
     worse = lambda _, poses, *__, **___: spoilt(poses, seed=5, degrees=10.0, metres=0.4)  # noqa: E731
-    monkeypatch.setattr(whole, "refine_jointly", worse)
-    fit = whole.refine_checked(scans, true, mirror=True)
+    monkeypatch.setattr(joint_icp, "refine_jointly", worse)
+    fit = joint_icp.refine_checked(scans, true, mirror=True)
     assert not fit.refined
     assert fit.T_sensor_object is true
 
@@ -93,8 +95,8 @@ def test_a_refinement_that_fits_worse_is_not_kept(monkeypatch):
 def test_a_refinement_that_leaves_the_vote_far_behind_is_not_kept(monkeypatch):
     scans, true = list(TRACK.scans), poses_of(TRACK)
     start = turned_around(true, {2})
-    monkeypatch.setattr(whole, "refine_jointly", lambda *_, **__: true)
-    assert not whole.refine_checked(scans, start, mirror=True).refined
+    monkeypatch.setattr(joint_icp, "refine_jointly", lambda *_, **__: true)
+    assert not joint_icp.refine_checked(scans, start, mirror=True).refined
 
 
 def test_scans_sure_of_their_heading_outvote_those_with_the_better_shape():
@@ -120,14 +122,14 @@ def test_scans_that_agree_on_a_wrong_place_move_to_the_surer_ones():
     def off(poses):
         return float((true.inverse() @ poses).translation.norm(dim=-1).max())
 
-    alike = whole.refine_checked(scans, start, mirror=True).T_sensor_object
-    told = whole.refine_checked(scans, start, odds, mirror=True).T_sensor_object
+    alike = joint_icp.refine_checked(scans, start, mirror=True).T_sensor_object
+    told = joint_icp.refine_checked(scans, start, odds, mirror=True).T_sensor_object
     assert off(told) < 0.5 * off(alike)
 
 
 def test_a_better_refinement_is_kept():
     start = spoilt(poses_of(TRACK), seed=1)
-    fit = whole.refine_checked(list(TRACK.scans), start, mirror=True)
+    fit = joint_icp.refine_checked(list(TRACK.scans), start, mirror=True)
     assert fit.refined
     off = [
         float((relative(poses_of(TRACK)).inverse() @ relative(poses)).angle().mean())
@@ -144,7 +146,7 @@ def test_one_scan_is_completed_as_ever():
 def test_of_a_long_track_key_scans_are_fitted_to_each_other_and_the_others_to_them():
     true = poses_of(TRACK)
     start, few = spoilt(true, seed=1), TrackConfig(key_scans=4)
-    fit = whole.refine_checked(list(TRACK.scans), start, mirror=True, config=few)
+    fit = joint_icp.refine_checked(list(TRACK.scans), start, mirror=True, config=few)
     assert fit.refined
     before, after = (
         (relative(true).inverse() @ relative(poses)).angle()
@@ -152,6 +154,28 @@ def test_of_a_long_track_key_scans_are_fitted_to_each_other_and_the_others_to_th
     )
     others = [1, 3, 5]
     assert float(after[others].mean()) < 0.7 * float(before[others].mean())
+
+
+def test_of_a_long_track_the_key_scans_alone_are_completed_each_on_its_own(monkeypatch):
+    """All scans get a result; of those between the key scans the look is enough."""
+    torch.manual_seed(0)
+    config = InferenceConfig(track=TrackConfig(key_scans=3))
+    predictor = Predictor(ShapePoseNet(CONFIG).eval(), SETTINGS, config=config)
+    completed_alone = []
+
+    def complete_looked(looked, sensor=None):
+        completed_alone.extend(looked.scans)
+        return Predictor.complete_looked(predictor, looked, sensor)
+
+    monkeypatch.setattr(predictor, "complete_looked", complete_looked)
+    scans = [scan.astype(np.float32) for scan in TRACK.scans]
+    done = predictor.complete_track(scans)
+    assert len(done) == len(scans)
+    assert [id(one) for one in completed_alone] == [id(scans[i]) for i in (0, 3, 6)]
+    assert len({item.box.size for item in done}) == 1
+    alone = [predictor.complete(scan) for scan in scans]
+    assert [item.branch for item in done] == [item.branch for item in alone]
+    assert [item.warning for item in done] == [item.warning for item in alone]
 
 
 def test_all_of_a_long_track_look_one_way():
@@ -179,28 +203,25 @@ def test_the_heavier_part_says_which_way():
     yaw = torch.linspace(0.0, 0.5, 6)
     back = torch.tensor([False, True, False, True, False, False])
     rotation = rotation_z(torch.where(back, yaw + torch.pi, yaw))
-    nothing = (torch.zeros(6), torch.zeros(5))
-    assert torch.equal(voted_signs(rotation, *nothing, torch.ones(6)) < 0, back)
+    assert torch.equal(followed_signs(rotation, torch.ones(6)) < 0, back)
     heavy = torch.where(back, 5.0, 1.0)
-    assert torch.equal(voted_signs(rotation, *nothing, heavy) > 0, back)
+    assert torch.equal(followed_signs(rotation, heavy) > 0, back)
     assert set(continuous_signs(rotation).tolist()) == {-1.0, 1.0}
 
 
 def test_turned_each_on_their_own_the_shape_and_the_neighbours_vote():
     """One scan that the shape is unsure of follows its neighbours; a sure shape is followed, and
     where neither says anything, the scan itself, if it is sure."""
-    generator = torch.Generator().manual_seed(1)
-    rotation = rotation_z(6.28 * torch.rand(5, generator=generator))
     alike = torch.full((4,), 0.1)
     unsure = torch.tensor((0.05, 0.05, -0.01, 0.05, 0.05))
-    assert voted_signs(rotation, unsure, alike, torch.ones(5)).tolist() == [1.0] * 5
+    assert voted_signs(unsure, alike, torch.ones(5)).tolist() == [1.0] * 5
     opposed = torch.tensor((0.1, -0.1, -0.1, 0.1))
-    assert voted_signs(rotation, unsure, opposed, torch.ones(5)).tolist() == [1, 1, -1, 1, 1]
+    assert voted_signs(unsure, opposed, torch.ones(5)).tolist() == [1, 1, -1, 1, 1]
     alone = torch.zeros(4)
-    assert voted_signs(rotation, unsure, alone, torch.zeros(5)).tolist() == [1, 1, -1, 1, 1]
-    assert voted_signs(rotation, unsure, alone, torch.ones(5)).tolist() == [1.0] * 5
+    assert voted_signs(unsure, alone, torch.zeros(5)).tolist() == [1, 1, -1, 1, 1]
+    assert voted_signs(unsure, alone, torch.ones(5)).tolist() == [1.0] * 5
     sure = torch.tensor((0.05, 0.05, -0.1, 0.05, 0.05))
-    assert voted_signs(rotation, sure, alone, torch.ones(5)).tolist() == [1, 1, -1, 1, 1]
+    assert voted_signs(sure, alone, torch.ones(5)).tolist() == [1, 1, -1, 1, 1]
 
 
 def test_scans_posed_alike_lie_on_each_other():

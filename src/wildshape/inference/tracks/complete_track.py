@@ -2,17 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """One object from all scans of its track: headings voted, poses refined, one shape (METHOD 11).
 
-Beyond the paper. Each scan was completed on its own first; here they are held against each other.
-Nothing but the scans and what the network said of each is used.
+Beyond the paper. Each scan was completed on its own first, of a long track the key scans; here they
+are held against each other. Nothing but the scans and what the network said of each is used.
 """
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int64
 from torch import Tensor
 
 from wildshape.geometry.box import FittedBox, unit_of
@@ -20,76 +19,77 @@ from wildshape.geometry.sampling import voxel_thin
 from wildshape.geometry.surface import mirrored
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
-from wildshape.inference.choose_hypothesis import NetworkInput
-from wildshape.inference.confidence import judged, odds_of
-from wildshape.inference.config import BoxConfig, InferenceConfig, TrackConfig
+from wildshape.inference.choose_hypothesis import Looked, NetworkInput
+from wildshape.inference.confidence import Glance, glance_of, judged, odds_of
+from wildshape.inference.config import BoxConfig, InferenceConfig, ReasonRule, TrackConfig
 from wildshape.inference.free_space import Rays, Sights, without_free_space
 from wildshape.inference.refine import denser, drawn_to, padded, partners
 from wildshape.inference.tracks.heading_vote import (
+    followed_signs,
     half_turn,
     likeness_of_next,
     nearness_of_next,
+    slow,
     turned_where,
     voted_signs,
 )
-from wildshape.inference.tracks.joint_icp import (
-    fused_surface,
-    refine_jointly,
-    refine_onto,
-    stayed_near,
-    surest,
-)
+from wildshape.inference.tracks.joint_icp import fused, refine_checked
 from wildshape.inference.tracks.pose_outliers import without_outliers
 from wildshape.inference.tracks.track_cost import network_inputs, track_cost
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.trust import TrackFeatures
 from wildshape.method.trust_features import track_features
-from wildshape.ops.nearest import nearest
-from wildshape.records import Completion, Points
+from wildshape.records import Completion, Points, Sensor
 
-_BATCH, _LEAST_SURE = 32, 1e-3
+_LEAST_SURE = 1e-3
 _DEFAULT = InferenceConfig()
 
 
-class TrackFit(NamedTuple):
-    """Poses of one object in a track's scans.
-
-    Attributes:
-        T_sensor_object: of every scan.
-        refined: whether they were made to fit each other.
-    """
-
-    T_sensor_object: SE3
-    refined: bool
-
-
 class Gathered:
-    """Completions of a track's single scans without their points, and their mean shape.
+    """What a track's scans say, each on its own, and the mean shape of those completed.
 
     Points of one index are the same place of every canonical shape. That holds for the network's
     own points, which come first.
 
     Attributes:
-        done: each scan on its own, in time order, without points.
+        said: of each scan, in time order; completions are without points.
         scans: of one rigid object, sensor frames.
-        weights: what each counts, the odds that it is right.
+        rows: of the scans that were completed; the others were looked at alone.
+        weights: what each counts, the odds that it is right; 0 of those looked at alone.
     """
 
     def __init__(self, settings: ModelSettings) -> None:
         """`settings`: of the network that completes them."""
         self.settings = settings
-        self.done: list[Completion] = []
+        self.said: list[Completion | Glance] = []
         self.scans: list[Points] = []
         self._odds: list[float] = []
         self._sum = torch.zeros(settings.network.points, 3, dtype=torch.float64)
 
     def add(self, done: Completion, scan: Points) -> None:
-        """The next scan."""
+        """The next scan, completed."""
         own = torch.from_numpy(done.points[: len(self._sum)]).double()
         self._odds.append(odds_of(done))
         self._sum += self._odds[-1] * done.pose.inverse().apply(own)
-        self.done.append(replace(done, points=done.points[:0].copy()))
+        self.said.append(replace(done, points=done.points[:0].copy()))
         self.scans.append(scan)
+
+    def pass_by(self, looked: Looked, sensor: Sensor | None, rule: ReasonRule) -> None:
+        """The next scan, looked at alone."""
+        self._odds.append(0.0)
+        said = looked.found.said(0)
+        self.said.append(glance_of(looked.scans[0], sensor, *said, self.settings, rule))
+        self.scans.append(looked.seen[0])
+
+    @property
+    def done(self) -> list[Completion]:
+        """The scans that were completed."""
+        return [one for one in self.said if isinstance(one, Completion)]
+
+    @property
+    def rows(self) -> Int64[Tensor, "U"]:
+        """Of the scans that were completed."""
+        return torch.nonzero(self.weights)[:, 0]
 
     @property
     def weights(self) -> Float[Tensor, "V"]:
@@ -99,7 +99,7 @@ class Gathered:
     @property
     def sure(self) -> Float[Tensor, "V"]:
         """How sure each is of its heading, 0 to 1: `p_pose`, or the confidence without it."""
-        stated = [one.confidence if one.p_pose is None else one.p_pose for one in self.done]
+        stated = [one.confidence if one.p_pose is None else one.p_pose for one in self.said]
         return torch.tensor(stated, dtype=torch.float64).clamp_min(_LEAST_SURE)
 
     @property
@@ -124,7 +124,7 @@ def complete_together(
     """
     done, scans, settings = gathered.done, gathered.scans, gathered.settings
     shape = gathered.shape
-    poses = stack([item.pose for item in done])
+    poses = stack([item.pose for item in gathered.said])
     inputs = network_inputs(scans, settings)
     voted = _voted(poses, shape, gathered, inputs, config.track)
     mirror, unit = settings.network.mirror, unit_of(settings.extent_m[1])
@@ -142,32 +142,36 @@ def complete_together(
     whole = _denser(shape, config) if settings.facing else shape
     cost = track_cost(shape, fit.T_sensor_object, inputs, settings)
     mean = float(np.mean([item.confidence for item in done]))
-    trust, evidence = settings.trust, _evidence(done, fit.T_sensor_object, fitted, cost)
+    trust, evidence = settings.trust, _evidence(gathered, fit.T_sensor_object, fitted, cost)
 
     def together(i: int) -> Completion:
-        item, T_sensor_object = done[i], fit.T_sensor_object[i]
-        item = replace(
-            item,
+        said, T_sensor_object = gathered.said[i], fit.T_sensor_object[i]
+        item = Completion(
             points=T_sensor_object.apply(whole).float().numpy(),
             pose=T_sensor_object,
             box=carried(fitted, T_sensor_object),
-            confidence=0.0 if item.warning else mean,
+            confidence=0.0 if said.warning else mean,
+            branch=said.branch,
             cost=float(cost[i]),
             refined=fit.refined,
+            warning=said.warning,
+            reasons=said.reasons,
+            features=said.features,
         )
         return judged(item, trust and trust.track, evidence[i], settings, config.reasons)
 
-    return map(together, range(len(done)))
+    return map(together, range(len(scans)))
 
 
 def _evidence(
-    done: list[Completion], T_sensor_object: SE3, fitted: FittedBox, cost: Float[Tensor, "V"]
+    gathered: Gathered, T_sensor_object: SE3, fitted: FittedBox, cost: Float[Tensor, "V"]
 ) -> list[TrackFeatures] | list[None]:
-    """What is known of each scan of the track; nothing where it is not known of all scans."""
-    if not all(item.evidence for item in done):
-        return [None] * len(done)
+    """What is known of each scan of the track; nothing where a completed one brought nothing."""
+    if not all(item.evidence for item in gathered.done):
+        return [None] * len(gathered.scans)
     length, width, height = fitted.size.tolist()
-    return track_features(done, T_sensor_object, (length, width, height), cost)
+    size = length, width, height
+    return track_features(gathered.done, gathered.rows, T_sensor_object, size, cost)
 
 
 def _denser(shape: Float[Tensor, "P 3"], config: InferenceConfig) -> Float[Tensor, "Q 3"]:
@@ -208,8 +212,25 @@ def _voted(
     config: TrackConfig,
 ) -> SE3:
     """The same poses, all looking one way and no outlier among them."""
-    settings = gathered.settings
     middle = float(shape[:, 0].amin() + shape[:, 0].amax()) / 2
+    if slow(T_sensor_can.rotation, config.vote):
+        signs = followed_signs(T_sensor_can.rotation, gathered.sure, config.vote)
+    else:
+        gain, links = _votes(T_sensor_can, shape, middle, gathered, inputs, config)
+        signs = voted_signs(gain, links, gathered.sure, config.vote)
+    return without_outliers(turned_where(T_sensor_can, signs, middle), config)
+
+
+def _votes(
+    T_sensor_can: SE3,
+    shape: Float[Tensor, "P 3"],
+    middle: float,
+    gathered: Gathered,
+    inputs: list[NetworkInput],
+    config: TrackConfig,
+) -> tuple[Float[Tensor, "V"], Float[Tensor, "W"]]:
+    """What the shape says of each scan, and each scan of the next (`voted_signs`)."""
+    settings = gathered.settings
     turned = T_sensor_can @ half_turn(middle)
     stands = track_cost(shape, T_sensor_can, inputs, settings)
     gain = track_cost(shape, turned, inputs, settings) - stands
@@ -220,8 +241,7 @@ def _voted(
         clouds = _some_of_each(gathered.scans, T_sensor_can, config.voting_points) / unit
         mirror = settings.network.mirror
         links = likeness_of_next(clouds, middle / unit, mirror=mirror, config=config.vote)
-    signs = voted_signs(T_sensor_can.rotation, gain / unit, links, gathered.sure, config.vote)
-    return without_outliers(turned_where(T_sensor_can, signs, middle), config)
+    return gain / unit, links
 
 
 def _some_of_each(scans: list[Points], T_sensor_object: SE3, count: int) -> Float[Tensor, "V n 3"]:
@@ -232,101 +252,10 @@ def _some_of_each(scans: list[Points], T_sensor_object: SE3, count: int) -> Floa
     return T_sensor_object.inverse().apply(picked.double()).float()
 
 
-def refine_checked(
-    scans: list[Points],
-    voted: SE3,
-    odds: Float[Tensor, "V"] | None = None,
-    *,
-    mirror: bool,
-    config: TrackConfig = _DEFAULT.track,
-) -> TrackFit:
-    """Refined poses, kept only if the scans then lie nearer to each other, and near the vote.
-
-    Scans are moved onto all others and, from the vote again, onto the surest alone: those that are
-    half hidden may agree on a wrong place. The better is kept. Of a long track the key scans are
-    fitted to each other, and each other scan to them.
-
-    Args:
-        scans: of one object.
-        voted: `T_sensor_object` to start from.
-        odds: of each scan being right, if known.
-        mirror: the object is symmetric in the plane y = 0 of its frame.
-        config: how they are refined.
-    """
-    odds = torch.ones(len(scans)) if odds is None else odds
-    if len(scans) > config.key_scans:
-        return _by_key_scans(scans, voted, odds, mirror, config)
-    sure = surest(odds, config.believed)
-    found = [voted]
-    for onto in (None,) if len(sure) == len(scans) else (None, sure):
-        refined = refine_jointly(scans, voted, onto, mirror=mirror, config=config.coarse)
-        found.append(refine_jointly(scans, refined, onto, mirror=False, config=config.fine))
-    near = [poses for poses in found if bool(stayed_near(voted, poses, config).all())]
-    best = min(near, key=lambda poses: _disagreement(scans, poses, mirror, config))
-    return TrackFit(best, refined=best is not voted)
-
-
-def _by_key_scans(
-    scans: list[Points],
-    voted: SE3,
-    odds: Float[Tensor, "V"],
-    mirror: bool,
-    config: TrackConfig,
-) -> TrackFit:
-    """A pose that would leave the vote far behind stays what it was."""
-    rows = torch.linspace(0, len(scans) - 1, config.key_scans).round().long()
-    keys = [scans[i] for i in rows.tolist()]
-    fit = refine_checked(keys, voted[rows], odds[rows], mirror=mirror, config=config)
-    if not fit.refined:
-        return TrackFit(voted, refined=False)
-    surface = fused_surface(keys, fit.T_sensor_object, config.onto, mirror=mirror)
-    parts = [slice(start, start + _BATCH) for start in range(0, len(scans), _BATCH)]
-    moved = [refine_onto(surface, scans[part], voted[part], config.onto) for part in parts]
-    rotation, translation = (
-        torch.cat([T.rotation for T in moved]),
-        torch.cat([T.translation for T in moved]),
-    )
-    near = stayed_near(voted, SE3(rotation, translation), config)
-    rotation = torch.where(near[:, None, None], rotation, voted.rotation)
-    translation = torch.where(near[:, None], translation, voted.translation)
-    rotation[rows], translation[rows] = (
-        fit.T_sensor_object.rotation,
-        fit.T_sensor_object.translation,
-    )
-    return TrackFit(SE3(rotation, translation), refined=True)
-
-
-def _disagreement(
-    scans: list[Points], T_sensor_object: SE3, mirror: bool, config: TrackConfig
-) -> float:
-    """Mean distance of every other scan to those between them, metres, each at most `far_m`."""
-    halves = [
-        _fused(scans, T_sensor_object, part, config.most_points)
-        for part in (slice(0, None, 2), slice(1, None, 2))
-    ]
-    bank = mirrored(halves[1][None])[0] if mirror else halves[1]
-    found = nearest(halves[0][None], bank[None])
-    return float(found.distance_squared.sqrt().clamp_max(config.vote.far_m).mean())
-
-
-def _fused(
-    scans: list[Points], T_sensor_object: SE3, part: slice, count: int
-) -> Float[Tensor, "n 3"]:
-    """Points of some of the scans in the object frame, about `count` at most."""
-    rng = np.random.default_rng(0)
-    chosen = range(len(scans))[part]
-    most = max(1, count // len(chosen))
-    clouds = []
-    for i in chosen:
-        points = torch.from_numpy(scans[i][rng.permutation(len(scans[i]))[:most]]).double()
-        clouds.append(T_sensor_object[i].inverse().apply(points))
-    return torch.cat(clouds).float()
-
-
 def _seen(
     scans: list[Points], T_sensor_object: SE3, mirror: bool, config: TrackConfig
 ) -> Float[Tensor, "n 3"]:
     """The surface that the scans saw, reflected and thinned to an even density, object frame."""
-    fused = _fused(scans, T_sensor_object, slice(None), config.most_points)
-    fused = mirrored(fused[None])[0] if mirror else fused
-    return torch.from_numpy(voxel_thin(fused.numpy(), config.voxel_m))
+    points = fused(scans, T_sensor_object, slice(None), config.most_points)
+    points = mirrored(points[None])[0] if mirror else points
+    return torch.from_numpy(voxel_thin(points.numpy(), config.voxel_m))

@@ -83,28 +83,39 @@ def _trace(matrix: Float[Tensor, "*batch 3 3"]) -> Float[Tensor, "*batch"]:
     return matrix.diagonal(dim1=-2, dim2=-1).sum(-1)
 
 
-def voted_signs(
+def followed_signs(
     rotation: Float[Tensor, "V 3 3"],
+    weights: Float[Tensor, "V"],
+    config: HeadingVoteConfig = _DEFAULT,
+) -> Float[Tensor, "V"]:
+    """+1 or -1 for each scan of a `slow` track: turn those of -1 around, and all are posed one way.
+
+    Args:
+        rotation: `R_sensor_object`, as each scan found it.
+        weights: how sure each scan is of its own pose, 0 to 1.
+        config: which neighbours are compared.
+    """
+    signs = continuous_signs(rotation, config)
+    return signs if float((signs * weights).sum()) >= 0 else -signs
+
+
+def voted_signs(
     gain: Float[Tensor, "V"],
     links: Float[Tensor, "W"],
     weights: Float[Tensor, "V"],
     config: HeadingVoteConfig = _DEFAULT,
 ) -> Float[Tensor, "V"]:
-    """+1 or -1 for each scan: turn those of -1 around, and all are posed one way.
+    """The same where the scans do not follow each other.
 
     Args:
-        rotation: `R_sensor_object`, as each scan found it.
         gain: by how much the track's shape costs more in a scan when turned around, metres.
         links: what speaks for each scan looking as the next one does, metres; one fewer than scans
             (`nearness_of_next`, `likeness_of_next`).
         weights: how sure each scan is of its own pose, 0 to 1.
         config: weights of the vote.
     """
-    if not slow(rotation, config):
-        own = config.own_m * (weights + config.unsure)
-        return _agreed(config.shape_votes * gain + own, links)
-    signs = continuous_signs(rotation, config)
-    return signs if float((signs * weights).sum()) >= 0 else -signs
+    own = config.own_m * (weights + config.unsure)
+    return _agreed(config.shape_votes * gain + own, links)
 
 
 def _agreed(single: Float[Tensor, "V"], links: Float[Tensor, "W"]) -> Float[Tensor, "V"]:

@@ -20,10 +20,11 @@ from wildshape.geometry.surface import mirrored, planes
 from wildshape.geometry.transforms.rotation import rotation_from_vector
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import JointIcpConfig, TrackConfig
-from wildshape.ops.nearest import nearest_k
+from wildshape.ops.nearest import nearest, nearest_k
 from wildshape.records import Points
 
 _TRACK = TrackConfig()
+_BATCH = 32
 
 
 class Surface(NamedTuple):
@@ -31,6 +32,87 @@ class Surface(NamedTuple):
 
     points: Float[Tensor, "*n 3"]
     normals: Float[Tensor, "*n 3"]
+
+
+class TrackFit(NamedTuple):
+    """Poses of one object in a track's scans.
+
+    Attributes:
+        T_sensor_object: of every scan.
+        refined: whether they were made to fit each other.
+    """
+
+    T_sensor_object: SE3
+    refined: bool
+
+
+def key_scans(count: int, config: TrackConfig = _TRACK) -> Int64[Tensor, "U"]:
+    """Which of so many scans are fitted to each other: all, or of a long track some."""
+    return torch.linspace(0, count - 1, min(count, config.key_scans)).round().long()
+
+
+def refine_checked(
+    scans: list[Points],
+    voted: SE3,
+    odds: Float[Tensor, "V"] | None = None,
+    *,
+    mirror: bool,
+    config: TrackConfig = _TRACK,
+) -> TrackFit:
+    """Refined poses, kept only if the scans then lie nearer to each other, and near the vote.
+
+    Scans are moved onto all others and, from the vote again, onto the surest alone: those that are
+    half hidden may agree on a wrong place. The better is kept. Of a long track the key scans are
+    fitted to each other, and each other scan to them.
+
+    Args:
+        scans: of one object.
+        voted: `T_sensor_object` to start from.
+        odds: of each key scan being right, if known; those of other scans are not asked.
+        mirror: the object is symmetric in the plane y = 0 of its frame.
+        config: how they are refined.
+    """
+    odds = torch.ones(len(scans)) if odds is None else odds
+    if len(scans) > config.key_scans:
+        return _by_key_scans(scans, voted, odds, mirror, config)
+    sure = surest(odds, config.believed)
+    found = [voted]
+    for onto in (None,) if len(sure) == len(scans) else (None, sure):
+        refined = refine_jointly(scans, voted, onto, mirror=mirror, config=config.coarse)
+        found.append(refine_jointly(scans, refined, onto, mirror=False, config=config.fine))
+    near = [poses for poses in found if bool(stayed_near(voted, poses, config).all())]
+    best = min(near, key=lambda poses: _disagreement(scans, poses, mirror, config))
+    return TrackFit(best, refined=best is not voted)
+
+
+def _by_key_scans(
+    scans: list[Points],
+    voted: SE3,
+    odds: Float[Tensor, "V"],
+    mirror: bool,
+    config: TrackConfig,
+) -> TrackFit:
+    """A pose that would leave the vote far behind stays what it was."""
+    rows = key_scans(len(scans), config)
+    keys = [scans[i] for i in rows.tolist()]
+    fit = refine_checked(keys, voted[rows], odds[rows], mirror=mirror, config=config)
+    if not fit.refined:
+        return TrackFit(voted, refined=False)
+    surface = fused_surface(keys, fit.T_sensor_object, config.onto, mirror=mirror)
+    parts = [slice(start, start + _BATCH) for start in range(0, len(scans), _BATCH)]
+    moved = [refine_onto(surface, scans[part], voted[part], config.onto) for part in parts]
+    rotation, translation = (
+        torch.cat([T.rotation for T in moved]),
+        torch.cat([T.translation for T in moved]),
+    )
+    near = stayed_near(voted, SE3(rotation, translation), config)
+    rotation = torch.where(near[:, None, None], rotation, voted.rotation)
+    translation = torch.where(near[:, None], translation, voted.translation)
+    rotation[rows], translation[rows] = (
+        fit.T_sensor_object.rotation,
+        fit.T_sensor_object.translation,
+    )
+    return TrackFit(SE3(rotation, translation), refined=True)
 
 
 @torch.no_grad()
@@ -208,3 +290,30 @@ def _as_a_whole(start: SE3, end: SE3, points: Tensor, mirror: bool) -> SE3:
     was = start.apply(points).flatten(0, 1).mean(0) * keep
     now = end.apply(points).flatten(0, 1).mean(0) * keep
     return SE3(turn, was - turn @ now)
+
+
+def _disagreement(
+    scans: list[Points], T_sensor_object: SE3, mirror: bool, config: TrackConfig
+) -> float:
+    """Mean distance of every other scan to those between them, metres, each at most `far_m`."""
+    halves = [
+        fused(scans, T_sensor_object, part, config.most_points)
+        for part in (slice(0, None, 2), slice(1, None, 2))
+    ]
+    bank = mirrored(halves[1][None])[0] if mirror else halves[1]
+    found = nearest(halves[0][None], bank[None])
+    return float(found.distance_squared.sqrt().clamp_max(config.vote.far_m).mean())
+
+
+def fused(
+    scans: list[Points], T_sensor_object: SE3, part: slice, count: int
+) -> Float[Tensor, "n 3"]:
+    """Points of some of the scans in the object frame, about `count` at most."""
+    rng = np.random.default_rng(0)
+    chosen = range(len(scans))[part]
+    most = max(1, count // len(chosen))
+    clouds = []
+    for i in chosen:
+        points = torch.from_numpy(scans[i][rng.permutation(len(scans[i]))[:most]]).double()
+        clouds.append(T_sensor_object[i].inverse().apply(points))
+    return torch.cat(clouds).float()
