@@ -139,3 +139,19 @@ def test_times_of_points_in_scan_files(tmp_path, suffix):
     turn = open_drive(tmp_path).turn(1)
     assert turn.seconds == pytest.approx(np.delete(rows["time"], 3))
     assert turn.points[:, 0].tolist() == np.delete(rows["x"], 3).tolist()
+
+
+def test_frames_asked_for_last_are_read_once_and_so_few_are_kept_in_memory():
+    read = []
+
+    def give(frame):
+        read.append(frame)
+        return Turn(np.full((1, 3), frame, np.float32))
+
+    drive = Drive.of("drive", [f"{n:06d}" for n in range(40)], give)
+    for frame in (*range(40), *range(8, 40)):
+        assert drive.turn(frame).points[0, 0] == frame
+    assert read == list(range(40))
+    drive.turn(0)
+    drive.turn(8)  # given up for it
+    assert read == [*range(40), 0, 8]

@@ -5,6 +5,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Generic, TypeVar
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -18,6 +19,35 @@ from wildshape.records import Points, Turn
 _LONGEST_PAUSE = 1e9  # scans; more are no count
 _MOMENT_S, _LONGEST_TURN_S = 0.01, 2.0
 _NOTHING = Turn(np.empty((0, 3), np.float32))
+_HELD = 32  # scans that are kept in memory
+
+T = TypeVar("T")
+
+
+class Held(Generic[T]):
+    """What a function gives for frames; that of the frames asked for last is kept.
+
+    Stages of short drives, and objects that are neighbours in time, ask for the same frames.
+    """
+
+    def __init__(self, give: Callable[[int], T]) -> None:
+        self.give = give
+        self._held: dict[int, T] = {}
+
+    def __reduce__(self) -> "tuple[type[Held[T]], tuple[Callable[[int], T]]]":
+        """What is kept does not go along to another process."""
+        return Held, (self.give,)
+
+    def __contains__(self, frame: int) -> bool:
+        return frame in self._held
+
+    def __call__(self, frame: int) -> T:
+        """A frame's; the one not asked for longest is given up for it."""
+        found = self._held.pop(frame) if frame in self._held else self.give(frame)
+        self._held[frame] = found
+        if len(self._held) > _HELD:
+            del self._held[next(iter(self._held))]
+        return found
 
 
 @dataclass(frozen=True)
@@ -29,7 +59,7 @@ class Drive:
         scan_names: one a frame; frames are counted from 0.
         ticks: when each was taken, counted in scans: a missing scan leaves its number out.
         read: gives a frame's finite points, sensor frame, metres, and when each was taken, if
-            that is known; `BadInputError` if it cannot.
+            that is known; they are not to be changed. `BadInputError` if it cannot.
         times: when each scan was taken, seconds, if known.
         T_world_sensor: `(n,)` poses, if known.
         warnings: what is odd about it, a sentence each.
@@ -74,7 +104,7 @@ class Drive:
             name=name,
             scan_names=names,
             ticks=ticks,
-            read=read,
+            read=Held(read),
             times=None if times is None else tuple(times),
             T_world_sensor=T_world_sensor,
             warnings=(*warnings, *missing),

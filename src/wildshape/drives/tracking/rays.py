@@ -5,13 +5,11 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from wildshape.drives.source import Drive
+from wildshape.drives.source import Drive, Held
 from wildshape.drives.tracking.segmentation import read_cut
 from wildshape.drives.tracking.sightings import Sightings
-from wildshape.geometry.projection.full_scan import FullScan, sight_lines
+from wildshape.geometry.projection.full_scan import sight_lines
 from wildshape.geometry.projection.sight_lines import SightLines
-
-_HELD = 32  # scans that are kept in memory: objects that are neighbours in time share them
 
 
 class RayCutter:
@@ -20,7 +18,7 @@ class RayCutter:
     def __init__(self, drive: Drive, cuts: Path) -> None:
         """`cuts`: folder of the drive's clusters."""
         self.drive, self.cuts = drive, cuts
-        self._held: dict[int, FullScan] = {}
+        self._scans = Held(drive.full_scan)
 
     def __reduce__(self) -> tuple[type["RayCutter"], tuple[Drive, Path]]:
         """Scans do not go along to another process."""
@@ -33,7 +31,7 @@ class RayCutter:
             frame: which.
             objects: the clusters of each.
         """
-        full, cut = self._scan(frame), read_cut(self.cuts, frame)
+        full, cut = self._scans(frame), read_cut(self.cuts, frame)
         if len(full.points) != cut.scanned:
             return [None] * len(objects)
         return [sight_lines(full, cut.rows_of(clusters)) for clusters in objects]
@@ -44,16 +42,9 @@ class RayCutter:
         for number, (seen, place) in enumerate(asked):
             by_frame.setdefault(seen.frames[place], []).append(number)
         found: list[SightLines | None] = [None] * len(asked)
-        for frame in sorted(by_frame, key=lambda frame: (frame not in self._held, frame)):
+        for frame in sorted(by_frame, key=lambda frame: (frame not in self._scans, frame)):
             numbers = by_frame[frame]
             objects = [asked[number][0].rows[asked[number][1]] for number in numbers]
             for number, rays in zip(numbers, self.in_frame(frame, objects)):
                 found[number] = rays
         return found
-
-    def _scan(self, frame: int) -> FullScan:
-        """A frame's; the one not asked for longest is given up for it."""
-        self._held[frame] = self._held.pop(frame, None) or self.drive.full_scan(frame)
-        if len(self._held) > _HELD:
-            del self._held[next(iter(self._held))]
-        return self._held[frame]
