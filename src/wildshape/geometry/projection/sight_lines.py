@@ -190,11 +190,16 @@ def _nearest(
     count: int,
 ) -> tuple[Int[np.ndarray, "n k"], Float[np.ndarray, "n k"]]:
     """The rays nearest to each point, and how far behind it they ended; NaN of those not near."""
-    from scipy.spatial import KDTree
+    import torch
+
+    from wildshape.ops.nearest import nearest_k
 
     away = np.maximum(np.linalg.norm(points, axis=1), 1e-9)[:, None]
-    tree = KDTree(directions, balanced_tree=False)
-    found = tree.query(points / away, k=min(count, len(ranges)))
-    apart, ray = (np.asarray(part).reshape(len(points), -1) for part in found)
+    clouds = (
+        torch.from_numpy(part.astype(np.float32))[None] for part in (points / away, directions)
+    )
+    most = within_m / float(away.min(initial=np.inf))
+    found = nearest_k(*clouds, min(count, len(ranges)), most=most)
+    apart, ray = found.distance_squared[0].sqrt().numpy(), found.index[0].numpy()
     beyond = ranges[ray].astype(np.float64) - away
     return ray, np.where(apart * away <= within_m, beyond, np.nan)

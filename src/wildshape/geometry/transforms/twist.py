@@ -5,12 +5,14 @@
 The exponential map of SE(3): Sola, Deray and Atchuthan, "A micro Lie theory", 2018, eq. 145, 174.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 from jaxtyping import Float
 
+from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.geometry.transforms.se3 import SE3
 
 _SLOW = 1e-9  # radians a second: no turn that a scan shows
@@ -37,10 +39,10 @@ class Twist:
             end: one pose, `seconds` later.
             seconds: not 0.
         """
-        from scipy.spatial.transform import Rotation
-
         T_start_end = start.inverse() @ end
-        turn = Rotation.from_matrix(T_start_end.rotation.numpy()).as_rotvec()
+        cosine, *axis = quaternion_from_rotation(T_start_end.rotation).tolist()
+        sine = math.hypot(*axis)
+        turn = np.array(axis) * (2 * math.atan2(sine, cosine) / sine if sine else 2.0)
         # Columns: where each axis would be carried.
         carried = np.stack([_carried(turn, axis, np.ones(1))[0] for axis in np.eye(3)], axis=1)
         way = np.linalg.solve(carried, T_start_end.translation.numpy())
