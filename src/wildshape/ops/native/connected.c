@@ -3,7 +3,8 @@
  *
  * Which points hang together over steps of at most a reach. The first point of each cell stands for
  * all in it. Cells are put into cubes so small that what is in one hangs together; cubes with two
- * points in reach are joined. Cells and cubes are found in hash tables.
+ * points in reach are joined. Cells and cubes are found in hash tables. Most places beside a cube
+ * are empty: a small table of bits says so, at sums of hashes, which are linear in the place.
  */
 #include <math.h>
 #include <stdint.h>
@@ -22,9 +23,12 @@ typedef struct {
     int bits;
 } grid;
 
+enum { BITS = 18 }; /* of a hash that tell whether a cube may be there: 32 KiB */
+
 typedef struct {
     const float *points;
     grid cells, cubes;
+    uint64_t *mixed, *taken; /* hash of each cube; a bit for the beginning of each hash */
     int32_t *cell;   /* of each point */
     int32_t *first;  /* the first point of each cell */
     int32_t *cube;   /* of each cell */
@@ -52,13 +56,16 @@ static void grid_free(grid *made)
     free(made->slots);
 }
 
+static uint64_t mixed(place at)
+{
+    return (uint64_t)at.x * 0x9E3779B97F4A7C15u + (uint64_t)at.y * 0xC2B2AE3D27D4EB4Fu +
+           (uint64_t)at.z * 0xD6E8FEB86659FD93u;
+}
+
 static int32_t *slot_of(const grid *in, place at)
 {
-    const uint64_t mixed = (uint64_t)at.x * 0x9E3779B97F4A7C15u +
-                           (uint64_t)at.y * 0xC2B2AE3D27D4EB4Fu +
-                           (uint64_t)at.z * 0xD6E8FEB86659FD93u;
     const uint64_t last = ((uint64_t)1 << in->bits) - 1;
-    uint64_t slot = mixed >> (64 - in->bits);
+    uint64_t slot = mixed(at) >> (64 - in->bits);
     for (; in->slots[slot] >= 0; slot = (slot + 1) & last) {
         const place held = in->places[in->slots[slot]];
         if (held.x == at.x && held.y == at.y && held.z == at.z)
@@ -131,6 +138,9 @@ static void fill_cubes(parts *of, int64_t side)
         of->head[number] = k;
         of->cube[k] = number;
         of->parent[number] = number;
+        of->mixed[number] = mixed(at);
+        const uint64_t bit = of->mixed[number] >> (64 - BITS);
+        of->taken[bit / 64] |= (uint64_t)1 << bit % 64;
     }
 }
 
@@ -165,7 +175,11 @@ static int may_reach(int64_t dx, int64_t dy, int64_t dz, double edge, double rea
 /* Join every cube with those one step away, (dx, dy, dz) cubes. */
 static void join_over(parts *of, int64_t dx, int64_t dy, int64_t dz, float reach_squared)
 {
+    const uint64_t step = mixed((place){dx, dy, dz});
     for (int32_t a = 0; a < of->cubes.count; a++) {
+        const uint64_t bit = (of->mixed[a] + step) >> (64 - BITS);
+        if (!(of->taken[bit / 64] >> bit % 64 & 1))
+            continue;
         const place own = of->cubes.places[a];
         const place at = {own.x + dx, own.y + dy, own.z + dz};
         const int32_t b = *slot_of(&of->cubes, at);
@@ -218,7 +232,9 @@ int wildshape_parts(const float *points, int64_t count, float reach, float edge,
         for (int k = 0; k < 6; k++)
             *held[k] = room + k * count;
         fill_cells(&of, count, edge);
-        failed = !grid_allocate(&of.cubes, of.cells.count);
+        of.mixed = malloc((size_t)of.cells.count * sizeof *of.mixed);
+        of.taken = calloc(((size_t)1 << BITS) / 64, sizeof *of.taken);
+        failed = !grid_allocate(&of.cubes, of.cells.count) || !of.mixed || !of.taken;
     }
     if (!failed) {
         const int64_t whole = (int64_t)(reach / (edge * sqrtf(3))), side = whole > 1 ? whole : 1;
@@ -230,6 +246,8 @@ int wildshape_parts(const float *points, int64_t count, float reach, float edge,
     }
     grid_free(&of.cells);
     grid_free(&of.cubes);
+    free(of.mixed);
+    free(of.taken);
     free(room);
     return failed;
 }
