@@ -22,8 +22,10 @@ from wildshape.inference.config import InferenceConfig, JointIcpConfig, TrackCon
 
 INFERENCE = InferenceConfig(
     track=TrackConfig(
-        coarse=JointIcpConfig(rounds=8),
-        fine=JointIcpConfig(rounds=8, points=256, most=4096, holding=0.02),
+        coarse=JointIcpConfig(rounds=8, normal_of=512, normal_points=16),
+        fine=JointIcpConfig(
+            rounds=8, points=256, most=4096, normal_of=512, normal_points=16, holding=0.02
+        ),
     )
 )
 """How `drive` completes objects: tracks in fewer rounds, of fewer points; boxes are as good."""

@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
 from wildshape.geometry.surface import mirrored, planes
-from wildshape.geometry.transforms.rotation import rotation_from_vector
+from wildshape.geometry.transforms.rotation import cross_matrix, rotation_from_vector
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import JointIcpConfig, TrackConfig
 from wildshape.ops.nearest import nearest, nearest_k
@@ -235,21 +235,37 @@ def _moved(
     off = points - at
     kernel = (1 + off.square().sum(-1) / width**2) ** -2  # Geman-McClure
     centre = points.mean(1, keepdim=True)
-    axes = torch.eye(3).expand(*points.shape[:2], 3, 3)
-    # Rows of the problem: along the normal, and weakly along each axis, against sliding.
-    directions = torch.cat((normal[:, :, None], axes), dim=2)
-    share = torch.tensor((1.0, *(config.holding,) * 3))
-    lever = torch.linalg.cross((points - centre)[:, :, None].expand_as(directions), directions)
-    rows = torch.cat((lever, directions), dim=-1)
-    weight = kernel[:, :, None] * share
-    residual = (off[:, :, None] * directions).sum(-1)
-    A = torch.einsum("vpd,vpdi,vpdj->vij", weight, rows, rows)
-    b = torch.einsum("vpd,vpdi,vpd->vi", weight, rows, residual)
+    arm = points - centre
+    rows = torch.cat((torch.linalg.cross(arm, normal), normal), dim=-1)
+    weighted = rows * kernel[..., None]
+    residual = (off * normal).sum(-1, keepdim=True)
+    A, b = weighted.mT @ rows, (weighted.mT @ residual)[..., 0]
+    held, pulled = _held(arm, off, kernel)
+    A, b = A + config.holding * held, b + config.holding * pulled
     damping = config.ridge * kernel.sum(1)[:, None, None] + 1e-6
     motion = -config.step * torch.linalg.solve(A + damping * torch.eye(6), b)
     turn = rotation_from_vector(motion[:, :3])
     about = SE3(turn, centre[:, 0] + motion[:, 3:] - (turn @ centre[:, 0, :, None])[..., 0])
     return about @ T_object_sensor
+
+
+def _held(
+    arm: Float[Tensor, "V n 3"], off: Float[Tensor, "V n 3"], kernel: Float[Tensor, "V n"]
+) -> tuple[Float[Tensor, "V 6 6"], Float[Tensor, "V 6"]]:
+    """What points that are held along all three axes add, against sliding.
+
+    With rows `(a x e, e)` for each axis e, the sum of the axes is in closed form: `|a|^2 - a a^T`,
+    the cross matrix of a, and the identity.
+    """
+    weighted = arm * kernel[..., None]
+    spread = weighted.mT @ arm
+    eye = torch.eye(3)
+    turning = spread.diagonal(dim1=-2, dim2=-1).sum(-1)[:, None, None] * eye - spread
+    across = cross_matrix(weighted.sum(1))
+    moving = kernel.sum(1)[:, None, None] * eye
+    A = torch.cat((torch.cat((turning, across), 2), torch.cat((across.mT, moving), 2)), 1)
+    pull = torch.linalg.cross(weighted, off).sum(1), (kernel[..., None] * off).sum(1)
+    return A, torch.cat(pull, dim=-1)
 
 
 def _counterparts(
