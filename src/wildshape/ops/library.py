@@ -34,6 +34,7 @@ _SIGNATURES = {
 _NEAREST_K = (_P, _P, _P, _P, _P, _P, _I64, _I64, _I64, _I64, _F32, _P, _P, _INT, _INT)
 
 _PARTS = (_P, _I64, _F32, _F32, _P, _I64, _P)
+_SPANS = (_P, _I64, _P, _I64, _P, _P)
 
 
 @cache
@@ -63,6 +64,11 @@ def nearest_k_kernel() -> Callable[..., int] | None:
 def connected_kernel() -> Callable[..., int] | None:
     """Points that hang together; None as above."""
     return _added("wildshape_parts", _PARTS)
+
+
+def spans_kernel() -> Callable[..., int] | None:
+    """How far points reach along directions; None as above."""
+    return _added("wildshape_spans", _SPANS)
 
 
 @cache

@@ -16,6 +16,7 @@ from jaxtyping import Float, Int
 
 from wildshape.drives.config import ClusterConfig
 from wildshape.ops.connected import connected_parts
+from wildshape.ops.spans import spans
 from wildshape.records import Points
 
 _SIZED_BY = 1000  # points of a cluster that tell its size
@@ -23,8 +24,9 @@ _SECTORS, _OVERLAP = 6, np.deg2rad(12.0)  # at 2 m the reach is 9 degrees wide
 _SECTOR = 2 * np.pi / _SECTORS
 _FAR = 1000.0  # reaches
 _TURNS = np.deg2rad(np.arange(0.0, 90.0, 2.0))
-_AHEAD = np.stack((np.cos(_TURNS), np.sin(_TURNS)), axis=1)
-_ASIDE = np.stack((-np.sin(_TURNS), np.cos(_TURNS)), axis=1)
+_AHEAD = np.stack((np.cos(_TURNS), np.sin(_TURNS)))
+_ASIDE = np.stack((-np.sin(_TURNS), np.cos(_TURNS)))
+_AROUND = np.concatenate((_AHEAD, _ASIDE), axis=1)
 
 Rows = Int[np.ndarray, "k"]
 
@@ -129,11 +131,13 @@ def _without_overhang(scan: _Above, rows: Rows, config: ClusterConfig) -> Int[np
     low = scan.heights[rows] < config.overhang_m
     if low.all() or low.sum() < config.fewest_points:
         return rows
-    flat = scan.points[rows, :2].T.astype(np.float64)
-    axes = _axes(flat[:, low])
-    below, above = _along(axes, flat[:, low]), _along(axes, flat[:, ~low])
-    ends, begins = below.max(1, keepdims=True), below.min(1, keepdims=True)
-    beyond = np.maximum(above - ends, begins - above).max(0)
+    points = scan.points[rows]
+    below = points[low]
+    axes = _axes(below)
+    begins, ends = spans(below, axes)
+    x, y = points[~low, :2].T.astype(np.float64)
+    above = axes[0][:, None] * x + axes[1][:, None] * y
+    beyond = np.maximum(above - ends[:, None], begins[:, None] - above).max(0)
     return rows[low] if (beyond > config.beyond_m).mean() > config.beyond else rows
 
 
@@ -155,21 +159,14 @@ def _stands(heights: Float[np.ndarray, "k"], config: ClusterConfig) -> bool:
 
 def extents(points: Points) -> tuple[float, float]:
     """Length and width of the upright rectangle of least area, of 2 degrees' steps, metres."""
-    flat = points[:, :2].T.astype(np.float64)
-    width, length = np.sort(np.ptp(_along(_axes(flat), flat), axis=1))
-    return float(length), float(width)
+    begins, ends = spans(points, _axes(points))
+    width, length = np.sort(ends - begins).tolist()
+    return length, width
 
 
-def _axes(flat: Float[np.ndarray, "2 k"]) -> Float[np.ndarray, "2 2"]:
-    """Of the rectangle of least area around points seen from above, of 2 degrees' steps; rows."""
-    some = flat[:, :: 1 + flat.shape[1] // _SIZED_BY]
-    areas = np.ptp(_along(_AHEAD, some), axis=1) * np.ptp(_along(_ASIDE, some), axis=1)
-    best = areas.argmin()
-    return np.stack((_AHEAD[best], _ASIDE[best]))
-
-
-def _along(
-    axes: Float[np.ndarray, "a 2"], flat: Float[np.ndarray, "2 k"]
-) -> Float[np.ndarray, "a k"]:
-    """Coordinates along axes: a product of matrices, for which BLAS would wake its threads."""
-    return axes[:, :1] * flat[0] + axes[:, 1:] * flat[1]
+def _axes(points: Points) -> Float[np.ndarray, "2 2"]:
+    """Of the rectangle of least area seen from above, of 2 degrees' steps; columns."""
+    begins, ends = spans(points[:: 1 + len(points) // _SIZED_BY], _AROUND)
+    ahead, aside = (ends - begins).reshape(2, -1)
+    best = (ahead * aside).argmin()
+    return np.stack((_AHEAD[:, best], _ASIDE[:, best]), axis=1)
