@@ -5,8 +5,8 @@
 import numpy as np
 import pytest
 
-from wildshape.ops.connected import connected_parts, connected_trees
-from wildshape.ops.library import connected_kernel
+from wildshape.ops.connected import connected_parts, connected_trees, first_of_cells, first_sorted
+from wildshape.ops.library import cells_kernel, connected_kernel
 
 
 def by_steps(points, reach):
@@ -67,3 +67,13 @@ def test_many_points_as_trees_have_it(cell):
 def test_none_and_one():
     assert connected_parts(np.zeros((0, 3), np.float32), 1.0, 0.1).shape == (0,)
     assert connected_parts(np.zeros((1, 3), np.float32), 1.0, 0.1).tolist() == [0]
+
+
+@pytest.mark.skipif(cells_kernel() is None, reason="no kernels")
+@pytest.mark.parametrize("cell", [0.05, 0.4, 3.0])
+def test_the_first_point_of_each_cell_is_the_same_with_the_kernel_and_by_sorting(cell):
+    points = some_groups()
+    rows = first_of_cells(points, cell)
+    assert np.array_equal(rows, first_sorted(points, cell))
+    assert len(np.unique(np.floor(points[rows] / np.float32(cell)), axis=0)) == len(rows)
+    assert len(first_of_cells(points[:0], cell)) == 0

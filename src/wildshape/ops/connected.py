@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Points that hang together: compiled C, or a k-d tree where there is no library."""
+"""Points that hang together, and one a cell: compiled C, or scipy and numpy without a library."""
 
 import numpy as np
-from jaxtyping import Float32, Int64
+from jaxtyping import Float32, Int32, Int64
 
-from wildshape.ops.library import connected_kernel
+from wildshape.ops.library import cells_kernel, connected_kernel
 
 _NO_PAIRS = np.empty((0, 2), np.int64)
 
@@ -59,3 +59,29 @@ def connected_trees(
     part = connected_components(graph, directed=False)[1][place]
     _, first, number = np.unique(part, return_index=True, return_inverse=True)
     return np.argsort(np.argsort(first))[number]
+
+
+def first_of_cells(points: Float32[np.ndarray, "n 3"], cell: float) -> Int32[np.ndarray, "k"]:
+    """The row of the first point in each cell that holds any, in rising order.
+
+    Args:
+        points: all finite.
+        cell: edge of the cells.
+
+    Raises:
+        MemoryError: no room.
+    """
+    kernel = cells_kernel()
+    if kernel is None:
+        return first_sorted(points, cell)
+    dense, rows = np.ascontiguousarray(points), np.empty(len(points), np.int32)
+    count = kernel(dense.ctypes.data, len(dense), cell, rows.ctypes.data)
+    if count < 0:
+        raise MemoryError(f"no room for the cells of {len(points)} points.")
+    return rows[:count]
+
+
+def first_sorted(points: Float32[np.ndarray, "n 3"], cell: float) -> Int32[np.ndarray, "k"]:
+    """The same by sorting the cells."""
+    cells = np.floor(points / np.float32(cell))
+    return np.sort(np.unique(cells, axis=0, return_index=True)[1]).astype(np.int32)

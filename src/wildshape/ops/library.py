@@ -34,6 +34,7 @@ _SIGNATURES = {
 _NEAREST_K = (_P, _P, _P, _P, _P, _P, _I64, _I64, _I64, _I64, _F32, _P, _P, _INT, _INT)
 
 _PARTS = (_P, _I64, _F32, _F32, _P, _I64, _P)
+_CELLS = (_P, _I64, _F32, _P)
 _SPANS = (_P, _I64, _P, _I64, _P, _P)
 
 
@@ -64,6 +65,11 @@ def nearest_k_kernel() -> Callable[..., int] | None:
 def connected_kernel() -> Callable[..., int] | None:
     """Points that hang together; None as above."""
     return _added("wildshape_parts", _PARTS)
+
+
+def cells_kernel() -> Callable[..., int] | None:
+    """The first point of each cell; None as above."""
+    return _added("wildshape_cells", _CELLS)
 
 
 def spans_kernel() -> Callable[..., int] | None:

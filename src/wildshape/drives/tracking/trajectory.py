@@ -24,6 +24,7 @@ from wildshape.errors import MissingExtraError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import STANDING, Twist
 from wildshape.io.guard import read_json, record_of
+from wildshape.ops.connected import first_of_cells
 from wildshape.ops.nearest import nearest
 from wildshape.records import Points, Turn
 
@@ -207,7 +208,7 @@ def _steps_differ(drive: Drive, frame: int) -> bool:
 def landmarks(
     turn: Turn, heights: Float[np.ndarray, "n"], mounting: Mounting, config: DriveConfig
 ) -> Turn:
-    """What stands on the ground, and the ground near the sensor.
+    """What stands on the ground, and the ground near the sensor: a point a cell, as KISS-ICP thins.
 
     Args:
         turn: whole.
@@ -217,7 +218,8 @@ def landmarks(
     """
     level = mounting.level(turn.points)
     near = np.hypot(level[:, 0], level[:, 1]) < config.trajectory.ground_m
-    kept = near | (heights > config.trajectory.standing_m)
+    kept = np.flatnonzero(near | (heights > config.trajectory.standing_m))
+    kept = kept[first_of_cells(turn.points[kept], config.trajectory.voxel_m / 2)]
     return Turn(turn.points[kept], None if turn.seconds is None else turn.seconds[kept])
 
 

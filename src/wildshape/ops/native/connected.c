@@ -251,3 +251,21 @@ int wildshape_parts(const float *points, int64_t count, float reach, float edge,
     free(room);
     return failed;
 }
+
+/* The row of the first point of each occupied cell, in rising order. Returns how many, or -1 if
+ * there are too many points or there is no room. */
+int wildshape_cells(const float *points, int64_t count, float edge, int32_t *first)
+{
+    parts of = {.points = points, .first = first};
+    if (count == 0)
+        return 0;
+    if (count > (int64_t)1 << 28)
+        return -1;
+    of.cell = malloc((size_t)count * sizeof *of.cell);
+    const int failed = !grid_allocate(&of.cells, count) || !of.cell;
+    if (!failed)
+        fill_cells(&of, count, edge);
+    grid_free(&of.cells);
+    free(of.cell);
+    return failed ? -1 : of.cells.count;
+}
