@@ -33,7 +33,7 @@ def connected_parts(
     if kernel is None:
         return connected_trees(points, reach, cell, pairs)
     part = np.empty(len(points), np.int64)
-    dense, joined = np.ascontiguousarray(points), np.ascontiguousarray(pairs)
+    dense, joined = np.ascontiguousarray(points, np.float32), np.ascontiguousarray(pairs)
     given = dense.ctypes.data, len(dense), reach, cell, joined.ctypes.data, len(joined)
     if kernel(*given, part.ctypes.data):
         raise MemoryError(f"no room to join {len(points)} points.")
@@ -74,7 +74,7 @@ def first_of_cells(points: Float32[np.ndarray, "n 3"], cell: float) -> Int32[np.
     kernel = cells_kernel()
     if kernel is None:
         return first_sorted(points, cell)
-    dense, rows = np.ascontiguousarray(points), np.empty(len(points), np.int32)
+    dense, rows = np.ascontiguousarray(points, np.float32), np.empty(len(points), np.int32)
     count = kernel(dense.ctypes.data, len(dense), cell, rows.ctypes.data)
     if count < 0:
         raise MemoryError(f"no room for the cells of {len(points)} points.")
