@@ -195,11 +195,11 @@ def _nearest(
     from wildshape.ops.nearest import nearest_k
 
     away = np.maximum(np.linalg.norm(points, axis=1), 1e-9)[:, None]
-    clouds = (
+    query, target = (
         torch.from_numpy(part.astype(np.float32))[None] for part in (points / away, directions)
     )
     most = within_m / float(away.min(initial=np.inf))
-    found = nearest_k(*clouds, min(count, len(ranges)), most=most)
+    found = nearest_k(query, target, min(count, len(ranges)), most=most)
     apart, ray = found.distance_squared[0].sqrt().numpy(), found.index[0].numpy()
     beyond = ranges[ray].astype(np.float64) - away
     return ray, np.where(apart * away <= within_m, beyond, np.nan)
