@@ -7,7 +7,8 @@
 
 Fitted to simulated streets, whose other objects are no vehicles, and to simulated tracks behind
 things, with rays and without. Nothing real is fitted to: `--check` names labelled tracks that the
-figures are also of. Those of simulated data are of streets and sets of tracks left out in turn.
+figures are also of, `--unseen` streets on which no feature was chosen. Those of other simulated
+data are of streets and sets of tracks left out in turn.
 What was completed is kept in OUT, a file a street or set of tracks, by several processes with
 `--workers 2`: new weights need a new OUT. Prints tables and writes OUT/trust.json.
 """
@@ -41,7 +42,7 @@ from wildshape.method.trust import (
 _FITTED_ON = "simulated streets and tracks with their truth: procedural vehicles"
 _RIDGE = 20.0  # scans of one object err alike
 _KINDS = ("pose", "box", "kind")
-_ALIKE = "alike"
+_ALIKE, _UNSEEN = "alike", "unseen"
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,7 @@ class Settings:
         streets: seeds of the simulated streets.
         share: of the simulated tracks; below 1 to try it.
         check: folders of labelled tracks.
+        unseen: seeds of streets that nothing is fitted to.
         workers: processes that complete streets and sets of tracks, one each at a time.
     """
 
@@ -64,6 +66,7 @@ class Settings:
     streets: tuple[int, ...] = STREETS
     share: float = 1.0
     check: tuple[Path, ...] = ()
+    unseen: tuple[int, ...] = ()
     workers: int = 1
 
 
@@ -73,7 +76,8 @@ def main(settings: Settings) -> None:
     model = weights_file(settings.model)
     parts = Parts(settings.out, model, settings.streets, settings.share)
     fitted = parts.simulated(settings.workers)
-    real = {path.name: parts.real(path) for path in settings.check}
+    others = {path.name: parts.real(path) for path in settings.check}
+    others |= {f"{_UNSEEN} {seed}": parts.street(seed) for seed in settings.unseen}
     scans, tracks = _scans(fitted), _tracks(fitted)
     trust = Trust(
         scan=fit(list(scans.values()), OF_SCAN, ScanFeatures._fields),
@@ -81,8 +85,8 @@ def main(settings: Settings) -> None:
         fitted_on=_FITTED_ON,
     )
     said = {
-        "scan": held(trust.scan, scans, _scans(real), OF_SCAN),
-        "track": held(trust.track, tracks, _tracks(real), OF_TRACK),
+        "scan": held(trust.scan, scans, _scans(others), OF_SCAN),
+        "track": held(trust.track, tracks, _tracks(others), OF_TRACK),
     }
     line = "python -m experiments.calibrate_confidence --out OUT"
     report = {"trust": asdict(trust), "held": said, "provenance": provenance(line)}
@@ -123,22 +127,26 @@ def stated(calibrator: Calibrator, known: Known, names: tuple[str, ...]) -> np.n
 
 
 def held(
-    calibrator: Calibrator, simulated: dict[str, Known], real: dict[str, Known], chosen: Chosen
+    calibrator: Calibrator, simulated: dict[str, Known], others: dict[str, Known], chosen: Chosen
 ) -> dict[str, dict[str, dict[str, float]]]:
-    """Figures of what was left out in turn, of the real data, and of streets and real together."""
+    """Figures of what was left out in turn, of the other data, and of streets and real together."""
     names = ScanFeatures._fields if chosen is OF_SCAN else TrackFeatures._fields
     found: dict[str, tuple[Known, np.ndarray]] = {}
     for left, known in simulated.items():
-        others = [part for name, part in simulated.items() if name.split()[0] != left.split()[0]]
-        found[left] = (known, stated(fit(others, chosen, names), known, names))
-    for name, known in real.items():
+        rest = [part for name, part in simulated.items() if name.split()[0] != left.split()[0]]
+        found[left] = (known, stated(fit(rest, chosen, names), known, names))
+    for name, known in others.items():
         found[name] = (known, stated(calibrator, known, names))
     alike = [name for name in simulated if name.endswith(_ALIKE)]
     streets = [name for name in simulated if name.startswith("street") and name not in alike]
+    unseen = [name for name in others if name.startswith(_UNSEEN)]
+    real = [name for name in others if not name.startswith(_UNSEEN) and not name.endswith(_ALIKE)]
     sets = {
         "streets": streets,
         "streets, views alike": alike,
         "tracks": [name for name in simulated if name not in (*streets, *alike)],
+        _UNSEEN: [name for name in unseen if not name.endswith(_ALIKE)],
+        f"{_UNSEEN}, views alike": [name for name in unseen if name.endswith(_ALIKE)],
         **{name: [name] for name in real},
         "streets and real": [*streets, *real],
     }

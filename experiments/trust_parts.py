@@ -58,6 +58,10 @@ class Parts:
             made = helpers.in_order(partial(_made, self), names)
             return {name: _read(path) for name, path in zip(names, made, strict=True)}
 
+    def street(self, seed: int) -> Both:
+        """Another one."""
+        return _read(_made(self, f"street{seed}"))
+
     def real(self, path: Path) -> Both:
         """Labelled tracks, without rays."""
         source = open_tracks(path)
