@@ -8,10 +8,9 @@ A stage whose files are in the output folder is not run again: a killed run goes
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from wildshape.drives.adapting import second_pass
-from wildshape.drives.adapting.adapt import Adaptation, adapt_to, like
 from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.clock import Clock, Watch, silent
 from wildshape.drives.completing.boxes import smooth
@@ -66,6 +65,9 @@ from wildshape.io.output import begin, finished, keep_apart
 from wildshape.io.poses import read_poses
 from wildshape.parallel.team import ALONE, Team, team
 
+if TYPE_CHECKING:
+    from wildshape.drives.adapting.adapt import Adaptation
+
 _DEFAULT, _NO_FILES = DriveConfig(), DriveFiles()
 
 
@@ -79,14 +81,13 @@ def drive(
     workers: int | None = None,
     files: DriveFiles = _NO_FILES,
     detections: DetectionFile | None = None,
-    adapt: AdaptConfig | Adaptation | None = None,
+    adapt: "AdaptConfig | Adaptation | None" = None,
     overwrite: bool = False,
     watch: Watch = silent,
 ) -> DriveResult:
     """Find every vehicle of a raw recording: its track, boxes and complete shape, without labels.
 
-    An interrupted run is gone on with. Of a finished one nothing is done again: the files asked for
-    are written.
+    An interrupted run is gone on with; of a finished one only the files asked for are written.
 
     Args:
         source: a folder of full scans, a drive of a published data set or a recording of ROS
@@ -130,6 +131,8 @@ def drive(
     else:
         found = earlier_result(out, done)
     if isinstance(adapt, AdaptConfig):
+        from wildshape.drives.adapting.adapt import adapt_to
+
         adapt = adapt_to([out], out, predictor, adapt, watch=watch)
     if adapt is not None and adapt.model and not second_pass.is_done(out, adapt.model):
         with team(workers) as helpers:
@@ -170,7 +173,7 @@ class _Run:
     def again(self, model: str, first: DriveResult) -> DriveResult:
         """A second pass with an adapted model; its results take the place of the first's."""
         second_pass.begin_second(self.out, model)
-        adapted = like(self.predictor, Path(model))
+        adapted = second_pass.like(self.predictor, Path(model))
         clock = Clock(self.clock.watch, "second ", dict(first.seconds))
         found = replace(self, predictor=adapted, clock=clock, second=True).perform()
         return second_pass.conclude(self.out, found, model)

@@ -13,9 +13,10 @@ from typing import Any
 from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.adapting.examples import Example, examples_of, split
 from wildshape.drives.adapting.measures import Measures, clear_headed, measure
+from wildshape.drives.adapting.second_pass import like
 from wildshape.drives.adapting.teaching import taught
 from wildshape.drives.clock import Watch, silent
-from wildshape.inference.predictor import Predictor, load
+from wildshape.inference.predictor import Predictor
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import read_json, read_record, reading, record_of
 from wildshape.io.output import MARKER, begin, finished
@@ -130,15 +131,6 @@ def adapt_to(
     write_json(folder / SAID, found.data)
     output.finish(result=asdict(found))
     return found
-
-
-def like(first: Predictor, model: Path) -> Predictor:
-    """Another model used as the first one is.
-
-    Raises:
-        BadInputError: the checkpoint cannot be used.
-    """
-    return load(model, str(first.device), level=first.up is not None, config=first.config)
 
 
 @dataclass(frozen=True)

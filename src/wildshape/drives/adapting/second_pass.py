@@ -12,6 +12,7 @@ from pathlib import Path
 
 from wildshape.drives.result import REPORT, DriveResult
 from wildshape.drives.writing.outputs import BOXES, MCAP, MESHES, RRD, SHAPES
+from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import lock_folder, write_json, write_text
 from wildshape.io.guard import read_json
 from wildshape.io.output import MARKER
@@ -89,3 +90,12 @@ def put_in_place(out: Path) -> None:
 def _move(path: Path, target: Path) -> None:
     if path.exists():
         path.rename(target)
+
+
+def like(first: Predictor, model: Path) -> Predictor:
+    """Another model used as the first one is.
+
+    Raises:
+        BadInputError: the checkpoint cannot be used.
+    """
+    return load(model, str(first.device), level=first.up is not None, config=first.config)

@@ -5,8 +5,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from wildshape.drives.adapting.adapt import Adaptation
 from wildshape.drives.clock import Watch, silent
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.result import REPORT, DriveResult
@@ -18,6 +18,9 @@ from wildshape.inference.predictor import Predictor
 from wildshape.io.progress import SILENT, Progress
 from wildshape.parallel.team import cores, team
 from wildshape.report.drive.page import write_drive_report
+
+if TYPE_CHECKING:
+    from wildshape.drives.adapting.adapt import Adaptation
 
 _CONFIG, _NO_FILES = DriveConfig(), DriveFiles()
 
@@ -38,7 +41,7 @@ class DriveAndPage:
     config: DriveConfig = _CONFIG
     files: DriveFiles = _NO_FILES
     detections: DetectionFile | None = None
-    adapt: Adaptation | None = None
+    adapt: "Adaptation | None" = None
     report: bool = True
     workers: int | None = None
     overwrite: bool = False
