@@ -61,6 +61,7 @@ LEAST_POINTS = 16
 _LARGEST_EXTENT = 100.0
 _SMALLEST_EXTENT = 0.01
 _FARTHEST = 1000.0
+_ENOUGH = 10_000  # points that tell where a scan lies
 _COARSEST_M = 0.005
 _FLOAT32_STEP = 2.0**-24  # half of what two neighbouring numbers of float32 differ by, relatively
 
@@ -270,6 +271,7 @@ def check_near(points: Float[np.ndarray, "n 3"], name: str) -> None:
     points = _only_finite(points)
     if not len(points):
         return
+    points = points[:: 1 + len(points) // _ENOUGH]
     with np.errstate(over="ignore"):  # infinitely far is farther
         away = math.hypot(*(float(np.median(axis)) for axis in points.T))
     if away > _FARTHEST:

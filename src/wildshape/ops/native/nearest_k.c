@@ -54,7 +54,9 @@ static inline __attribute__((always_inline)) void insert_among(uint64_t *keys, i
 /* The same; known lengths are unrolled. */
 static inline void insert_key(uint64_t *keys, int k, uint64_t key)
 {
-    if (k == 8)
+    if (k == 16)
+        insert_among(keys, 16, key);
+    else if (k == 8)
         insert_among(keys, 8, key);
     else if (k == 6)
         insert_among(keys, 6, key);
