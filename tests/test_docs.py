@@ -258,7 +258,9 @@ def test_contributors_find_every_room():
 
 def is_room(path: Path) -> bool:
     """A folder with Python files, or a file that is a floor of its own."""
-    return (path / "__init__.py").is_file() or (path.suffix == ".py" and path.stem != "__init__")
+    return (path / "__init__.py").is_file() or (
+        path.suffix == ".py" and not path.stem.startswith("__")
+    )
 
 
 def test_sources_cite_no_document_that_is_not_here():
