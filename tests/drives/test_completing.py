@@ -13,7 +13,7 @@ from wildshape.drives.completing.boxes import moves, smooth
 from wildshape.drives.completing.claims import claim
 from wildshape.drives.completing.completion import fullest_of_parts, keyframes, order_of_looks
 from wildshape.drives.completing.merging import Places
-from wildshape.drives.completing.placing import Completed
+from wildshape.drives.completing.placing import Completed, on_ground
 from wildshape.drives.completing.surroundings import Surroundings
 from wildshape.drives.completing.turns import Turns
 from wildshape.drives.completing.vehicles import (
@@ -256,6 +256,23 @@ def test_vehicles_beside_each_other_are_not_joined_by_what_lies_between():
     first, between, second = at(0.0, "0"), at(2.3, "1"), at(5.0, "2")
     (found,) = places().fragments([first, between, second])
     assert found.name == "0+1"
+
+
+def test_boxes_reach_down_to_the_ground_under_the_clusters_that_are_left(tmp_path):
+    for frame, ground in enumerate((-1.0, -1.0, 9.0)):
+        with cut_file(tmp_path, frame).open("wb") as file:
+            known = {"points": np.zeros((4, 3), np.float32), "rows": np.arange(4)}
+            known |= {"counts": np.array([4]), "grounds": np.array([[0.0, 0.0, ground]])}
+            np.savez(file, **known, scanned=4, tracks=np.array([], str))
+    one = completed([(0.0, 0.0, -0.1, 0.0)] * 3)
+    on_two = replace(one, seen=one.seen.part([0, 1]))
+    found = on_ground(on_two, tmp_path, still(3), BoxConfig())
+    assert found.size == pytest.approx((4.0, 1.8, 1.65))
+    assert found.boxes[:, 2] == pytest.approx([-0.175] * 3)
+    nowhere = replace(one, seen=one.seen.part([]))
+    assert on_ground(nowhere, tmp_path, still(3), BoxConfig()) is nowhere
+    lifted = replace(one, boxes=np.add(one.boxes, (0.0, 0.0, 1.0, 0.0)))
+    assert on_ground(lifted, tmp_path, still(3), BoxConfig()) is lifted
 
 
 def test_clusters_in_the_box_of_a_vehicle_are_its_own(tmp_path):

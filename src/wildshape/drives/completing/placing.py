@@ -111,9 +111,13 @@ def on_ground(one: Completed, cuts: Path, turns: Turns, config: BoxConfig) -> Co
     length, width, height = one.size
     gaps = []
     for frame, box in zip(one.frames, one.boxes):
+        if frame not in rows:  # its cluster there belongs to another vehicle
+            continue
         grounds = read_cut(cuts, frame).grounds[list(rows[frame])]
         ground = turns.T_level_sensor[frame].apply_numpy(grounds)[:, 2]
         gaps.append(box[2] - height / 2 - np.median(ground))
+    if not gaps:
+        return one
     gap = float(np.median(gaps))
     if abs(gap) > config.ground_gap_m:
         return one
