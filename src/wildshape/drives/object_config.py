@@ -27,7 +27,6 @@ class CompletionConfig:
         ticks: between them; neighbours at 10 Hz are nearly the same scan.
         fewest_points: scans of fewer are not completed where others are fuller.
         rays: whole tracks are put together with the rays beside the object.
-        rays_in_looks: the network sees them in each look, too.
     """
 
     looks: int = 3
@@ -43,7 +42,6 @@ class CompletionConfig:
     ticks: int = 4
     fewest_points: int = 60
     rays: bool = True
-    rays_in_looks: bool = False
 
 
 @dataclass(frozen=True)

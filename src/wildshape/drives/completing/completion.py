@@ -30,7 +30,6 @@ from wildshape.inference.folders.complete_folder import (
     POSES,
     objects_of,
 )
-from wildshape.inference.free_space import Rays
 from wildshape.inference.predictor import Predictor
 from wildshape.io.atomic import write_json
 from wildshape.io.boxes.detections import moved
@@ -52,7 +51,7 @@ class _Candidate:
         chosen: in the frames that may be completed.
         clouds: its points in them, level frames.
         order: in which they are looked at.
-        rays: beside it in these frames, level frames too, by place; those that were asked for.
+        rays: beside it in these frames, level frames too, by place; of whole tracks alone.
         looks: the network's, in that order.
         nats: what each of these says for a vehicle.
     """
@@ -147,7 +146,7 @@ class Completer:
             every = [one for one in every if self._may_be_a_vehicle(one, cost_m, nats)]
         self._look([one for one in every if one.said >= of.doubtful_nats], None)
         if self.config.rays:
-            self._cut_rays([(one, i) for one in every if len(one.looks) > 1 for i in one.places])
+            self._cut_rays([one for one in every if len(one.looks) > 1])
         alone = completed([look for one in every for look in one.in_time], self.predictor)
         together = [self._together(alone, one) for one in every]
         seconds = (time.perf_counter() - began) / max(sum(map(len, together)), 1)
@@ -169,19 +168,15 @@ class Completer:
     def _look(self, every: list[_Candidate], count: int | None) -> None:
         """Look at the first so many scans of each."""
         asked = [(one, i) for one in every for i in one.order[len(one.looks) : count]]
-        rays: Rays = ()
-        if self.config.rays_in_looks:
-            self._cut_rays(asked)
-            rays = [one.rays[i] for one, i in asked]
-        found = looks_at([one.clouds[i] for one, i in asked], self.predictor, rays)
+        found = looks_at([one.clouds[i] for one, i in asked], self.predictor)
         for (one, _), look in zip(asked, found):
             one.looks.append(look)
 
-    def _cut_rays(self, asked: list[tuple[_Candidate, int]]) -> None:
-        """The rays beside objects in some of their frames, by place, as far as they are missing."""
-        missing = [(one, i) for one, i in asked if i not in one.rays]
-        cut = self.rays.of([(one.chosen, i) for one, i in missing])
-        for (one, i), rays in zip(missing, cut):
+    def _cut_rays(self, every: list[_Candidate]) -> None:
+        """The rays beside objects in the frames that were looked at."""
+        asked = [(one, i) for one in every for i in one.places]
+        cut = self.rays.of([(one.chosen, i) for one, i in asked])
+        for (one, i), rays in zip(asked, cut):
             one.rays[i] = self._level(rays)
 
     def _level(self, rays: SightLines | None) -> SightLines | None:

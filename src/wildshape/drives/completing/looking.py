@@ -7,15 +7,14 @@ from collections.abc import Iterator, Sequence
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.boxes import box_seen
 from wildshape.inference.choose_hypothesis import Looked
-from wildshape.inference.free_space import Rays
 from wildshape.inference.predictor import BATCH, Predictor
 from wildshape.records import Box, Completion, Points
 
 
-def looks_at(scans: Sequence[Points], predictor: Predictor, rays: Rays = ()) -> list[Looked]:
-    """What a network says of each scan; `rays`: beside the objects, if it is to see them."""
-    parts = [slice(start, start + BATCH) for start in range(0, len(scans), BATCH)]
-    return [one for part in parts for one in predictor.look(scans[part], rays[part]).each()]
+def looks_at(scans: Sequence[Points], predictor: Predictor) -> list[Looked]:
+    """What a network says of each scan."""
+    parts = [scans[start : start + BATCH] for start in range(0, len(scans), BATCH)]
+    return [one for part in parts for one in predictor.look(part).each()]
 
 
 def completed(looks: Sequence[Looked], predictor: Predictor) -> Iterator[Completion]:
