@@ -67,7 +67,7 @@ def test_an_end_that_rays_pass_through_is_drawn_inwards():
     assert one.size == pytest.approx((4.7 - config.most_m, 1.8, 1.5))
     rear = one.boxes[0, 0] - one.size[0] / 2
     assert rear == pytest.approx(_PLACE[0] - _TRUE[0] / 2)  # where its points are it stays
-    assert one.ahead_m == pytest.approx(-config.most_m / 2)
+    assert one.moved_m == pytest.approx((-config.most_m / 2, 0.0, 0.0))
 
 
 def test_a_box_that_fits_stays_and_so_does_one_whose_end_is_hidden():

@@ -29,6 +29,7 @@ from wildshape.inference.folders.box_files import BoxFiles
 from wildshape.io.boxes.detections import read_detections
 from wildshape.io.boxes.table import HEADER, read_box_table
 from wildshape.io.poses import read_poses, read_tum
+from wildshape.io.scans.points import read_points
 from wildshape.io.tracks import read_track
 from wildshape.records import Turn
 
@@ -83,6 +84,16 @@ def test_boxes_stand_on_the_road_and_are_as_high_as_the_cars(found, truth):
         heights[row.track] = row.height
     known = sorted(size[2] for size in truth.sizes.values())
     assert sorted(heights.values()) == pytest.approx(known, abs=0.12)
+
+
+def test_shapes_stand_in_their_boxes_where_they_were_completed(found):
+    off = []
+    for row in read_box_table(found.out / "boxes.csv"):
+        scan = found.out / "objects" / row.track / "completed" / f"{row.frame:06d}.ply"
+        if scan.is_file():
+            shape = read_points(found.out / "shapes" / f"{row.track}.ply")
+            off.append(row.z + shape[:, 2].mean() - read_points(scan)[:, 2].mean())
+    assert np.mean(off) == pytest.approx(0.0, abs=0.01)
 
 
 def test_a_moving_car_looks_where_it_drives(found, truth):

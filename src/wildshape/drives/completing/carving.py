@@ -150,7 +150,7 @@ def _cut(one: Completed, slabs: _Slabs, config: CarveConfig) -> Completed:
     boxes[:, :2] += ahead * along
     length, width, height = one.size
     size = (length - front - rear, width, height)
-    return replace(one, boxes=boxes, size=size, ahead_m=ahead)
+    return replace(one, boxes=boxes, size=size, moved_m=(ahead, 0.0, 0.0))
 
 
 def _until(flags: Bool[np.ndarray, "bins"]) -> int:

@@ -38,7 +38,8 @@ class Completed:
         cost_m: label-free cost, the middle one of its scans, the fuller the heavier.
         confidence: of the completions, 0 to 1.
         p_kind: probability that it is a vehicle; None for weights that state none.
-        ahead_m: how far the boxes' middle was moved forward from that of the completed shape.
+        moved_m: how far the boxes' middle was moved from that of the completed shape: forward, to
+            the left, upward.
         phases: `(k,)` when the beam met it, in turns since the middle of each frame's.
     """
 
@@ -49,7 +50,7 @@ class Completed:
     cost_m: float
     confidence: float
     p_kind: float | None = None
-    ahead_m: float = 0.0
+    moved_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     phases: Float[np.ndarray, "k"] | float = 0.0
 
     @property
@@ -121,8 +122,13 @@ def on_ground(one: Completed, cuts: Path, turns: Turns, config: BoxConfig) -> Co
     gap = float(np.median(gaps))
     if abs(gap) > config.ground_gap_m:
         return one
-    boxes = one.boxes - (0.0, 0.0, gap / 2, 0.0)
-    return replace(one, boxes=boxes, size=(length, width, height + gap))
+    ahead, aside, up = one.moved_m
+    return replace(
+        one,
+        boxes=one.boxes - (0.0, 0.0, gap / 2, 0.0),
+        size=(length, width, height + gap),
+        moved_m=(ahead, aside, up - gap / 2),
+    )
 
 
 def _mean(values: list[float | None]) -> float | None:

@@ -151,7 +151,7 @@ def write_vehicle(out: Path, one: Vehicle, folder: Path, cuts: Path, drive: Driv
     """
     write_vehicle_track(out / TRACKS, one.completed.seen, cuts, drive)
     copy_object(folder, out / "objects" / one.name)
-    write_shape(out / SHAPES / f"{one.name}.ply", folder, one.completed.ahead_m)
+    write_shape(out / SHAPES / f"{one.name}.ply", folder, one.completed.moved_m)
 
 
 def write_vehicle_track(out: Path, seen: Sightings, cuts: Path, drive: Drive) -> None:
@@ -174,13 +174,15 @@ def copy_object(folder: Path, target: Path) -> None:
     write_text(target / OBJECTS, (folder / OBJECTS).read_text("utf-8"))
 
 
-def write_shape(path: Path, folder: Path, ahead_m: float = 0.0) -> None:
+def write_shape(
+    path: Path, folder: Path, moved_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> None:
     """A vehicle's complete shape in the frame of its box: x forward, origin in the middle.
 
     Args:
         path: file to write.
         folder: of the completed object; all its scans have one shape.
-        ahead_m: how far the box's middle was moved forward since.
+        moved_m: how far the box's middle was moved since, along the box.
     """
     if path.is_file():
         return
@@ -188,7 +190,7 @@ def write_shape(path: Path, folder: Path, ahead_m: float = 0.0) -> None:
     first = next(detections_of(said, 0))
     points = read_points(folder / COMPLETED / f"{first.scan}.ply")
     placed = pose_of(first.box).inverse().apply_numpy(points)
-    write_ply(path, placed - np.array((ahead_m, 0.0, 0.0), placed.dtype))
+    write_ply(path, placed - np.array(moved_m, placed.dtype))
 
 
 def boxes_of(vehicle: Vehicle, turns: Turns) -> list[tuple[int, Box]]:
