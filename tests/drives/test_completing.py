@@ -270,6 +270,8 @@ def test_boxes_reach_down_to_the_ground_under_the_clusters_that_are_left(tmp_pat
     assert found.size == pytest.approx((4.0, 1.8, 1.65))
     assert found.boxes[:, 2] == pytest.approx([-0.175] * 3)
     assert found.moved_m == pytest.approx((0.0, 0.0, -0.075))
+    unknown = replace(one, boxes=np.full_like(one.boxes, math.nan))
+    assert on_ground(unknown, tmp_path, still(3), BoxConfig()) is unknown
     nowhere = replace(one, seen=one.seen.part([]))
     assert on_ground(nowhere, tmp_path, still(3), BoxConfig()) is nowhere
     lifted = replace(one, boxes=np.add(one.boxes, (0.0, 0.0, 1.0, 0.0)))

@@ -120,7 +120,7 @@ def on_ground(one: Completed, cuts: Path, turns: Turns, config: BoxConfig) -> Co
     if not gaps:
         return one
     gap = float(np.median(gaps))
-    if abs(gap) > config.ground_gap_m:
+    if not abs(gap) <= config.ground_gap_m:  # far off, or not known at all
         return one
     ahead, aside, up = one.moved_m
     return replace(
