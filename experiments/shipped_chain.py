@@ -71,14 +71,20 @@ ROUNDS = {
     "chained": Round(data=2, steps=8_000, lr=6e-4, teacher="taught", start="taught"),
     "again": Round(data=3, steps=8_000, lr=6e-4, teacher="chained", start="chained"),
     "rays": Round(data=3, steps=6_000, lr=6e-4, teacher="again", start="again", rays=True),
-    "last": Round(data=4, steps=16_000, lr=6e-4, teacher="rays", start="rays", rays=True),
+    "mixed": Round(data=4, steps=16_000, lr=6e-4, teacher="rays", start="rays", rays=True),
+    "plain": Round(data=5, steps=16_000, lr=6e-4, teacher="mixed", start="mixed", rays=True),
+    "last": Round(data=6, steps=32_000, lr=6e-4, teacher="plain", start="plain", rays=True),
 }
 """In their order; the last one is shipped."""
 
-OCCLUSION, RAYS = {1: 0.3, 2: 0.6, 3: 0.6, 4: 0.5}, {1: 0, 2: 0, 3: 512, 4: 512}
+OCCLUSION = {1: 0.3, 2: 0.6, 3: 0.6, 4: 0.5, 5: 0.4, 6: 0.4}
+RAYS = {1: 0, 2: 0, 3: 512, 4: 512, 5: 512, 6: 512}
 """By the seed of the data: the share of the tracks past something that stands in the way, and the
 rays kept with a scan."""
-VARIED = {1: (True,), 2: (True,), 3: (True,), 4: (True, False)}
+VARIED = {
+    1: (True,), 2: (True,), 3: (True,), 4: (True, False),
+    5: (True, False, False), 6: (True, False, False),
+}  # fmt: skip
 """By the seed of the data: forms and sensors varied, or as they are, as many tracks of each."""
 
 
