@@ -138,6 +138,8 @@ def test_meshes_of_a_folder_are_coloured(wildshape, scan_file, trained, tmp_path
         (b"", ("complete", "a.ply", "--out", "-", "--format", "ply"), "--format is for stdin"),
         (b"", ("complete", "a.ply", "--out", "c", "--format", "ply"), "is for a scan on stdin"),
         (b"", ("complete", "-", "--mesh-colours", "confidence"), "pass --mesh"),
+        (b"", ("complete", "a.ply", "--out", "c", "--mesh-format", "glb"), "pass --mesh"),
+        (b"", ("drive", "a", "--out", "c", "--mesh-format", "obj"), "pass --mesh"),
         (b"", ("register", "-", "-"), "stdin holds one scan"),
         (b"", ("register", "a.ply", "b.ply", "--format", "ply"), "is for a scan on stdin"),
     ],

@@ -134,6 +134,11 @@ def test_scores_leave_out_what_the_detector_doubts(street, write, tmp_path):
     )
 
 
+def test_scores_that_no_box_has_are_not_asked_for(street, tmp_path):
+    given = replace(kitti_tracking(street, tmp_path), least_score=0.3)
+    refused(find_detections, given, street.drive, match="no box has a score")
+
+
 def test_a_lower_score_is_counted_and_a_needless_calibration_named(street, tmp_path):
     given = openpcdet(street, tmp_path)
     said = json.loads(given.path.read_text())

@@ -117,6 +117,32 @@ def test_other_settings_do_not_go_on_with_an_output(found, recording):
     refused(wildshape.drive, recording, found.out, other, match="--overwrite")
 
 
+@pytest.mark.parametrize("change", ["times.txt", "poses.txt", "a scan"])
+def test_a_finished_drive_is_not_taken_for_that_of_a_changed_recording(
+    found, recording, tmp_path, change
+):
+    """As somebody does who mends his recording and repeats the command."""
+    out = shutil.copytree(found.out, tmp_path / "out")
+    source = shutil.copytree(recording, tmp_path / "recording")
+    moved_to(out, source)
+    assert wildshape.drive(source, out).boxes == found.boxes
+    files = sorted(source.glob("0*"))
+    if change == "times.txt":
+        (source / change).write_text("".join(f"{0.1 * row}\n" for row in range(len(files))))
+    elif change == "poses.txt":
+        (source / change).write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * len(files))
+    else:
+        files[-1].write_bytes(files[-1].read_bytes()[:-160])
+    refused(wildshape.drive, source, out, match="with other settings; pass --overwrite")
+
+
+def moved_to(out, source):
+    """A finished drive whose recording lies elsewhere now."""
+    record = json.loads((out / "wildshape.json").read_text())
+    record["settings"]["source"] = str(source)
+    (out / "wildshape.json").write_text(json.dumps(record))
+
+
 def test_what_is_missing_of_a_group_is_completed_as_it_was(found, recording, tmp_path, monkeypatch):
     """From the scans and the rays beside the object, whole tracks alone."""
     of, stages = DriveConfig(), found.out / "stages"

@@ -2,15 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """A sensor that jumps, one that stands, and objects in place of scans."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import torch
 from tests.drives.street import street
 from tests.refusal import refused
 
+import wildshape
 from wildshape.drives.config import DriveConfig, LinkConfig, MountingConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.mounting import Mounting, find_mounting
 from wildshape.drives.tracking.trajectory import Breaks, find_trajectory
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Turn
 
 pytest.importorskip("kiss_icp")
@@ -35,7 +40,7 @@ def test_the_way_breaks_off_where_a_scan_was_taken_elsewhere(scans):
     way = find_trajectory(drive_of(jumped), LEVEL, DriveConfig())
     assert way.breaks.frames == (2,)
     (told,) = way.breaks.told()
-    assert "breaks off 1 times, first at frame 2" in told
+    assert "breaks off 1 time, first at frame 2" in told
     steps = np.linalg.norm(np.diff(way.T_world_sensor.translation.numpy(), axis=0), axis=1)
     assert steps[1] == pytest.approx(steps[0])  # it goes on as it went before
     assert Breaks((2,)).ticks((0, 1, 2, 3), LinkConfig(longest_gap=4)) == [0, 1, 7, 8]
@@ -47,7 +52,54 @@ def test_a_sensor_that_stands_stays_where_it_is(scans):
     assert way.T_world_sensor.translation.abs().max() < 0.01
 
 
+def test_poses_that_do_not_fit_the_scans_are_said():
+    """Right ones, their inverse, scans that are in the world already, a camera's axes."""
+    seen = street(frames=8)
+    path = path_of(seen.places)
+    turn = torch.tensor(((0, -1, 0, 5e5), (1, 0, 0, 5e6), (0, 0, 1, 90), (0, 0, 0, 1.0)))
+    T_map_sensor = SE3.from_matrix(turn.double()) @ path
+    placed = [path[frame].apply_numpy(scan) for frame, scan in enumerate(seen.scans)]
+    camera = SE3.from_matrix(torch.eye(4).double()[[1, 2, 0, 3]])
+    for scans, poses, told in (
+        (seen.scans, T_map_sensor, None),
+        (seen.scans, T_map_sensor.inverse(), "inverse of the poses fits the scans better"),
+        (placed, path, "lie better on each other without them"),
+        (seen.scans, camera @ path @ camera.inverse(), "without them"),
+    ):
+        drive = replace(drive_of(scans), T_world_sensor=poses)
+        found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
+        assert len(found) == bool(told)
+        assert (told or "") in "".join(found)
+
+
+def path_of(places):
+    """`T_world_sensor` of a sensor that looks along x."""
+    moved = np.column_stack((places, np.zeros(len(places))))
+    return SE3(torch.eye(3).double().repeat(len(places), 1, 1), torch.from_numpy(moved))
+
+
 def test_scans_of_objects_are_refused(scans):
     car = [scan[(np.abs(scan - (9, -4, -1)) < (3, 2, 1.2)).all(1)] for scan in scans]
     refused(find_mounting, drive_of(car), MountingConfig(), match="single objects, cut out")
     assert find_mounting(drive_of(scans), MountingConfig()).height_m == pytest.approx(1.7, abs=0.05)
+
+
+def test_a_sensor_upside_down_is_refused_and_a_tilted_one_is_not(scans, tmp_path):
+    config = MountingConfig()
+    hanging = [scan * np.array((1, -1, -1), np.float32) for scan in scans]
+    refused(find_mounting, drive_of(hanging), config, match="hung upside down; turn the scans")
+    np.save(tmp_path / "0.npy", hanging[0])
+    refused(wildshape.drive, tmp_path, tmp_path / "out", match="hung upside down")
+    assert not (tmp_path / "out").exists()  # so that it may be begun with mended scans
+    c, s = np.cos(np.radians(20)), np.sin(np.radians(20))
+    turn = np.array(((c, 0, s), (0, 1, 0), (-s, 0, c)), np.float32)
+    tilted = find_mounting(drive_of([scan @ turn.T for scan in scans]), config)
+    assert tilted.tilt_deg == pytest.approx(20, abs=0.5)
+
+
+def test_scans_in_the_frame_of_a_vehicle_are_said(scans):
+    """Its origin lies on the road: what a ray passed is not what the sensor looked through."""
+    of_vehicle = [scan + np.array((1.0, 0.0, 1.7), np.float32) for scan in scans]
+    (told,) = find_mounting(drive_of(of_vehicle), MountingConfig()).told()
+    assert "give scans as the sensor saw them" in told
+    assert find_mounting(drive_of(scans), MountingConfig()).told() == []

@@ -36,6 +36,20 @@ def test_names_sorted_are_the_order_in_time(folder):
     assert (drive.ticks, drive.warnings) == ((0, 1, 2, 3), ())
 
 
+@pytest.mark.parametrize("before", ["", "scan_"])
+def test_numbers_without_leading_zeros_are_refused(tmp_path, before):
+    """As text 10 comes before 9."""
+    for number in (9, 10):
+        np.save(tmp_path / f"{before}{number}.npy", np.ones((50, 3)))
+    refused(open_drive, tmp_path, match=f"{before}10.npy is sorted before {before}9.npy")
+
+
+def test_decimals_in_names_are_no_counts(tmp_path):
+    for name in ("1.25", "1.5", "a2", "b1"):
+        np.save(tmp_path / f"{name}.npy", np.ones((50, 3)))
+    assert open_drive(tmp_path).scan_names == ("1.25", "1.5", "a2", "b1")
+
+
 def test_a_missing_scan_is_counted_and_leaves_its_time_out(tmp_path):
     write_scans(tmp_path, (7, 8, 11))
     drive = open_drive(tmp_path)

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from tyro.conf import OmitArgPrefixes, Positional, arg
 from tyro.constructors import PrimitiveConstructorSpec
 
+from wildshape.errors import BadInputError
+
 if TYPE_CHECKING:
     from wildshape.inference.folders.complete_folder import FolderOptions
     from wildshape.io.scans.points import Coordinates
@@ -179,6 +181,18 @@ Network = Annotated[NetworkOptions, OmitArgPrefixes]
 Work = Annotated[WorkOptions, OmitArgPrefixes]
 DEFAULT_WORK = WorkOptions()
 Files = Annotated[FileOptions, OmitArgPrefixes]
+
+
+def check_mesh_format(kind: str, *, mesh: bool) -> None:
+    """Refuse a format of meshes where none is written.
+
+    Raises:
+        BadInputError: so it is.
+    """
+    if kind != "ply" and not mesh:
+        raise BadInputError("--mesh-format: there is no mesh to write; pass --mesh, too.")
+
+
 DEFAULT_NETWORK, DEFAULT_FILES = NetworkOptions(), FileOptions()
 
 

@@ -89,7 +89,7 @@ def settings_of(
     """What decides a drive's result, as JSON values; arguments as of `drive`."""
     return {
         "source": str(source.resolve()),
-        "scans": len(recording),
+        "recording": recording.fingerprint,
         **({} if topic is None else {"topic": topic}),
         "drive": asdict(config),
         "model": predictor.settings.provenance,

@@ -125,7 +125,7 @@ def drive(
     done = None if overwrite else finished(out, "drive", settings, parts=(BOXES, FRAMES))
     if done is None:
         output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
-        with team(workers) as helpers:
+        with team(workers) as helpers, output.abandoned_if_refused():
             found = replace(run, helpers=helpers).perform()
         output.finish(result={**asdict(found), "out": str(out)})
     else:
@@ -201,7 +201,7 @@ class _Run:
             vehicles=tuple(one.name for one in vehicles),
             boxes=self.write(vehicles, turns),
             moving=sum(one.way.moving for one in vehicles),
-            warnings=self.warnings(T_world_sensor),
+            warnings=self.warnings(T_world_sensor, mounting),
             seconds=self.clock.seconds,
             workers=self.helpers.worked,
         )
@@ -337,14 +337,14 @@ class _Run:
             folders = self.completing / "objects"
             return write_vehicles(self.results, vehicles, folders, self.cuts, self.drive, turns, at)
 
-    def warnings(self, T_world_sensor: SE3) -> tuple[str, ...]:
+    def warnings(self, T_world_sensor: SE3, mounting: Mounting) -> tuple[str, ...]:
         """What is odd about the drive; writes `frames.csv` on the way."""
         points = [cut.scanned for cut in read_cuts(self.cuts, len(self.drive))]
         write_frames(self.out / FRAMES, self.drive, points)
-        found = list(self.drive.warnings)
+        found = [*self.drive.warnings, *mounting.told()]
         if empty := points.count(0):
             found.append(f"{empty} of {len(points)} scans are empty or cannot be read")
         found += self.breaks.told()
         if leaps := list(jumps(T_world_sensor, self.drive.ticks, self.config.trajectory)):
-            found.append(f"the sensor jumps {len(leaps)} times, first at frame {leaps[0]}")
+            found.append(f"jumps of the sensor: {len(leaps)}, the first at frame {leaps[0]}")
         return tuple(found)

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A drive: its scans in time order, read one by one, and what is known of them."""
 
+import hashlib
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -65,6 +67,7 @@ class Drive:
         warnings: what is odd about it, a sentence each.
         cut_by: how its objects are cut out, for their files.
         motion: of the sensor at each frame, once known: scans are corrected by it.
+        sizes: bytes of each scan's file, where every scan has one.
     """
 
     name: str
@@ -76,6 +79,7 @@ class Drive:
     warnings: tuple[str, ...] = ()
     cut_by: str = "without labels"
     motion: tuple[Twist, ...] | None = None
+    sizes: tuple[int, ...] = ()
 
     @classmethod
     def of(
@@ -86,6 +90,7 @@ class Drive:
         times: Sequence[float] | None = None,
         T_world_sensor: SE3 | None = None,
         warnings: Sequence[str] = (),
+        sizes: Sequence[int] = (),
     ) -> "Drive":
         """A drive whose ticks come from the scans' times, or from their names if these count.
 
@@ -108,10 +113,18 @@ class Drive:
             times=None if times is None else tuple(times),
             T_world_sensor=T_world_sensor,
             warnings=(*warnings, *missing),
+            sizes=tuple(sizes),
         )
 
     def __len__(self) -> int:
         return len(self.scan_names)
+
+    @property
+    def fingerprint(self) -> str:
+        """Of names, times, poses and sizes: another one is another recording, or a mended one."""
+        poses = None if self.T_world_sensor is None else self.T_world_sensor.matrix.tolist()
+        known = json.dumps((self.scan_names, self.times, poses, self.sizes))
+        return hashlib.sha256(known.encode()).hexdigest()
 
     def turn(self, frame: int) -> Turn:
         """A frame as it was read; without points where its file is damaged or empty.

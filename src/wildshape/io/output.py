@@ -12,7 +12,8 @@ import platform
 import shlex
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata
@@ -47,6 +48,15 @@ class Output:
         if [entry.name for entry in self.path.iterdir()] == [MARKER]:
             (self.path / MARKER).unlink()
             self.path.rmdir()
+
+    @contextmanager
+    def abandoned_if_refused(self) -> Iterator[None]:
+        """`abandon`, where what is done in here ends in a `BadInputError`."""
+        try:
+            yield
+        except BadInputError:
+            self.abandon()
+            raise
 
     def finish(self, **more: object) -> None:
         """Say that everything is there."""

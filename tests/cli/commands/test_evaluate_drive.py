@@ -54,6 +54,17 @@ def test_the_truth_is_right(wildshape, street, found, tmp_path):
     assert "AP BEV 0.5" in (out / "table.md").read_text()
 
 
+def test_half_a_drive_is_not_measured_against_all_labels(wildshape, street, found):
+    poses = (found / "trajectory.txt").read_text().splitlines(keepends=True)
+    (found / "trajectory.txt").write_text("".join(poses[:-1]))
+    rows = (found / "boxes.csv").read_text().splitlines(keepends=True)
+    kept = [row for row in rows if not row.startswith(f"{SCANS - 1},")]
+    (found / "boxes.csv").write_text("".join(kept))
+    said = wildshape("evaluate-drive", found, "--labels", street)
+    assert said.code == 2
+    assert f"is of {SCANS - 1} scans, but the labels know {SCANS}" in said.err
+
+
 def test_plain_boxes_around_the_same_clusters(wildshape, street, found):
     """Of the points that lie in the true boxes."""
     rows = [line.split(",") for line in (found / "boxes.csv").read_text().splitlines()[1:]]

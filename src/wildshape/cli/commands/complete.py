@@ -15,6 +15,7 @@ from wildshape.cli.options import (
     Format,
     Scans,
     Work,
+    check_mesh_format,
     is_pipe,
     listed,
     option,
@@ -141,6 +142,7 @@ def _mesh(settings: Settings) -> "MeshFiles | None":
     coloured = settings.mesh_colours == "confidence"
     if coloured and not settings.mesh:
         raise BadInputError("--mesh-colours: there is no mesh to colour; pass --mesh, too.")
+    check_mesh_format(settings.mesh_format, mesh=settings.mesh)
     return MeshFiles(settings.mesh_format, coloured) if settings.mesh else None
 
 

@@ -18,6 +18,7 @@ from wildshape.cli.options import (
     OutFolder,
     Overwrite,
     Work,
+    check_mesh_format,
     listed,
     option,
 )
@@ -140,10 +141,10 @@ def run(settings: Settings) -> None:
     from wildshape.inference.predictor import load
     from wildshape.report.drive.many import DriveAndPage
 
-    adapt = _adapt(settings)
+    adapt, files = _adapt(settings), _files(settings)
     drives = _drives(settings)
     folders = _folders(settings, list(drives))
-    files, detections = _files(settings), _detections(settings, drives)
+    detections = _detections(settings, drives)
     files.check()
     task = DriveAndPage(
         predictor=load(settings.network.model, settings.network.device, config=INFERENCE),
@@ -232,6 +233,7 @@ def _answer(
 def _files(settings: Settings) -> "DriveFiles":
     from wildshape.drives.writing.files import DriveFiles
 
+    check_mesh_format(settings.mesh_format, mesh=settings.mesh)
     mesh = settings.mesh_format if settings.mesh else None
     return DriveFiles(_box_files(settings), mesh, mcap=settings.mcap, rerun=settings.rerun)
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Folders of scans: one's own, and KITTI's layouts."""
 
+import re
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -19,6 +20,7 @@ from wildshape.records import Turn
 _BESIDE = ("poses.txt", "times.txt", "timestamps.txt", "calib.txt")
 _RAW, _ODOMETRY = Path("velodyne_points") / "data", "velodyne"
 _TEXT = (".txt", ".csv")
+_COUNTED = re.compile(r"(?P<before>|.*[^0-9.-])(?P<number>[0-9]+)")  # no decimals
 _LONGEST_STEP_S = 20.0  # more are milliseconds, or smaller units
 _OBJECTS = "velodyne_objects_xyz0"  # a drive of KITTI raw cut down to its vehicles
 
@@ -129,6 +131,7 @@ def _drive(
         read=_Files(tuple(files), None if times is None else tuple(times)),
         times=times,
         T_world_sensor=None if poses is None else read_poses(poses, len(files)),
+        sizes=[file.stat().st_size for file in files],
     )
 
 
@@ -149,7 +152,22 @@ def _files(folder: Path) -> list[Path]:
     for one, other in pairwise(files):
         if one.stem == other.stem:
             raise BadInputError(f"{folder}: {one.name} and {other.name} are one frame; remove one.")
+    _check_counted(folder, files)
     return files
+
+
+def _check_counted(folder: Path, files: list[Path]) -> None:
+    """Refuse names that count without leading zeros: as text, scan_10 comes before scan_9."""
+    counts = [_COUNTED.fullmatch(file.stem) for file in files]
+    if None in counts or len({count["before"] for count in counts if count}) > 1:
+        return
+    numbers = [int(count["number"]) for count in counts if count]
+    for row, (one, other) in enumerate(pairwise(numbers)):
+        if one > other:
+            raise BadInputError(
+                f"{folder}: {files[row].name} is sorted before {files[row + 1].name}, for names are"
+                " sorted as text; write their numbers with leading zeros."
+            )
 
 
 def _seconds(path: Path) -> list[float] | None:

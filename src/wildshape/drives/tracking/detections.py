@@ -67,10 +67,14 @@ class DetectionFile:
         """All of them.
 
         Raises:
-            BadInputError: a file cannot be read.
+            BadInputError: a file cannot be read, or has none of the scores asked for.
         """
         camera = read_camera(self.calibration) if self.calibration else camera_at_the_lidar()
-        return read_detector_boxes(self.path, camera.T_rect_sensor)
+        found = read_detector_boxes(self.path, camera.T_rect_sensor)
+        scored = not found or any(box.score is not None for box in found)
+        if self.least_score is not None and not scored:
+            raise BadInputError(f"{self.path}: no box has a score; leave --min-score away.")
+        return found
 
     def is_sure(self, box: DetectorBox) -> bool:
         """Whether a box's score is high enough."""

@@ -22,6 +22,10 @@ from wildshape.records import Points
 
 _MOST_POINTS, _FEWEST_POINTS = 4000, 100
 _OFF_UNIT = 1e-3
+_LOWEST_M = 0.15  # no sensor that sees vehicles sits lower
+_UPSIDE_DOWN = np.array((1.0, -1.0, -1.0), np.float32)
+
+Plane = Float[np.ndarray, "4"]
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,15 @@ class Mounting:
         """Whether the sensor's z is not taken for vertical."""
         return self.up != (0.0, 0.0, 1.0)
 
+    def told(self) -> list[str]:
+        """A sentence, if the origin is hardly that of a sensor."""
+        if self.height_m > _LOWEST_M:
+            return []
+        return [
+            f"the ground lies {self.height_m:.2f} m below the origin: give scans as the sensor saw"
+            " them, not in a vehicle's or a map's frame"
+        ]
+
     def levelling(self) -> SE3:
         """`T_level_sensor`: the smallest turn after which z is vertical; the origin stays."""
         up = torch.tensor(self.up, dtype=torch.float64)
@@ -70,7 +83,7 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
     """Height and tilt of a drive's sensor.
 
     Raises:
-        BadInputError: no scan shows ground around the sensor.
+        BadInputError: no scan shows ground around the sensor, or it is above.
     """
     chosen = np.unique(np.linspace(0, len(drive) - 1, config.scans).round().astype(int))
     scans = [drive.scan(int(frame)) for frame in chosen]
@@ -80,6 +93,11 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
             " For objects there is `wildshape complete --track`."
         )
     planes = [ground_plane(scan, config) for scan in scans]
+    if _hangs(scans, planes, config):
+        raise BadInputError(
+            f"{drive.name}: the ground lies above the sensor, as if it hung upside down; turn the"
+            " scans by 180 degrees about x, so that z points up."
+        )
     found = np.array([plane for plane in planes if plane is not None])
     if not len(found):
         drive.read(int(chosen[0]))  # says why if it cannot be read
@@ -106,7 +124,27 @@ def _is_an_object(scan: Points, config: MountingConfig) -> bool:
     return bool(max(sides[:2]) < config.object_m and not around)
 
 
-def ground_plane(points: Points, config: MountingConfig) -> Float[np.ndarray, "4"] | None:
+def _hangs(scans: list[Points], planes: list[Plane | None], config: MountingConfig) -> bool:
+    """Whether most of the points lie where the sky should be; `planes`: taken for the ground."""
+    share = _on_ground(scans, planes, config)
+    if share > config.ground:
+        return False
+    turned = [scan * _UPSIDE_DOWN for scan in scans]
+    found = _on_ground(turned, [ground_plane(scan, config) for scan in turned], config)
+    return found > max(config.ground, 2 * share)
+
+
+def _on_ground(scans: list[Points], planes: list[Plane | None], config: MountingConfig) -> float:
+    """The share of the points around the sensor that lie on the ground, of the middle scan."""
+    shares = []
+    for points, plane in zip(scans, planes):
+        near = points[(points[:, :2] ** 2).sum(1) < config.reach_m**2]
+        away = near[:0] if plane is None else np.abs(near @ plane[:3] + plane[3])
+        shares.append(float((away < config.thick_m).sum()) / max(len(near), 1))
+    return float(np.median(shares))
+
+
+def ground_plane(points: Points, config: MountingConfig) -> Plane | None:
     """Unit normal (upwards) of the ground around the sensor, and how far below it lies, metres.
 
     None where a scan shows no ground: hardly any points, or no plane that is level enough.
@@ -133,7 +171,7 @@ def ground_plane(points: Points, config: MountingConfig) -> Float[np.ndarray, "4
     return _fitted(near[np.abs(heights[:, best]) < config.thick_m])
 
 
-def _fitted(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "4"]:
+def _fitted(points: Float[np.ndarray, "n 3"]) -> Plane:
     """The plane of least squared distances."""
     middle = points.mean(0)
     normal = np.linalg.svd(points - middle, full_matrices=False)[2][2]

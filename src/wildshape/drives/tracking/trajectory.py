@@ -18,12 +18,14 @@ from jaxtyping import Float
 
 from wildshape.drives.config import DriveConfig, LinkConfig, TrajectoryConfig
 from wildshape.drives.source import Drive
+from wildshape.drives.tracking.given_poses import misfit
 from wildshape.drives.tracking.ground import height_above_ground
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.errors import MissingExtraError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import STANDING, Twist
 from wildshape.io.guard import read_json, record_of
+from wildshape.io.progress import counted
 from wildshape.ops.connected import first_of_cells
 from wildshape.ops.nearest import nearest
 from wildshape.records import Points, Turn
@@ -37,13 +39,15 @@ _FIRST_SCANS = 3  # tell the motion at the beginning
 
 @dataclass(frozen=True)
 class Breaks:
-    """Where the sensor's way breaks off.
+    """Where the sensor's way breaks off, and what else is odd about it.
 
     Attributes:
         frames: whose place could not be told from the frame before.
+        misfit: what seems to be wrong with poses that came with the drive.
     """
 
     frames: tuple[int, ...] = ()
+    misfit: str = ""
 
     @classmethod
     def read(cls, path: Path) -> "Breaks":
@@ -59,14 +63,15 @@ class Breaks:
         return (np.asarray(ticks) + apart * before).tolist()
 
     def told(self) -> list[str]:
-        """A sentence, if there are any."""
-        if not self.frames:
-            return []
-        count, first = len(self.frames), self.frames[0]
-        return [
-            f"the sensor's way breaks off {count} times, first at frame {first}: that scan does not"
-            " fit the one before it; no vehicle is followed across"
-        ]
+        """A sentence on each that there is."""
+        told = [self.misfit] if self.misfit else []
+        if self.frames:
+            times = counted(len(self.frames), "time")
+            told.append(
+                f"the sensor's way breaks off {times}, first at frame {self.frames[0]}: that scan"
+                " does not fit the one before it; no vehicle is followed across"
+            )
+        return told
 
 
 @dataclass(frozen=True)
@@ -91,10 +96,10 @@ def find_trajectory(
 ) -> Way:
     """The way of the sensor; the world is the sensor frame of the first frame.
 
-    Poses that came with the drive are taken as they are. Scans whose points have times are
-    corrected by the motion just before them, the first ones by that of a first try. A scan of
-    hardly any points goes on as the one before it went, and so does one that does not fit the one
-    before.
+    Poses that came with the drive are taken as they are, and looked at. Scans whose points have
+    times are corrected by the motion just before them, the first ones by that of a first try. A
+    scan of hardly any points goes on as the one before it went, and so does one that does not fit
+    the one before.
 
     Args:
         drive: its scans are read one by one.
@@ -107,7 +112,8 @@ def find_trajectory(
         MissingExtraError: KISS-ICP is not installed.
     """
     if drive.T_world_sensor is not None:
-        return Way(drive.T_world_sensor[0].inverse() @ drive.T_world_sensor)
+        breaks = Breaks(misfit=misfit(drive, mounting, config))
+        return Way(drive.T_world_sensor[0].inverse() @ drive.T_world_sensor, breaks)
     if turns is None:
         turns = (_landmarks_of(drive.turn(frame), mounting, config) for frame in range(len(drive)))
     rest = iter(turns)

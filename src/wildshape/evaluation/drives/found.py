@@ -99,7 +99,12 @@ def read_found(path: Path, scans: int) -> FoundDrive:
         seen.add((row.frame, row.track))
         frames[row.frame].append(Found(row.track, row.confidence, _upright(row)))
     trajectory = path / TRAJECTORY
-    poses = read_poses(trajectory, scans) if trajectory.is_file() else None
+    poses = read_poses(trajectory) if trajectory.is_file() else None
+    if poses is not None and len(poses) != scans:
+        raise BadInputError(
+            f"{trajectory}: is of {len(poses)} scans, but the labels know {scans}; give the labels"
+            " of this very drive, or find its vehicles in all its scans."
+        )
     return FoundDrive(path, tuple(tuple(frames[i]) for i in range(scans)), poses)
 
 

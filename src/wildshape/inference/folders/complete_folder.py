@@ -13,7 +13,6 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.confidence import ReasonCounts
 from wildshape.inference.folders.box_files import BOX_FILES, BoxFiles
@@ -155,13 +154,10 @@ def complete_folder(
     keep_apart(source, out)
     command, identity = "register" if registers else "complete", options.identity(source)
     output = begin(out, command, identity, FILES, overwrite=options.overwrite, progress=progress)
-    try:
+    with output.abandoned_if_refused():
         found = write_results(
             tracks, predictor, output, options, registers=registers, progress=progress
         )
-    except BadInputError:
-        output.abandon()
-        raise
     if options.boxes is not None:
         for note in options.boxes.write(out):
             progress.say(note)

@@ -277,9 +277,9 @@ def check_near(points: Float[np.ndarray, "n 3"], name: str) -> None:
     if away > _FARTHEST:
         raise BadInputError(
             f"{name}: lies {away:.5g} m from the origin, but a scan is in its sensor's frame,"
-            f" within {_FARTHEST:g} m of it: coordinates of a map (then pass the sensor's position"
-            " there, --origin X,Y,Z, or subtract it in float64) or in millimetres (then pass --unit"
-            " mm or cm)."
+            f" within {_FARTHEST:g} m of it: coordinates of a map (then subtract the sensor's"
+            " position there in float64; commands on objects do so with --origin X,Y,Z) or in"
+            " millimetres (then write metres; commands on objects: pass --unit mm or cm)."
         )
 
 

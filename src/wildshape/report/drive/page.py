@@ -32,7 +32,7 @@ MOST_OBJECTS = 150
 _POINTS = 2500  # of a panel
 _SHOWN_S = 0.05  # less of a stage reads 0.0
 _NOTES = (
-    "Drift can be told only where true poses are known: `wildshape evaluate-drive` measures it.",
+    "Drift can be told only where true poses are known: wildshape evaluate-drive measures it.",
 )
 _COLUMNS = (
     "vehicle",
@@ -100,7 +100,6 @@ def _facts(found: FinishedDrive) -> list[tuple[str, str]]:
         ("scans", str(len(found))),
         ("time", f"{found.seconds[-1]:.1f} s" if len(found) else "0 s"),
         ("way of the sensor", f"{found.travelled_m:.0f} m"),
-        ("drift", "n/a"),
     ]
 
 

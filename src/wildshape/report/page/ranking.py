@@ -149,7 +149,7 @@ def objects_of_scores(scores: Path, method: str) -> Table | None:
         columns=columns,
         rows=rows,
         caption="CD: mean over an object's scans; rotation and translation: medians to its "
-        "middle scan. `wildshape view` on the same folder shows the objects in this order."
+        "middle scan. wildshape view on the same folder shows the objects in this order."
         f"{_meaning(columns)}",
         sortable=True,
     )
