@@ -8,7 +8,9 @@ CAD holds `manifest.csv` (columns category, file, split, tier, licence, source, 
 it names. Simulated scans alone are trained on, of procedural shapes and of meshes of split `train`
 that an Apache-2.0 file may be made from. RUN/weights holds what is shipped, and its NOTICE.
 With `--start WEIGHTS` the last round alone is trained: they teach it, and it goes on from them.
-The same command goes on with a run that was stopped; what is finished is not made again.
+The same command goes on with a run that was stopped; what is finished is not made again. RUN holds
+the weights of each finished round, `<round>.safetensors`: copied to another machine's RUN, they are
+not trained again there.
 """
 
 from dataclasses import dataclass, replace
@@ -66,25 +68,17 @@ class Round:
 
 
 ROUNDS = {
-    "first": Round(data=1, steps=14_000),
+    "first": Round(data=1, steps=12_000),
     "taught": Round(data=1, steps=12_000, teacher="first"),
-    "chained": Round(data=2, steps=8_000, lr=6e-4, teacher="taught", start="taught"),
-    "again": Round(data=3, steps=8_000, lr=6e-4, teacher="chained", start="chained"),
-    "rays": Round(data=3, steps=6_000, lr=6e-4, teacher="again", start="again", rays=True),
-    "mixed": Round(data=4, steps=16_000, lr=6e-4, teacher="rays", start="rays", rays=True),
-    "plain": Round(data=5, steps=16_000, lr=6e-4, teacher="mixed", start="mixed", rays=True),
-    "last": Round(data=6, steps=32_000, lr=6e-4, teacher="plain", start="plain", rays=True),
+    "mixed": Round(data=2, steps=20_000, lr=6e-4, teacher="taught", start="taught", rays=True),
+    "last": Round(data=3, steps=24_000, lr=6e-4, teacher="mixed", start="mixed", rays=True),
 }
 """In their order; the last one is shipped."""
 
-OCCLUSION = {1: 0.3, 2: 0.6, 3: 0.6, 4: 0.5, 5: 0.4, 6: 0.4}
-RAYS = {1: 0, 2: 0, 3: 512, 4: 512, 5: 512, 6: 512}
+OCCLUSION, RAYS = {1: 0.3, 2: 0.5, 3: 0.4}, {1: 0, 2: 512, 3: 512}
 """By the seed of the data: the share of the tracks past something that stands in the way, and the
 rays kept with a scan."""
-VARIED = {
-    1: (True,), 2: (True,), 3: (True,), 4: (True, False),
-    5: (True, False, False), 6: (True, False, False),
-}  # fmt: skip
+VARIED = {1: (True, False), 2: (True, False), 3: (True, False, False)}
 """By the seed of the data: forms and sensors varied, or as they are, as many tracks of each."""
 
 
@@ -126,7 +120,11 @@ class Settings:
         """Of a round, or the one that takes its place."""
         if name is None:
             return None
-        return self.out / name / MODEL if self.start is None else weights_file(self.start)
+        return self.finished(name) if self.start is None else weights_file(self.start)
+
+    def finished(self, name: str) -> Path:
+        """Where the weights of a finished round are kept."""
+        return self.out / f"{name}.safetensors"
 
 
 def main(settings: Settings) -> None:
@@ -137,13 +135,15 @@ def main(settings: Settings) -> None:
     write_text(weights / "NOTICE", notice(settings.cad))
     for name in settings.rounds:
         trained(name, settings)
-    _shipped(settings.out / tuple(ROUNDS)[-1] / MODEL, settings, "vehicle")
+    _shipped(settings.finished(settings.rounds[-1]), settings, "vehicle")
     for category in VIEWS:
         _views(category, settings)
 
 
-def trained(name: str, settings: Settings) -> Path:
-    """The checkpoint of a round, trained now or resumed where it is not finished."""
+def trained(name: str, settings: Settings) -> None:
+    """A round's weights, in half precision: made now or resumed, unless they are there."""
+    if settings.finished(name).exists():
+        return
     of, folder = ROUNDS[name], settings.out / name
     recipe = PRESETS["default"]()
     steps, rate = settings.part(of.steps), recipe.optim.lr if of.lr is None else of.lr
@@ -161,7 +161,7 @@ def trained(name: str, settings: Settings) -> Path:
     )
     if run.state.step < steps:  # else it is there; made anew, it would teach others
         fit(run, lambda step, values: print(name, step, values, flush=True))
-    return folder / MODEL
+    save_checkpoint(settings.finished(name), *load_checkpoint(folder / MODEL), half=True)
 
 
 def _data(seed: int, settings: Settings) -> Store:
@@ -217,7 +217,7 @@ def _views(category: Literal["airplane", "chair", "car"], settings: Settings) ->
 def _shipped(
     model: Path, settings: Settings, category: Literal["vehicle", "airplane", "chair", "car"]
 ) -> None:
-    """The weights in half precision, their confidence calibrated."""
+    """The weights with their confidence calibrated."""
     name = "default" if category == "vehicle" else category
     final = settings.out / "weights" / f"{name}.safetensors"
     if final.exists():

@@ -17,13 +17,23 @@ def test_the_last_round_goes_on_from_weights_that_teach_it(cad, tmp_path, monkey
     monkeypatch.setattr(shipped_chain, "_SENSORS", ("hdl64",))
     monkeypatch.setattr(shipped_chain, "_SCANS", 5)
     few = Settings(tmp_path, cad, tracks=4, share=1e-4)
-    first = trained("first", few)
+    trained("first", few)
+    first = few.finished("first")
     again = replace(few, start=first)
     assert again.rounds == (LAST,)
-    last = trained(LAST, again)
+    trained(LAST, again)
+    last = again.finished(LAST)
     (one, of_one), (other, of_other) = (load_checkpoint(path) for path in (first, last))
     assert one.rays is None
     assert other.rays is not None
     assert not torch.equal(next(one.parameters()), next(other.parameters()))
     assert [of.provenance["round"] for of in (of_one, of_other)] == ["first", LAST]
     assert of_other.provenance["command"].endswith(f"--start {first.name}")
+
+
+def test_a_finished_round_of_another_machine_is_not_trained_again(cad, tmp_path, monkeypatch):
+    weights = Settings(tmp_path, cad).finished("first")
+    weights.write_bytes(b"kept")
+    monkeypatch.setattr(shipped_chain, "setup", None)
+    trained("first", Settings(tmp_path, cad))
+    assert weights.read_bytes() == b"kept"
