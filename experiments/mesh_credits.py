@@ -4,7 +4,8 @@
 
     python -m experiments.mesh_credits CAD > NOTICE
 
-No GPL, no ShareAlike. What asks for its author to be named (CC-BY) is named, each model.
+No GPL, no ShareAlike. What asks for its author to be named (CC-BY) is named, each model. With
+`--every-tier` it is the NOTICE of weights that such meshes were not left out of.
 """
 
 import csv
@@ -42,8 +43,8 @@ CREDITS = {
 }
 
 
-def rows_of(cad: Path, split: str) -> list[Row]:
-    """The manifest's rows of a split; of `train` those that weights may be made from.
+def rows_of(cad: Path, split: str, *, every_tier: bool = False) -> list[Row]:
+    """The manifest's rows of a split; of `train` those that weights may be made from, or all.
 
     Raises:
         BadInputError: there is no manifest.
@@ -53,16 +54,22 @@ def rows_of(cad: Path, split: str) -> list[Row]:
         raise BadInputError(f"{path}: no such file; give the folder of the CAD meshes.")
     with path.open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["split"] == split]
-    return [row for row in rows if split != "train" or row["tier"] in TIERS]
+    return [row for row in rows if split != "train" or every_tier or row["tier"] in TIERS]
 
 
-def notice(cad: Path) -> str:
+def notice(cad: Path, *, every_tier: bool = False) -> str:
     """The NOTICE of weights made from the meshes: by source, every CC-BY model by name.
+
+    Args:
+        cad: folder with a manifest.
+        every_tier: the weights were made from all meshes of the train split.
 
     Raises:
         BadInputError: a CC-BY model whose author is not known.
     """
-    rows = rows_of(cad, "train")
+    rows = rows_of(cad, "train", every_tier=every_tier)
+    copyleft = [row for row in rows if row["tier"] not in TIERS]
+    rows = [row for row in rows if row["tier"] in TIERS]
     return (
         "The weights were trained on simulated scans of procedural shapes and of these models.\n"
         "The models were scaled, stretched and bent, and seen by simulated sensors; none of them"
@@ -70,6 +77,8 @@ def notice(cad: Path) -> str:
         + "".join(sorted(f"- {_credited(row)}\n" for row in rows if _asks(row)))
         + "\nModels in the public domain or under permissive licences\n\n"
         + "".join(_counted(row for row in rows if not _asks(row)))
+        + ("\nModels under copyleft licences\n\n" if copyleft else "")
+        + "".join(_counted(copyleft))
     )
 
 
@@ -98,5 +107,9 @@ def _counted(rows: Iterable[Row]) -> list[str]:
     ]
 
 
+def _main(cad: tyro.conf.Positional[Path], *, every_tier: bool = False) -> None:
+    print(notice(cad, every_tier=every_tier), end="")
+
+
 if __name__ == "__main__":
-    print(notice(tyro.cli(tyro.conf.Positional[Path])), end="")
+    tyro.cli(_main)

@@ -52,6 +52,7 @@ class Settings:
         share: of steps and tracks, for a trial.
         steps: of each training instead of the size's own.
         seeds: trainings of each row.
+        table: only this one.
         rows: only rows whose names hold one of these, with commas.
         plan: say what is to be done, and how long it takes, and do nothing.
     """
@@ -62,6 +63,7 @@ class Settings:
     share: float = 1.0
     steps: int | None = None
     seeds: int = 3
+    table: Literal["vehicle", "views", "ablations"] | None = None
     rows: str = ""
     plan: bool = False
 
@@ -211,6 +213,7 @@ def run(settings: Settings, command: str) -> None:
     shop = Workshop(settings.out, settings.device, command)
     words = tuple(word.strip() for word in settings.rows.split(",") if word.strip())
     made = tables(given, settings.seeds, words)
+    made = {name: made[name] for name in made if settings.table in (None, name)}
     planned, spent = jobs(made), _spent(settings.out / RECORD)
     for number, job in enumerate(planned, start=1):
         if settings.plan:

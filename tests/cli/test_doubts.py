@@ -95,3 +95,13 @@ def test_few_points_are_a_reason(wildshape, tmp_path):
     write_ply(tmp_path / "few.ply", (car_surface(20)[0] + (10, 0, -1)).astype(np.float32))
     wildshape("complete", tmp_path / "few.ply", "--out", tmp_path / "out")
     assert "few_points" in _reasons(tmp_path / "out")[0]
+
+
+def test_weights_of_another_sensor_are_doubted_in_a_comparison(wildshape, tmp_path):
+    data, words = tmp_path / "tracks", ("--baselines", "none", "--raw", "--out")
+    wildshape("simulate", data, "--tracks", "1", "--scans", "2")
+    done = wildshape("evaluate", data, *words, tmp_path / "chairs", "--model", "chair")
+    assert done.code == 0, done.err
+    assert "trained on camera scans, but 1 of 1 tracks are of lidar scans" in done.err
+    done = wildshape("evaluate", data, *words, tmp_path / "vehicles")
+    assert "trained on" not in done.err

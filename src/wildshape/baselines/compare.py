@@ -116,6 +116,8 @@ def compare(
     source = open_tracks(data, options.coordinates)
     _check_truth(source)
     models = load_models(options.models, options.device, raw=options.raw)
+    for told in _other_sensors(source, models):
+        progress.say(told)
     keep_apart(data, out)
     identity = options.identity(data)
     output = begin(out, "evaluate", identity, FILES, overwrite=options.overwrite, progress=progress)
@@ -201,6 +203,20 @@ def _with_selected(runs: list[Results], models: Mapping[str, Model]) -> list[Res
         replace(run, methods=(*run.methods, chosen)) if i == best else run
         for i, run in enumerate(runs)
     ]
+
+
+def _other_sensors(source: TrackSource, models: Mapping[str, Model]) -> list[str]:
+    """A sentence on each of our models that learned from another kind of sensor's scans."""
+    kinds = [track.sensor.kind for track in source]
+    told = []
+    for name, model in models.items():
+        if isinstance(model, Predictor) and (other := set(kinds) - {model.settings.sensor}):
+            count = sum(kind in other for kind in kinds)
+            told.append(
+                f"{name}: trained on {model.settings.sensor} scans, but {count} of {len(kinds)}"
+                f" tracks are of {other.pop()} scans; choose other weights by --model"
+            )
+    return told
 
 
 def _check_truth(source: TrackSource) -> None:
