@@ -36,7 +36,7 @@ def test_names_sorted_are_the_order_in_time(folder):
     assert (drive.ticks, drive.warnings) == ((0, 1, 2, 3), ())
 
 
-@pytest.mark.parametrize("before", ["", "scan_"])
+@pytest.mark.parametrize("before", ["", "scan_", "frame-"])
 def test_numbers_without_leading_zeros_are_refused(tmp_path, before):
     """As text 10 comes before 9."""
     for number in (9, 10):

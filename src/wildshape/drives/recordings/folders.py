@@ -20,7 +20,7 @@ from wildshape.records import Turn
 _BESIDE = ("poses.txt", "times.txt", "timestamps.txt", "calib.txt")
 _RAW, _ODOMETRY = Path("velodyne_points") / "data", "velodyne"
 _TEXT = (".txt", ".csv")
-_COUNTED = re.compile(r"(?P<before>|.*[^0-9.-])(?P<number>[0-9]+)")  # no decimals
+_COUNTED = re.compile(r"(?P<before>|.*[^0-9.-]|.*[^0-9]-)(?P<number>[0-9]+)")  # no dates
 _LONGEST_STEP_S = 20.0  # more are milliseconds, or smaller units
 _OBJECTS = "velodyne_objects_xyz0"  # a drive of KITTI raw cut down to its vehicles
 
