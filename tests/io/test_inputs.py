@@ -80,6 +80,29 @@ def test_dropped_points_are_listed(tmp_path: Path, cloud: np.ndarray) -> None:
     assert source.dropped_nonfinite == (("a/a.ply", 1),)
 
 
+@pytest.mark.parametrize("names", [("9", "10"), ("scan-8", "scan-9", "scan-10")])
+def test_numbers_without_leading_zeros_are_doubted(
+    tmp_path: Path, cloud: np.ndarray, names: tuple[str, ...]
+) -> None:
+    for track in ("a", "b"):
+        for name in names:
+            write_ply(tmp_path / track / "scans" / f"{name}.ply", cloud)
+    source = open_tracks(tmp_path)
+    assert source.doubts == ()
+    assert len(list(source)) == 2
+    (told,) = source.doubts
+    assert told.startswith(f"a: {names[-1]}.ply is sorted before {names[0]}.ply")
+    assert "1 more track likewise" in told
+
+
+def test_names_that_do_not_count_are_not_doubted(tmp_path: Path, cloud: np.ndarray) -> None:
+    for name in ("2011-10-9", "2011-9-10", "car", "10"):
+        write_ply(tmp_path / f"{name}.ply", cloud)
+    source = open_tracks(tmp_path)
+    assert len(source[0].scans) == 4
+    assert source.doubts == ()
+
+
 def test_a_run_without_any_usable_scan_fails(tmp_path: Path) -> None:
     write_ply(tmp_path / "d" / "t" / "scans" / "0.ply", np.zeros((40, 3), np.float32))
     with pytest.raises(BadInputError, match="all 40 points are equal"):

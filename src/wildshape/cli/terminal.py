@@ -61,8 +61,8 @@ def say_skipped(skipped: Sequence[tuple[str, str]]) -> None:
 
 def conclude(found: "FolderSummary", *, as_json: bool) -> None:
     """What `complete` and `register` say of a folder."""
-    if found.dropped:
-        say(found.dropped)
+    for told in found.doubts:
+        say(told)
     say_skipped(found.skipped)
     if found.reasons.flagged:
         say(found.reasons.sentence)

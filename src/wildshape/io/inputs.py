@@ -82,6 +82,7 @@ class TrackSource:
         self._read = read
         self._skipped: dict[str, tuple[tuple[str, str], ...]] = {}  # by track
         self._dropped: dict[str, int] = {}
+        self._out_of_order: dict[str, tuple[str, ...]] = {}
 
     @property
     def skipped(self) -> tuple[tuple[str, str], ...]:
@@ -99,12 +100,24 @@ class TrackSource:
         return {name: number for number, name in reversed(list(enumerate(self.names)))}
 
     @property
-    def dropped(self) -> str:
-        """A sentence on points that were not finite, or nothing."""
-        if not self._dropped:
-            return ""
-        points = counted(sum(self._dropped.values()), "point")
-        return f"dropped {points} with NaN or infinity in {counted(len(self._dropped), 'scan')}"
+    def doubts(self) -> tuple[str, ...]:
+        """A sentence each on points that were not finite, and on scans that are out of order."""
+        told = []
+        if self._dropped:
+            points = counted(sum(self._dropped.values()), "point")
+            scans = counted(len(self._dropped), "scan")
+            told.append(f"dropped {points} with NaN or infinity in {scans}")
+        if self._out_of_order:
+            name, (one, other) = next(iter(self._out_of_order.items()))
+            told.append(
+                f"{name}: {one} is sorted before {other}, for names are sorted as text"
+                f"{self._and_more()}; if they count time, write their numbers with leading zeros"
+            )
+        return tuple(told)
+
+    def _and_more(self) -> str:
+        more = len(self._out_of_order) - 1
+        return f" ({counted(more, 'more track')} likewise)" if more else ""
 
     @property
     def dropped_nonfinite(self) -> tuple[tuple[str, int], ...]:
@@ -133,6 +146,8 @@ class TrackSource:
             raise
         self._skipped[name] = found.skipped
         self._dropped |= {f"{name}/{scan}": count for scan, count in found.dropped_nonfinite}
+        if found.out_of_order:
+            self._out_of_order[name] = found.out_of_order
         return found.track
 
     def __iter__(self) -> Iterator[Track]:

@@ -18,6 +18,7 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import read_json
+from wildshape.io.order import out_of_order
 from wildshape.io.poses import read_poses, write_poses
 from wildshape.io.rays import read_rays, write_rays
 from wildshape.io.scans.points import (
@@ -55,11 +56,13 @@ class TrackFile:
         track: the usable scans, with their truth if there is any.
         skipped: file name and reason of each scan that could not be used.
         dropped_nonfinite: file name and number of the points that were NaN or infinite.
+        out_of_order: the first two files whose numbers go back, or nothing.
     """
 
     track: Track
     skipped: Skipped = ()
     dropped_nonfinite: tuple[tuple[str, int], ...] = ()
+    out_of_order: tuple[str, ...] = ()
 
 
 class NoUsableScanError(BadInputError):
@@ -107,7 +110,7 @@ def read_track_file(folder: Path | str, coordinates: Coordinates = SENSOR_METRES
         rays=tuple(rays_beside(file, coordinates) for file in kept),
         label_size_m=info["label_size_m"],
     )
-    return TrackFile(track, skipped, dropped)
+    return TrackFile(track, skipped, dropped, _out_of_order(files))
 
 
 def track_of_files(
@@ -120,7 +123,12 @@ def track_of_files(
     """
     kept, skipped, dropped = _read_scans(files, files[0].parent, coordinates)
     track = Track(name, tuple(kept.values()), _stems(list(kept)))
-    return TrackFile(track, skipped, dropped)
+    return TrackFile(track, skipped, dropped, _out_of_order(files))
+
+
+def _out_of_order(files: list[Path]) -> tuple[str, ...]:
+    row = out_of_order([file.stem for file in files])
+    return () if row is None else (files[row].name, files[row + 1].name)
 
 
 def folder_name(folder: Path) -> str:

@@ -185,8 +185,8 @@ def _one_scan(settings: Settings) -> "Track":
             f"{settings.input}: holds {len(track.scans)} scans, but --out - writes one shape; name"
             " the file of one scan, or a folder for --out."
         )
-    if source.dropped:
-        say(source.dropped)
+    for told in source.doubts:
+        say(told)
     return track
 
 

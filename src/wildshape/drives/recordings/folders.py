@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Folders of scans: one's own, and KITTI's layouts."""
 
-import re
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -13,6 +12,7 @@ import numpy as np
 from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
+from wildshape.io.order import out_of_order
 from wildshape.io.poses import read_poses
 from wildshape.io.scans.points import is_scan_file, read_turn
 from wildshape.records import Turn
@@ -20,7 +20,6 @@ from wildshape.records import Turn
 _BESIDE = ("poses.txt", "times.txt", "timestamps.txt", "calib.txt")
 _RAW, _ODOMETRY = Path("velodyne_points") / "data", "velodyne"
 _TEXT = (".txt", ".csv")
-_COUNTED = re.compile(r"(?P<before>|.*[^0-9.-]|.*[^0-9]-)(?P<number>[0-9]+)")  # no dates
 _LONGEST_STEP_S = 20.0  # more are milliseconds, or smaller units
 _OBJECTS = "velodyne_objects_xyz0"  # a drive of KITTI raw cut down to its vehicles
 
@@ -158,16 +157,12 @@ def _files(folder: Path) -> list[Path]:
 
 def _check_counted(folder: Path, files: list[Path]) -> None:
     """Refuse names that count without leading zeros: as text, scan_10 comes before scan_9."""
-    counts = [_COUNTED.fullmatch(file.stem) for file in files]
-    if None in counts or len({count["before"] for count in counts if count}) > 1:
-        return
-    numbers = [int(count["number"]) for count in counts if count]
-    for row, (one, other) in enumerate(pairwise(numbers)):
-        if one > other:
-            raise BadInputError(
-                f"{folder}: {files[row].name} is sorted before {files[row + 1].name}, for names are"
-                " sorted as text; write their numbers with leading zeros."
-            )
+    row = out_of_order([file.stem for file in files])
+    if row is not None:
+        raise BadInputError(
+            f"{folder}: {files[row].name} is sorted before {files[row + 1].name}, for names are"
+            " sorted as text; write their numbers with leading zeros."
+        )
 
 
 def _seconds(path: Path) -> list[float] | None:

@@ -104,7 +104,7 @@ class FolderSummary:
         finished_before: tracks of an earlier, interrupted run.
         seconds, workers: that it took.
         skipped: what could not be used, with the reason.
-        dropped: a sentence on points that were not finite, or nothing.
+        doubts: a sentence on each thing that is odd about the scans.
         reasons: which scans' results are not to be trusted.
     """
 
@@ -116,7 +116,7 @@ class FolderSummary:
     seconds: float = 0.0
     workers: int = 1
     skipped: list[tuple[str, str]] = field(default_factory=list)
-    dropped: str = ""
+    doubts: tuple[str, ...] = ()
     reasons: ReasonCounts = field(default_factory=ReasonCounts)
 
 
@@ -227,7 +227,7 @@ def write_results(
             summary.tracks, summary.scans = summary.tracks + 1, summary.scans + len(scans)
             summary.reasons.of((f"{track.name}/{name}" for name in track.scan_names), scans)
         summary.workers = helpers.worked
-    summary.skipped, summary.dropped = [*earlier, *source.skipped], source.dropped
+    summary.skipped, summary.doubts = [*earlier, *source.skipped], source.doubts
     return summary
 
 

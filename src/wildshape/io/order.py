@@ -1,0 +1,26 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whether names that are sorted as text are in the order of their numbers."""
+
+import re
+from collections.abc import Sequence
+from itertools import pairwise
+
+_COUNTED = re.compile(r"(?P<before>|.*[^0-9.-]|.*[^0-9]-)(?P<number>[0-9]+)")  # no dates
+
+
+def out_of_order(stems: Sequence[str]) -> int | None:
+    """Where names that only count go back: `scan_10` is before `scan_9`.
+
+    Args:
+        stems: of files, sorted as text.
+
+    Returns:
+        The place of the first name whose successor has a smaller number; None where there is none,
+        or where the names differ by more than a number at their end.
+    """
+    counts = [_COUNTED.fullmatch(stem) for stem in stems]
+    if None in counts or len({count["before"] for count in counts if count}) > 1:
+        return None
+    numbers = [int(count["number"]) for count in counts if count]
+    return next((i for i, (one, other) in enumerate(pairwise(numbers)) if one > other), None)
