@@ -5,7 +5,7 @@
     python -m experiments.mesh_credits CAD > NOTICE
 
 No GPL, no ShareAlike. What asks for its author to be named (CC-BY) is named, each model. With
-`--every-tier` it is the NOTICE of weights that such meshes were not left out of.
+`--copyleft car` it is the NOTICE of weights that such meshes of cars were not left out of.
 """
 
 import csv
@@ -43,8 +43,13 @@ CREDITS = {
 }
 
 
-def rows_of(cad: Path, split: str, *, every_tier: bool = False) -> list[Row]:
-    """The manifest's rows of a split; of `train` those that weights may be made from, or all.
+def rows_of(cad: Path, split: str, copyleft: tuple[str, ...] = ()) -> list[Row]:
+    """The manifest's rows of a split; of `train` those that weights may be made from.
+
+    Args:
+        cad: folder with a manifest.
+        split: `train` or `test`.
+        copyleft: categories of which those under copyleft licences are there, too.
 
     Raises:
         BadInputError: there is no manifest.
@@ -54,21 +59,22 @@ def rows_of(cad: Path, split: str, *, every_tier: bool = False) -> list[Row]:
         raise BadInputError(f"{path}: no such file; give the folder of the CAD meshes.")
     with path.open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["split"] == split]
-    return [row for row in rows if split != "train" or every_tier or row["tier"] in TIERS]
+    kept = [row["tier"] in TIERS or row["category"] in copyleft for row in rows]
+    return [row for row, keep in zip(rows, kept) if keep or split != "train"]
 
 
-def notice(cad: Path, *, every_tier: bool = False) -> str:
+def notice(cad: Path, copyleft: tuple[str, ...] = ()) -> str:
     """The NOTICE of weights made from the meshes: by source, every CC-BY model by name.
 
     Args:
         cad: folder with a manifest.
-        every_tier: the weights were made from all meshes of the train split.
+        copyleft: categories of which those under copyleft licences were not left out.
 
     Raises:
         BadInputError: a CC-BY model whose author is not known.
     """
-    rows = rows_of(cad, "train", every_tier=every_tier)
-    copyleft = [row for row in rows if row["tier"] not in TIERS]
+    rows = rows_of(cad, "train", copyleft)
+    others = [row for row in rows if row["tier"] not in TIERS]
     rows = [row for row in rows if row["tier"] in TIERS]
     return (
         "The weights were trained on simulated scans of procedural shapes and of these models.\n"
@@ -77,8 +83,8 @@ def notice(cad: Path, *, every_tier: bool = False) -> str:
         + "".join(sorted(f"- {_credited(row)}\n" for row in rows if _asks(row)))
         + "\nModels in the public domain or under permissive licences\n\n"
         + "".join(_counted(row for row in rows if not _asks(row)))
-        + ("\nModels under copyleft licences\n\n" if copyleft else "")
-        + "".join(_counted(copyleft))
+        + ("\nModels under copyleft licences\n\n" if others else "")
+        + "".join(_counted(others))
     )
 
 
@@ -107,8 +113,8 @@ def _counted(rows: Iterable[Row]) -> list[str]:
     ]
 
 
-def _main(cad: tyro.conf.Positional[Path], *, every_tier: bool = False) -> None:
-    print(notice(cad, every_tier=every_tier), end="")
+def _main(cad: tyro.conf.Positional[Path], copyleft: tuple[str, ...] = ()) -> None:
+    print(notice(cad, copyleft), end="")
 
 
 if __name__ == "__main__":
