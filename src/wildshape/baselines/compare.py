@@ -134,6 +134,8 @@ def compare(
             for seed, rows in enumerate(evaluated)
         ]
         workers = helpers.worked
+    for told in source.doubts:
+        progress.say(told)
     if pooled:
         runs = _with_selected(runs, models)
     provenance = {**output.record["provenance"], "settings": output.record["settings"]}
@@ -206,17 +208,14 @@ def _with_selected(runs: list[Results], models: Mapping[str, Model]) -> list[Res
 
 
 def _other_sensors(source: TrackSource, models: Mapping[str, Model]) -> list[str]:
-    """A sentence on each of our models that learned from another kind of sensor's scans."""
-    kinds = [track.sensor.kind for track in source]
-    told = []
-    for name, model in models.items():
-        if isinstance(model, Predictor) and (other := set(kinds) - {model.settings.sensor}):
-            count = sum(kind in other for kind in kinds)
-            told.append(
-                f"{name}: trained on {model.settings.sensor} scans, but {count} of {len(kinds)}"
-                f" tracks are of {other.pop()} scans; choose other weights by --model"
-            )
-    return told
+    """A sentence on each of our models that learned from another sensor's scans than the first."""
+    kind = next(iter(source)).sensor.kind
+    return [
+        f"{name}: trained on {model.settings.sensor} scans, but these are {kind} scans; choose"
+        " other weights by --model"
+        for name, model in models.items()
+        if isinstance(model, Predictor) and model.settings.sensor != kind
+    ]
 
 
 def _check_truth(source: TrackSource) -> None:

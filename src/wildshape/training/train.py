@@ -301,6 +301,8 @@ def open_training_data(
         progress=progress,
         bar=("packing tracks", len(source)),
     )
+    for told in source.doubts:
+        progress.say(told)
     progress.skipped(source.skipped)
     return open_store(packed)
 

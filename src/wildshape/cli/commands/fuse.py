@@ -57,6 +57,8 @@ def run(settings: Settings) -> None:
     )
     fused = fuse_scans(track.scans, to_middle(stack([scan.pose for scan in done])))
     write_cloud(settings.out, fused)
+    for told in source.doubts:
+        say(told)
     say_skipped(source.skipped)
     reasons = ReasonCounts().of(track.scan_names, done)
     if reasons.flagged:
