@@ -105,3 +105,16 @@ def test_weights_of_another_sensor_are_doubted_in_a_comparison(wildshape, tmp_pa
     assert "trained on camera scans, but these are lidar scans" in done.err
     done = wildshape("evaluate", data, *words, tmp_path / "vehicles")
     assert "trained on" not in done.err
+
+
+def test_scans_out_of_order_are_doubted_by_convert(wildshape, tmp_path):
+    for name in ("9", "10"):
+        write_ply(
+            tmp_path / "raw" / "car" / "scans" / f"{name}.ply",
+            np.random.default_rng(1).uniform((9, -1, -1), (12, 1, 0), (100, 3)).astype(np.float32),
+        )
+    done = wildshape("convert", "folder", tmp_path / "raw", tmp_path / "made", "--json")
+    assert done.code == 0, done.err
+    assert "car: 10.ply is sorted before 9.ply" in done.err
+    (part,) = json.loads(done.out)["parts"]
+    assert "car: 10.ply is sorted before 9.ply" in part["doubts"][0]

@@ -45,6 +45,7 @@ Words = Annotated[tuple[str, ...] | None, listed("A,B", words=1), option()]
 Word = Annotated[str | None, option(metavar="WORD")]
 
 _OURS = ("source", "root", "out", "layout", "work", "overwrite", "json")
+_DOUBTS = 4
 _TRUTH = ("truth", "outliers", "outlier_radius", "outlier_neighbours", "ground_strip")
 
 
@@ -207,6 +208,11 @@ def _tell(found: "Converted", settings: Settings, seconds: float) -> None:
     damaged = [result.damage for result in results if result.damage]
     if damaged:
         say(f"{len(damaged)} of {len(results)} parts are damaged, for example {damaged[0]}")
+    doubts = [told for result in results for told in result.doubts]
+    for told in doubts[:_DOUBTS]:
+        say(told)
+    if len(doubts) > _DOUBTS:
+        say(f"and {counted(len(doubts) - _DOUBTS, 'more doubt')} of this kind")
     written = ", ".join(counted(n, key.removesuffix("s")) for key, n in counts.items())
     took = f"in {duration(seconds)} with {counted(found.workers, 'worker')}"
     text = f"converted {written} {took}; see {settings.out}"

@@ -36,6 +36,7 @@ class PartResult:
         left_out: how many objects and scans were not, by reason.
         names: of the tracks that were written as folders, in order.
         damage: why the part could not be read, in a sentence; it is left out whole then.
+        doubts: a sentence each on what was read and may not be meant.
     """
 
     part: str
@@ -45,6 +46,7 @@ class PartResult:
     left_out: dict[str, int] = field(default_factory=dict)
     names: list[str] = field(default_factory=list)
     damage: str = ""
+    doubts: list[str] = field(default_factory=list)
 
     def count(self, track: Track) -> None:
         """Add a track."""
@@ -128,6 +130,7 @@ def convert_part(
         tracks = _counted(source, result, truth)
         (_write_store if layout == "packed" else _write_folders)(tracks, unfinished, result)
         result.left_out = dict(sorted((result.left_out | source.rejected).items()))
+        result.doubts = list(getattr(source, "doubts", ()))
         write_json(unfinished / _RESULT, asdict(result))
         _put(unfinished, folder, result.part)
     finally:

@@ -32,6 +32,7 @@ class Folder:
         unit: of the coordinates on disk.
         origin: the sensor's position in them.
         rejected: see `Source`.
+        doubts: see `TrackSource`, of the part that was read last.
     """
 
     root: Path
@@ -39,6 +40,7 @@ class Folder:
     unit: Unit = "m"
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
+    doubts: tuple[str, ...] = field(default=(), init=False)
 
     def parts(self) -> list[str]:
         """Groups of tracks in the order of their names.
@@ -70,6 +72,7 @@ class Folder:
             if track is not None:
                 yield track
         damage.settle()
+        self.doubts = source.doubts
         for _, reason in source.skipped:
             self.rejected[f"scan: {reason.partition(': ')[2] or reason}"] += 1
 
