@@ -3,12 +3,14 @@
 """What scripts read: one JSON object on stdout and nothing else, from every command."""
 
 import json
+import signal
 
 import numpy as np
 import pytest
 
 from wildshape.cli.main import COMMANDS
-from wildshape.cli.terminal import answer
+from wildshape.cli.terminal import Terminated, answer, terminable
+from wildshape.errors import BadInputError
 
 
 def refuse(constant):
@@ -41,3 +43,21 @@ def test_what_is_no_number_is_null(capsys):
     answer("", data, as_json=True)
     found = json.loads(capsys.readouterr().out, parse_constant=refuse)
     assert found == {"a": [1.5, None], "b": {"c": None}, "d": [None, "x", 3]}
+
+
+@pytest.mark.parametrize(
+    ("number", "stopped"), [(signal.SIGTERM, Terminated), (signal.SIGINT, KeyboardInterrupt)]
+)
+@pytest.mark.parametrize("error", [BadInputError("model: not readable."), BaseException("a panic")])
+def test_what_a_library_makes_of_a_signal_leaves_as_the_signal(number, stopped, error):
+    with pytest.raises(stopped) as left, terminable():
+        try:
+            signal.raise_signal(number)
+        except KeyboardInterrupt:
+            raise error from None
+    assert left.type is stopped
+
+
+def test_without_a_signal_an_error_stays_as_it_is():
+    with pytest.raises(BadInputError, match="not readable"), terminable():
+        raise BadInputError("model: not readable.")

@@ -63,7 +63,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     # Threads that wait must sleep: where another program has one of two cores, spinning ones made
     # training twenty times slower. Read when torch is imported, hence here.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
-    with terminable():
+    with terminable():  # the way out, too
         try:
             _guarded(arguments[0], arguments[1:])
         finally:
@@ -104,8 +104,9 @@ def _guarded(command: str, arguments: list[str]) -> None:
     reserved: list[bytearray] = []
     try:
         reserved.append(bytearray(_RESERVED_BYTES))
-        module = module_of(command)
-        module.run(_parse(module, command, arguments))
+        with terminable():
+            module = module_of(command)
+            module.run(_parse(module, command, arguments))
     except (BadInputError, MissingExtraError) as error:
         _leave(str(error), _BAD_INPUT)
     except Terminated as stopped:

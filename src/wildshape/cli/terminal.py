@@ -194,9 +194,26 @@ class StopFlag:
 
 @contextmanager
 def terminable() -> Iterator[None]:
-    """Inside, SIGTERM raises `Terminated` as Ctrl-C raises KeyboardInterrupt."""
-    with _handled(_raise, signal.SIGTERM):
-        yield
+    """Inside, SIGTERM raises `Terminated` as Ctrl-C raises KeyboardInterrupt.
+
+    A library that the signal met in its native code may raise an error of its own instead. Left
+    alone it would blame a sound file: whatever is raised after a signal leaves as the signal.
+    """
+    came: list[int] = []
+
+    def receive(number: int, frame: FrameType | None) -> None:
+        came.append(number)
+        _raise(number, frame)
+
+    with _handled(receive, signal.SIGINT, signal.SIGTERM):
+        try:
+            yield
+        except (KeyboardInterrupt, SystemExit):
+            raise
+        except BaseException:  # a panic of native code is no Exception
+            if came:
+                _raise(came[-1], None)
+            raise
 
 
 @contextmanager
