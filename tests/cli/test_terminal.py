@@ -45,16 +45,21 @@ def test_what_is_no_number_is_null(capsys):
     assert found == {"a": [1.5, None], "b": {"c": None}, "d": [None, "x", 3]}
 
 
+def blame(number, error):
+    """What a library does that a signal met in its native code."""
+    try:
+        signal.raise_signal(number)
+    except KeyboardInterrupt:
+        raise error from None
+
+
 @pytest.mark.parametrize(
     ("number", "stopped"), [(signal.SIGTERM, Terminated), (signal.SIGINT, KeyboardInterrupt)]
 )
 @pytest.mark.parametrize("error", [BadInputError("model: not readable."), BaseException("a panic")])
 def test_what_a_library_makes_of_a_signal_leaves_as_the_signal(number, stopped, error):
     with pytest.raises(stopped) as left, terminable():
-        try:
-            signal.raise_signal(number)
-        except KeyboardInterrupt:
-            raise error from None
+        blame(number, error)
     assert left.type is stopped
 
 
