@@ -73,14 +73,20 @@ ROUNDS = {
     "first": Round(data=1, steps=12_000),
     "taught": Round(data=1, steps=12_000, teacher="first"),
     "mixed": Round(data=2, steps=20_000, lr=6e-4, teacher="taught", start="taught", rays=True),
-    "last": Round(data=3, steps=24_000, lr=6e-4, teacher="mixed", start="mixed", rays=True),
+    "fourth": Round(data=3, steps=24_000, lr=6e-4, teacher="mixed", start="mixed", rays=True),
+    "last": Round(data=4, steps=24_000, lr=6e-4, teacher="fourth", start="fourth", rays=True),
 }
 """In their order; the last one is shipped."""
 
-OCCLUSION, RAYS = {1: 0.3, 2: 0.5, 3: 0.4}, {1: 0, 2: 512, 3: 512}
+OCCLUSION, RAYS = {1: 0.3, 2: 0.5, 3: 0.4, 4: 0.4}, {1: 0, 2: 512, 3: 512, 4: 512}
 """By the seed of the data: the share of the tracks past something that stands in the way, and the
 rays kept with a scan."""
-VARIED = {1: (True, False), 2: (True, False), 3: (True, False, False)}
+VARIED = {
+    1: (True, False),
+    2: (True, False),
+    3: (True, False, False),
+    4: (True, False, False),
+}
 """By the seed of the data: forms and sensors varied, or as they are, as many tracks of each."""
 
 
