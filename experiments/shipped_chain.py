@@ -33,13 +33,14 @@ from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import MODEL, load_checkpoint, save_checkpoint, weights_file
 from wildshape.method.ray_encoder import RayConfig
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+from wildshape.training.config import Recipe
 from wildshape.training.loop import fit
 from wildshape.training.recipes import PRESETS
 from wildshape.training.setup import setup
 
 _SENSORS = ("hdl64", "hdl64", "hdl32", "os1-128")
 _GROUND = 1  # of the sensors the one whose scans keep some ground
-_SCANS, _SHAPE_POINTS = 20, 512
+_SCANS, _SHAPE_POINTS, _VALIDATE_EVERY = 16, 512, 3000
 _COMMAND = "python -m experiments.shipped_chain --cad CAD --out RUN"
 VIEWS: tuple[Literal["airplane", "chair", "car"], ...] = ("airplane", "chair", "car")
 NAMES = ("default", *VIEWS)
@@ -55,6 +56,8 @@ class Round:
     Attributes:
         data: seed of its tracks.
         steps: gradient steps.
+        points: of a scan that the network is given.
+        preset: whose recipe it is; `small` has a quarter of the shape's points and teaches as well.
         lr: learning rate that it falls from; None: the preset's.
         teacher: round that poses and fuses its tracks; None: the paper's objective.
         start: round whose weights it goes on from; None: random ones.
@@ -63,31 +66,56 @@ class Round:
 
     data: int
     steps: int
+    points: int = 512
+    preset: Literal["small", "default"] = "default"
     lr: float | None = None
     teacher: str | None = None
     start: str | None = None
     rays: bool = False
 
+    def recipe(self, steps: int) -> Recipe:
+        """What so many steps of it are."""
+        base = PRESETS[self.preset]()
+        rate = base.optim.lr if self.lr is None else self.lr
+        return replace(
+            base,
+            network=replace(base.network, rays=RayConfig() if self.rays else None),
+            views=replace(base.views, points=self.points),
+            optim=replace(base.optim, steps=steps, lr=rate),
+            validate_every=_VALIDATE_EVERY,
+        )
+
 
 ROUNDS = {
-    "first": Round(data=1, steps=12_000),
-    "taught": Round(data=1, steps=12_000, teacher="first"),
-    "mixed": Round(data=2, steps=20_000, lr=6e-4, teacher="taught", start="taught", rays=True),
-    "fourth": Round(data=3, steps=24_000, lr=6e-4, teacher="mixed", start="mixed", rays=True),
-    "last": Round(data=4, steps=24_000, lr=6e-4, teacher="fourth", start="fourth", rays=True),
+    "first": Round(data=1, steps=6_000, preset="small"),
+    "taught": Round(data=1, steps=8_000, teacher="first"),
+    "main": Round(data=2, steps=30_000, teacher="taught", start="taught"),
+    "last": Round(
+        data=3, steps=9_000, points=1024, lr=4e-4, teacher="main", start="main", rays=True
+    ),
 }
 """In their order; the last one is shipped."""
 
-OCCLUSION, RAYS = {1: 0.3, 2: 0.5, 3: 0.4, 4: 0.4}, {1: 0, 2: 512, 3: 512, 4: 512}
-"""By the seed of the data: the share of the tracks past something that stands in the way, and the
-rays kept with a scan."""
-VARIED = {
-    1: (True, False),
-    2: (True, False),
-    3: (True, False, False),
-    4: (True, False, False),
-}
-"""By the seed of the data: forms and sensors varied, or as they are, as many tracks of each."""
+
+@dataclass(frozen=True)
+class Tracks:
+    """The simulated drives of a data set.
+
+    Attributes:
+        count: of all sensors and sources; as many of each.
+        occlusion: share of them past something that stands in the way.
+        rays: kept with a scan.
+        varied: forms and sensors varied, or as they are, as many tracks of each.
+    """
+
+    count: int = 2400
+    occlusion: float = 0.3
+    rays: int = 0
+    varied: tuple[bool, ...] = (True, False, False)
+
+
+DATA = {1: Tracks(), 2: Tracks(count=4800), 3: Tracks(occlusion=0.5, rays=512)}
+"""By their seeds. What is learned carries over to unseen objects the better the more there were."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +125,6 @@ class Settings:
     Attributes:
         out: folder of the run.
         cad: folder of CAD meshes with a manifest.
-        tracks: of each data set, as many for each sensor and source.
         share: of all tracks and steps; below 1 to try the chain, not to ship what comes out.
         start: checkpoint, or the name of weights shipped, that teach the last round and that it
             goes on from; the rounds before are left out.
@@ -106,7 +133,6 @@ class Settings:
 
     out: Path
     cad: Path
-    tracks: int = 2400
     share: float = 1.0
     start: Path | None = None
     only: tuple[Literal["default", "airplane", "chair", "car"], ...] = NAMES
@@ -157,12 +183,9 @@ def trained(name: str, settings: Settings) -> None:
     if settings.finished(name).exists():
         return
     of, folder = ROUNDS[name], settings.out / name
-    recipe = PRESETS["default"]()
-    steps, rate = settings.part(of.steps), recipe.optim.lr if of.lr is None else of.lr
-    network = replace(recipe.network, rays=RayConfig() if of.rays else None)
-    recipe = replace(recipe, network=network, optim=replace(recipe.optim, steps=steps, lr=rate))
+    steps = settings.part(of.steps)
     run = setup(
-        recipe,
+        of.recipe(steps),
         _data(of.data, settings),
         folder,
         seed=of.data,
@@ -188,21 +211,22 @@ def _data(seed: int, settings: Settings) -> Store:
 
 def _add_drives(store: StoreWriter, number: int, seed: int, settings: Settings) -> None:
     """Those of one sensor."""
-    sets = 2 * len(VARIED[seed])
-    share = settings.part(settings.tracks // (sets * len(_SENSORS)), least=4)
+    tracks = DATA[seed]
+    sets = 2 * len(tracks.varied)
+    share = settings.part(tracks.count // (sets * len(_SENSORS)), least=4)
     config = SimulationConfig(
         tracks=share,
         scans=_SCANS,
         sensor=_SENSORS[number],
-        occlusion=OCCLUSION[seed],
-        rays=RAYS[seed],
+        occlusion=tracks.occlusion,
+        rays=tracks.rays,
         ground=number == _GROUND,
         shape_points=_SHAPE_POINTS,
     )
     own = 1000 * seed + 100 * number
     with TemporaryDirectory() as folder:
         road_vehicles(settings.cad, Path(folder), share, own)
-        sources = product(VARIED[seed], (None, Path(folder)))
+        sources = product(tracks.varied, (None, Path(folder)))
         for place, (varied, meshes) in enumerate(sources):
             drives = replace(config, meshes=meshes, varied=varied)
             for track in simulate_tracks(drives, own + place):

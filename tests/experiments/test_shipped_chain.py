@@ -16,19 +16,20 @@ LAST = tuple(ROUNDS)[-1]
 def test_the_last_round_goes_on_from_weights_that_teach_it(cad, tmp_path, monkeypatch):
     monkeypatch.setattr(shipped_chain, "_SENSORS", ("hdl64",))
     monkeypatch.setattr(shipped_chain, "_SCANS", 5)
-    few = Settings(tmp_path, cad, tracks=4, share=1e-4)
-    trained("first", few)
-    first = few.finished("first")
-    again = replace(few, start=first)
+    few = Settings(tmp_path, cad, share=1e-4)
+    for name in ("first", "taught"):
+        trained(name, few)
+    taught = few.finished("taught")
+    again = replace(few, start=taught)
     assert again.rounds == (LAST,)
     trained(LAST, again)
     last = again.finished(LAST)
-    (one, of_one), (other, of_other) = (load_checkpoint(path) for path in (first, last))
+    (one, of_one), (other, of_other) = (load_checkpoint(path) for path in (taught, last))
     assert one.rays is None
     assert other.rays is not None
     assert not torch.equal(next(one.parameters()), next(other.parameters()))
-    assert [of.provenance["round"] for of in (of_one, of_other)] == ["first", LAST]
-    assert of_other.provenance["command"].endswith(f"--start {first.name}")
+    assert [of.provenance["round"] for of in (of_one, of_other)] == ["taught", LAST]
+    assert of_other.provenance["command"].endswith(f"--start {taught.name}")
 
 
 def test_a_finished_round_of_another_machine_is_not_trained_again(cad, tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from wildshape.geometry.projection.field_of_view import slope
-from wildshape.training.batches.occlusion_augmentation import partly_hidden
+from wildshape.training.batches.occlusion_augmentation import OcclusionConfig, partly_hidden
 
 
 def _wall(top: float) -> torch.Tensor:
@@ -18,9 +18,9 @@ def _wall(top: float) -> torch.Tensor:
     return torch.stack((torch.full_like(y, 8.0), y, -1.5 + (top + 1.5) * z), 1)
 
 
-def _drawn(points: torch.Tensor, fewest: int = 100) -> list[torch.Tensor]:
-    rngs = map(np.random.default_rng, range(200))
-    return [partly_hidden(points, rng, fewest).points for rng in rngs]
+def _drawn(points: torch.Tensor, least: float = 0.05) -> list[torch.Tensor]:
+    rngs, config = map(np.random.default_rng, range(200)), OcclusionConfig(least=least)
+    return [partly_hidden(points, rng, config).points for rng in rngs]
 
 
 def _wide_gaps(part: torch.Tensor) -> int:
@@ -39,7 +39,7 @@ def test_what_is_left_is_of_the_scan_and_as_many_points():
 def test_what_is_hidden_is_of_the_scan_and_no_longer_seen():
     points, hidden = _wall(1.0), 0
     for seed in range(40):
-        part = partly_hidden(points, np.random.default_rng(seed), 100)
+        part = partly_hidden(points, np.random.default_rng(seed))
         seen, gone = ({tuple(p) for p in some.tolist()} for some in part)
         assert gone <= {tuple(point) for point in points.tolist()}
         assert not seen & gone
@@ -79,14 +79,14 @@ def test_what_rises_above_the_horizon_is_cut_at_some_elevation():
 
 def test_too_little_is_not_left():
     points = _wall(1.0)
-    assert all(torch.equal(part, points) for part in _drawn(points, fewest=len(points)))
+    assert all(torch.equal(part, points) for part in _drawn(points, least=1.0))
 
 
 def test_a_fifth_show_rings_alone_and_some_no_feet():
     points = _wall(-0.2)
     elevation = torch.rad2deg(torch.atan(slope(points)))
     highs, rings = [], 0
-    for part in _drawn(points, fewest=16):
+    for part in _drawn(points, least=0.008):
         seen = torch.rad2deg(torch.atan(slope(part))).unique()
         highs.append(float(seen.min() - elevation.min()))
         rings += _wide_gaps(part) >= 3

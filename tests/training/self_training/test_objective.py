@@ -11,7 +11,7 @@ from tests.strategies import clouds, rotation_about
 
 from wildshape.geometry.surface import mirrored
 from wildshape.geometry.transforms.rotation import rotation_z
-from wildshape.training.self_training.objective import pose_terms, seen_from, shape_terms
+from wildshape.training.self_training.objective import one_side, pose_terms, seen_from, shape_terms
 
 
 def box(half=(2.0, 0.9, 0.7), count=2000, seed=0):
@@ -103,6 +103,22 @@ def test_the_gradient_of_the_shape_terms_is_autograds():
     apart = torch.cdist(shapes, targets, compute_mode="donot_use_mm_for_euclid_dist")
     (expected,) = torch.autograd.grad((apart.amin(2).mean() + apart.amin(1).mean()), shapes)
     torch.testing.assert_close(found, expected, atol=1e-5, rtol=1e-4)
+
+
+@pytest.mark.parametrize("known", [None, 12])
+def test_one_side_of_symmetric_clouds_has_the_terms_and_gradients_of_both(known):
+    half = clouds(8, 2, 20, 3).float().requires_grad_()
+    across = torch.tensor((1.0, -1.0, 1.0))
+    targets = clouds(9, 2, 15, 3).float()
+    both, theirs = (torch.cat((part, part * across), dim=1) for part in (half, targets))
+    seen = None if known is None else (torch.arange(40) % 20 < known).expand(2, 40)
+    whole, one = shape_terms(both, theirs, seen), shape_terms(*one_side(both, targets, seen))
+    for found, expected in zip(one, whole):
+        torch.testing.assert_close(found, expected)
+        gradients = (
+            torch.autograd.grad(term.sum(), half, retain_graph=True) for term in (found, expected)
+        )
+        torch.testing.assert_close(*(next(iter(g)) for g in gradients), atol=1e-5, rtol=1e-4)
 
 
 def brute_force(shape, place, cell=0.25):

@@ -181,10 +181,9 @@ class FusedSampler:
     def _seen(self, scan: int, rng: np.random.Generator) -> PartlyHidden:
         """A scan of the store, or a part of it."""
         points = self.views.picked(scan, rng)
-        config = self.views.config
-        if config.sensor != "lidar":
+        if self.views.config.sensor != "lidar":
             return PartlyHidden(points, points[:0])
-        return partly_hidden(points, rng, config.min_points, self.config.occlusion)
+        return partly_hidden(points, rng, self.config.occlusion)
 
     def _rays_beside(
         self,

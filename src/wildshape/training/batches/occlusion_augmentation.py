@@ -33,6 +33,7 @@ class OcclusionConfig:
         rings: share of the scans that are thinned to rings of beams.
         ring_deg: height of a ring.
         ring_apart_deg: of rings, as of sensors of fifty to sixteen beams.
+        least: share of a scan that has to be left; else it stays as it is.
     """
 
     strip: float = 0.2
@@ -46,6 +47,7 @@ class OcclusionConfig:
     rings: float = 0.2
     ring_deg: float = 0.25
     ring_apart_deg: tuple[float, float] = (0.7, 2.2)
+    least: float = 0.1
 
 
 _DEFAULT = OcclusionConfig()
@@ -66,7 +68,6 @@ class PartlyHidden(NamedTuple):
 def partly_hidden(
     points: Float[Tensor, "n 3"],
     rng: np.random.Generator,
-    fewest: int,
     config: OcclusionConfig = _DEFAULT,
 ) -> PartlyHidden:
     """A LiDAR scan, or as many points of a part of it.
@@ -77,7 +78,6 @@ def partly_hidden(
     Args:
         points: sensor frame, z up.
         rng: decides.
-        fewest: points that have to be left; else the scan stays as it is.
         config: how often what is hidden.
     """
     looked_at = torch.ones(len(points), dtype=torch.bool)
@@ -94,7 +94,7 @@ def partly_hidden(
     if rng.random() < config.rings:
         looked_at &= _rings(points, rng, config)
     rows = torch.nonzero(looked_at & open_to_view)[:, 0]
-    if len(rows) < fewest or len(rows) == len(points):
+    if len(rows) < config.least * len(points) or len(rows) == len(points):
         return PartlyHidden(points, points[:0])
     kept = points[rows[torch.from_numpy(rng.integers(len(rows), size=len(points)))]]
     return PartlyHidden(kept, points[looked_at & ~open_to_view])

@@ -37,7 +37,7 @@ class TaughtLossConfig:
     """
 
     pose: float = 1.0
-    belief: float = 0.1
+    belief: float = 0.3
     cell_m: float = 0.25
     far_m: float = 0.4
     strays: float = 0.02
@@ -87,7 +87,11 @@ class SelfTaught(nn.Module):
             self.distances,
         )
         belief = poses.log_belief.gather(1, pose.winner[:, None]).mean()
-        shape = shape_terms(shapes, batch.shapes, self._known(shapes, batch), self.distances)
+        known = self._known(shapes, batch)
+        if self._halved:
+            shape = shape_terms(*one_side(shapes, batch.shapes, known), self.distances)
+        else:
+            shape = shape_terms(shapes, batch.shapes, known, self.distances)
         deviation = template_deviation(shapes)
         precision, coverage, distance = (
             part.mean() for part in (shape.precision, shape.coverage, pose.distance)
@@ -104,6 +108,11 @@ class SelfTaught(nn.Module):
         }
         metres = {name: self.unit * part.detach() for name, part in lengths.items()}
         return Objective(loss, metres, pose.winner)
+
+    @property
+    def _halved(self) -> bool:
+        """Shapes are reflected halves, and so are fused targets: one side stands for both."""
+        return self.network.config.mirror and not self.complete
 
     def _in_units(self, batch: FusedBatch) -> FusedBatch:
         """Targets in units instead of metres; scans as they are."""
@@ -197,6 +206,28 @@ def shape_terms(
         return ShapeTerms(precision.mean(-1), coverage.mean(-1))
     near = masked_mean(precision.clamp_max(config.far_m), known)
     return ShapeTerms(near, coverage.clamp_max(2 * config.far_m).mean(-1))
+
+
+def one_side(
+    shapes: Float[Tensor, "B P 3"],
+    targets: Float[Tensor, "B G 3"],
+    known: Bool[Tensor, "B P"] | None,
+) -> tuple[Float[Tensor, "B Q 3"], Float[Tensor, "B G 3"], Bool[Tensor, "B Q"] | None]:
+    """What `shape_terms` takes, on the side y > 0: the same terms for half of the search.
+
+    Where both clouds are symmetric in y = 0, the nearest point of a point on that side is on that
+    side, too. Targets are drawn from symmetric clouds; reflected onto one side they lie twice as
+    dense.
+
+    Args:
+        shapes: predicted; the second half of the points is the reflection of the first.
+        targets: of symmetric objects.
+        known: as of `shape_terms`, the same on both sides.
+    """
+    half = shapes.shape[1] // 2
+    (x, y, z), (u, v, w) = shapes[:, :half].unbind(-1), targets.unbind(-1)
+    ours, theirs = torch.stack((x, y.abs(), z), dim=-1), torch.stack((u, v.abs(), w), dim=-1)
+    return ours, theirs, None if known is None else known[:, :half]
 
 
 @torch.no_grad()

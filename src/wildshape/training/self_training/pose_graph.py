@@ -107,8 +107,9 @@ def refine_by_graph(
         config: what is laid on what.
     """
     found = T_sensor_object.to(torch.float64)
+    clouds = [_prepared(scan, config) for scan in scans]
     for _ in range(config.passes):
-        edges = register_pairs(scans, found, config)
+        edges = register_pairs(clouds, found, config)
         if edges is None:
             return T_sensor_object
         found = solve(found, edges, config)
@@ -116,11 +117,10 @@ def refine_by_graph(
 
 
 def register_pairs(
-    scans: list[Points], T_sensor_object: SE3, config: PoseGraphConfig = _DEFAULT
+    clouds: list[Any], T_sensor_object: SE3, config: PoseGraphConfig = _DEFAULT
 ) -> Edges | None:
-    """Each scan laid on the next few, by GICP from the given poses."""
-    clouds = [_prepared(scan, config) for scan in scans]
-    pairs = [(i, i + step) for step in config.steps for i in range(len(scans) - step)]
+    """Each scan, `_prepared`, laid on the next few, by GICP from the given poses."""
+    pairs = [(i, i + step) for step in config.steps for i in range(len(clouds) - step)]
     pairs = [pair for pair in pairs if clouds[pair[0]] and clouds[pair[1]]]
     if not pairs:
         return None

@@ -14,11 +14,12 @@ records and `fused_targets` calls the rules, one after the other.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Float32, Int64
 from torch import Tensor
 
 from wildshape.geometry.box import unit_of
@@ -31,6 +32,7 @@ from wildshape.inference.tracks.joint_icp import refine_jointly, stayed_near
 from wildshape.inference.tracks.pose_outliers import without_outliers
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint
 from wildshape.method.network import ShapePoseNet
+from wildshape.parallel.team import team
 from wildshape.records import Points
 from wildshape.training.batches.fused import DrawConfig, FusedTargets
 from wildshape.training.batches.views import ViewSampler
@@ -198,11 +200,12 @@ def fused_targets(
         teacher, sampler, config, time_ordered=time_ordered, headings=headings, fronts=fronts
     )
     tracks, votes = [], []
-    for done, scans in enumerate(sampler.scans_of):
-        posed = pose_track(who.network, who.asked, who.settings, scans)
-        votes.append(heading_votes(who, posed))
-        tracks.append(refined(who, posed.turned(votes[-1])))
-        progress(done + 1, len(sampler.scans_of))
+    with team() as helpers:
+        each = helpers.in_order(partial(posed_together, who), sampler.scans_of)
+        for done, (track, signs) in enumerate(each, start=1):
+            tracks.append(track)
+            votes.append(signs)
+            progress(done, len(sampler.scans_of))
     if who.headings is None and fronts is None:
         tracks = agreed_tracks(who, tracks, votes)
     if who.is_lidar:
@@ -212,6 +215,15 @@ def fused_targets(
     if who.is_lidar:
         shapes = [with_roof(who, *known) for known in zip(shapes, tracks, tops)]
     return targets_of(sampler, tracks, shapes, tops, config.fusion, complete=False)
+
+
+def posed_together(
+    teacher: Teacher, scans: Int64[np.ndarray, "V"]
+) -> tuple[PosedTrack, Float[Tensor, "V"]]:
+    """A track as the teacher poses it, its scans moved onto each other; their heading votes."""
+    posed = pose_track(teacher.network, teacher.asked, teacher.settings, scans)
+    votes = heading_votes(teacher, posed)
+    return refined(teacher, posed.turned(votes)), votes
 
 
 def heading_votes(teacher: Teacher, track: PosedTrack) -> Float[Tensor, "V"]:
