@@ -140,10 +140,13 @@ class PoseOutlierConfig:
     Attributes:
         alike_deg: neighbours that differ by less agree.
         apart_deg: a scan that differs from both by more is an outlier.
+        worse_m: it stays if the shape of the track costs so much more between its neighbours, for
+            a sensor that passes close by sees an object turn fast.
     """
 
     alike_deg: float = 25.0
     apart_deg: float = 45.0
+    worse_m: float = 0.5
 
 
 @dataclass(frozen=True)

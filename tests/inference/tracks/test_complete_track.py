@@ -127,6 +127,17 @@ def test_scans_that_agree_on_a_wrong_place_move_to_the_surer_ones():
     assert off(told) < 0.5 * off(alike)
 
 
+def test_a_scan_that_turned_and_fits_is_not_put_between_its_neighbours():
+    """Two far scans agree, the next one is of a sensor that turned: the shape fits it as it is."""
+    angle = torch.tensor([0.0, 0.0, 0.0, 0.0, 1.1]).double()
+    turn = SE3(rotation_z(angle), torch.zeros(5, 3).double())
+    part = TRACK.part([0, 1, 2, 3, 6])
+    true = turn @ poses_of(part)
+    scans = [turn[i].apply_numpy(scan) for i, scan in enumerate(part.scans)]
+    for i, item in enumerate(together(completed(true), scans)):
+        assert float(torch.rad2deg((true[i].inverse() @ item.pose).angle())) < 5.0
+
+
 def test_a_better_refinement_is_kept():
     start = spoilt(poses_of(TRACK), seed=1)
     fit = joint_icp.refine_checked(list(TRACK.scans), start, mirror=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from wildshape.errors import BadInputError
@@ -45,6 +45,13 @@ class SE3:
         """Transforms that change nothing, of the given batch shape."""
         eye = torch.eye(3, dtype=dtype).expand(*batch, 3, 3)
         return cls(eye, torch.zeros(*batch, 3, dtype=dtype))
+
+    def where(self, chosen: Bool[Tensor, "*batch"], other: "SE3") -> "SE3":
+        """These transforms where they are chosen, the other's elsewhere."""
+        rotation = torch.where(chosen[..., None, None], self.rotation, other.rotation)
+        return type(self)(
+            rotation, torch.where(chosen[..., None], self.translation, other.translation)
+        )
 
     @classmethod
     def from_matrix(cls, matrix: Float[Tensor, "*batch rows 4"] | np.ndarray) -> "SE3":

@@ -218,7 +218,15 @@ def _voted(
     else:
         gain, links = _votes(T_sensor_can, shape, middle, gathered, inputs, config)
         signs = voted_signs(gain, links, gathered.sure, config.vote)
-    return without_outliers(turned_where(T_sensor_can, signs, middle), config)
+    turned = turned_where(T_sensor_can, signs, middle)
+    between = without_outliers(turned, config)
+    if between is turned:
+        return turned
+    own, other = (
+        track_cost(shape, poses, inputs, gathered.settings) for poses in (turned, between)
+    )
+    unit = unit_of(gathered.settings.extent_m[1])
+    return between.where(other - own < unit * config.outliers.worse_m, turned)
 
 
 def _votes(

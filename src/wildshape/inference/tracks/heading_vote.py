@@ -31,12 +31,8 @@ def half_turn(middle_x: float, dtype: torch.dtype = torch.float64) -> SE3:
 
 def turned_where(T_sensor_object: SE3, sign: Float[Tensor, "V"], middle_x: float) -> SE3:
     """The poses, those of sign -1 turned by `half_turn`."""
-    back = sign < 0
     turned = T_sensor_object @ half_turn(middle_x, T_sensor_object.rotation.dtype)
-    return SE3(
-        torch.where(back[:, None, None], turned.rotation, T_sensor_object.rotation),
-        torch.where(back[:, None], turned.translation, T_sensor_object.translation),
-    )
+    return turned.where(sign < 0, T_sensor_object)
 
 
 def continuous_signs(

@@ -105,14 +105,13 @@ def _by_key_scans(
         torch.cat([T.rotation for T in moved]),
         torch.cat([T.translation for T in moved]),
     )
-    near = stayed_near(voted, SE3(rotation, translation), config)
-    rotation = torch.where(near[:, None, None], rotation, voted.rotation)
-    translation = torch.where(near[:, None], translation, voted.translation)
-    rotation[rows], translation[rows] = (
+    found = SE3(rotation, translation)
+    found = found.where(stayed_near(voted, found, config), voted)
+    found.rotation[rows], found.translation[rows] = (
         fit.T_sensor_object.rotation,
         fit.T_sensor_object.translation,
     )
-    return TrackFit(SE3(rotation, translation), refined=True)
+    return TrackFit(found, refined=True)
 
 
 @torch.no_grad()
