@@ -56,7 +56,6 @@ class Round:
     Attributes:
         data: seed of its tracks.
         steps: gradient steps.
-        points: of a scan that the network is given.
         preset: whose recipe it is; `small` has a quarter of the shape's points and teaches as well.
         lr: learning rate that it falls from; None: the preset's.
         teacher: round that poses and fuses its tracks; None: the paper's objective.
@@ -66,7 +65,6 @@ class Round:
 
     data: int
     steps: int
-    points: int = 512
     preset: Literal["small", "default"] = "default"
     lr: float | None = None
     teacher: str | None = None
@@ -80,7 +78,6 @@ class Round:
         return replace(
             base,
             network=replace(base.network, rays=RayConfig() if self.rays else None),
-            views=replace(base.views, points=self.points),
             optim=replace(base.optim, steps=steps, lr=rate),
             validate_every=_VALIDATE_EVERY,
         )
@@ -90,9 +87,7 @@ ROUNDS = {
     "first": Round(data=1, steps=6_000, preset="small"),
     "taught": Round(data=1, steps=8_000, teacher="first"),
     "main": Round(data=2, steps=30_000, teacher="taught", start="taught"),
-    "last": Round(
-        data=3, steps=9_000, points=1024, lr=4e-4, teacher="main", start="main", rays=True
-    ),
+    "last": Round(data=3, steps=12_000, lr=4e-4, teacher="main", start="main", rays=True),
 }
 """In their order; the last one is shipped."""
 

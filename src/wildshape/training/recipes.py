@@ -99,10 +99,9 @@ def views() -> Recipe:
 
 
 def default() -> Recipe:
-    """For a long run: `small` with more points and finer bins; the shipped weights' recipe.
+    """For a long run: `small` with more shape points and finer bins; the shipped weights' recipe.
 
-    Its widths are those of `small`, so that it can be trained without a GPU: about 6 steps a second
-    and core.
+    Its widths are those of `small`, so that it can be trained without a GPU.
     """
     base = small()
     return replace(
@@ -110,7 +109,7 @@ def default() -> Recipe:
         name="default",
         network=replace(base.network, points=4096),
         loss=replace(base.loss, projection=FacingBins(0.3), template=1.0, agree_at=(0.07, 0.3)),
-        views=replace(base.views, points=1024, roll=0.4),
+        views=replace(base.views, roll=0.4),
         optim=replace(base.optim, steps=30_000, average=0.999, search="bf16"),
         validate_every=1000,
     )
