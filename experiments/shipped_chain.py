@@ -26,6 +26,7 @@ from experiments.mesh_credits import notice
 from experiments.meshes import road_vehicles
 
 from experiments import calibrate_confidence, confidence, views_weights
+from wildshape.cli.terminal import TERMINAL, stoppable
 from wildshape.io.atomic import write_text
 from wildshape.io.output import provenance
 from wildshape.io.store.store import Store, is_store, open_store
@@ -34,9 +35,9 @@ from wildshape.method.checkpoint import MODEL, load_checkpoint, save_checkpoint,
 from wildshape.method.ray_encoder import RayConfig
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.config import Recipe
-from wildshape.training.loop import fit
 from wildshape.training.recipes import PRESETS
 from wildshape.training.setup import setup
+from wildshape.training.train import fit_with_progress
 
 _SENSORS = ("hdl64", "hdl64", "hdl32", "os1-128")
 _GROUND = 1  # of the sensors the one whose scans keep some ground
@@ -179,18 +180,20 @@ def trained(name: str, settings: Settings) -> None:
         return
     of, folder = ROUNDS[name], settings.out / name
     steps = settings.part(of.steps)
-    run = setup(
-        of.recipe(steps),
-        _data(of.data, settings),
-        folder,
-        seed=of.data,
-        resume=True,
-        teacher=settings.checkpoint(of.teacher),
-        start=settings.checkpoint(of.start),
-        provenance=provenance(settings.command) | {"round": name},
-    )
+    with TERMINAL.bar(f"round {name}: fusing tracks", 0) as bar:
+        run = setup(
+            of.recipe(steps),
+            _data(of.data, settings),
+            folder,
+            seed=of.data,
+            resume=True,
+            teacher=settings.checkpoint(of.teacher),
+            start=settings.checkpoint(of.start),
+            provenance=provenance(settings.command) | {"round": name},
+            taught=lambda done, total: bar.at(done, total=total),
+        )
     if run.state.step < steps:  # else it is there; made anew, it would teach others
-        fit(run, lambda step, values: print(name, step, values, flush=True))
+        fit_with_progress(run, TERMINAL, stoppable, resume=settings.command)
     save_checkpoint(settings.finished(name), *load_checkpoint(folder / MODEL), half=True)
 
 

@@ -30,6 +30,7 @@ from wildshape.training.runtime.cuda_graph import Captured
 from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.runtime.torchrun import Processes, join
 from wildshape.training.self_training.objective import SelfTaught
+from wildshape.training.self_training.posed_parts import PosedParts
 from wildshape.training.self_training.pseudo_labels import Fronts, fused_targets
 from wildshape.training.self_training.targets import load_targets, save_targets, true_targets
 from wildshape.training.state import STATE, TrainState, load_state
@@ -212,6 +213,7 @@ def _targets(
     kept["rules"] = _short_hash(repr((config, time_ordered)).encode())
     found = load_targets(folder, kept, sampler.store.scan_count, len(sampler.scans_of))
     if found is None:
+        parts = PosedParts(folder, kept)
         found = fused_targets(
             teacher,
             sampler,
@@ -220,8 +222,10 @@ def _targets(
             time_ordered=time_ordered,
             headings=headings,
             fronts=fronts,
+            parts=parts,
         )
         save_targets(folder, found, kept)
+        parts.clear()
     return found
 
 

@@ -15,6 +15,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +60,7 @@ from wildshape.training.self_training.headings import (
 )
 from wildshape.training.self_training.objective import TaughtLossConfig
 from wildshape.training.self_training.pose_graph import PoseGraphConfig, refine_by_graph
+from wildshape.training.self_training.posed_parts import PosedParts
 from wildshape.training.self_training.targets import targets_of
 from wildshape.training.self_training.unseen_roof import RoofConfig
 
@@ -95,6 +97,7 @@ class SelfTrainingConfig:
 
 
 _DEFAULT = SelfTrainingConfig()
+_NOT_KEPT = PosedParts()
 
 
 @dataclass(frozen=True)
@@ -180,6 +183,7 @@ def fused_targets(
     time_ordered: bool = True,
     headings: Path | None = None,
     fronts: Fronts | None = None,
+    parts: PosedParts = _NOT_KEPT,
 ) -> FusedTargets:
     """Targets for all scans of a sampler, from a checkpoint and the scans alone.
 
@@ -192,6 +196,7 @@ def fused_targets(
         headings: another checkpoint, asked which way each scan looks (`heading_transfer.py`).
         fronts: directions in which the objects look, sensor frame of each scan of the store;
             poses that look the other way are turned, and no one is asked.
+        parts: keeps the tracks that are posed, and has kept some if the work was stopped.
 
     Raises:
         BadInputError: a checkpoint cannot be used.
@@ -200,9 +205,12 @@ def fused_targets(
         teacher, sampler, config, time_ordered=time_ordered, headings=headings, fronts=fronts
     )
     tracks, votes = [], []
+    known = parts.found(sampler.scans_of)
     with team() as helpers:
-        each = helpers.in_order(partial(posed_together, who), sampler.scans_of)
-        for done, (track, signs) in enumerate(each, start=1):
+        rest = sampler.scans_of[len(known) :]
+        each = helpers.in_order(partial(posed_together, who), rest)
+        posed = chain(known, parts.kept(each, len(known)))
+        for done, (track, signs) in enumerate(posed, start=1):
             tracks.append(track)
             votes.append(signs)
             progress(done, len(sampler.scans_of))
