@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""`wildshape drive --detections`: what is refused before any work is done."""
+"""`wildshape drive`: what is refused before any work is done, and where each drive goes."""
 
 import numpy as np
 import pytest
+
+from wildshape.cli.commands.drive import Settings, _folders
 
 CALIBRATION = "R0_rect: 1 0 0 0 1 0 0 0 1\nTr_velo_to_cam: 0 -1 0 0 0 0 -1 0 1 0 0 0\n"
 
@@ -43,3 +45,17 @@ def test_detections_in_the_output_are_refused(recording, tmp_path, refused):
     given = ("drive", recording, "--out", tmp_path / "out", "--overwrite", "--detections", labels)
     assert "holds the input" in refused(*given)
     assert labels.exists()
+
+
+def test_drives_of_one_name_are_told_apart_by_the_folders_above(tmp_path):
+    out, one, two = tmp_path / "out", tmp_path / "monday" / "0000", tmp_path / "tuesday" / "0000"
+    settings = Settings(source=(one, two), out=out)
+    assert _folders(settings, [one]) == {one: out}
+    assert _folders(settings, [one, tmp_path / "0001"])[one] == out / "0000"
+    expected = {one: out / "monday-0000", two: out / "tuesday-0000"}
+    assert _folders(settings, [one, two]) == expected
+
+
+def test_a_drive_given_twice_is_refused(recording, tmp_path, refused):
+    other = recording.parent / "." / "recording" / ".." / "recording"
+    assert "given twice" in refused("drive", recording, other, "--out", tmp_path / "out")

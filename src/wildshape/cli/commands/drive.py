@@ -287,11 +287,24 @@ def _folders(settings: Settings, drives: list[Path]) -> dict[Path, Path]:
     """Where each drive goes."""
     if len(drives) == 1:
         return {drives[0]: settings.out}
-    names = [drive.resolve().name for drive in drives]
-    for name in names:
-        if names.count(name) > 1:
-            raise BadInputError(f"{name}: two drives of one name; rename one.")
-    return {drive: settings.out / name for drive, name in zip(drives, names)}
+    return {drive: settings.out / name for drive, name in zip(drives, _names(drives))}
+
+
+def _names(drives: list[Path]) -> list[str]:
+    """The drives' names; of the folders above as many before them as it takes to tell them apart.
+
+    Raises:
+        BadInputError: no number of folders tells them apart: one is given twice, say.
+    """
+    parts, names = [drive.resolve().parts for drive in drives], [""] * len(drives)
+    for depth in range(1, 1 + max(map(len, parts))):
+        names = ["-".join(own[-depth:]) for own in parts]
+        if len(set(names)) == len(names):
+            return names
+    twice = next(drive for drive, name in zip(drives, names) if names.count(name) > 1)
+    raise BadInputError(
+        f"{twice}: another drive has the same name, or it is given twice; drop one."
+    )
 
 
 @contextmanager
