@@ -54,6 +54,8 @@ def test_drives_of_one_name_are_told_apart_by_the_folders_above(tmp_path):
     assert _folders(settings, [one, tmp_path / "0001"])[one] == out / "0000"
     expected = {one: out / "monday-0000", two: out / "tuesday-0000"}
     assert _folders(settings, [one, two]) == expected
+    below = [folder.with_name("velodyne") / "0000" for folder in (one, two)]
+    assert list(_folders(settings, below).values()) == list(expected.values())
 
 
 def test_a_drive_given_twice_is_refused(recording, tmp_path, refused):

@@ -5,6 +5,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -291,14 +292,17 @@ def _folders(settings: Settings, drives: list[Path]) -> dict[Path, Path]:
 
 
 def _names(drives: list[Path]) -> list[str]:
-    """The drives' names; of the folders above as many before them as it takes to tell them apart.
+    """The drives' names, before them those of folders above where it takes them to tell all apart.
 
     Raises:
         BadInputError: no number of folders tells them apart: one is given twice, say.
     """
     parts, names = [drive.resolve().parts for drive in drives], [""] * len(drives)
-    for depth in range(1, 1 + max(map(len, parts))):
-        names = ["-".join(own[-depth:]) for own in parts]
+    for depth in range(1, 1 + min(map(len, parts))):
+        ends = [own[-depth:] for own in parts]
+        tells = [len(set(level)) > 1 for level in zip(*ends)]
+        tells[-1] = True
+        names = ["-".join(compress(own, tells)) for own in ends]
         if len(set(names)) == len(names):
             return names
     twice = next(drive for drive, name in zip(drives, names) if names.count(name) > 1)
