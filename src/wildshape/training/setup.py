@@ -210,6 +210,7 @@ def _targets(
     time_ordered = recipe.loss.time_ordered or recipe.views.sensor == "lidar"
     asked = ("data", "teacher", "headings", "fronts")
     kept = {key: identity[key] for key in asked if key in identity}
+    kept["scans"] = _short_hash(np.concatenate(sampler.scans_of).tobytes())
     kept["rules"] = _short_hash(repr((config, time_ordered)).encode())
     found = load_targets(folder, kept, sampler.store.scan_count, len(sampler.scans_of))
     if found is None:

@@ -324,6 +324,21 @@ def test_targets_of_other_rules_are_made_anew(car_store, teacher, tmp_path):
         assert run.targets.shapes.shape[1] == points
 
 
+def test_targets_of_fewer_scans_are_made_anew(cars, teacher, tmp_path):
+    """A run that also reads smaller scans does not take targets in which these have no pose."""
+    with StoreWriter(tmp_path / "store", {}) as writer:
+        for car in cars[:2]:
+            writer.add(car.part(range(3)))
+    store = open_store(tmp_path / "store")
+    smallest = int(np.argmin(store.scan_sizes))
+    for least in (int(store.scan_sizes[smallest]) + 1, TAUGHT.views.min_points):
+        recipe = replace(TAUGHT, views=replace(TAUGHT.views, min_points=least))
+        run = setup(recipe, store, tmp_path, seed=3, teacher=teacher)
+        assert run.targets is not None
+    rotation = run.targets.rotation[smallest]
+    torch.testing.assert_close(rotation @ rotation.T, torch.eye(3), atol=1e-4, rtol=0)
+
+
 def test_the_rules_numbers_are_saved_with_the_run_and_its_model(car_store, tmp_path):
     rules = replace(TAUGHT.self_training, fusion=FusionConfig(points=64))
     recipe = replace(TAUGHT, self_training=rules, optim=replace(TAUGHT.optim, steps=1))

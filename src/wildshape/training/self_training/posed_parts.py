@@ -30,7 +30,7 @@ class PosedParts:
     """Keeps what is posed, and finds what was kept."""
 
     def __init__(self, folder: Path | None = None, identity: dict[str, str] | None = None) -> None:
-        """`folder`: of the run, None keeps nothing; `identity`: what the tracks are posed by."""
+        """`folder`: of the run, None keeps nothing; `identity`: which tracks, posed by what."""
         self._folder, self._identity = folder, identity or {}
 
     def found(self, scans_of: Sequence[Int64[np.ndarray, "_"]]) -> list[Posed]:
@@ -59,7 +59,7 @@ class PosedParts:
         """Remove the files."""
         if self._folder is not None:
             for path in self._folder.glob("posed-*.safetensors"):
-                path.unlink()
+                path.unlink(missing_ok=True)  # another process may be first
 
     def _path(self, number: int) -> Path:
         assert self._folder is not None
