@@ -6,7 +6,7 @@
     python -m experiments.leave_one_out kitti --out RUN
 
 Each object is left out in turn; the model is adapted to the others as `wildshape drive --adapt`
-does. Labels only measure. Stopped, the command goes on.
+does. Labels only measure. Stopped, the command goes on; RUN is of one data set.
 """
 
 from dataclasses import dataclass
@@ -25,6 +25,7 @@ from wildshape.drives.adapting.second_pass import like
 from wildshape.drives.adapting.teaching import taught
 from wildshape.inference.predictor import Predictor
 from wildshape.io.inputs import open_tracks
+from wildshape.method.checkpoint import fingerprint
 from wildshape.records import Track
 
 
@@ -57,7 +58,7 @@ def main(settings: Settings) -> None:
     before, after, kept = [], [], 0
     for i, track in enumerate(tracks[: settings.most]):
         others, own = [*examples[:i], *examples[i + 1 :]], [examples[i]]
-        folder = settings.out / track.name
+        folder = settings.out / fingerprint(Path(settings.model)) / track.name
         folder.mkdir(parents=True, exist_ok=True)
         model = like(base, taught(base, others, folder, config, lambda *_: None))
         was, now = (measure(one, own, config, lambda _: None) for one in (base, model))

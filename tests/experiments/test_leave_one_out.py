@@ -7,7 +7,7 @@ from experiments.leave_one_out import Settings, main
 from tests.models import CONFIG, SETTINGS
 
 from wildshape.io.write_tracks import write_tracks
-from wildshape.method.checkpoint import save_checkpoint
+from wildshape.method.checkpoint import fingerprint, save_checkpoint
 from wildshape.method.network import ShapePoseNet
 
 
@@ -22,7 +22,8 @@ def test_each_object_is_left_out_in_turn(cars, tmp_path, capsys):
     assert "2 objects left out in turn" in said
     rows = [line for line in said.splitlines() if line.startswith(("| before", "| after"))]
     assert len(rows) == 4
+    run = tmp_path / "run" / fingerprint(model)
     for car in cars[:2]:
         assert f"{car.name}: BEV IoU" in said
-        assert (tmp_path / "run" / car.name / "run" / "candidate.safetensors").is_file()
-    assert not (tmp_path / "run" / cars[2].name).exists()
+        assert (run / car.name / "run" / "candidate.safetensors").is_file()
+    assert not (run / cars[2].name).exists()

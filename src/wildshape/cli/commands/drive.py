@@ -5,7 +5,6 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -286,29 +285,11 @@ def _drives(settings: Settings) -> dict[Path, str]:
 
 def _folders(settings: Settings, drives: list[Path]) -> dict[Path, Path]:
     """Where each drive goes."""
+    from wildshape.drives.recordings.opening import names_of
+
     if len(drives) == 1:
         return {drives[0]: settings.out}
-    return {drive: settings.out / name for drive, name in zip(drives, _names(drives))}
-
-
-def _names(drives: list[Path]) -> list[str]:
-    """The drives' names, before them those of folders above where it takes them to tell all apart.
-
-    Raises:
-        BadInputError: no number of folders tells them apart: one is given twice, say.
-    """
-    parts, names = [drive.resolve().parts for drive in drives], [""] * len(drives)
-    for depth in range(1, 1 + min(map(len, parts))):
-        ends = [own[-depth:] for own in parts]
-        tells = [len(set(level)) > 1 for level in zip(*ends)]
-        tells[-1] = True
-        names = ["-".join(compress(own, tells)) for own in ends]
-        if len(set(names)) == len(names):
-            return names
-    twice = next(drive for drive, name in zip(drives, names) if names.count(name) > 1)
-    raise BadInputError(
-        f"{twice}: another drive has the same name, or it is given twice; drop one."
-    )
+    return {drive: settings.out / name for drive, name in zip(drives, names_of(drives))}
 
 
 @contextmanager

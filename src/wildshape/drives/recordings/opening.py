@@ -7,6 +7,7 @@ a line in `_LAYOUTS`.
 """
 
 from collections.abc import Callable
+from itertools import compress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -89,6 +90,26 @@ def find_drives(path: Path) -> Found:
         return Found(_BAG, [path])
     layout, drives = _layout(path)
     return Found(layout.what, drives)
+
+
+def names_of(drives: list[Path]) -> list[str]:
+    """The drives' names, before them those of folders above where it takes them to tell all apart.
+
+    Raises:
+        BadInputError: no number of folders tells them apart: one is given twice, say.
+    """
+    parts, names = [drive.resolve().parts for drive in drives], [""] * len(drives)
+    for depth in range(1, 1 + min(map(len, parts))):
+        ends = [own[-depth:] for own in parts]
+        tells = [len(set(level)) > 1 for level in zip(*ends)]
+        tells[-1] = True
+        names = ["-".join(compress(own, tells)) for own in ends]
+        if len(set(names)) == len(names):
+            return names
+    twice = next(drive for drive, name in zip(drives, names) if names.count(name) > 1)
+    raise BadInputError(
+        f"{twice}: another drive has the same name, or it is given twice; drop one."
+    )
 
 
 def open_drive(path: Path | str, topic: str | None = None) -> Drive:
