@@ -33,6 +33,8 @@ from wildshape.io.store.store import Store, is_store, open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import MODEL, load_checkpoint, save_checkpoint, weights_file
 from wildshape.method.ray_encoder import RayConfig
+from wildshape.ops.threads import exact_on
+from wildshape.parallel.team import cores
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.config import Recipe
 from wildshape.training.recipes import PRESETS
@@ -193,7 +195,8 @@ def trained(name: str, settings: Settings) -> None:
             taught=lambda done, total: bar.at(done, total=total),
         )
     if run.state.step < steps:  # else it is there; made anew, it would teach others
-        fit_with_progress(run, TERMINAL, stoppable, resume=settings.command)
+        with exact_on(cores()):
+            fit_with_progress(run, TERMINAL, stoppable, resume=settings.command)
     save_checkpoint(settings.finished(name), *load_checkpoint(folder / MODEL), half=True)
 
 

@@ -87,6 +87,7 @@ class Step:
             batch = self.views.batch(self.dials.step)
         with record_function("wildshape: forward"):
             result: Objective = self.objective(batch, self.dials.template)
+        self.views.ahead()  # what follows leaves a core free
         with record_function("wildshape: backward"):
             self.state.optimiser.zero_grad(set_to_none=True)
             result.loss.backward()

@@ -9,6 +9,7 @@ from tests.strategies import clouds
 
 from wildshape.method.encoders.pcn import PCNEncoder
 from wildshape.method.encoders.pcn_winners import distinct_rows, encode_winners
+from wildshape.ops.threads import exact_on
 
 
 def encoder(seed=0):
@@ -42,6 +43,17 @@ def test_same_code_and_gradients(count, batch):
     points = clouds(batch, batch, count, 3)
     assert_same(net, points, net)
     assert_same(net, points, lambda x: naive.encode(net, x))
+
+
+def test_threads_change_no_bit():
+    net, points = encoder().float(), clouds(3, 7, 90, 3).float()
+    found = []
+    for count in (1, 4):
+        with exact_on(count):
+            found.append(value_and_gradients(lambda x: encode_winners(net, x), net, points, 1.0))
+    (code, gradients), (other, others) = found
+    assert torch.equal(code, other)
+    assert all(torch.equal(gradients[name], others[name]) for name in gradients)
 
 
 def test_repeated_points():

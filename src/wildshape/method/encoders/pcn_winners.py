@@ -17,6 +17,7 @@ from torch.profiler import record_function
 
 from wildshape.method.encoders.pcn import PCNEncoder
 from wildshape.ops.column_argmax import column_argmax
+from wildshape.ops.threads import spread
 
 _ROWS, _FEATURES = 64, 32  # products of few sizes: each new one is prepared, which takes as long
 _MIXERS = np.array((0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)).view(np.int64)
@@ -66,8 +67,10 @@ def _winning_rows(
     """
     weight3, weight4 = (layer.weight.to(scoring) for layer in (encoder.join_point, encoder.point4))
     weight4 = weight4.T.contiguous()
-    pooled_rows, code_rows = [], []
-    for cloud, rows in zip(points, distinct_rows(points)):
+
+    @torch.no_grad()  # each thread has a setting of its own
+    def of_one(one: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+        cloud, rows = one
         distinct = torch.cat((rows, rows[:1].expand(-len(rows) % _ROWS)))
         local = torch.addmm(encoder.point1.bias, cloud[distinct], encoder.point1.weight.T).relu_()
         local = torch.addmm(encoder.point2.bias, local, encoder.point2.weight.T)
@@ -77,8 +80,10 @@ def _winning_rows(
         joined = torch.addmm(bias.to(scoring), weight3, local.to(scoring).T).relu_()
         lit = _lit_first(joined)
         deep = joined.index_select(0, lit).T @ weight4.index_select(0, lit)
-        pooled_rows.append(distinct[row])
-        code_rows.append(distinct[column_argmax(deep.to(local.dtype))])
+        return distinct[row], distinct[column_argmax(deep.to(local.dtype))]
+
+    found = spread(of_one, zip(points, distinct_rows(points)))
+    pooled_rows, code_rows = zip(*found)
     return torch.stack(pooled_rows), torch.stack(code_rows)
 
 

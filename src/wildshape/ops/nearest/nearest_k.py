@@ -11,6 +11,7 @@ from torch import Tensor
 from wildshape.errors import BadInputError
 from wildshape.ops.library import check_memory, nearest_k_kernel
 from wildshape.ops.nearest.neighbours import Neighbourhoods, check_clouds
+from wildshape.ops.threads import exact_threads
 
 _CHUNK_ELEMENTS = 1 << 22
 _WIDEST = -1
@@ -51,7 +52,7 @@ def nearest_k_native(
         most * most,
         found.distance_squared.data_ptr(),
         found.index.data_ptr(),
-        torch.get_num_threads(),
+        exact_threads(),
         level,
     )
     if failed:

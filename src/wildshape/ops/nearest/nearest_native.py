@@ -15,6 +15,7 @@ from torch import Tensor
 
 from wildshape.ops.library import check_memory, library
 from wildshape.ops.nearest.neighbours import Neighbours, check_clouds
+from wildshape.ops.threads import exact_threads
 
 WIDEST = -1
 
@@ -89,7 +90,7 @@ def _search(
         there.index.data_ptr(),
         back.distance_squared.data_ptr() if back is not None else None,
         back.index.data_ptr() if back is not None else None,
-        torch.get_num_threads(),
+        exact_threads(),
         level,
     )
     if failed:
@@ -140,7 +141,7 @@ class NativeDistance(torch.autograd.Function):
             target.shape[1],
             to_query.data_ptr() if to_query is not None else None,
             to_target.data_ptr() if to_target is not None else None,
-            torch.get_num_threads(),
+            exact_threads(),
         )
         return to_query, to_target, None, None
 

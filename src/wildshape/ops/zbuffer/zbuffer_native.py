@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float32, Int64
 from torch import Tensor
 
 from wildshape.ops.library import check_memory, library
+from wildshape.ops.threads import exact_threads
 from wildshape.ops.zbuffer.zbuffer_torch import check_bins
 
 
@@ -33,7 +34,7 @@ def visible_native(
         *bins.shape,
         n_bins,
         seen.data_ptr(),
-        torch.get_num_threads(),
+        exact_threads(),
     )
     if failed:
         raise MemoryError(f"no room for the bins of {bins.shape[1]} points.")

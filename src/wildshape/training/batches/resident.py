@@ -86,6 +86,9 @@ class ResidentViews:
     def prepare(self, step: int) -> None:
         """Nothing: the batch is drawn on the device."""
 
+    def ahead(self) -> None:
+        """Nothing, as before."""
+
     def hold(self, anchors: Float[Tensor, "S 3 3"]) -> None:
         """From now on scans are held to these headings."""
         self._anchors.copy_(anchors)

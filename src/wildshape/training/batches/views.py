@@ -97,6 +97,7 @@ class ViewSampler:
         self.anchors: Float[Tensor, "S 3 3"] | None = None
         facing = config.turn == "facing"
         self._frames = np.full((len(sizes) if facing else 0, 4, 3), np.nan, dtype=np.float32)
+        self._faced = np.zeros(len(self._frames), dtype=bool)
         self._centres = np.full((len(sizes), 3), np.nan, dtype=np.float32)
 
     def draw(self, *seed: int) -> Batch:
@@ -196,17 +197,18 @@ class ViewSampler:
 
     def _facing(self, scans: list[int]) -> Facing:
         """The facing frames of scans, each found once."""
-        new = [scan for scan in dict.fromkeys(scans) if np.isnan(self._frames[scan, 0, 0])]
+        new = [scan for scan in dict.fromkeys(scans) if not self._faced[scan]]
         if new:
             found = face_each([self._points(scan) for scan in new], self.config.sensor)
             self._frames[new, :3], self._frames[new, 3] = found.turn.numpy(), found.centre.numpy()
+            self._faced[new] = True  # last: another thread may draw
         known = torch.from_numpy(self._frames[scans])
         return Facing(known[:, :3], known[:, 3])
 
     def _centre(self, scan: int) -> Tensor:
         """The label-free centre of a scan, found once."""
         centre = self._centres[scan]
-        if np.isnan(centre[0]):
+        if np.isnan(centre).any():
             centre[:] = scan_centre(self._points(scan), self.config.sensor).numpy()
         return torch.from_numpy(centre)
 

@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Threads for work whose result is the same on any number of them.
+
+A sum of torch's depends on how many threads share it. Searches and single scans do not.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import TypeVar
+
+import torch
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+_given: int | None = None
+
+
+def exact_threads() -> int:
+    """How many threads such work runs on: as many as torch, unless `exact_on` says otherwise."""
+    return torch.get_num_threads() if _given is None else _given
+
+
+@contextmanager
+def exact_on(count: int) -> Iterator[None]:
+    """Such work runs on so many threads, however few torch has: its sums may be kept to one."""
+    global _given
+    before, _given = _given, count
+    try:
+        yield
+    finally:
+        _given = before
+
+
+def alone(count: int) -> ThreadPoolExecutor:
+    """So many threads, in each of which torch works alone."""
+    return ThreadPoolExecutor(count, initializer=torch.set_num_threads, initargs=(1,))
+
+
+def spread(task: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+    """`task(item)` of all items, in order.
+
+    Args:
+        task: spends its time where Python lets other threads run; its result depends on the item
+            alone.
+        items: what it works on.
+    """
+    listed = list(items)
+    count = min(exact_threads(), len(listed))
+    if count < 2:
+        return [task(item) for item in listed]
+    with alone(count) as threads:
+        return list(threads.map(task, listed))
