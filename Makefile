@@ -3,6 +3,7 @@
 #
 #   make demo [DATA=folder]   the whole way in five minutes, ending in demo/report.html
 #   make test                 lint, types, import floors, tests
+#   make check                the first three alone; not repeated where no Python file has changed
 #   make bench                everything timed beside the alternatives, in five minutes; all bars
 #   make smoke                every benchmark at its smallest: whether it runs and agrees, no times
 #   make fuzz                 20,000 damaged files for all readers, in three minutes
@@ -28,21 +29,28 @@ INSTALLED := $(VENV)/.installed
 TESTED := $(VENV)/.installed-test
 BENCHED := $(VENV)/.installed-bench
 DOCUMENTED := $(VENV)/.installed-docs
+CHECKED := $(VENV)/.checked
 # The package is installed in place: only these make another installation necessary.
+PYTHONS := .ci benchmarks docs examples experiments src tests hatch_build.py
 SOURCES := pyproject.toml constraints.txt hatch_build.py $(wildcard src/wildshape/ops/native/*.[ch])
 
-.PHONY: demo test bench smoke fuzz wheel docs clean
+.PHONY: demo test check bench smoke fuzz wheel docs installed clean
 .DELETE_ON_ERROR:
 
 demo: $(INSTALLED)
 	$(BIN)/wildshape demo --out "$(OUT)" --overwrite $(if $(DATA),--data "$(DATA)")
 
-test: $(TESTED)
+test: $(TESTED) $(CHECKED)
+	$(BIN)/python -m pytest -n 2 --dist loadgroup
+
+check: $(CHECKED)
+
+$(CHECKED): pyproject.toml $(shell find $(PYTHONS) -name '*.py') | $(TESTED)
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/ruff check --quiet .
 	$(BIN)/basedpyright
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest -n 2
+	@touch $@
 
 bench: $(BENCHED)
 	@$(BIN)/python benchmarks/run.py
@@ -87,6 +95,11 @@ $(BENCHED): $(INSTALLED)
 $(DOCUMENTED): $(INSTALLED)
 	$(PIP) -e ".[docs]"
 	@touch $@
+
+# All three at once: what CI needs is resolved and built once.
+installed: $(INSTALLED)
+	$(PIP) -e ".[test,bench,docs]"
+	@touch $(TESTED) $(BENCHED) $(DOCUMENTED)
 
 clean:
 	rm -rf $(VENV) "$(OUT)" site
