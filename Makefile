@@ -30,8 +30,10 @@ TESTED := $(VENV)/.installed-test
 BENCHED := $(VENV)/.installed-bench
 DOCUMENTED := $(VENV)/.installed-docs
 CHECKED := $(VENV)/.checked
+# Folders are watched, too: a file that is gone changes what others mean.
+PYTHONS := $(shell find .ci/ benchmarks/ docs/ examples/ experiments/ src/ tests/ hatch_build.py \
+	-name __pycache__ -prune -o \( -name '*.py' -o -type d \) -print)
 # The package is installed in place: only these make another installation necessary.
-PYTHONS := .ci benchmarks docs examples experiments src tests hatch_build.py
 SOURCES := pyproject.toml constraints.txt hatch_build.py $(wildcard src/wildshape/ops/native/*.[ch])
 
 .PHONY: demo test check bench smoke fuzz wheel docs installed clean
@@ -45,7 +47,7 @@ test: $(TESTED) $(CHECKED)
 
 check: $(CHECKED)
 
-$(CHECKED): pyproject.toml $(shell find $(PYTHONS) -name '*.py') | $(TESTED)
+$(CHECKED): $(TESTED) $(PYTHONS)
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/ruff check --quiet .
 	$(BIN)/basedpyright
