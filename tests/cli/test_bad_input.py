@@ -266,6 +266,25 @@ def test_a_refused_command_leaves_nothing_behind(wildshape, refused, dataset, tm
         shutil.rmtree(out)
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("train", "DATASET", "--preset", "tiny", "--start", "nothere"),
+        ("train", "DATASET", "--preset", "tiny", "--teacher", "nothere"),
+        ("train", "DATASET", "--preset", "tiny", "--teacher", "shipped", "--headings", "nothere"),
+        ("train", "STORE", "--preset", "tiny", "--start", "shipped"),  # of other sizes
+        ("demo", "--data", "nothere"),
+    ],
+)
+def test_refused_for_a_name_or_weights_it_leaves_nothing_either(
+    words, wildshape, dataset, store, tmp_path
+):
+    given = {"DATASET": dataset, "STORE": store, "nothere": tmp_path / "nothere"}
+    found = wildshape(*(given.get(word, word) for word in words), "--out", tmp_path / "out")
+    assert found.code == 2
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_input_is_never_overwritten(refused, dataset, store, trained, tmp_path):
     data = shutil.copytree(dataset, tmp_path / "data")
     packed = shutil.copytree(store, tmp_path / "packed")

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import lock_folder, write_json
@@ -161,17 +161,13 @@ def train(
         BadInputError: data or options that cannot be used, an existing run without `resume`.
         StopRequested: `stopping` said so, the state is saved; its text says how to go on.
     """
-    device = choose_device(options.device)
+    device, weights = choose_device(options.device), _Weights.named_in(options)
     output = begin_run(data, out, options)
-    try:
+    with output.abandoned_if_refused() if output is not None else nullcontext():
         store = open_training_data(data, out, options, progress)
         recipe = recipe_for(store, options.preset, options.steps)
         recipe = with_encoder(recipe, options.encoder or recipe.network.backbone)
-    except BadInputError:
-        if output is not None:
-            output.abandon()
-        raise
-    run = _set_up(recipe, store, data, out, options, device, progress)
+        run = _set_up(recipe, store, data, out, options, weights, device, progress)
     if options.profile and run.processes.leads:
         run.profile = out / PROFILE
     began, first = time.monotonic(), run.state.step
@@ -184,16 +180,32 @@ def train(
     return _finished(run, out, seconds, text)
 
 
+class _Weights(NamedTuple):
+    """The checkpoints that a user names, found before anything is written."""
+
+    start: Path | None
+    teacher: Path | Literal["truth"] | None
+    headings: Path | None
+
+    @classmethod
+    def named_in(cls, options: TrainingOptions) -> "_Weights":
+        """Of the options."""
+        truth = options.teacher == "truth"
+        teacher = "truth" if truth else _checkpoint(options.teacher)
+        return cls(_checkpoint(options.start), teacher, _checkpoint(options.headings))
+
+
 def _set_up(
     recipe: Recipe,
     store: Store,
     data: Path,
     out: Path,
     options: TrainingOptions,
+    weights: _Weights,
     device: str,
     progress: Progress,
 ) -> Run:
-    learns = options.teacher not in (None, "truth")
+    learns = isinstance(weights.teacher, Path)
     with (progress if learns else SILENT).bar("fusing tracks", 0) as bar:
         return setup(
             recipe,
@@ -202,17 +214,13 @@ def _set_up(
             seed=options.seed,
             device=device,
             resume=options.resume,
-            start=_checkpoint(options.start),
-            teacher=_teacher(options.teacher),
-            headings=_checkpoint(options.headings),
+            start=weights.start,
+            teacher=weights.teacher,
+            headings=weights.headings,
             provenance={**provenance(command_line()), "data": str(data)},
             taught=lambda done, total: bar.at(done, total=total),
             say=progress.say,
         )
-
-
-def _teacher(model: str | None) -> Path | Literal["truth"] | None:
-    return "truth" if model == "truth" else _checkpoint(model)
 
 
 def _checkpoint(model: str | None) -> Path | None:

@@ -4,6 +4,7 @@
 
 import os
 import time
+from contextlib import nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -44,7 +45,7 @@ def train_dpc(
     _refuse_foreign(options)
     began = time.monotonic()
     output = begin_run(data, out, options)
-    try:
+    with output.abandoned_if_refused() if output is not None else nullcontext():
         run = setup_dpc(
             dpc_recipe(options),
             open_training_data(data, out, options, progress),
@@ -54,10 +55,6 @@ def train_dpc(
             resume=options.resume,
             provenance={**provenance(command_line()), "data": str(data)},
         )
-    except BadInputError:
-        if output is not None:
-            output.abandon()
-        raise
     _fit(run, progress, stopping)
     finish_run(out)
     model = out / MODEL

@@ -86,7 +86,8 @@ def run_demo(
     overwrite = options.overwrite or unfinished(out, "demo")
     output = begin(out, "demo", {}, FILES, overwrite=overwrite, progress=progress)
     agenda.next()
-    data = prepare(out, options, progress)
+    with output.abandoned_if_refused():
+        data = prepare(out, options, progress)
     agenda.next(f" on {data.described}")
     models = {f"{options.preset}, just trained": _train(out, options, progress, stopping)}
     models |= _shipped(progress)
