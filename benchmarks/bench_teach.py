@@ -61,7 +61,7 @@ def measure(
     recipe = PRESETS["default"]()
     recipe = replace(recipe, network=replace(recipe.network, rays=rays))
     several = f"{max(2, cores())} threads"
-    counts = {"one thread": 1, several: max(2, cores())}
+    counts = {several: max(2, cores()), "one thread": 1}
     runs = {name: setup(recipe, store, folder / name, teacher="truth") for name in counts}
     works = {name: stepper(run, counts[name]) for name, run in runs.items()}
     outcome.add(case, take_turns(works, seconds))
