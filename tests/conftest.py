@@ -3,6 +3,7 @@
 """One thread a test process, the same examples on every run, and a few simulated cars."""
 
 import pytest
+import tests.runtime_types  # noqa: F401  before wildshape is imported
 import torch
 from hypothesis import settings
 
