@@ -79,10 +79,14 @@ $(BIN)/python:
 		echo "$(PYTHON) cannot make a virtual environment: its venv module is missing; install it" \
 			"(Debian and Ubuntu: python3-venv), or name another: make PYTHON=..." >&2; exit 1; }
 
+define ANNOUNCED
+echo "installing into $(VENV), once; this takes a few minutes"
+command -v "$${CC:-cc}" >/dev/null || \
+	echo "no C compiler found: Wildshape works without its native kernels, slower" >&2
+endef
+
 $(INSTALLED): $(SOURCES) | $(BIN)/python
-	@echo "installing into $(VENV), once; this takes a few minutes"
-	@command -v "$${CC:-cc}" >/dev/null || \
-		echo "no C compiler found: Wildshape works without its native kernels, slower" >&2
+	@$(ANNOUNCED)
 	$(PIP) -e .
 	@touch $@
 
@@ -98,10 +102,11 @@ $(DOCUMENTED): $(INSTALLED)
 	$(PIP) -e ".[docs]"
 	@touch $@
 
-# All three at once: what CI needs is resolved and built once.
-installed: $(INSTALLED)
+# All at once: what CI needs is resolved and built once.
+installed: $(SOURCES) | $(BIN)/python
+	@$(ANNOUNCED)
 	$(PIP) -e ".[test,bench,docs]"
-	@touch $(TESTED) $(BENCHED) $(DOCUMENTED)
+	@touch $(INSTALLED) && touch $(TESTED) $(BENCHED) $(DOCUMENTED)
 
 clean:
 	rm -rf $(VENV) "$(OUT)" site
