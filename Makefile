@@ -43,7 +43,7 @@ demo: $(INSTALLED)
 	$(BIN)/wildshape demo --out "$(OUT)" --overwrite $(if $(DATA),--data "$(DATA)")
 
 test: $(TESTED) $(CHECKED)
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 check: $(CHECKED)
 

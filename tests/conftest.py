@@ -17,16 +17,6 @@ settings.load_profile("repeatable")
 torch.set_num_threads(1)
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """Tests that share a fixture of their file run in one process, or each would make it."""
-    for item in items:
-        known = getattr(item, "_fixtureinfo", None)
-        made = [d for ds in known.name2fixturedefs.values() for d in ds] if known else []
-        if any(definition.scope == "module" for definition in made):
-            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
-
-
 @pytest.fixture(scope="session")
 def cars():
     """Eight simulated drive-bys, 12 scans each."""
