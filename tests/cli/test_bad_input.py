@@ -273,6 +273,8 @@ def test_a_refused_command_leaves_nothing_behind(wildshape, refused, dataset, tm
         ("train", "DATASET", "--preset", "tiny", "--teacher", "nothere"),
         ("train", "DATASET", "--preset", "tiny", "--teacher", "shipped", "--headings", "nothere"),
         ("train", "STORE", "--preset", "tiny", "--start", "shipped"),  # of other sizes
+        ("train", "DATASET", "--preset", "tiny", "--start", "shipped"),  # packed before
+        ("train", "DATASET", "--preset", "dpc-small"),  # for a camera's
         ("demo", "--data", "nothere"),
     ],
 )
@@ -283,6 +285,7 @@ def test_refused_for_a_name_or_weights_it_leaves_nothing_either(
     found = wildshape(*(given.get(word, word) for word in words), "--out", tmp_path / "out")
     assert found.code == 2
     assert not list(tmp_path.iterdir())
+    assert str(tmp_path / "out") not in found.err  # of what is gone nothing can be said
 
 
 def test_the_input_is_never_overwritten(refused, dataset, store, trained, tmp_path):

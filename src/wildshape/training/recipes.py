@@ -170,7 +170,7 @@ def recipe_for(store: Store, preset: str, steps: int | None) -> Recipe:
     if kind != recipe.views.sensor:
         if preset.startswith("paper-"):
             raise BadInputError(
-                f"{store.path}: holds {kind} scans, but preset {preset} is for"
+                f"{store.named}: holds {kind} scans, but preset {preset} is for"
                 f" {recipe.views.sensor} scans; choose another preset."
             )
         recipe = replace(recipe, views=replace(recipe.views, sensor=kind))

@@ -299,9 +299,11 @@ def _network(recipe: Recipe, start: Path | None) -> ShapePoseNet:
         seeing.load_state_dict(network.state_dict(), strict=False)
         return seeing
     if settings.network != recipe.network:
+        wanted, found = asdict(recipe.network), asdict(settings.network)
+        others = (f"{k} {found[k]} instead of {v}" for k, v in wanted.items() if found[k] != v)
         raise BadInputError(
-            f"{start}: its sizes are not those of the preset {recipe.name}: expected"
-            f" {recipe.network}, found {settings.network}; choose the preset it was trained with."
+            f"{start}: its sizes are not those of the preset {recipe.name}: {', '.join(others)};"
+            " choose the preset it was trained with."
         )
     return network.train()
 

@@ -2,11 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A whole training from an input to a checkpoint: what `wildshape train` does.
 
-`loop.fit` trains what `setup` has made; here are the folder of the run, the data and the preset.
+`loop.fit` trains what `setup` has made; here data, options and preset come together.
 """
 
-import json
-import os
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -14,42 +12,17 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from wildshape.errors import BadInputError
-from wildshape.io.atomic import lock_folder, write_json
-from wildshape.io.inputs import open_tracks
-from wildshape.io.output import (
-    MARKER,
-    Output,
-    begin,
-    command_line,
-    is_begun,
-    keep_apart,
-    provenance,
-    remove_leftovers,
-)
+from wildshape.io.output import command_line, provenance
 from wildshape.io.progress import SILENT, Progress, duration
-from wildshape.io.scans.points import SENSOR_METRES, Coordinates
-from wildshape.io.store.layout import INDEX_JSON
-from wildshape.io.store.store import Store, is_store, open_store
-from wildshape.io.write_tracks import write_tracks
+from wildshape.io.store.store import Store
 from wildshape.method.checkpoint import MODEL, load_checkpoint, weights_file
-from wildshape.method.encoders.named import Backbone
 from wildshape.ops.device import choose_device
 from wildshape.training.config import Recipe
 from wildshape.training.loop import Run, StopRequested, fit, setup
+from wildshape.training.options import TrainingOptions
 from wildshape.training.recipes import recipe_for, with_encoder
+from wildshape.training.run_folder import begun_run, finish_run, open_training_data
 from wildshape.training.runtime.profiler import PROFILE
-
-_PACKED = "data.store"
-_FILES = (
-    "*.safetensors",
-    "run.json",
-    "log.jsonl",
-    "profile.txt",
-    "tensorboard/*",
-    f"{_PACKED}/*",
-)
-
 
 Stopping = Callable[[], AbstractContextManager[Callable[[], bool]]]
 """Gives a context in which a training asks between two steps whether to stop."""
@@ -58,50 +31,6 @@ Stopping = Callable[[], AbstractContextManager[Callable[[], bool]]]
 def never_stopped() -> AbstractContextManager[Callable[[], bool]]:
     """Nobody asks to stop."""
     return nullcontext(lambda: False)
-
-
-@dataclass(frozen=True)
-class TrainingOptions:
-    """How a model is trained.
-
-    Attributes:
-        preset: of `recipes.PRESETS`; DPC's have a training of their own (`baselines/dpc`).
-        encoder: point network that reads a scan; None: the preset's.
-        steps: gradient steps instead of the preset's; the schedule is stretched to them.
-        seed: of weights and batches.
-        resume: go on with the run; a finished one is left as it is.
-        start: fine-tune these weights, a checkpoint of the same preset or `shipped`.
-        teacher: a checkpoint or `shipped`, whose pseudo-labels are trained on; `truth` is the
-            oracle.
-        headings: checkpoint that is asked which way views look that come in no order.
-        device: `auto`, `cpu` or `cuda`.
-        coordinates: of the data's files.
-        overwrite: replace an earlier run.
-        profile: write where a step's time goes; the weights are the same.
-    """
-
-    preset: str = "default"
-    encoder: Backbone | None = None
-    steps: int | None = None
-    seed: int = 0
-    resume: bool = False
-    start: str | None = None
-    teacher: str | None = None
-    headings: str | None = None
-    device: str = "auto"
-    coordinates: Coordinates = SENSOR_METRES
-    overwrite: bool = False
-    profile: bool = False
-
-    def __post_init__(self) -> None:
-        if self.seed < 0:
-            raise BadInputError(f"--seed {self.seed}: expected 0 or more.")
-        if self.steps is not None and self.steps < 1:
-            raise BadInputError(f"--steps {self.steps}: expected 1 or more.")
-        if self.headings and self.teacher in (None, "truth"):
-            raise BadInputError(
-                "--headings: decides which way a teacher's tracks look; pass --teacher M, too."
-            )
 
 
 @dataclass(frozen=True)
@@ -162,8 +91,7 @@ def train(
         StopRequested: `stopping` said so, the state is saved; its text says how to go on.
     """
     device, weights = choose_device(options.device), _Weights.named_in(options)
-    output = begin_run(data, out, options)
-    with output.abandoned_if_refused() if output is not None else nullcontext():
+    with begun_run(data, out, options):
         store = open_training_data(data, out, options, progress)
         recipe = recipe_for(store, options.preset, options.steps)
         recipe = with_encoder(recipe, options.encoder or recipe.network.backbone)
@@ -278,70 +206,6 @@ def _line(values: dict[str, Any]) -> str:
         f"loss {values['loss']:.4f} ({terms}), branches {shares} %,"
         f" {values['steps_per_second']:.1f} steps/s"
     )
-
-
-def open_training_data(
-    data: Path, out: Path, options: TrainingOptions, progress: Progress = SILENT
-) -> Store:
-    """The packed store to train on; track folders are packed once into the run's folder.
-
-    Raises:
-        BadInputError: no tracks there; or track folders under torchrun.
-    """
-    if is_store(data):
-        return open_store(data)
-    if int(os.environ.get("WORLD_SIZE", "1")) > 1:
-        raise BadInputError(
-            f"{data}: several processes need a packed store; make one first by"
-            f" `wildshape convert folder {data} OUT`."
-        )
-    packed = out / _PACKED
-    if options.resume and (packed / INDEX_JSON).is_file():  # else it is none, or half-written
-        return open_store(packed)
-    source = open_tracks(data, options.coordinates)
-    write_tracks(
-        source,
-        packed,
-        "packed",
-        command="train",
-        settings={"input": str(data.resolve()), **asdict(options.coordinates)},
-        overwrite=True,
-        progress=progress,
-        bar=("packing tracks", len(source)),
-    )
-    for told in source.doubts:
-        progress.say(told)
-    progress.skipped(source.skipped)
-    return open_store(packed)
-
-
-def begin_run(data: Path, out: Path, options: TrainingOptions) -> Output | None:
-    """The marker of a new run; processes that do not lead leave the folder alone.
-
-    Raises:
-        BadInputError: another run is there.
-    """
-    if int(os.environ.get("RANK", "0")) > 0:
-        return None
-    if options.resume and (out / MARKER).is_file():
-        lock_folder(out)
-        remove_leftovers(out)
-        return None
-    keep_apart(data, out)
-    if is_begun(out) and not options.overwrite:
-        raise BadInputError(
-            f"{out}: a run is there already; pass --resume to go on with it, --overwrite"
-            " to replace it, or choose another --out."
-        )
-    parts = ("preset", "encoder", "steps", "seed")
-    identity = {"data": str(data), **{name: str(getattr(options, name)) for name in parts}}
-    return begin(out, "train", identity, _FILES, overwrite=options.overwrite)
-
-
-def finish_run(out: Path) -> None:
-    """Say in the run's folder that it is finished."""
-    marker = out / MARKER
-    write_json(marker, {**json.loads(marker.read_text("utf-8")), "status": "finished"})
 
 
 def _finished(run: Run, out: Path, seconds: float, text: str) -> Trained:

@@ -150,7 +150,7 @@ def _refuse_unseen(recipe: DpcRecipe, store: Store, sampler: ViewSampler) -> Non
     if wanted != found:
         other = "dpc-lidar" if found == "lidar" else "dpc or dpc-dagger"
         raise BadInputError(
-            f"{store.path}: holds {found} scans, but preset {recipe.name} is for {wanted} scans;"
+            f"{store.named}: holds {found} scans, but preset {recipe.name} is for {wanted} scans;"
             f" choose {other}."
         )
     volume = recipe.network.volume
@@ -166,6 +166,6 @@ def _refuse_unseen(recipe: DpcRecipe, store: Store, sampler: ViewSampler) -> Non
         else f"objects of at most {volume.scale:g} m"
     )
     raise BadInputError(
-        f"{store.path}: most of its objects lie outside of DPC's images, which need {told}; train"
+        f"{store.named}: most of its objects lie outside of DPC's images, which need {told}; train"
         " a preset of Wildshape's own instead."
     )

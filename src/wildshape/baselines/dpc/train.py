@@ -4,7 +4,6 @@
 
 import os
 import time
-from contextlib import nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -17,15 +16,9 @@ from wildshape.io.progress import SILENT, Progress
 from wildshape.method.checkpoint import MODEL
 from wildshape.ops.device import choose_device
 from wildshape.training.loop import StopRequested
-from wildshape.training.train import (
-    Stopping,
-    Trained,
-    TrainingOptions,
-    begin_run,
-    finish_run,
-    never_stopped,
-    open_training_data,
-)
+from wildshape.training.options import TrainingOptions
+from wildshape.training.run_folder import begun_run, finish_run, open_training_data
+from wildshape.training.train import Stopping, Trained, never_stopped
 
 
 def train_dpc(
@@ -44,8 +37,7 @@ def train_dpc(
     """
     _refuse_foreign(options)
     began = time.monotonic()
-    output = begin_run(data, out, options)
-    with output.abandoned_if_refused() if output is not None else nullcontext():
+    with begun_run(data, out, options):
         run = setup_dpc(
             dpc_recipe(options),
             open_training_data(data, out, options, progress),

@@ -95,7 +95,8 @@ def run(settings: Settings) -> None:
         KeyboardInterrupt: stopped by a signal, the state saved.
     """
     from wildshape.cli.terminal import TERMINAL, answer, stoppable
-    from wildshape.training.train import TrainingOptions, train
+    from wildshape.training.options import TrainingOptions
+    from wildshape.training.train import train
 
     options = TrainingOptions(
         preset=settings.preset,

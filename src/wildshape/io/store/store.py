@@ -46,13 +46,17 @@ def is_store(path: Path | str) -> bool:
     return any((Path(path) / name).is_file() for name in (INDEX_JSON, WRITING_JSON))
 
 
-def open_store(path: Path | str) -> "Store":
+def open_store(path: Path | str, named: Path | None = None) -> "Store":
     """Open a finished packed store for reading; costs milliseconds however large it is.
+
+    Args:
+        path: its folder.
+        named: what a user calls its tracks, who did not pack them; by default the folder.
 
     Raises:
         BadInputError: no store, half-written, of another version, or damaged.
     """
-    return Store(Path(path))
+    return Store(Path(path), named)
 
 
 class Store:
@@ -60,19 +64,20 @@ class Store:
 
     Attributes:
         path: its folder.
+        named: what messages about its tracks call it.
         track_starts: `(T + 1,)` first scan of each track.
         scan_sizes: `(S,)` points of each scan.
         fingerprint: short hash of the contents (not of the provenance).
         provenance: how it was made.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, named: Path | None = None) -> None:
         """Map the index; the shards follow when touched.
 
         Raises:
             BadInputError: see `open_store`.
         """
-        self.path = path
+        self.path, self.named = path, named or path
         manifest = read_manifest(path)
         self._files = files_of(manifest)
         for record in self._files:
@@ -96,7 +101,7 @@ class Store:
         self._sensors: dict[int, Sensor] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return open_store, (self.path,)
+        return open_store, (self.path, self.named)
 
     def __len__(self) -> int:
         return len(self.track_starts) - 1

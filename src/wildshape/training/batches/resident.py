@@ -166,7 +166,7 @@ def _refuse_too_large(sampler: ViewSampler, device: torch.device, most: int | No
     needed = 12 * sum(int(sizes[scans].sum()) for scans in sampler.scans_of)
     if most is not None and needed > most:
         raise TooLargeError(
-            f"{sampler.store.path}: its scans take {needed / 1e9:.2f} GB, more than the"
+            f"{sampler.store.named}: its scans take {needed / 1e9:.2f} GB, more than the"
             f" {most / 1e9:.2f} GB that they may take of the memory of {device}."
         )
 

@@ -91,7 +91,7 @@ class ViewSampler:
         self.scans_of = [scans for scans in usable if len(scans) > 0]
         if not self.scans_of:
             raise BadInputError(
-                f"{store.path}: no track has a scan of {config.min_points} points or more;"
+                f"{store.named}: no track has a scan of {config.min_points} points or more;"
                 " nothing to train on."
             )
         self.anchors: Float[Tensor, "S 3 3"] | None = None

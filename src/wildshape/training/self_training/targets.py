@@ -68,7 +68,7 @@ def true_targets(sampler: ViewSampler, config: FusionConfig = _DEFAULT) -> Fused
         known, shape = store.poses_of(number), store.shape_of(number)
         if known is None or shape is None:
             raise BadInputError(
-                f"{store.path}: track {store.names[number]} has no true poses or shape; the oracle"
+                f"{store.named}: track {store.names[number]} has no true poses or shape; the oracle"
                 " needs both."
             )
         own = known[torch.from_numpy(scans - starts[number])].to(torch.float32)

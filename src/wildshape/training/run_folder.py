@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The folder of a training run: its marker, and the tracks packed into it."""
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+
+from wildshape.errors import BadInputError
+from wildshape.io.atomic import lock_folder, write_json
+from wildshape.io.inputs import open_tracks
+from wildshape.io.output import MARKER, Output, begin, is_begun, keep_apart, remove_leftovers
+from wildshape.io.progress import SILENT, Progress
+from wildshape.io.store.layout import INDEX_JSON
+from wildshape.io.store.store import Store, is_store, open_store
+from wildshape.io.write_tracks import write_tracks
+from wildshape.training.options import TrainingOptions
+
+_PACKED = "data.store"
+_FILES = (
+    "*.safetensors",
+    "run.json",
+    "log.jsonl",
+    "profile.txt",
+    "tensorboard/*",
+    f"{_PACKED}/*",
+)
+
+
+@contextmanager
+def begun_run(data: Path, out: Path, options: TrainingOptions) -> Iterator[None]:
+    """The marker of a run; of a new one nothing stays if what is done in here is refused.
+
+    Raises:
+        BadInputError: another run is there.
+    """
+    output = _begin(data, out, options)
+    if output is None:
+        yield
+        return
+    with output.abandoned_if_refused():
+        try:
+            yield
+        except BadInputError:
+            shutil.rmtree(out / _PACKED, ignore_errors=True)
+            raise
+
+
+def _begin(data: Path, out: Path, options: TrainingOptions) -> Output | None:
+    """None where a run is gone on with, and to processes that do not lead."""
+    if int(os.environ.get("RANK", "0")) > 0:
+        return None
+    if options.resume and (out / MARKER).is_file():
+        lock_folder(out)
+        remove_leftovers(out)
+        return None
+    keep_apart(data, out)
+    if is_begun(out) and not options.overwrite:
+        raise BadInputError(
+            f"{out}: a run is there already; pass --resume to go on with it, --overwrite"
+            " to replace it, or choose another --out."
+        )
+    parts = ("preset", "encoder", "steps", "seed")
+    identity = {"data": str(data), **{name: str(getattr(options, name)) for name in parts}}
+    return begin(out, "train", identity, _FILES, overwrite=options.overwrite)
+
+
+def open_training_data(
+    data: Path, out: Path, options: TrainingOptions, progress: Progress = SILENT
+) -> Store:
+    """The packed store to train on; track folders are packed once into the run's folder.
+
+    Raises:
+        BadInputError: no tracks there; or track folders under torchrun.
+    """
+    if is_store(data):
+        return open_store(data)
+    if int(os.environ.get("WORLD_SIZE", "1")) > 1:
+        raise BadInputError(
+            f"{data}: several processes need a packed store; make one first by"
+            f" `wildshape convert folder {data} OUT`."
+        )
+    packed = out / _PACKED
+    if options.resume and (packed / INDEX_JSON).is_file():  # else it is none, or half-written
+        return open_store(packed, data)
+    source = open_tracks(data, options.coordinates)
+    write_tracks(
+        source,
+        packed,
+        "packed",
+        command="train",
+        settings={"input": str(data.resolve()), **asdict(options.coordinates)},
+        overwrite=True,
+        progress=progress,
+        bar=("packing tracks", len(source)),
+    )
+    for told in source.doubts:
+        progress.say(told)
+    progress.skipped(source.skipped)
+    return open_store(packed, data)
+
+
+def finish_run(out: Path) -> None:
+    """Say in the run's folder that it is finished."""
+    marker = out / MARKER
+    write_json(marker, {**json.loads(marker.read_text("utf-8")), "status": "finished"})
