@@ -106,7 +106,7 @@ $(DOCUMENTED): $(INSTALLED)
 installed: $(SOURCES) | $(BIN)/python
 	@$(ANNOUNCED)
 	$(PIP) -e ".[test,bench,docs]"
-	@touch $(INSTALLED) && touch $(TESTED) $(BENCHED) $(DOCUMENTED)
+	@touch $(INSTALLED) $(TESTED) $(BENCHED) $(DOCUMENTED)
 
 clean:
 	rm -rf $(VENV) "$(OUT)" site

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Types are checked at each call, as by `jaxtyping.jaxtyped`, in half of its time.
+"""Types are checked at each call, as by `jaxtyping.jaxtyped`, in less time.
 
 That one binds all arguments by name and checks them twice a call, for its messages. Here a function
 that names no array is beartype's alone; where shapes are named, beartype runs in a context of its
