@@ -15,7 +15,12 @@ from typing import Any
 import numpy as np
 import tyro
 
+from wildshape.evaluation.tables import pipe_table
 from wildshape.io.store.store import open_store
+
+_COLUMNS = (
+    "kind", "scans", "CD, m", "precision", "coverage", "acc 30, %", "rot, deg", "trans, m"
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -33,28 +38,30 @@ class Settings:
     method: str = "wildshape"
 
 
-def main(settings: Settings) -> None:
-    """Print a table: a row a kind."""
-    words = {track.name: track.source.split()[-1] for track in open_store(settings.data)}
+def table(data: Path, evaluation: Path, method: str = "wildshape") -> str:
+    """A row a kind, as markdown.
+
+    Args:
+        data: simulated tracks, as a packed store.
+        evaluation: folder that `wildshape evaluate` wrote for them.
+        method: row to look at.
+    """
+    words = {track.name: track.source.split()[-1] for track in open_store(data)}
     kinds = {name: word.split("_")[0] for name, word in words.items()}  # of meshes, the category
-    runs = json.loads((settings.evaluation / "scores.json").read_text("utf-8"))["runs"]
-    methods = [m for run in runs for m in run["methods"] if m["name"] == settings.method]
+    runs = json.loads((evaluation / "scores.json").read_text("utf-8"))["runs"]
+    methods = [m for run in runs for m in run["methods"] if m["name"] == method]
     completed = _by_kind(methods, kinds, "completions")
     registered = _by_kind(methods, kinds, "registrations")
-    names = sorted(completed, key=lambda kind: -len(completed[kind]))
-    print("| kind | scans | CD, m | precision | coverage | acc 30, % | rot, deg | trans, m |")
-    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
-    for kind in names:
+    rows = []
+    for kind in sorted(completed, key=lambda kind: -len(completed[kind])):
         errors = [row["error"] for row in completed[kind]]
         precision, coverage = (np.mean([e[k] for e in errors]) for k in ("precision", "coverage"))
-        rows = registered[kind]
-        angle = np.asarray([row["rotation_deg"] for row in rows])
-        apart = np.median([row["translation_m"] for row in rows])
-        print(
-            f"| {kind} | {len(errors)} | {precision + coverage:.3f} | {precision:.3f} |"
-            f" {coverage:.3f} | {100 * np.mean(angle <= 30):.1f} | {np.median(angle):.2f} |"
-            f" {apart:.3f} |"
-        )
+        angle = np.asarray([row["rotation_deg"] for row in registered[kind]])
+        apart = np.median([row["translation_m"] for row in registered[kind]])
+        shares = (precision + coverage, precision, coverage)
+        pose = (f"{100 * np.mean(angle <= 30):.1f}", f"{np.median(angle):.2f}", f"{apart:.3f}")
+        rows.append([kind, str(len(errors)), *(f"{share:.3f}" for share in shares), *pose])
+    return pipe_table(_COLUMNS, rows)
 
 
 def _by_kind(methods: list[Any], kinds: dict[str, str], what: str) -> dict[str, list[Any]]:
@@ -66,4 +73,5 @@ def _by_kind(methods: list[Any], kinds: dict[str, str], what: str) -> dict[str, 
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Settings))
+    settings = tyro.cli(Settings)
+    print(table(settings.data, settings.evaluation, settings.method))
