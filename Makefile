@@ -25,6 +25,8 @@ OUT ?= demo
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq install $(PIP_ARGS) -c constraints.txt
+# pip compiles modules on one core. Some that libraries carry are for other versions of python.
+COMPILED = $(BIN)/python -m compileall -qq -j 0 $(VENV)/lib || :
 INSTALLED := $(VENV)/.installed
 TESTED := $(VENV)/.installed-test
 BENCHED := $(VENV)/.installed-bench
@@ -78,6 +80,7 @@ $(BIN)/python:
 	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
 		echo "$(PYTHON) cannot make a virtual environment: its venv module is missing; install it" \
 			"(Debian and Ubuntu: python3-venv), or name another: make PYTHON=..." >&2; exit 1; }
+	@$(PIP) --upgrade pip # the one that python brings may be years old, and takes twice as long
 
 define ANNOUNCED
 echo "installing into $(VENV), once; this takes a few minutes"
@@ -87,25 +90,30 @@ endef
 
 $(INSTALLED): $(SOURCES) | $(BIN)/python
 	@$(ANNOUNCED)
-	$(PIP) -e .
+	$(PIP) --no-compile -e .
+	@$(COMPILED)
 	@touch $@
 
 $(TESTED): $(INSTALLED)
-	$(PIP) -e ".[test]"
+	$(PIP) --no-compile -e ".[test]"
+	@$(COMPILED)
 	@touch $@
 
 $(BENCHED): $(INSTALLED)
-	$(PIP) -e ".[bench]"
+	$(PIP) --no-compile -e ".[bench]"
+	@$(COMPILED)
 	@touch $@
 
 $(DOCUMENTED): $(INSTALLED)
-	$(PIP) -e ".[docs]"
+	$(PIP) --no-compile -e ".[docs]"
+	@$(COMPILED)
 	@touch $@
 
 # All at once: what CI needs is resolved and built once.
 installed: $(SOURCES) | $(BIN)/python
 	@$(ANNOUNCED)
-	$(PIP) -e ".[test,bench,docs]"
+	$(PIP) --no-compile -e ".[test,bench,docs]"
+	@$(COMPILED)
 	@touch $(INSTALLED) $(TESTED) $(BENCHED) $(DOCUMENTED)
 
 clean:
