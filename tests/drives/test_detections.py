@@ -67,6 +67,7 @@ def street(tmp_path_factory):
         drive=drive,
         mounting=mounting,
         scans=scans,
+        known=[{row.tobytes(): place for place, row in enumerate(scan.points)} for scan in scans],
         standing=[standing(scan, mounting) for scan in scans],
     )
 
@@ -87,9 +88,8 @@ def cut(street, detections, folder):
 
 def owners(street, frame, points):
     """Whose each point of a cluster is."""
-    scan = street.scans[frame]
-    known = {row.tobytes(): owner for row, owner in zip(scan.points, scan.owner.tolist())}
-    return np.array([known[row.tobytes()] for row in points])
+    places = [street.known[frame][row.tobytes()] for row in points]
+    return street.scans[frame].owner[places]
 
 
 def owner_of(street, frame, points):

@@ -54,7 +54,7 @@ def test_a_reader_that_breaks_a_rule_is_found(reader, failure, tmp_path):
 
 
 def test_a_reader_that_refuses_passes_and_a_seed_is_the_same_inputs(tmp_path):
-    broken = ("--targets", "tests.fuzz.broken", "--only", "right", "--inputs", 0, "--each", 200)
+    broken = ("--targets", "tests.fuzz.broken", "--only", "right", "--inputs", 0, "--each", 100)
     done, again = (fuzz(tmp_path, *broken, "--workers", workers) for workers in (1, 2))
     assert (done.returncode, again.returncode) == (0, 0)
     counts, failures = row(done, "right")
@@ -79,5 +79,5 @@ def test_a_bomb_is_damaged_as_it_is():  # unpacked and packed again it would tak
 
 
 def test_our_readers_break_no_rule(tmp_path):
-    done = fuzz(tmp_path, "--inputs", 0, "--each", 200)
+    done = fuzz(tmp_path, "--inputs", 0, "--each", 100)
     assert done.returncode == 0, done.stdout + done.stderr
