@@ -25,8 +25,9 @@ OUT ?= demo
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq install $(PIP_ARGS) -c constraints.txt
-# pip compiles modules on one core. Some that libraries carry are for other versions of python.
-COMPILED = $(BIN)/python -m compileall -qq -j 0 $(VENV)/lib || :
+# pip compiles modules on one core. Some that libraries carry are for other versions of python. The
+# whole path: a relative one would be put right at each import, at a cost of memory.
+COMPILED = $(BIN)/python -m compileall -qq -j 0 $(abspath $(VENV))/lib || :
 INSTALLED := $(VENV)/.installed
 TESTED := $(VENV)/.installed-test
 BENCHED := $(VENV)/.installed-bench

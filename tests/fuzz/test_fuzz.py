@@ -54,7 +54,7 @@ def test_a_reader_that_breaks_a_rule_is_found(reader, failure, tmp_path):
 
 
 def test_a_reader_that_refuses_passes_and_a_seed_is_the_same_inputs(tmp_path):
-    broken = ("--targets", "tests.fuzz.broken", "--only", "right", "--inputs", 0, "--each", 100)
+    broken = ("--targets", "tests.fuzz.broken", "--only", "right", "--inputs", 0, "--each", 200)
     done, again = (fuzz(tmp_path, *broken, "--workers", workers) for workers in (1, 2))
     assert (done.returncode, again.returncode) == (0, 0)
     counts, failures = row(done, "right")
