@@ -79,5 +79,5 @@ def test_a_bomb_is_damaged_as_it_is():  # unpacked and packed again it would tak
 
 
 def test_our_readers_break_no_rule(tmp_path):
-    done = fuzz(tmp_path, "--inputs", 0, "--each", 100)
+    done = fuzz(tmp_path, "--inputs", 0, "--each", 200)
     assert done.returncode == 0, done.stdout + done.stderr

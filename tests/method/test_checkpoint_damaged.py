@@ -29,14 +29,8 @@ FREE = ("provenance", "metrics")  # say where weights come from; nothing is comp
 
 
 def paths_of(values, at=()):
-    """Where each value lies, records and lists as well as what they hold.
-
-    Of a list it is the first and the last: what is between them is read alike.
-    """
-    if isinstance(values, dict):
-        entries = values.items()
-    else:
-        entries = [(place, values[place]) for place in sorted({0, len(values) - 1})]
+    """Where each value lies, records and lists as well as what they hold."""
+    entries = values.items() if isinstance(values, dict) else enumerate(values)
     for key, value in entries:
         if key in FREE:
             continue

@@ -24,7 +24,7 @@ from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 EXAMPLE = Path(__file__).parents[3] / "examples" / "06_onnx_inference.py"
 NAMES = sorted(path.stem for path in SHIPPED.parent.glob("*.safetensors"))
 NUMBERS = ("extent_m", "cost_m", "calibration", "trust", "provenance", "metrics")
-SCANS, AS_GRAPH, WITH_TORCH = 100, 24, 6
+SCANS, AS_GRAPH, WITH_TORCH = 200, 24, 6
 TURNED = 4  # each so many scans one is turned freely: such are looked at again
 # One trace for both files, in a process whose shapes are not checked: the tracer sees no checks.
 EXPORT = """
