@@ -4,12 +4,13 @@
 
 python -m experiments.shipped_weights --cad CAD --kitti KITTI --out OUT
 
-writes OUT/shipped-weights.md. Stopped, the same command goes on with what was not measured yet.
+writes OUT/shipped-weights.md. Stopped, the same command goes on with what was not measured yet;
+the page names every commit that measured a part of it.
 """
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,7 @@ class Settings:
         out: folder of data, evaluations and the page.
         cad: folder of CAD meshes with a manifest; without it these vehicles are left out.
         kitti: KITTI raw, the folder above the dates; without it real cars are left out.
-        share: of the drives, for a trial.
+        share: of the drives, for a trial in a folder of its own.
     """
 
     out: Path
@@ -124,9 +125,10 @@ def _test_meshes(cad: Path, into: Path) -> Path:
 
 def run(settings: Settings, command: str) -> None:
     """Make the data, measure them, write the page."""
+    out = settings.out if settings.share == 1 else settings.out / f"share-{settings.share:g}"
     done = []
-    for data in drives(settings):
-        store = settings.out / data.name
+    for data in drives(replace(settings, out=out)):
+        store = out / data.name
         if not is_store(store):
             _make(data, store)
         for protocol, words in data.measured.items():
@@ -134,8 +136,8 @@ def run(settings: Settings, command: str) -> None:
                 said = ("--out", str(_evaluation(store, protocol)), "--max-scans", _MOST_SCANS)
                 main(["evaluate", str(store), *said, *words, "--overwrite"])
         done.append(data)
-        write_text(settings.out / PAGE, page(settings.out, done, command))
-    say(f"see {settings.out / PAGE}")
+        write_text(out / PAGE, page(out, done, command))
+    say(f"see {out / PAGE}")
 
 
 def _make(data: Drives, store: Path) -> None:
@@ -156,10 +158,14 @@ def _finished(folder: Path) -> bool:
 
 def page(out: Path, done: list[Drives], command: str) -> str:
     """The tables of what is finished."""
-    first = _metrics(out / done[0].name, "none")["provenance"]
+    found = [_metrics(out / data.name, way)["provenance"] for data in done for way in data.measured]
+    made = {
+        f"commit {one['code'][:7]}, {one['time_utc'][:10]}, {one['hardware']['cpu']}"
+        for one in found
+    }
     head = (
         f"# The shipped weights: the tables\n\n```text\n{command}\n```\n\n"
-        f"Commit {first['code'][:7]}, {first['time_utc'][:10]}, {first['hardware']['cpu']}. At most"
+        f"Measured at {'; '.join(sorted(made))}. At most"
         f' {_MOST_SCANS} scans a track are measured. "track" completes all scans of a track'
         ' together; "sym" forgives a half turn; `±` is over the seeds of the turns; boxes are of'
         " the body. [What they say](../shipped-weights.md)."

@@ -35,7 +35,7 @@ def two_sets(monkeypatch):
 def test_the_page_has_every_row_and_is_made_once(two_sets, tmp_path, cad):
     settings = Settings(tmp_path, cad, share=0.01)
     run(settings, "the command")
-    page = (tmp_path / PAGE).read_text("utf-8")
+    page = (tmp_path / "share-0.01" / PAGE).read_text("utf-8")
     first, second = page.split("\n## ")[1:]
     for name in ("identity", "one-scan", "local-icp", "wildshape", "wildshape, track"):
         assert f"\n| {name} | " in first
