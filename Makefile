@@ -27,7 +27,9 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq install $(PIP_ARGS) -c constraints.txt
 # pip compiles modules on one core. Some that libraries carry are for other versions of python. The
 # whole path: a relative one would be put right at each import, at a cost of memory.
-COMPILED = $(BIN)/python -m compileall -qq -j 0 $(abspath $(VENV))/lib || :
+COMPILE := $(BIN)/python -m compileall -qq -j 0 $(abspath $(VENV))/lib
+ALL := .[test,bench,docs]
+INSTALL = $(PIP) --no-compile -e "$(1)" && { $(COMPILE) || :; }
 INSTALLED := $(VENV)/.installed
 TESTED := $(VENV)/.installed-test
 BENCHED := $(VENV)/.installed-bench
@@ -91,30 +93,25 @@ endef
 
 $(INSTALLED): $(SOURCES) | $(BIN)/python
 	@$(ANNOUNCED)
-	$(PIP) --no-compile -e .
-	@$(COMPILED)
+	@$(call INSTALL,.)
 	@touch $@
 
 $(TESTED): $(INSTALLED)
-	$(PIP) --no-compile -e ".[test]"
-	@$(COMPILED)
+	@$(call INSTALL,.[test])
 	@touch $@
 
 $(BENCHED): $(INSTALLED)
-	$(PIP) --no-compile -e ".[bench]"
-	@$(COMPILED)
+	@$(call INSTALL,.[bench])
 	@touch $@
 
 $(DOCUMENTED): $(INSTALLED)
-	$(PIP) --no-compile -e ".[docs]"
-	@$(COMPILED)
+	@$(call INSTALL,.[docs])
 	@touch $@
 
 # All at once: what CI needs is resolved and built once.
 installed: $(SOURCES) | $(BIN)/python
 	@$(ANNOUNCED)
-	$(PIP) --no-compile -e ".[test,bench,docs]"
-	@$(COMPILED)
+	@$(call INSTALL,$(ALL))
 	@touch $(INSTALLED) $(TESTED) $(BENCHED) $(DOCUMENTED)
 
 clean:
