@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 import tyro
 from experiments.tables import (
     ablations,
+    added,
     codes,
     encoders,
     kitti,
@@ -33,6 +34,7 @@ TABLES = {
     "vehicle": vehicle.table,
     "kitti": kitti.table,
     "ablations": ablations.table,
+    "added": added.table,
     "seeds": seeds.table,
     "trucks": trucks.table,
     "encoders": encoders.table,
@@ -53,6 +55,7 @@ Name = Literal[
     "vehicle",
     "kitti",
     "ablations",
+    "added",
     "seeds",
     "trucks",
     "encoders",

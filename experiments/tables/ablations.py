@@ -1,24 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""What each part is good for (paper, supplement, tables 5 and 6), and what we add taken away."""
+"""What each part of the paper's method is good for (supplement, tables 5 and 6)."""
 
 from dataclasses import replace
 from typing import Any, Literal
 
 from experiments.tables.given import Given
-from experiments.tables.rows import default_form, flat, paper_form, views_form
+from experiments.tables.rows import flat, paper_form, views_form
 from experiments.tables.table import Block, Table, Trained
 
 from wildshape.evaluation.paper import ABLATION_ROWS, VIEW_COUNT_ROWS
 from wildshape.evaluation.results import Rotate
 from wildshape.simulate.config import Category
 
+Part = Literal["network", "loss", "views"]
 _TURNS: tuple[Rotate, ...] = ("none", "yaw")
 
 
 def table(given: Given) -> Table:
-    """Both forms on drives, the paper's on depth views: of cars alone before size small."""
-    blocks = [_paper_drives(given), _ours_drives(given)]
+    """On drives, and on depth views: of cars alone before size small."""
+    blocks = [_paper_drives(given)]
     categories: tuple[Category, ...] = ("car",)
     if given.size.steps is None or given.size.like == "small":
         categories = ("airplane", "car", "chair")
@@ -27,9 +28,7 @@ def table(given: Given) -> Table:
     return Table(title, tuple(blocks), given.size.ablation_seeds)
 
 
-def changed(
-    row: Trained, name: str, part: Literal["network", "loss", "views"], **values: Any
-) -> Trained:
+def changed(row: Trained, name: str, part: Part, **values: Any) -> Trained:
     """The row with another value in one part of its recipe."""
     recipe = row.recipe
     new = replace(getattr(recipe, part), **values)
@@ -52,20 +51,6 @@ def _paper_drives(given: Given) -> Block:
     )
     title = "Simulated drives, the paper's form"
     return Block(title, given.drives("test"), rows, VIEW_COUNT_ROWS, _TURNS)
-
-
-def _ours_drives(given: Given) -> Block:
-    base = default_form(given.size, given.drives("train"))
-    rows = (
-        replace(base, name="default, full"),
-        changed(base, "default, w/o facing: turned in yaw", "views", turn="yaw", roll=0.0),
-        changed(base, "default, w/o mirror", "network", mirror=False),
-        changed(base, "default, w/o template", "loss", template=0.0),
-        changed(base, "default, w/o agreed headings", "loss", time_ordered=False, agree_at=()),
-        changed(base, "default, w/o selector", "network", selector=False),
-        replace(base, name="default, taught by the full one", teacher=base),
-    )
-    return Block("Simulated drives, default form", given.drives("test"), rows, (), _TURNS)
 
 
 def _views(given: Given, category: Category) -> Block:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the user gives a table, and the data sets that are made of it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from experiments.tables.data import Cad, Kitti, Simulated, Split
@@ -14,6 +14,7 @@ from wildshape.simulate.generate import SimulationConfig
 
 _SEEDS: dict[Split, int] = {"train": 1, "test": 9002}
 TRUCKS = 14
+_OCCLUDED, _RAYS = 0.5, 512
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,12 @@ class Given:
         count = self.size.train if split == "train" else self.size.test
         config = SimulationConfig(tracks=count)
         return Simulated(f"cars-{split}", config, _SEEDS[split], self._cad(("car",), split))
+
+    def occluded(self, split: Split) -> Simulated:
+        """The same past what stands in the way, the rays beside each car kept with its scans."""
+        plain = self.drives(split)
+        config = replace(plain.config, occlusion=_OCCLUDED, rays=_RAYS)
+        return replace(plain, name=f"occluded-{plain.name}", config=config)
 
     def views(self, category: Category, split: Split, noise: float | None = None) -> Simulated:
         """Depth views of unit-sized objects, five each; `noise` is the sigma of depths."""

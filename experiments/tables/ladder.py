@@ -10,8 +10,7 @@ from experiments.tables.data import store_of
 from experiments.tables.given import Given
 from experiments.tables.make import selected
 from experiments.tables.measure import measure, method_of
-from experiments.tables.rows import baselines, oracle, paper_form
-from experiments.tables.size import sized
+from experiments.tables.rows import baselines, oracle, paper_form, small_form
 from experiments.tables.table import Block, Table, Trained
 from experiments.tables.train import Workshop, model_of
 
@@ -58,8 +57,7 @@ def rungs(given: Given) -> tuple[Trained, ...]:
 
 
 def _ours(given: Given) -> Trained:
-    """The form of preset `small`, which has all of it; `default` is for runs of many more steps."""
-    return Trained("ours", sized(small(), given.size), given.drives("train"))
+    return small_form(given.size, given.drives("train"))
 
 
 def _with(row: Trained, part: Part, **values: Any) -> Trained:

@@ -10,7 +10,7 @@ from experiments.tables.table import Baseline, Trained
 
 from wildshape.baselines.dpc.objective import dpc, dpc_dagger, dpc_lidar
 from wildshape.training.config import Recipe
-from wildshape.training.recipes import default, paper_lidar, paper_views, shape_oracle
+from wildshape.training.recipes import default, paper_lidar, paper_views, shape_oracle, small
 
 ORACLE = "oracle"
 """Taught the true pose, too; the paper's own is `paper_oracle`."""
@@ -37,6 +37,11 @@ def paper_form(size: Size, data: Data) -> Trained:
 def default_form(size: Size, data: Data) -> Trained:
     """What we add, without a teacher."""
     return Trained("ours, default form", sized(default(), size), data)
+
+
+def small_form(size: Size, data: Data) -> Trained:
+    """What we add, as our preset `small` has it, without a teacher: for short runs."""
+    return Trained("ours", sized(small(), size), data)
 
 
 def oracle(size: Size, data: Data) -> Trained:

@@ -17,6 +17,7 @@ from experiments.paper_tables import (  # pyright: ignore
     run,
     tables,
 )
+from experiments.tables.added import REMOVED  # pyright: ignore
 from experiments.tables.given import Given  # pyright: ignore
 from experiments.tables.size import SIZES  # pyright: ignore
 from experiments.tables.table import Trained  # pyright: ignore
@@ -40,9 +41,11 @@ def test_the_plan_has_every_row_that_the_claims_need(planned):
         "views, Car: ours, losses on 2D projections",
         "views, Airplane, depths with noise of 0.01: ours, paper's form, trained with noise",
         "ablations, Simulated drives, the paper's form: hindsight for a batch",
+        "added, Simulated drives, ours: taught, w/o selector",
+        "added, Simulated drives with occluders, ours: taught, with rays",
     ):
-        assert wanted in names
-    ours = next(job for job in planned if job.name.endswith("cars: ours, paper's form"))
+        assert f"{wanted}, 3 seeds" in names
+    ours = next(job for job in planned if job.name.endswith("cars: ours, paper's form, 3 seeds"))
     assert [(block.accumulated, len(block.rotate)) for block in ours.blocks] == [(0, 3), (1, 1)]
 
 
@@ -75,6 +78,25 @@ def test_rows_are_made_and_found_again(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(paper_tables, "measure", None)
     run(given, "the command")
     assert json.loads((tmp_path / RECORD).read_text("utf-8")) == spent
+
+
+def test_more_seeds_are_another_job(planned):
+    fewer = jobs(tables(Given(SIZES["small"], Path("cad")), 1))
+    assert len(fewer) == len(planned)
+    assert not {job.name for job in fewer} & {job.name for job in planned}
+
+
+def test_each_part_that_we_add_is_left_out_alone(planned):
+    """One value differs from the full form, in both rounds; the teacher lacks the same part."""
+    added = {job.row.name: job.row for job in planned if job.table == "added"}
+    for removal in REMOVED:
+        for form in ("first round", "taught"):
+            less, full = added[f"{form}, w/o {removal.name}"], added[f"{form}, full"]
+            parts = ("network", "loss", "views", "optim", "self_training")
+            other = [getattr(less.recipe, p) != getattr(full.recipe, p) for p in parts]
+            assert sum(other) == 1
+            assert less.data == full.data
+        assert added[f"taught, w/o {removal.name}"].teacher.recipe == less.recipe
 
 
 def test_a_share_has_a_name_of_its_own():

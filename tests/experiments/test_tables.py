@@ -98,7 +98,7 @@ def test_tables_as_declared(name, size):
         keys = [(r.key, r.answer) for r in block.rows if isinstance(r, Trained)]
         assert len(set(names)) == len(names)
         assert len(set(keys)) == len(keys)
-        assert block.paper or name in ("encoders", "ablations", "ladder") or "noise" in block.title
+        assert block.paper or name in ("encoders", "added", "ladder") or "noise" in block.title
 
 
 def test_a_table_that_needs_a_folder_says_so():
