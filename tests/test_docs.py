@@ -115,7 +115,8 @@ def check(words: list[str], *, run: bool) -> None:
         assert set(extras) <= set(project()["optional-dependencies"])
     elif program == "python":
         name = arguments[1].replace(".", "/") if arguments[0] == "-m" else arguments[0]
-        assert (ROOT / name).exists() or (ROOT / "site").name == arguments[-1], words
+        there = (ROOT / name).exists() or (ROOT / f"{name}.py").exists()
+        assert there or (ROOT / "site").name == arguments[-1], words
         if run and name.startswith("examples/"):
             succeed(arguments)
     else:
