@@ -33,7 +33,6 @@ from wildshape.io.store.store import Store, open_store
 from wildshape.ops.nearest import nearest
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.config import Recipe, learning_rate
-from wildshape.training.objectives import template_weight
 from wildshape.training.recipes import PRESETS
 from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.setup import Run, setup, step_of
@@ -96,8 +95,7 @@ class PlainTrainer:
         run, number = self.run, len(self.losses)
         run.views.prepare(number)
         batch = run.views.batch(torch.tensor(number, device=run.processes.device))
-        weight = template_weight(number, run.recipe.optim.steps, run.recipe.loss)
-        return plain_loss(self.network, batch, run.recipe.loss, weight)
+        return plain_loss(self.network, batch, run.recipe.loss)
 
     def __call__(self) -> None:
         number, optim, loss = len(self.losses), self.run.recipe.optim, self.loss()

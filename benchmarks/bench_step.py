@@ -39,7 +39,7 @@ from wildshape.ops.device import keep_memory
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.batches.views import Batch, ViewSampler
 from wildshape.training.config import Recipe
-from wildshape.training.objectives import WeaklySupervised, template_weight
+from wildshape.training.objectives import WeaklySupervised
 from wildshape.training.recipes import PRESETS
 
 VARIANTS = ("ours", "plain", "plain, kept")
@@ -56,7 +56,7 @@ class Trained:
     """A network, its loss, and a step with it."""
 
     network: torch.nn.Module
-    loss: Callable[[Batch, float], torch.Tensor]
+    loss: Callable[[Batch], torch.Tensor]
     gradients: Callable[[], dict[str, torch.Tensor]]
 
 
@@ -68,13 +68,13 @@ def trained(variant: str, recipe: Recipe, *, exact: bool = False) -> Trained:
         objective = WeaklySupervised(ours, recipe.loss)
         return Trained(
             ours,
-            lambda batch, template: objective(batch, template).loss,
+            lambda batch: objective(batch).loss,
             lambda: {name: p.grad for name, p in ours.named_parameters() if p.grad is not None},
         )
     plain = twin_of(ours)
     return Trained(
         plain,
-        lambda batch, template: plain_loss(plain, batch, recipe.loss, template, exact=exact),
+        lambda batch: plain_loss(plain, batch, recipe.loss, exact=exact),
         lambda: gradients_as_ours(plain, ours),
     )
 
@@ -109,14 +109,12 @@ def serve(
             link.send(peak_mib())
         else:
             held = trained(variant, recipe, exact=True)
-            link.send(gradients(in_double(held) if asked == "float64" else held, recipe, sampler))
+            link.send(gradients(in_double(held) if asked == "float64" else held, sampler))
 
 
-def gradients(
-    held: Trained, recipe: Recipe, sampler: ViewSampler
-) -> tuple[float, dict[str, np.ndarray]]:
+def gradients(held: Trained, sampler: ViewSampler) -> tuple[float, dict[str, np.ndarray]]:
     """Loss of the first batch, and the gradient of each parameter under our names."""
-    loss = held.loss(sampler.draw(_SEED, 0), template_weight(0, recipe.optim.steps, recipe.loss))
+    loss = held.loss(sampler.draw(_SEED, 0))
     loss.backward()
     return loss.item(), {name: g.detach().float().numpy() for name, g in held.gradients().items()}
 
@@ -133,8 +131,7 @@ class Stepper:
         """Milliseconds of one step."""
         began, optim, network = now(), self.recipe.optim, self.held.network
         batch = self.sampler.draw(_SEED, self.done)
-        weight = template_weight(self.done, optim.steps, self.recipe.loss)
-        loss = self.held.loss(batch, weight)
+        loss = self.held.loss(batch)
         self.optimiser.zero_grad(set_to_none=True)
         loss.backward()
         if optim.clip > 0:

@@ -4,7 +4,7 @@
 
 Conv1d and Linear modules, the pooled feature copied to each point, `torch.cdist` and `argmin` for
 every branch, a z-buffer by scatter, and autograd through all of it. The bins of the image, the
-handicap of turning branches and the template's pull are plain torch already and are shared.
+handicap of turning branches is plain torch already and is shared.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from wildshape.geometry.transforms.rotation import rotation_from_6d
 from wildshape.method.multiview import LossConfig
 from wildshape.method.network import NetworkConfig, ShapePoseNet
 from wildshape.training.batches.views import Batch
-from wildshape.training.objectives import template_deviation, turning_handicap
+from wildshape.training.objectives import turning_handicap
 
 _SMALLEST = 1e-12
 _MODES = {False: "use_mm_for_euclid_dist_if_necessary", True: "donot_use_mm_for_euclid_dist"}
@@ -67,9 +67,7 @@ def mlp(size: int, widths: tuple[int, int], out: int) -> nn.Sequential:
     )
 
 
-def plain_loss(
-    net: PlainNet, batch: Batch, config: LossConfig, template: float, *, exact: bool = False
-) -> Tensor:
+def plain_loss(net: PlainNet, batch: Batch, config: LossConfig, *, exact: bool = False) -> Tensor:
     """The same loss as `training.objectives.WeaklySupervised`.
 
     `exact` is for comparing, not for timing: torch.cdist goes by way of a matrix product, whose
@@ -87,8 +85,6 @@ def plain_loss(
     cost = torch.stack(terms, dim=1)
     winner = (cost.detach() + handicap(batch, rotation, cost, log_belief, config)).argmin(1)
     loss = cost.gather(1, winner[:, None]).mean() * views
-    if template > 0:
-        loss = loss + template * template_deviation(shapes)
     return loss - config.belief * log_belief.gather(1, winner[:, None]).mean()
 
 

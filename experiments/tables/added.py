@@ -26,7 +26,6 @@ class Removal(NamedTuple):
 
 REMOVED = (
     Removal("selector", lambda row: _less(row, "network", selector=False)),
-    Removal("template", lambda row: _less(row, "loss", template=0.0)),
     Removal("agreed headings", lambda row: _less(row, "loss", time_ordered=False, agree_at=())),
     Removal("mirror", lambda row: _less(row, "network", mirror=False)),
     Removal("facing", lambda row: _less(row, "views", turn="yaw", roll=0.0)),

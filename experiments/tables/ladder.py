@@ -37,17 +37,16 @@ def rungs(given: Given) -> tuple[Trained, ...]:
     facing = _with(base, "views", turn="facing", window=goal.views.window)
     facing = _with(facing, "loss", projection=goal.loss.projection, beta=goal.loss.beta)
     mirror = _with(facing, "network", mirror=True)
-    template = _with(mirror, "network", start=goal.network.start)
+    start = _with(mirror, "network", start=goal.network.start)
     loss = goal.loss
-    template = _with(template, "loss", template=loss.template, template_end=loss.template_end)
-    headings = _with(template, "loss", time_ordered=loss.time_ordered, agree_at=loss.agree_at)
+    headings = _with(start, "loss", time_ordered=loss.time_ordered, agree_at=loss.agree_at)
     ours = _ours(given)
     taught = replace(ours, teacher=ours)
     return (
         replace(base, name="1 paper's form"),
         replace(facing, name="2 + scans turned towards their object"),
         replace(mirror, name="3 + mirror symmetry"),
-        replace(template, name="4 + a shared template"),
+        replace(start, name="4 + an ellipsoid at the start"),
         replace(headings, name="5 + agreed headings"),
         replace(ours, name="6 + a selector beside the cost"),
         replace(taught, name="7 + self-training on fused tracks"),

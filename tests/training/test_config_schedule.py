@@ -4,9 +4,7 @@ import math
 
 import pytest
 
-from wildshape.method.multiview import LossConfig
 from wildshape.training.config import OptimConfig, learning_rate
-from wildshape.training.objectives import template_weight
 
 
 def test_warmup_rises_linearly_to_the_full_rate():
@@ -23,16 +21,3 @@ def test_cosine_falls_to_a_hundredth():
     assert learning_rate(100, config) == pytest.approx(0.01)
     rates = [learning_rate(step, config) for step in range(101)]
     assert rates == sorted(rates, reverse=True)
-
-
-def test_template_weight_is_geometric():
-    config = LossConfig(template=0.4, template_end=0.004)
-    assert template_weight(0, 101, config) == pytest.approx(0.4)
-    assert template_weight(50, 101, config) == pytest.approx(0.04)
-    assert template_weight(100, 101, config) == pytest.approx(0.004)
-
-
-def test_template_weight_may_stay_or_be_nothing():
-    assert template_weight(70, 100, LossConfig(template=0.4)) == 0.4
-    assert template_weight(70, 100, LossConfig()) == 0
-    assert template_weight(0, 1, LossConfig(template=0.4, template_end=0.1)) == 0.4

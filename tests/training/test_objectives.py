@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a track is held to before and after headings are agreed; the pull to a template."""
+"""What a track is held to before and after headings are agreed; what is logged."""
 
 import math
 from dataclasses import replace
@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.strategies import clouds, rotation_about
+from tests.strategies import rotation_about
 from tests.training.worker import SMALLEST
 
 from wildshape.geometry.transforms.rotation import random_rotation
@@ -20,7 +20,6 @@ from wildshape.training.batches.views import ViewSampler
 from wildshape.training.objectives import (
     WeaklySupervised,
     own_anchor,
-    template_deviation,
     turning_handicap,
 )
 from wildshape.training.runtime.running_mean import Meter
@@ -55,7 +54,7 @@ def anchors_held_to(network, batch, monkeypatch):
         return turning_handicap(rotation, turn, anchor)
 
     monkeypatch.setattr(objectives, "turning_handicap", spy)
-    WeaklySupervised(network, SMALLEST.loss)(batch, 0.5)
+    WeaklySupervised(network, SMALLEST.loss)(batch)
     return seen[0]
 
 
@@ -101,31 +100,25 @@ def test_views_in_no_order_are_held_to_what_was_agreed_on_alone(batch):
     assert bool((handicap[agreed] > 1).any())
 
 
-def objectives_of(batch, network, loss):
+def objectives_of(batch, network, belief):
     """What both objectives ask of a network that has seen these scans."""
     turns, ends = batch.turn[:4], torch.full((4,), 0.1)
     shapes, sensors = torch.randn(4, 80, 3), 5 * torch.randn(4, 2, 3)
     taught = FusedBatch(
         batch.scans[:4], turns, torch.ones(4, 3), shapes, sensors, ends, torch.zeros(4, 0, 6)
     )
-    yield WeaklySupervised(network, loss)(batch, 1.0).loss
-    yield SelfTaught(network, loss, False)(taught, 1.0).loss
+    yield WeaklySupervised(network, replace(SMALLEST.loss, belief=belief))(batch).loss
+    rules = replace(SMALLEST.self_training.loss, belief=belief)
+    yield SelfTaught(network, False, distances=rules)(taught).loss
 
 
-@pytest.mark.parametrize("left_out", ["template", "selector"])
-def test_one_field_leaves_the_template_or_the_selector_out(batch, left_out):
+def test_one_field_leaves_the_selector_out(batch):
     """Other weights of what is left out change no gradient."""
     grads = []
-    for weight in (0.1, 0.9):
+    for belief in (0.1, 0.9):
         torch.manual_seed(0)
-        if left_out == "template":
-            sizes, loss = SMALLEST.network, replace(SMALLEST.loss, template=0.0)
-            loss = replace(loss, template_end=weight)
-        else:
-            sizes = replace(SMALLEST.network, selector=False)
-            loss = replace(SMALLEST.loss, belief=weight)
-        network = ShapePoseNet(sizes)
-        torch.stack(list(objectives_of(batch, network, loss))).sum().backward()
+        network = ShapePoseNet(replace(SMALLEST.network, selector=False))
+        torch.stack(list(objectives_of(batch, network, belief))).sum().backward()
         grads.append([p.grad for p in network.parameters()])
     torch.testing.assert_close(*grads)
 
@@ -143,11 +136,11 @@ def test_what_is_taught_does_not_depend_on_the_size_of_the_objects():
         batch = FusedBatch(
             unit * scans, rotation, *places, view_top=ends, rays=torch.zeros(4, 0, 6)
         )
-        found.append(SelfTaught(network, SMALLEST.loss, False, unit=unit)(batch, 0.0))
+        found.append(SelfTaught(network, False, unit=unit)(batch))
     large, small = found
     torch.testing.assert_close(large.loss, small.loss, atol=1e-3, rtol=1e-3)
     # What is logged is in metres: a fifth for an object a fifth as large.
-    assert list(small.terms) == ["pose", "coverage", "precision", "template"]
+    assert list(small.terms) == ["pose", "coverage", "precision"]
     for name, metres in small.terms.items():
         torch.testing.assert_close(large.terms[name], 5 * metres, atol=1e-3, rtol=1e-3)
 
@@ -178,41 +171,10 @@ def test_the_turn_of_training_is_taken_off():
     assert (still == 0).tolist() == [[True, True, False, False]] * 6
 
 
-def test_the_template_by_hand():
-    """Two shapes of two points: the first pair 6 m apart (3 m off its mean), the second equal."""
-    first = torch.tensor([[[1.0, 0.0, 0.0], [5.0, 5.0, 5.0]]])
-    second = torch.tensor([[[1.0, 0.0, 6.0], [5.0, 5.0, 5.0]]])
-    found = template_deviation(torch.cat((first, second)))
-    assert float(found) == pytest.approx((3 + 0 + 3 + 0) / 4, abs=1e-6)
-
-
-def test_equal_shapes_cost_nothing_and_have_a_finite_gradient():
-    shapes = clouds(0, 1, 20, 3).float().repeat(4, 1, 1).requires_grad_()
-    loss = template_deviation(shapes)
-    loss.backward()
-    assert float(loss.detach()) < 2e-6
-    assert shapes.grad is not None
-    assert shapes.grad.isfinite().all()
-
-
-def test_a_turned_shape_pays():
-    shape = clouds(1, 50, 3)
-    turned = shape @ rotation_about((0.0, 0.0, 1.0), 3.1).T
-    straight = torch.stack((shape, shape + 0.01))
-    assert float(template_deviation(torch.stack((shape, turned)))) > 20 * float(
-        template_deviation(straight)
-    )
-
-
-def test_gradcheck_of_the_template():
-    shapes = clouds(2, 3, 4, 3).requires_grad_()
-    assert torch.autograd.gradcheck(template_deviation, (shapes,))
-
-
 def test_what_is_logged_is_called_what_it_is(batch):
     network = ShapePoseNet(SMALLEST.network)
-    weak = WeaklySupervised(network, SMALLEST.loss)(batch, 0.5)
-    assert list(weak.terms) == ["observation", "projection", "template"]
+    weak = WeaklySupervised(network, SMALLEST.loss)(batch)
+    assert list(weak.terms) == ["observation", "projection"]
     meter = Meter(SMALLEST.network.branches, 0, torch.device("cpu"))
     meter.write(torch.tensor(0), weak)
     read = meter.read(1)

@@ -22,7 +22,7 @@ def mean_terms(run, network):
     """Loss and observation term over batches that are never trained on in this order."""
     objective = WeaklySupervised(network, RECIPE.loss)
     with torch.no_grad():
-        rows = [objective(run.sampler.draw(99, step), 0.0) for step in range(8)]
+        rows = [objective(run.sampler.draw(99, step)) for step in range(8)]
     return np.mean([(float(r.loss), float(r.terms["observation"])) for r in rows], axis=0)
 
 

@@ -27,7 +27,6 @@ def test_what_both_paper_presets_share(recipe):
     assert recipe.network.decoder == (1024, 1024)
     assert (recipe.network.points, recipe.network.branches) == (2048, 4)
     assert (recipe.network.mirror, recipe.network.scale) == (False, 1.0)
-    assert recipe.loss.template == 0
     assert (recipe.views.tracks, recipe.views.views, recipe.views.window) == (8, 4, 20)
     assert (recipe.views.turn, recipe.views.min_points) == ("none", 100)
     assert (recipe.optim.lr, recipe.optim.decay_every) == (1e-4, 100_000)
@@ -66,7 +65,7 @@ def test_every_preset_is_named_and_takes_a_step(name, car_store):
     views = replace(recipe.views, tracks=1, views=2, min_points=16)
     network = ShapePoseNet(recipe.network)
     batch = ViewSampler(car_store, torch.arange(8).numpy(), views).draw(0)
-    WeaklySupervised(network, recipe.loss)(batch, recipe.loss.template).loss.backward()
+    WeaklySupervised(network, recipe.loss)(batch).loss.backward()
     for weight, p in network.named_parameters():
         assert p.grad is not None, weight
         assert p.grad.isfinite().all(), weight
@@ -85,7 +84,7 @@ def test_the_papers_oracle_learns_true_shapes_of_scans_as_recorded_and_no_pose(c
     assert all(partly_hidden(scan, rng, plain).points is scan for _ in range(50))
     torch.manual_seed(0)
     network = ShapePoseNet(recipe.network)
-    found = SelfTaught(network, recipe.loss, complete=True, distances=rules.loss)(batch, 0.0)
+    found = SelfTaught(network, complete=True, distances=rules.loss)(batch)
     shapes = network.canonical(network.encode(batch.scans))
     torch.testing.assert_close(found.loss, chamfer(shapes, batch.shapes).mean())
     found.loss.backward()

@@ -15,7 +15,7 @@ from tests.training.worker import SMALLEST
 
 from wildshape.training.batches.resident import ResidentViews
 from wildshape.training.config import learning_rate
-from wildshape.training.objectives import Objective, WeaklySupervised, template_weight
+from wildshape.training.objectives import Objective, WeaklySupervised
 from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.step import average_one_by_one, average_together
 
@@ -84,8 +84,7 @@ def test_equal_batches_give_equal_losses(car_store, recipe):
     network = copy.deepcopy(step.state.network)
     found = take(step, recipe, 1)
     batch = batch_of(step, 0)
-    weight = template_weight(0, recipe.optim.steps, recipe.loss)
-    expected = WeaklySupervised(network, recipe.loss)(batch, weight).loss
+    expected = WeaklySupervised(network, recipe.loss)(batch).loss
     torch.testing.assert_close(found[0], expected.detach(), rtol=1e-5, atol=0)
 
 
@@ -98,7 +97,7 @@ def test_a_hundred_steps_are_the_plain_ones(car_store):
     expected = []
     for number in range(100):
         batch = batch_of(step, number)
-        loss = plain_loss(plain, batch, recipe.loss, template_weight(number, 100, recipe.loss))
+        loss = plain_loss(plain, batch, recipe.loss)
         adam.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(plain.parameters(), recipe.optim.clip)
@@ -152,7 +151,5 @@ def test_the_dials_hold_the_schedule(car_store):
     for number in (0, 3, 40):
         dials.turn(number, recipe)
         assert float(dials.rate) == pytest.approx(learning_rate(number, recipe.optim))
-        weight = template_weight(number, recipe.optim.steps, recipe.loss)
-        assert float(dials.template) == pytest.approx(weight)
         assert float(dials.fresh) == pytest.approx(1 - min(0.99, (1 + number) / (10 + number)))
         assert math.isclose(int(dials.step), number)

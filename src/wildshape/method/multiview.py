@@ -26,9 +26,6 @@ class LossConfig:
         beta: weight of the projection term.
         projection: how the sensor's image is binned; if it is `flat`, both terms are of points in
             the image (the paper's losses on 2D projections).
-        template: weight of the pull of every canonical shape to the batch's mean shape, at the
-            first step (beyond the paper; see docs/accuracy.md); 0 is no template at all.
-        template_end: the same at the last step; geometric in between.
         belief: weight of the cross-entropy that teaches the selector the winner; also the metres
             of cost that a nat of belief is worth when a branch is chosen.
         time_ordered: an object does not turn around within a window of neighbouring scans: a branch
@@ -42,8 +39,6 @@ class LossConfig:
 
     beta: float = 0.05
     projection: Projection = field(default_factory=PolarBins)
-    template: float = 0.0
-    template_end: float = 0.0
     belief: float = 0.0
     time_ordered: bool = False
     agree_at: tuple[float, ...] = ()

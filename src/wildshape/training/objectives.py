@@ -32,7 +32,7 @@ class Objective(NamedTuple):
 
 
 class WeaklySupervised(nn.Module):
-    """The paper's objective (eq. 5), with the pull to a shared template where asked."""
+    """The paper's objective (eq. 5), with what holds headings together where asked."""
 
     def __init__(
         self, network: ShapePoseNet, config: LossConfig, encoding: Encoding | None = None
@@ -42,8 +42,8 @@ class WeaklySupervised(nn.Module):
         self.encoding: Encoding | None = encoding
         self._held = config.time_ordered or bool(config.agree_at)
 
-    def forward(self, batch: Batch, template: float | Tensor) -> Objective:
-        """Loss of one batch; `template` is this step's weight of the template pull."""
+    def forward(self, batch: Batch) -> Objective:
+        """Loss of one batch."""
         code = self.network.encode(batch.scans, self.encoding)
         with record_function("wildshape: heads"):
             poses = self.network.poses(code)
@@ -57,18 +57,11 @@ class WeaklySupervised(nn.Module):
             self.config,
             partial(self._handicap, batch, poses) if self._held else None,
         )
-        deviation = template_deviation(shapes)
         loss = terms.total
-        if self.config.template > 0:
-            loss = loss + template * deviation
         if self.config.belief > 0:
             belief = poses.log_belief.gather(1, terms.winner[:, None]).mean()
             loss = loss - self.config.belief * belief
-        logged = {
-            "observation": terms.observation,
-            "projection": terms.projection,
-            "template": deviation.detach(),
-        }
+        logged = {"observation": terms.observation, "projection": terms.projection}
         return Objective(loss, logged, terms.winner)
 
     def _handicap(
@@ -121,23 +114,3 @@ def turning_handicap(
     relative = anchor[:, None].mT @ recorded
     cosine = (relative.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2
     return torch.where(cosine > 0, 0.0, PROHIBITIVE_M * (1 - cosine))
-
-
-def template_deviation(shapes: Float[Tensor, "I P 3"]) -> Float[Tensor, ""]:
-    """Mean distance, metres, of canonical points from the batch's mean of the same points.
-
-    Beyond the paper. Without a shared template each object may settle in either of two headings a
-    half turn apart (METHOD 12.2): a decoder free to draw every object alone has no reason to prefer
-    one. A shape that must stay near the mean of all shapes pays for being turned. The decoder's
-    j-th outputs correspond across shapes, so no search is needed.
-    """
-    deviation = shapes - shapes.mean(0, keepdim=True)
-    return deviation.square().sum(-1).clamp_min(1e-12).sqrt().mean()
-
-
-def template_weight(step: int, steps: int, config: LossConfig) -> float:
-    """Weight of the template pull: geometric from `template` to `template_end`."""
-    if config.template <= 0 or config.template_end <= 0:
-        return config.template
-    share = min(1.0, step / max(1, steps - 1))
-    return config.template * (config.template_end / config.template) ** share

@@ -42,8 +42,8 @@ def paper_views() -> Recipe:
 def small() -> Recipe:
     """Learns on two CPU cores in minutes: half the widths and points, and what we add.
 
-    Beyond the paper: scans turned towards their object, mirror symmetry, a shared template, bins
-    that face the object, a higher learning rate that falls along a cosine, averaged weights.
+    Beyond the paper: scans turned towards their object, mirror symmetry, bins that face
+    the object, a higher learning rate that falls along a cosine, averaged weights.
     """
     return Recipe(
         name="small",
@@ -61,8 +61,6 @@ def small() -> Recipe:
         loss=LossConfig(
             beta=0.25,
             projection=FacingBins(0.4),
-            template=1.0,
-            template_end=0.02,
             belief=0.05,
             time_ordered=True,
             agree_at=(0.15, 0.4),
@@ -108,7 +106,7 @@ def default() -> Recipe:
         base,
         name="default",
         network=replace(base.network, points=4096),
-        loss=replace(base.loss, projection=FacingBins(0.3), template=1.0, agree_at=(0.07, 0.3)),
+        loss=replace(base.loss, projection=FacingBins(0.3), agree_at=(0.07, 0.3)),
         views=replace(base.views, roll=0.4),
         optim=replace(base.optim, steps=30_000, average=0.999, search="bf16"),
         validate_every=1000,

@@ -258,13 +258,13 @@ def _views(
 def step_of(run: Run, meter: Meter) -> tuple[Step, Callable[[], None]]:
     """The run's step, and how its device's part is called: as it is, or recorded and replayed."""
     encoding = _encoding(run)
-    network, loss = run.state.network, run.recipe.loss
+    network = run.state.network
     if run.targets is None:
-        objective = WeaklySupervised(network, loss, encoding)
+        objective = WeaklySupervised(network, run.recipe.loss, encoding)
     else:
         unit = unit_of(run.sampler.extent_range()[1])
         rules = run.recipe.self_training.loss
-        objective = SelfTaught(network, loss, run.targets.complete, encoding, unit, rules)
+        objective = SelfTaught(network, run.targets.complete, encoding, unit, rules)
     wrapped = run.processes.wrap(objective)
     step = Step(run.state, wrapped, run.views, meter, run.recipe.optim.clip)
     return step, Captured(step.advance, run.say) if _records(run) else step.advance

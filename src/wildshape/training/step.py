@@ -17,7 +17,7 @@ from torch.profiler import record_function
 from wildshape.training.batches.host import HostViews
 from wildshape.training.batches.resident import ResidentViews
 from wildshape.training.config import Recipe, learning_rate
-from wildshape.training.objectives import Objective, template_weight
+from wildshape.training.objectives import Objective
 from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.state import TrainState
 
@@ -31,13 +31,11 @@ class Dials:
     Attributes:
         step: number of the step.
         rate: learning rate, the very tensor that the optimiser reads.
-        template: weight of the template pull.
         fresh: share of the new weights in their running mean.
     """
 
     step: Tensor
     rate: Tensor
-    template: Tensor
     fresh: Tensor
 
     @classmethod
@@ -45,7 +43,7 @@ class Dials:
         """Dials where the optimiser's learning rate lies."""
         rate = optimiser.param_groups[0]["lr"]
         step = torch.zeros((), dtype=torch.int64, device=rate.device)
-        return cls(step, rate, torch.zeros_like(rate), torch.zeros_like(rate))
+        return cls(step, rate, torch.zeros_like(rate))
 
     def turn(self, step: int, recipe: Recipe) -> None:
         """Set them for a step; the host does not wait."""
@@ -53,7 +51,6 @@ class Dials:
         keep = min(optim.average, (1 + step) / (10 + step))  # the mean is young at first
         self.step.fill_(step)
         self.rate.fill_(learning_rate(step, optim))
-        self.template.fill_(template_weight(step, optim.steps, recipe.loss))
         self.fresh.fill_(1 - keep)
 
 
@@ -62,7 +59,7 @@ class Step:
 
     Args:
         state: is moved on, but for its count of steps.
-        objective: of a batch and the weight of the template pull.
+        objective: of a batch.
         views: give the batches.
         meter: takes the figures.
         clip: largest norm of the gradient; 0 is none.
@@ -86,7 +83,7 @@ class Step:
         with record_function("wildshape: sampling"):
             batch = self.views.batch(self.dials.step)
         with record_function("wildshape: forward"):
-            result: Objective = self.objective(batch, self.dials.template)
+            result: Objective = self.objective(batch)
         self.views.ahead()  # what follows leaves a core free
         with record_function("wildshape: backward"):
             self.state.optimiser.zero_grad(set_to_none=True)

@@ -191,8 +191,7 @@ def test_metrics_and_log_become_table_and_curves(tmp_path: Path) -> None:
     (tmp_path / "evaluation").mkdir()
     (tmp_path / "evaluation" / "metrics.json").write_text(json.dumps(metrics), encoding="utf-8")
     lines = [
-        {"step": i, "loss": 1 / i, "observation": 0.1, "template": 0.0, "branch_shares": [0.5, 0.5]}
-        for i in (1, 2)
+        {"step": i, "loss": 1 / i, "observation": 0.1, "branch_shares": [0.5, 0.5]} for i in (1, 2)
     ]
     lines.append({"step": 2, "validation/cycle_deg": 4.0})
     (tmp_path / "run").mkdir()

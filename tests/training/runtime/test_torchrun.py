@@ -14,7 +14,7 @@ from tests.training.worker import FEW_STEPS, SEED
 
 from wildshape.training.config import learning_rate
 from wildshape.training.loop import setup
-from wildshape.training.objectives import WeaklySupervised, template_weight
+from wildshape.training.objectives import WeaklySupervised
 
 ROOT = Path(__file__).parents[3]
 
@@ -43,10 +43,9 @@ def one_process(store, folder, ranks):
     optim = FEW_STEPS.optim
     for step in range(optim.steps):
         run.state.optimiser.zero_grad()
-        weight = template_weight(step, optim.steps, FEW_STEPS.loss)
         for rank in ranks:
             batch = run.sampler.draw(SEED, step, rank)
-            (objective(batch, weight).loss / len(ranks)).backward()
+            (objective(batch).loss / len(ranks)).backward()
         torch.nn.utils.clip_grad_norm_(run.state.network.parameters(), optim.clip)
         for group in run.state.optimiser.param_groups:
             group["lr"] = learning_rate(step, optim)

@@ -12,13 +12,12 @@ from torch.profiler import record_function
 
 from wildshape.geometry.projection.field_of_view import within_view
 from wildshape.geometry.projection.visibility import FacingBins, facing_bins
-from wildshape.method.multiview import LossConfig
 from wildshape.method.network import Encoding, ShapePoseNet
 from wildshape.method.observation import masked_mean
 from wildshape.ops.nearest import nearest_both, nearest_distance
 from wildshape.ops.zbuffer import visible
 from wildshape.training.batches.fused import FusedBatch
-from wildshape.training.objectives import Objective, template_deviation
+from wildshape.training.objectives import Objective
 
 _SMALLEST = 1e-12
 _SIDES = torch.tensor([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
@@ -51,7 +50,6 @@ class SelfTaught(nn.Module):
 
     Args:
         network: is taught.
-        config: `template_end` is the weight of the template, where there is one.
         complete: the target shapes are whole; else only what the sensors saw is taught.
         encoding: how the network encodes (see there).
         unit: metres of the unit in which losses are taken (`unit_of`).
@@ -61,19 +59,18 @@ class SelfTaught(nn.Module):
     def __init__(
         self,
         network: ShapePoseNet,
-        config: LossConfig,
         complete: bool,
         encoding: Encoding | None = None,
         unit: float = 1.0,
         distances: TaughtLossConfig = _DEFAULT,
     ) -> None:
         super().__init__()
-        self.network, self.config = network, config
+        self.network = network
         self.complete, self.unit, self.distances = complete, unit, distances
         self.encoding: Encoding | None = encoding
 
-    def forward(self, batch: FusedBatch, template: float | Tensor) -> Objective:  # noqa: ARG002
-        """Loss of one batch; the weight of the template does not change from step to step."""
+    def forward(self, batch: FusedBatch) -> Objective:
+        """Loss of one batch."""
         code = self.network.encode(batch.scans, self.encoding, batch.rays)
         with record_function("wildshape: heads"):
             poses, shapes = self.network.poses(code), self.network.canonical(code) / self.unit
@@ -92,20 +89,12 @@ class SelfTaught(nn.Module):
             shape = shape_terms(*one_side(shapes, batch.shapes, known), self.distances)
         else:
             shape = shape_terms(shapes, batch.shapes, known, self.distances)
-        deviation = template_deviation(shapes)
         precision, coverage, distance = (
             part.mean() for part in (shape.precision, shape.coverage, pose.distance)
         )
         rules = self.distances
         loss = rules.pose * distance + precision + coverage - rules.belief * belief
-        if self.config.template > 0:
-            loss = loss + self.config.template_end * deviation
-        lengths = {
-            "pose": distance,
-            "coverage": coverage,
-            "precision": precision,
-            "template": deviation,
-        }
+        lengths = {"pose": distance, "coverage": coverage, "precision": precision}
         metres = {name: self.unit * part.detach() for name, part in lengths.items()}
         return Objective(loss, metres, pose.winner)
 
