@@ -3,8 +3,8 @@
 """The plain twin of a training step: what one writes first, to measure against and to check with.
 
 Conv1d and Linear modules, the pooled feature copied to each point, `torch.cdist` and `argmin` for
-every branch, a z-buffer by scatter, and autograd through all of it. The bins of the image, the
-handicap of turning branches is plain torch already and is shared.
+every branch, a z-buffer by scatter, and autograd through all of it. The bins of the image and the
+handicap of turning branches are plain torch already and are shared.
 """
 
 from collections.abc import Iterator

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What we add to the paper, taken away again, each alone: does it pay?"""
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from experiments.tables.ablations import Part, changed
 from experiments.tables.given import Given
@@ -18,19 +17,19 @@ _TURNS: tuple[Rotate, ...] = ("none", "yaw")
 
 
 class Removal(NamedTuple):
-    """A part of the method, and how a row does without it."""
+    """A part of the method, and the values in one part of a recipe that leave it out."""
 
     name: str
-    of: Callable[[Trained], Trained]
+    part: Part
+    values: dict[str, Any]
 
 
 REMOVED = (
-    Removal("selector", lambda row: _less(row, "network", selector=False)),
-    Removal("agreed headings", lambda row: _less(row, "loss", time_ordered=False, agree_at=())),
-    Removal("mirror", lambda row: _less(row, "network", mirror=False)),
-    Removal("facing", lambda row: _less(row, "views", turn="yaw", roll=0.0)),
+    Removal("selector", "network", {"selector": False}),
+    Removal("agreed headings", "loss", {"time_ordered": False, "agree_at": ()}),
+    Removal("mirror", "network", {"mirror": False}),
+    Removal("facing", "views", {"turn": "yaw", "roll": 0.0}),
 )
-"""The network's parts, those first that are suspected not to pay."""
 
 
 def table(given: Given) -> Table:
@@ -55,8 +54,8 @@ def _drives(given: Given) -> Block:
         replace(taught, name="taught, all scans of the track", answer="track"),
     ]
     for removal in REMOVED:
-        less = removal.of(first)
-        rows.append(_without(replace(less, teacher=less), "taught", removal))
+        less = _without(first, "taught", removal)
+        rows.append(replace(less, teacher=less))
     rows.append(replace(first, name="taught twice", teacher=taught))
     return Block("Simulated drives, ours", given.drives("test"), tuple(rows), (), _TURNS)
 
@@ -67,15 +66,10 @@ def _occluded(given: Given) -> Block:
     taught = replace(first, teacher=first)
     rows = (
         replace(taught, name="taught, scans alone"),
-        replace(_less(taught, "network", rays=RayConfig()), name="taught, with rays"),
+        changed(taught, "taught, with rays", "network", rays=RayConfig()),
     )
     return Block("Simulated drives with occluders, ours", given.occluded("test"), rows)
 
 
 def _without(row: Trained, form: str, removal: Removal) -> Trained:
-    return replace(removal.of(row), name=f"{form}, w/o {removal.name}")
-
-
-def _less(row: Trained, part: Part, **values: object) -> Trained:
-    """The row with another value in one part of its recipe, under the same name."""
-    return changed(row, row.name, part, **values)
+    return changed(row, f"{form}, w/o {removal.name}", removal.part, **removal.values)
