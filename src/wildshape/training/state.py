@@ -113,6 +113,6 @@ def _check_identity(path: Path, found: dict[str, str], expected: dict[str, str])
     different = [k for k in expected if found.get(k, "") != expected[k]]
     if different:
         raise BadInputError(
-            f"{path}: was written by a run with another {' and '.join(different)};"
+            f"{path}: was written by a run with other {' and '.join(different)};"
             " resume with the same settings, data and seed, or choose a new --out."
         )
