@@ -24,7 +24,7 @@ def wildshape_command(*arguments: object) -> str:
     program = shutil.which("wildshape", path=sysconfig.get_path("scripts"))
     assert program, "the command is not installed"
     words = [program, *map(str, arguments)]
-    run = subprocess.run(words, check=True, capture_output=True, text=True)
+    run = subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True)
     return run.stdout
 
 

@@ -36,6 +36,20 @@ with team(2) as two:
     print(list(two.in_order(OfTheScript(), [1])))
 """
 
+SHORT_SCRIPT = """
+import torch
+from wildshape.parallel import processes
+from wildshape.parallel.team import team
+processes._WORTH_S = 0.0
+
+class Long(list):
+    def __call__(self, number):
+        return number
+
+with team(2) as two:
+    print(list(two.in_order(Long(torch.ones(20000)), [1])))
+"""
+
 
 @pytest.fixture(autouse=True)
 def _helpers_at_once(monkeypatch):
@@ -177,6 +191,14 @@ def test_a_script_without_a_guard_runs_once_and_its_own_tasks_are_done_here(tmp_
     script.write_text(PLAIN_SCRIPT)
     run = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
     assert run.stdout == "begun\n[-1]\n", run.stderr
+
+
+def test_a_script_may_end_while_its_task_is_written_for_a_helper(tmp_path):
+    """A thread that Python ends inside of torch ends the process: "terminate called"."""
+    script = tmp_path / "script.py"
+    script.write_text(SHORT_SCRIPT)
+    run = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "[1]\n", "")
 
 
 def test_the_cores_of_this_process_are_used():

@@ -30,6 +30,7 @@ class Processes:
     def __init__(self, size: int) -> None:
         self.size = size
         self._assistants = [_Assistant() for _ in range(size - 1)]
+        self._open: list[Handout[Any, Any]] = []
 
     @property
     def worked(self) -> int:
@@ -55,13 +56,16 @@ class Processes:
         return self._spread(task, Handout(items))
 
     def close(self) -> None:
-        """End the helpers, whatever they are doing."""
+        """End the helpers, whatever they are doing; nothing more is handed out."""
+        for handout in self._open:
+            handout.end()
         for one in self._assistants:
             one.close()
 
     def _spread(
         self, task: Callable[[Item], Result], handout: Handout[Item, Result]
     ) -> Iterator[Result]:
+        self._open.append(handout)
         for one in self._assistants:
             one.assist(task, handout)
         threads = _Threads()
@@ -73,11 +77,14 @@ class Processes:
                 handout.do_one(task)
         finally:
             handout.end()
+            self._open.remove(handout)
             threads.restore()
 
 
 class _Assistant:
     """A thread that gives items to a helper.
+
+    Python waits for it at its end: a thread that is cut off inside of torch aborts the process.
 
     Attributes:
         ready: the helper is at work, or waits for it.
@@ -90,7 +97,7 @@ class _Assistant:
         self._jobs: SimpleQueue[tuple[Callable[[Any], Any], Handout[Any, Any]] | None] = (
             SimpleQueue()
         )
-        self._thread = Thread(target=self._run, daemon=True)
+        self._thread = Thread(target=self._run)
 
     def assist(self, task: Callable[[Any], Any], handout: Handout[Any, Any]) -> None:
         """Help with this, once the work before is done."""

@@ -68,8 +68,8 @@ class Page:
         with self.lock:
             self.turn += 1
             turn = self.turn
-        worker = threading.Thread(target=self._work, args=(number, turn), daemon=True)
-        worker.start()
+        # No daemon: cut off inside of torch at the end of Python, it would abort the process.
+        threading.Thread(target=self._work, args=(number, turn)).start()
 
     def close(self) -> None:
         """Whatever is being made is no longer sent."""
