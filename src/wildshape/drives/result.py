@@ -10,7 +10,7 @@ from typing import Any
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.detections import DetectionFile
-from wildshape.drives.writing.outputs import (
+from wildshape.drives.writing.folder import (
     BOXES,
     FRAMES,
     MCAP,

@@ -46,10 +46,8 @@ from wildshape.drives.tracking.sightings import Sightings, read_sightings, write
 from wildshape.drives.tracking.tracks import linked_clusters
 from wildshape.drives.tracking.trajectory import Breaks, find_trajectory, jumps
 from wildshape.drives.writing.files import DriveFiles
+from wildshape.drives.writing.folder import BOXES, FRAMES, TRAJECTORY
 from wildshape.drives.writing.outputs import (
-    BOXES,
-    FRAMES,
-    TRAJECTORY,
     RayWriter,
     Vehicle,
     write_frames,

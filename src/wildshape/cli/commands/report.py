@@ -50,7 +50,7 @@ def run(settings: Settings) -> None:
         BadInputError: nothing there to report, or the page exists.
     """
     from wildshape.cli.terminal import answer
-    from wildshape.drives.writing.finished import is_drive
+    from wildshape.drives.writing.folder import is_drive
     from wildshape.io.output import refuse_file
     from wildshape.report.drive.page import report_from_drive
     from wildshape.report.page.folder import report_from_folder

@@ -105,13 +105,16 @@ def _page(
     settings: Settings,
 ) -> "tuple[AbstractContextManager[Page] | AbstractContextManager[DrivePage], int]":
     """What to serve, and how many tracks or vehicles that are."""
-    from wildshape.drives.writing.finished import is_drive, read_finished
-    from wildshape.report.viewer.drive_page import serving_drive
-    from wildshape.report.viewer.page import serving
+    from wildshape.drives.writing.folder import is_drive
 
     if is_drive(settings.input):
+        from wildshape.drives.writing.finished import read_finished
+        from wildshape.report.viewer.drive_page import serving_drive
+
         found = read_finished(settings.input)
         return serving_drive(found, settings.port, settings.allow_host), len(found.vehicles)
+    from wildshape.report.viewer.page import serving
+
     source = source_of(settings)
     return serving(source, settings.port, settings.allow_host), len(source.labels)
 
@@ -136,7 +139,7 @@ def source_of(settings: Settings) -> "Source":
 def _scans(settings: Settings, path: Path) -> "Source":
     from wildshape.io.inputs import open_tracks
     from wildshape.records import as_text
-    from wildshape.report.viewer.sources import from_model
+    from wildshape.report.viewer.completing import from_model
 
     source = open_tracks(path, settings.files.coordinates)
     title = as_text(path.resolve().name)
@@ -151,7 +154,8 @@ def _evaluated(settings: Settings) -> "Source":
     from wildshape.io.scans.points import SENSOR_METRES
     from wildshape.records import as_text
     from wildshape.report.results import METRICS, SCORES, coordinates_of, read_object
-    from wildshape.report.viewer.sources import from_model, worst_first
+    from wildshape.report.viewer.completing import from_model
+    from wildshape.report.viewer.sources import worst_first
 
     said = read_object(settings.input / METRICS)
     asked = (said.get("provenance") or {}).get("settings") or {}

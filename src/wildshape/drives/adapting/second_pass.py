@@ -11,7 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from wildshape.drives.result import REPORT, DriveResult
-from wildshape.drives.writing.outputs import BOXES, MCAP, MESHES, RRD, SHAPES
+from wildshape.drives.writing.folder import BOXES, MCAP, MESHES, RRD, SHAPES
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import lock_folder, write_json, write_text
 from wildshape.io.guard import read_json

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from wildshape.drives.completing.completion import CATEGORY
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle, read_finished
-from wildshape.drives.writing.outputs import MCAP, MESHES, RRD
+from wildshape.drives.writing.folder import MCAP, MESHES, RRD
 from wildshape.drives.writing.playback.mcap import check_mcap, write_mcap
 from wildshape.drives.writing.playback.rerun import load_rerun, write_rerun
 from wildshape.geometry.meshing import closed_mesh

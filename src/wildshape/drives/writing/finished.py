@@ -22,7 +22,14 @@ from wildshape.drives.completing.placing import boxes_in_scans, level_poses
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.mounting import Mounting
-from wildshape.drives.writing.outputs import BOXES, FRAMES, SHAPES, TRAJECTORY, TUM
+from wildshape.drives.writing.folder import (
+    BOXES,
+    FRAMES,
+    SHAPES,
+    TRAJECTORY,
+    TUM,
+    is_drive,
+)
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detections import pose_of
@@ -160,24 +167,6 @@ class FinishedDrive:
         """`T_level_box` in each of a vehicle's frames."""
         for frame, box in zip(vehicle.frames, vehicle.boxes):
             yield self.T_level_sensor[frame] @ pose_of(box)
-
-
-def is_drive(out: Path) -> bool:
-    """Whether a folder holds a finished drive.
-
-    Raises:
-        BadInputError: it holds several, a folder each.
-    """
-    if _finished(out):
-        return True
-    several = sorted(folder.parent for folder in out.glob(f"*/{BOXES}") if _finished(folder.parent))
-    if several:
-        raise BadInputError(f"{out}: holds drives, a folder each; name one, such as {several[0]}.")
-    return False
-
-
-def _finished(out: Path) -> bool:
-    return all((out / name).is_file() for name in (BOXES, FRAMES, MARKER))
 
 
 def read_finished(out: Path | str) -> FinishedDrive:

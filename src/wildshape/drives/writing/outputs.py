@@ -19,6 +19,7 @@ from wildshape.drives.completing.turns import Turns
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.rays import RayCutter
 from wildshape.drives.tracking.sightings import Sightings
+from wildshape.drives.writing.folder import BOXES, SHAPES, TRACKS, TRAJECTORY, TUM
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import COMPLETED, OBJECTS
 from wildshape.io.atomic import write_text
@@ -30,10 +31,6 @@ from wildshape.io.rays import rays_bytes
 from wildshape.io.scans.points import read_points, write_ply
 from wildshape.io.tracks import file_names, write_track
 from wildshape.records import Box
-
-TRAJECTORY, TUM, FRAMES, BOXES = "trajectory.txt", "trajectory.tum", "frames.csv", "boxes.csv"
-SHAPES, MESHES, MCAP, RRD = "shapes", "meshes", "drive.mcap", "drive.rrd"
-TRACKS = "tracks"
 
 
 @dataclass(frozen=True)

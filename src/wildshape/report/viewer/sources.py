@@ -1,19 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the viewer shows and where it comes from: results on disk, or scans and a model."""
+"""What the viewer shows, and results on disk as its source; those of a model: `completing.py`."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from wildshape.datasets.tracks.truth import shape_partial
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.folders.complete_folder import describe
-from wildshape.records import Box, Completion, Points, Sensor, Track, as_text
+from wildshape.records import Box, Points, Track, as_text
 from wildshape.report.results import (
     OBJECTS,
     Inputs,
@@ -76,15 +74,6 @@ def true_shape(track: Track) -> Points | None:
     return shape_partial(track)
 
 
-@runtime_checkable
-class Completes(Protocol):
-    """What is asked of a model."""
-
-    def complete_many(self, scans: Sequence[object], sensor: Sensor | None) -> Iterator[Completion]:
-        """Each scan completed on its own, in order."""
-        ...
-
-
 def from_results(folder: Path, inputs: Path | None = None) -> Source:
     """What `complete` or `register` left in a folder, or in one track's folder.
 
@@ -116,32 +105,6 @@ def from_results(folder: Path, inputs: Path | None = None) -> Source:
     )
 
 
-def from_model(
-    title: str,
-    labels: Sequence[str],
-    track: Callable[[int], Track],
-    model: Callable[[], Completes],
-    note: str = "",
-) -> Source:
-    """Scans, and a model that completes them when they are shown.
-
-    Args:
-        title: where the scans come from.
-        labels: names of the tracks.
-        track: reads one.
-        model: gives the model; called once, when the first scan is to be completed.
-        note: a sentence to show beside them.
-    """
-    loaded: list[Completes] = []
-
-    def make(_: int, shown: Track, first: int) -> Iterator[tuple[int, CompletedScan]]:
-        if not loaded:
-            loaded.append(model())
-        yield from _complete(loaded[0], shown, first)
-
-    return Source(title, tuple(labels), track, make, note)
-
-
 def worst_first(scores: Path, method: str) -> list[tuple[str, float]]:
     """Tracks and their mean CD of one method's row in scores.json, the worst first.
 
@@ -150,28 +113,6 @@ def worst_first(scores: Path, method: str) -> list[tuple[str, float]]:
     """
     cds = errors_of_scores(scores, method)["cd"]
     return sorted(((t, float(np.mean(v))) for t, v in cds.items()), key=lambda pair: -pair[1])
-
-
-def _complete(model: Completes, track: Track, first: int) -> Iterator[tuple[int, CompletedScan]]:
-    """The scan that is looked at, then all others."""
-    order = [first, *(i for i in range(len(track.scans)) if i != first)]
-    for part in (order[:1], order[1:]):
-        done = model.complete_many([track.scans[i] for i in part], track.sensor)
-        for number, completion in zip(part, done):
-            yield number, _completed(completion)
-
-
-def _completed(done: Completion) -> CompletedScan:
-    said = describe("", done)
-    return CompletedScan(
-        points=done.points,
-        box=done.box,
-        pose=done.pose,
-        confidence=done.confidence,
-        warning=doubt_of(said),
-        seconds=done.seconds,
-        chances=chances_of([said]),
-    )
 
 
 def _read(result: TrackResult, track: Track, first: int) -> Iterator[tuple[int, CompletedScan]]:
