@@ -147,7 +147,9 @@ def test_evaluate_models_as_seeds(wildshape, store, trained, tmp_path):
     other = tmp_path / "second.safetensors"
     other.write_bytes((trained / "model.safetensors").read_bytes())
     measure = ("evaluate", store, "--out", tmp_path / "e", "--max-scans", 2, "--as-seeds", "--json")
-    found = wildshape(*measure, "--baselines", "none", "--model", trained, other)
+    models = ("--baselines", "none", "--model", trained, other)
+    found = wildshape(*measure, *models, "--seeds", 3)
+    assert "--as-seeds: each model is measured once" in found.err
     methods = json.loads(found.out)["methods"]
     assert len(methods["wildshape"]["per_seed"]) == 2
     assert methods["wildshape"]["std"]["cd"] == 0.0

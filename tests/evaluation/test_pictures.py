@@ -10,6 +10,7 @@ from tests.evaluation.scores import completion
 from wildshape.baselines.icp import LocalIcp
 from wildshape.baselines.identity import OneScan
 from wildshape.baselines.pairs import Chained
+from wildshape.errors import BadInputError
 from wildshape.evaluation.examples import gather, pick
 from wildshape.evaluation.pictures import draw_errors, draw_examples, project, write_figures
 from wildshape.evaluation.protocol import run
@@ -34,6 +35,17 @@ def test_examples_are_picked_by_error():
 class Method(OneScan, Chained):
     def __init__(self):
         Chained.__init__(self, LocalIcp())
+
+
+class Refusing(Method):
+    def register_track(self, scans, sensor):
+        raise BadInputError("a scan lies outside of the picture.")
+
+
+def test_an_object_whose_scans_are_refused_is_drawn_without_their_fusion():
+    tracks = [drive_by(scans=3, points=100)]
+    results = run({"m": Refusing()}, tracks)
+    assert [one.fused for one in gather(tracks, results, "m", Refusing())] == 3 * [None]
 
 
 def test_examples_and_figures(tmp_path):

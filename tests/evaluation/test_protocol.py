@@ -18,7 +18,7 @@ from wildshape.evaluation.results import Limits, Skipped
 from wildshape.evaluation.summary import figures_of
 from wildshape.geometry.transforms.rotation import random_rotation
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.records import Sensor
+from wildshape.records import Sensor, SightLines
 
 LOCAL_ICP = Chained(LocalIcp())
 
@@ -188,6 +188,41 @@ def test_shapes_in_the_objects_frame_are_measured_there_however_scans_are_turned
     assert known(figures_of(results["moved"]))["cd"] > 5
     assert not results["right"].registrations
     assert {one.track for one in results["right"].skipped} == {"bare"}
+
+
+class PickyCanonical:
+    def __init__(self, shape):
+        self.shape = shape
+
+    def complete_canonical(self, scans, sensor):
+        for scan in scans:
+            if len(scan) == 30:
+                raise BadInputError("thirty points are too few.")
+            yield self.shape
+
+
+class PickySighted(OneScan):
+    """Looks at rays, and refuses by the number of points."""
+
+    def complete_sighted(self, scans, sensor, rays):
+        for scan, seen in zip(scans, rays):
+            if len(scan) == 30:
+                raise BadInputError("thirty points are too few.")
+            yield Spoken(seen.ends.astype(np.float32))
+
+
+def test_a_refused_scan_costs_no_other_its_shape_or_its_rays():
+    track = drive_by(scans=4)
+    shape = np.asarray(track.shape)
+    assert track.T_sensor_object is not None
+    scans = (track.scans[0][:30], *track.scans[1:])
+    rays = tuple(SightLines.of_returns(pose.apply_numpy(shape)) for pose in track.T_sensor_object)
+    seen = replace(track, scans=scans, rays=rays)
+    results = run({"canonical": PickyCanonical(shape), "sighted": PickySighted()}, [seen])
+    for row in results.methods:
+        assert [one.reason for one in row.skipped] == ["completion: refused by the method"]
+        assert len(row.completions) == 3
+        assert known(figures_of(row))["cd"] < 1e-5
 
 
 class Picky(OneScan):

@@ -4,6 +4,7 @@
 
 import dataclasses
 import math
+import time
 from pathlib import Path
 
 import numpy as np
@@ -82,6 +83,20 @@ def test_many_are_completed_one_by_one(predictor):
     assert len(together) == 37
     for i in (0, 1, 31, 32, 36):
         assert_same(together[i], predictor.complete(scans[i]))
+
+
+def test_a_track_of_one_scan_says_what_it_took(predictor):
+    began = time.perf_counter()
+    (done,) = predictor.complete_track([scan()])
+    took = time.perf_counter() - began
+    assert 0.1 * took < done.seconds <= took
+
+
+def test_nothing_cannot_be_posed_or_fused(predictor):
+    assert predictor.complete_track([]) == []
+    for asked in (predictor.poses, predictor.register_track, predictor.fuse):
+        with pytest.raises(BadInputError, match="no scans"):
+            asked([])
 
 
 def test_repeatable(predictor):

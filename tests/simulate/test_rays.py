@@ -30,6 +30,18 @@ def test_no_ray_that_came_back_passed_through_the_object() -> None:
         assert true < 0.03 < 0.1 < wrong
 
 
+def test_points_at_the_sensor_are_no_returns() -> None:
+    """Drivers write them where nothing came back."""
+    config = SimulationConfig(tracks=1, scans=1, occlusion=0.999, far_m=15.0, rays=2048)
+    (track,) = simulate_tracks(config, 7, workers=1)
+    (scan,), (rays,) = track.scans, track.rays
+    assert rays is not None
+    filled = np.vstack((scan, np.zeros((3, 3), scan.dtype)))
+    larger = scan * np.float32(1.1)
+    for said, of_scan in zip(standing(larger, filled, rays), standing(larger, scan, rays)):
+        np.testing.assert_array_equal(said, of_scan)
+
+
 def test_for_training_something_stands_behind_and_the_scans_stay_as_they_are() -> None:
     plain = SimulationConfig(tracks=6, scans=2, far_m=15.0, varied=True)
     before = list(simulate_tracks(plain, 3, workers=1))

@@ -122,6 +122,8 @@ def compare(
     identity = options.identity(data)
     output = begin(out, "evaluate", identity, FILES, overwrite=options.overwrite, progress=progress)
     pooled = options.as_seeds and len(models) > 1
+    if pooled and options.seeds > 1:
+        progress.say("--as-seeds: each model is measured once, under a seed of its own for turns")
     evaluated = (
         _pooled(models, track=options.track)
         if pooled

@@ -5,6 +5,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 
 from wildshape.evaluation.drives.overlap import UprightBox
@@ -13,13 +14,16 @@ from wildshape.evaluation.protocol import Spoken
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation, rotation_z
 from wildshape.records import Box, Points, Sensor
 
+_R_LEVEL_CAMERA = np.array(((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0)))
+"""A camera's x right, y down, z forward to a LiDAR's x forward, y left, z up."""
+
 
 @dataclass(frozen=True)
 class Rectangle:
     """A box around each scan; the scan itself is its shape.
 
     Attributes:
-        fit: the upright box around points, sensor frame.
+        fit: the upright box around points, z up.
         about: the method in a line.
     """
 
@@ -30,9 +34,11 @@ class Rectangle:
         """`points`, unchanged."""
         return points
 
-    def complete_many(self, scans: list[Points], sensor: Sensor) -> list[Spoken]:  # noqa: ARG002
-        """Each scan and the box around it."""
-        return [Spoken(scan, None, _upright(self.fit(scan))) for scan in scans]
+    def complete_many(self, scans: list[Points], sensor: Sensor) -> list[Spoken]:
+        """Each scan and the box around it; cameras are taken to be level."""
+        turn = _R_LEVEL_CAMERA if sensor.kind == "camera" else np.eye(3)
+        fits = [self.fit(scan @ turn.T.astype(scan.dtype)) for scan in scans]
+        return [Spoken(scan, None, _box(fit, turn.T)) for scan, fit in zip(scans, fits)]
 
 
 def smallest() -> Rectangle:
@@ -45,8 +51,9 @@ def fitted_l_shape() -> Rectangle:
     return Rectangle(l_shape, "the upright box whose sides lie nearest to the scan (L-shape)")
 
 
-def _upright(found: UprightBox) -> Box:
-    turn = rotation_z(torch.tensor(found.yaw, dtype=torch.float64))
+def _box(found: UprightBox, R_sensor_level: np.ndarray) -> Box:
+    back = torch.from_numpy(R_sensor_level)
+    turn = back @ rotation_z(torch.tensor(found.yaw, dtype=torch.float64))
     qw, qx, qy, qz = quaternion_from_rotation(turn).tolist()
-    size = (found.length, found.width, found.height)
-    return Box((found.x, found.y, found.z), size, (qw, qx, qy, qz))
+    x, y, z = (R_sensor_level @ (found.x, found.y, found.z)).tolist()
+    return Box((x, y, z), (found.length, found.width, found.height), (qw, qx, qy, qz))

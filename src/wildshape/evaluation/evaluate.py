@@ -60,10 +60,10 @@ def write_evaluation(
     """
     from wildshape.evaluation.pictures import write_figures
 
-    write_figures(out, runs[0], gather(source, runs[0], *drawn))
     write_scores(out, runs)
     write_table(out, runs, views=has_views(source))
     write_metrics(out, runs, provenance)
+    write_figures(out, runs[0], gather(source, runs[0], *drawn))
     return markdown(runs)
 
 

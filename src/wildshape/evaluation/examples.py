@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wildshape.errors import BadInputError
 from wildshape.evaluation.cases import Case, prepare
 from wildshape.evaluation.method import Completer, Method, Registrar
 from wildshape.evaluation.protocol import complete_scans
@@ -26,7 +27,7 @@ class Example:
         scan: `(n, 3)`, the middle scan.
         truth: `(g, 3)`.
         completed: `(m, 3)`, from the middle scan alone.
-        fused: `(f, 3)`, all scans moved by the method; None if it does not register.
+        fused: `(f, 3)`, all scans moved by the method; None if it does not register, or refuses.
         rival: `(f, 3)`, all scans moved by another method; None if none was asked for.
     """
 
@@ -103,5 +104,8 @@ def _example(
     )
 
 
-def _fused(method: Registrar, case: Case) -> Points:
-    return fuse_scans(case.scans, method.register_track(case.inputs(), case.sensor))
+def _fused(method: Registrar, case: Case) -> Points | None:
+    try:
+        return fuse_scans(case.scans, method.register_track(case.inputs(), case.sensor))
+    except BadInputError:  # the method refuses a scan of this track; its rows have counted that
+        return None

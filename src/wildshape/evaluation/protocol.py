@@ -172,8 +172,13 @@ def _score_canonical(method: CanonicalCompleter, case: Case, ledger: _Ledger) ->
     if case.truth is None:
         _skip_scans(case, ledger)
         return
-    for i, points in enumerate(method.complete_canonical(case.inputs(), case.sensor)):
-        _score_completion(Spoken(points), case, case.truth, SE3.identity(), i, ledger)
+
+    def alone(scan: Any, sensor: Sensor) -> Points:
+        return next(iter(method.complete_canonical([scan], sensor)))
+
+    for i, scan in enumerate(case.inputs()):
+        answer = _spoken(alone, scan, case)
+        _score_completion(answer, case, case.truth, SE3.identity(), i, ledger)
 
 
 class Spoken(NamedTuple):
@@ -191,11 +196,18 @@ def complete_scans(method: Completer, case: Case) -> Sequence[Answer | None]:
     if case.rays and isinstance(method, SightedCompleter):
         with suppress(BadInputError):
             return list(method.complete_sighted(case.inputs(), case.sensor, case.rays))
-    if isinstance(method, BatchCompleter):
         # One scan's refusal must not cost the others theirs: then each goes alone.
+        return [_sighted(method, case, i) for i in range(len(case.scans))]
+    if isinstance(method, BatchCompleter):
         with suppress(BadInputError):
             return list(method.complete_many(case.inputs(), case.sensor))
     return [_spoken(method.complete, scan, case) for scan in case.inputs()]
+
+
+def _sighted(method: SightedCompleter, case: Case, i: int) -> Answer | None:
+    with suppress(BadInputError):
+        return next(iter(method.complete_sighted([case.inputs()[i]], case.sensor, [case.rays[i]])))
+    return None
 
 
 def _spoken(complete: Callable[[Any, Sensor], Points], given: Any, case: Case) -> Spoken | None:

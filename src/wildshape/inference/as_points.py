@@ -12,7 +12,13 @@ from torch import Tensor
 from wildshape.errors import BadInputError
 from wildshape.geometry.box import spans
 from wildshape.io.rays import read_rays
-from wildshape.io.scans.points import LEAST_POINTS, check_near, drop_nonfinite, read_scan
+from wildshape.io.scans.points import (
+    LEAST_POINTS,
+    check_near,
+    check_one_object,
+    drop_nonfinite,
+    read_scan,
+)
 from wildshape.records import Points, SightLines
 
 _RAYS = ("directions", "ranges", "origins")
@@ -29,8 +35,8 @@ def as_points(scan: object, name: str = "scan") -> Points:
         name: for the error.
 
     Raises:
-        BadInputError: not `(n, 3)`, fewer than 16 finite points, all points equal, or farther than
-            1 km from the origin.
+        BadInputError: not `(n, 3)`, fewer than 16 finite points, all points equal, over 100 m
+            across, or farther than 1 km from the origin.
     """
     if isinstance(scan, str | Path):
         return read_scan(scan).points
@@ -52,6 +58,7 @@ def as_points(scan: object, name: str = "scan") -> Points:
         )
     if not spans(points).any():
         raise BadInputError(f"{name}: all {len(points)} points are equal; is the file damaged?")
+    check_one_object(points, name)
     return points
 
 

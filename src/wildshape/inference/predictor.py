@@ -10,6 +10,7 @@ from pathlib import Path
 
 import torch
 
+from wildshape.errors import BadInputError
 from wildshape.geometry.ground import without_skirt
 from wildshape.geometry.sampling import sorted_points
 from wildshape.geometry.transforms.se3 import SE3, stack
@@ -106,9 +107,10 @@ class Predictor:
     def compile(self) -> "Predictor":
         """The same with its network compiled by `torch.compile`, ready when this returns.
 
-        Results are equal to 1e-4 m. On a CPU it takes a minute and is worth it for large batches
-        alone (docs/performance.md). Where torch finds no compiler, a RuntimeWarning says so and
-        the network runs as it did.
+        What the network says is equal to 1e-4 m. Refinement may turn that into another choice of
+        a point, as it may among the scans of a batch: single points then move by centimetres. On a
+        CPU it takes a minute and is worth it for large batches alone (docs/performance.md). Where
+        torch finds no compiler, a RuntimeWarning says so and the network runs as it did.
         """
         other = copy(self)
         other.network = compiled(self.network, self.settings.input_points)
@@ -210,7 +212,7 @@ class Predictor:
     ) -> Iterator[Completion]:
         """One shape of a track's scans that were completed each on its own."""
         if len(scans) < 2:
-            return iter(alone)
+            return iter(list(alone))
         gathered = Gathered(self.settings)
         for cloud, done in zip(scans, alone):
             self._add(gathered, cloud, done)
@@ -242,7 +244,13 @@ class Predictor:
     def poses(
         self, scans: Sequence[object], sensor: Sensor | None = None, *, track: bool = False
     ) -> SE3:
-        """`T_sensor_canonical` of each scan; `track` as in `register_track`."""
+        """`T_sensor_canonical` of each scan; `track` as in `register_track`.
+
+        Raises:
+            BadInputError: there is no scan, or one that cannot be used.
+        """
+        if not len(scans):
+            raise BadInputError("no scans; hand in at least one.")
         done = self.complete_checked(all_as_points(scans), sensor, track=track)
         return stack([item.pose for item in done])
 

@@ -161,7 +161,8 @@ def standing(
     """
     free, hidden = np.zeros(len(points), bool), np.zeros(len(points), bool)
     for origin, rows in _by_origin(rays.returned):
-        own = SightLines.of_returns(scan - origin.astype(scan.dtype))
+        seen = scan - origin.astype(scan.dtype)
+        own = SightLines.of_returns(seen[seen.any(axis=1)])  # a point at the sensor is no return
         others = rays.returned.part(rows)
         directions = np.concatenate((own.directions, others.directions))
         ranges = np.concatenate((own.ranges, others.ranges))

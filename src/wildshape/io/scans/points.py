@@ -30,6 +30,7 @@ __all__ = [
     "ScanFile",
     "Unit",
     "check_near",
+    "check_one_object",
     "check_scan",
     "drop_nonfinite",
     "is_scan_file",
@@ -234,20 +235,13 @@ def check_scan(points: Float[np.ndarray, "n 3"], name: str) -> None:
             f"{name}: {len(points)} finite points; a scan needs at least {LEAST_POINTS}: "
             "use a denser one."
         )
-    low, high = points.min(0).astype(np.float64), points.max(0).astype(np.float64)
-    extent = float((high - low).max())
+    extent = _extent(points)
     if extent == 0.0:
         raise BadInputError(
             f"{name}: all {len(points)} points are equal; the file was written wrongly or "
             "is no scan."
         )
-    if extent > _LARGEST_EXTENT:
-        raise BadInputError(
-            f"{name}: {extent:.4g} m across, but a scan of one object is at most "
-            f"{_LARGEST_EXTENT:g} m: "
-            "coordinates in millimetres (then pass --unit mm or cm) or degrees, or a whole scene "
-            "(then cut the object out first)."
-        )
+    check_one_object(points, name)
     if extent < _SMALLEST_EXTENT:
         raise BadInputError(
             f"{name}: {extent:.4g} m across, but a scan of one object is at least "
@@ -256,6 +250,32 @@ def check_scan(points: Float[np.ndarray, "n 3"], name: str) -> None:
             "(drop --unit mm if the file is in metres)."
         )
     check_near(points, name)
+
+
+def check_one_object(points: Float[np.ndarray, "n 3"], name: str) -> None:
+    """Refuse a scene, and units that are no metres.
+
+    Args:
+        points: `(n, 3)`, finite, metres.
+        name: the file, for the error.
+
+    Raises:
+        BadInputError: they are over 100 m across.
+    """
+    extent = _extent(points)
+    if extent > _LARGEST_EXTENT:
+        raise BadInputError(
+            f"{name}: {extent:.4g} m across, but a scan of one object is at most "
+            f"{_LARGEST_EXTENT:g} m: "
+            "coordinates in millimetres (then pass --unit mm or cm) or degrees, or a whole scene "
+            "(then cut the object out first)."
+        )
+
+
+def _extent(points: Float[np.ndarray, "n 3"]) -> float:
+    """The longest side of the bounding box, metres."""
+    low, high = points.min(0).astype(np.float64), points.max(0).astype(np.float64)
+    return float((high - low).max())
 
 
 def check_near(points: Float[np.ndarray, "n 3"], name: str) -> None:
