@@ -276,6 +276,8 @@ def test_a_refused_command_leaves_nothing_behind(wildshape, refused, dataset, tm
         ("train", "DATASET", "--preset", "tiny", "--start", "shipped"),  # packed before
         ("train", "DATASET", "--preset", "dpc-small"),  # for a camera's
         ("demo", "--data", "nothere"),
+        ("demo", "--seconds", "nan"),
+        ("demo", "--drive-scans", "-1"),
     ],
 )
 def test_refused_for_a_name_or_weights_it_leaves_nothing_either(

@@ -3,6 +3,7 @@
 """Work in several processes: order, errors, and helpers that are killed."""
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -48,6 +49,20 @@ class Long(list):
 
 with team(2) as two:
     print(list(two.in_order(Long(torch.ones(20000)), [1])))
+"""
+
+LEFT_SCRIPT = """
+from itertools import count
+from wildshape.parallel import processes
+from wildshape.parallel.team import team
+processes._WORTH_S = 0.0
+
+def numbers():
+    with team(3) as three:
+        yield from three.in_order(abs, count())
+
+found = numbers()
+print(next(found))
 """
 
 
@@ -199,6 +214,21 @@ def test_a_script_may_end_while_its_task_is_written_for_a_helper(tmp_path):
     script.write_text(SHORT_SCRIPT)
     run = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
     assert (run.returncode, run.stdout, run.stderr) == (0, "[1]\n", "")
+
+
+def test_a_script_may_end_before_its_work(tmp_path):
+    """Its generator is still there when Python ends, and nothing has closed the team."""
+    script = tmp_path / "script.py"
+    script.write_text(LEFT_SCRIPT)
+    run = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "0\n", "")
+
+
+def test_a_helper_ends_where_its_parent_was_killed_in_the_middle_of_a_message():
+    helper = [sys.executable, "-c", "from wildshape.parallel.helper import serve; serve()"]
+    half = pickle.dumps(("task", bytes(1000)))[:500]
+    run = subprocess.run(helper, input=half, capture_output=True, timeout=60)
+    assert (run.returncode, run.stdout, run.stderr) == (0, b"", b"")
 
 
 def test_the_cores_of_this_process_are_used():

@@ -180,7 +180,7 @@ def _receive(source: BinaryIO, messages: "SimpleQueue[tuple[str, bytes]]") -> No
     while True:
         try:
             messages.put(pickle.load(source))
-        except EOFError:
+        except Exception:  # noqa: BLE001  the end, or half a message of a parent that was killed
             os._exit(0)
 
 

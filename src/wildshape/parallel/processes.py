@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Work spread over this process and others beside it; what a killed one held is done again."""
 
+import atexit
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
@@ -16,6 +17,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 _AHEAD = 16
+_PATIENCE_S = 10.0  # at the end of Python, for a thread that reads an item
 _WORTH_S = 1.0
 """Shorter work is done here: a helper needs as long to import what it needs."""
 
@@ -30,7 +32,6 @@ class Processes:
     def __init__(self, size: int) -> None:
         self.size = size
         self._assistants = [_Assistant() for _ in range(size - 1)]
-        self._open: list[Handout[Any, Any]] = []
 
     @property
     def worked(self) -> int:
@@ -56,16 +57,13 @@ class Processes:
         return self._spread(task, Handout(items))
 
     def close(self) -> None:
-        """End the helpers, whatever they are doing; nothing more is handed out."""
-        for handout in self._open:
-            handout.end()
+        """End the helpers, whatever they are doing."""
         for one in self._assistants:
             one.close()
 
     def _spread(
         self, task: Callable[[Item], Result], handout: Handout[Item, Result]
     ) -> Iterator[Result]:
-        self._open.append(handout)
         for one in self._assistants:
             one.assist(task, handout)
         threads = _Threads()
@@ -77,14 +75,11 @@ class Processes:
                 handout.do_one(task)
         finally:
             handout.end()
-            self._open.remove(handout)
             threads.restore()
 
 
 class _Assistant:
-    """A thread that gives items to a helper.
-
-    Python waits for it at its end: a thread that is cut off inside of torch aborts the process.
+    """A thread that gives items to a helper, until `close`, or until Python ends (`_end_all`).
 
     Attributes:
         ready: the helper is at work, or waits for it.
@@ -97,26 +92,45 @@ class _Assistant:
         self._jobs: SimpleQueue[tuple[Callable[[Any], Any], Handout[Any, Any]] | None] = (
             SimpleQueue()
         )
-        self._thread = Thread(target=self._run)
+        self._handout: Handout[Any, Any] | None = None
+        self._closed = False
+        self._thread = Thread(target=self._run, daemon=True)
 
     def assist(self, task: Callable[[Any], Any], handout: Handout[Any, Any]) -> None:
         """Help with this, once the work before is done."""
         if self._thread.ident is None:
+            _AT_WORK.add(self)
             self._thread.start()
         self._jobs.put((task, handout))
 
     def close(self) -> None:
         """End the helper, and soon this thread: it may wait for an import of the caller's."""
+        self._closed = True
         self._jobs.put(None)
+        if (handout := self._handout) is not None:
+            handout.end()
         self._helper.close()
 
+    def join(self, seconds: float) -> None:
+        """Wait so long at most for this thread to end."""
+        self._thread.join(seconds)
+
     def _run(self) -> None:
-        for task, handout in iter(self._jobs.get, None):
-            if not self.ready and handout.ends_within(_WORTH_S):
-                continue
-            with suppress(UnknownTaskError, OSError):  # then it is done without help
-                self._helper.learn(task)
-                self._serve(handout)
+        try:
+            for task, handout in iter(self._jobs.get, None):
+                self._handout = handout
+                if self._closed:
+                    break
+                self._help(task, handout)
+        finally:
+            _AT_WORK.discard(self)
+
+    def _help(self, task: Callable[[Any], Any], handout: Handout[Any, Any]) -> None:
+        if not self.ready and handout.ends_within(_WORTH_S):
+            return
+        with suppress(UnknownTaskError, OSError):  # then it is done without help
+            self._helper.learn(task)
+            self._serve(handout)
 
     def _serve(self, handout: Handout[Any, Any]) -> None:
         self.ready = True
@@ -127,6 +141,19 @@ class _Assistant:
                 self.helped = True
             except Exception as error:  # noqa: BLE001
                 handout.fail(number, error)
+
+
+_AT_WORK: set[_Assistant] = set()
+
+
+@atexit.register
+def _end_all() -> None:
+    """Python may not end before these threads: one that is cut off inside of torch aborts it."""
+    assistants = tuple(_AT_WORK)
+    for one in assistants:
+        one.close()
+    for one in assistants:
+        one.join(_PATIENCE_S)
 
 
 class _Threads:

@@ -100,6 +100,15 @@ class Inputs:
         except (BadInputError, KeyError, ValueError):
             return None
 
+    def check(self, folder: Path) -> None:
+        """Open the place that was named for the results of a folder.
+
+        Raises:
+            BadInputError: there are no scans.
+        """
+        if self.place is not None:
+            self._open(self.place, coordinates_of(_settings(folder.parent / MARKER)))
+
     def _open(self, path: Path, coordinates: Coordinates) -> TrackSource:
         if (path, coordinates) not in self.opened:
             self.opened[path, coordinates] = open_tracks(path, coordinates)

@@ -18,6 +18,7 @@ from wildshape.io.tracks import write_track
 from wildshape.records import Track
 from wildshape.report.page.folder import report_from_folder
 from wildshape.report.page.html import render
+from wildshape.report.viewer.sources import from_results
 
 NAMES = ("000000", "000001", "000002")
 
@@ -222,6 +223,28 @@ def test_folder_without_anything_to_report_is_refused(tmp_path: Path, content: s
         (tmp_path / "metrics.json").write_text(content, encoding="utf-8")
     with pytest.raises(BadInputError, match=tmp_path.name):
         report_from_folder(tmp_path)
+
+
+def test_scans_that_are_named_must_be_there(tmp_path: Path) -> None:
+    _completed(tmp_path / "0007", _track(), {"scans": [_entry(name) for name in NAMES]})
+    for read in (report_from_folder, from_results):
+        with pytest.raises(BadInputError, match="absent"):
+            read(tmp_path, tmp_path / "absent")
+
+
+def test_the_middle_scan_against_itself_says_nothing_of_poses(tmp_path: Path) -> None:
+    track = _track()
+    poses = track.T_sensor_object
+    assert poses is not None
+    write_track(tmp_path / "data" / "0007", track)
+    objects = {"input": str(tmp_path / "data"), "scans": [_entry(n) for n in NAMES]}
+    _completed(tmp_path / "out" / "0007", track, objects)
+    turned = SE3(
+        rotation_z(torch.deg2rad(torch.tensor((20.0, 0.0, 40.0)))).double(), 0 * poses.translation
+    )
+    write_poses(tmp_path / "out" / "0007" / "poses.txt", poses @ turned)
+    (shown,) = report_from_folder(tmp_path / "out").objects
+    assert ("median pose error", "30.0°") in shown.details
 
 
 def test_missing_folder_is_refused(tmp_path: Path) -> None:

@@ -1,10 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 from tests.report.viewer.shown import perfect, track
 
+from wildshape.geometry.transforms.rotation import rotation_z
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.registration import to_middle
 from wildshape.report.scene import upright as upright_points
 from wildshape.report.viewer.fusing import AFTER, BEFORE, TRUTH, WAYS, moves
@@ -52,3 +56,13 @@ def test_ways_to_fuse_wait_for_the_scans_and_know_their_error() -> None:
     assert before is not None
     assert before.error is not None
     assert float(before.error.translation_m.max()) > 0.01
+
+
+def test_the_middle_scan_against_itself_is_no_test() -> None:
+    pair = track(scans=2)
+    first, second = perfect(pair, 0), perfect(pair, 1)
+    assert first.pose is not None
+    half = SE3(rotation_z(torch.tensor(torch.pi, dtype=torch.float64)), torch.zeros(3).double())
+    found = moves(AFTER, pair, {0: replace(first, pose=first.pose @ half), 1: second})
+    assert found is not None
+    assert found.verdict == "180.0°, 0.00 m median; 0 % within 30°"

@@ -68,6 +68,15 @@ def test_headers_that_are_missing_or_said_twice_are_refused():
     assert not is_welcome([OWN[0]], [f"ftp://{OWN[0]}"], AT)
 
 
+@pytest.mark.parametrize("port", [-5, 65536])
+def test_a_port_is_one(port):
+    with (
+        pytest.raises(BadInputError, match=rf"--port {port}: expected 0 to 65535"),
+        page.serving(source(), port),
+    ):
+        pass
+
+
 def test_port_80_goes_without_saying():
     assert is_welcome(["localhost"], ["http://localhost"], 80)
     assert not is_welcome(["localhost"], ["https://localhost"], 80)

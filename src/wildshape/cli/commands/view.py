@@ -86,7 +86,7 @@ def run(settings: Settings) -> None:
     import webbrowser
 
     with uncollected():
-        from wildshape.cli.terminal import answer, say
+        from wildshape.cli.terminal import Terminated, answer, say
         from wildshape.report.viewer.page import run_until_interrupted
 
         page_of, tracks = _page(settings)
@@ -97,6 +97,8 @@ def run(settings: Settings) -> None:
             webbrowser.open(page.url)
         try:
             run_until_interrupted(page)
+        except Terminated:
+            raise
         except KeyboardInterrupt:
             say("closed")
 

@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The demo's tracks: simulated, or the user's own; those tested are never trained on."""
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from wildshape.errors import BadInputError
 from wildshape.io.inputs import TrackSource, open_tracks
 from wildshape.io.progress import Progress, counted
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates
@@ -41,6 +43,12 @@ class DemoOptions:
     seconds: float = 95.0
     drive_scans: int = 100
     overwrite: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0 < self.seconds < math.inf:
+            raise BadInputError(f"--seconds {self.seconds:g}: expected more than 0.")
+        if self.drive_scans < 0:
+            raise BadInputError(f"--drive-scans {self.drive_scans}: expected 0 or more.")
 
 
 @dataclass(frozen=True)

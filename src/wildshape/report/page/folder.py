@@ -61,10 +61,11 @@ def report_from_folder(folder: Path, inputs: Path | None = None) -> Report:
     Args:
         folder: the `--out` of one or several commands.
         inputs: the scans that were completed, if they have moved from where objects.json says.
-            Where they cannot be read only the completed shapes are shown.
+            Where one cannot be read only the completed shape is shown.
 
     Raises:
-        BadInputError: no such folder, nothing to report in it, or a damaged file.
+        BadInputError: no such folder, nothing to report in it, no scans at `inputs`, or a damaged
+            file.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -78,6 +79,8 @@ def report_from_folder(folder: Path, inputs: Path | None = None) -> Report:
             "evaluate or train with --out first."
         )
     where = Inputs(inputs)
+    for track in tracks[:1]:
+        where.check(track)
     ranked = worst_first(_judged(track, where) for track in tracks[:MAX_JUDGED])
     drawn = ranked[:MAX_OBJECTS]
     return Report(

@@ -5,6 +5,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from wildshape.baselines.icp import LocalIcp
 from wildshape.baselines.identity import Identity
 from wildshape.baselines.pairs import Chained
@@ -25,20 +27,22 @@ class Moves:
     Attributes:
         T_middle_scan: one a scan.
         error: one a scan; None without true poses.
+        middle: number of the middle scan.
     """
 
     T_middle_scan: SE3
     error: RegistrationError | None
+    middle: int
 
     @property
     def verdict(self) -> str:
-        """How well it does by the truth, or nothing."""
-        if self.error is None:
+        """How well it does by the truth, or nothing; the middle scan against itself is no test."""
+        if self.error is None or len(self.T_middle_scan) < 2:
             return ""
-        median = float(self.error.rotation_deg.median())
-        right = float((self.error.rotation_deg <= ACCURATE_DEG).double().mean())
-        metres = float(self.error.translation_m.median())
-        return f"{median:.1f}°, {metres:.2f} m median; {100 * right:.0f} % within 30°"
+        degrees = np.delete(self.error.rotation_deg.numpy(), self.middle)
+        metres = np.median(np.delete(self.error.translation_m.numpy(), self.middle))
+        right = 100 * np.mean(degrees <= ACCURATE_DEG)
+        return f"{np.median(degrees):.1f}°, {metres:.2f} m median; {right:.0f} % within 30°"
 
 
 def moves(way: str, track: Track, completed: Mapping[int, CompletedScan]) -> Moves | None:
@@ -50,8 +54,9 @@ def moves(way: str, track: Track, completed: Mapping[int, CompletedScan]) -> Mov
         return None
     truth = track.T_sensor_object
     if truth is None:
-        return Moves(T_middle_scan, None)
-    return Moves(T_middle_scan, registration_error(T_middle_scan, truth, truth[track.middle]))
+        return Moves(T_middle_scan, None, track.middle)
+    error = registration_error(T_middle_scan, truth, truth[track.middle])
+    return Moves(T_middle_scan, error, track.middle)
 
 
 def _moves(way: str, track: Track, completed: Mapping[int, CompletedScan]) -> SE3 | None:

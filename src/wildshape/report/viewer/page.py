@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from viser import ViserServer
 
 HOST = "127.0.0.1"
+_LAST_PORT = 65535
 _PLAY_SECONDS, _SPEAK_SECONDS, _STOP_SECONDS, _LOOK_SECONDS = 0.12, 0.5, 5.0, 0.05
 _PATIENCE_S, _DRAWN_S = 10.0, 1.0  # for a browser to open the page, and to draw it
 
@@ -54,6 +55,7 @@ class Page:
         self.stage: Stage | None = None
         self.status = ""
         self.turn = 0  # which choice of a track is the latest
+        self.workers: list[threading.Thread] = []
         self.opened = False  # by a browser
         self.panel = Panel(server, source.labels, self.refresh, self.choose)
         self.choose(0)
@@ -68,14 +70,21 @@ class Page:
         with self.lock:
             self.turn += 1
             turn = self.turn
-        # No daemon: cut off inside of torch at the end of Python, it would abort the process.
-        threading.Thread(target=self._work, args=(number, turn)).start()
+            worker = threading.Thread(target=self._work, args=(number, turn), daemon=True)
+            self.workers = [*(one for one in self.workers if one.is_alive()), worker]
+            worker.start()
 
     def close(self) -> None:
-        """Whatever is being made is no longer sent."""
+        """Whatever is being made is no longer sent.
+
+        Its threads end, too: one that Python cuts off inside of torch aborts the process.
+        """
         with self.lock:
             self.turn += 1
             self.stage = None
+            workers, self.workers = self.workers, []
+        for one in workers:
+            one.join(_STOP_SECONDS)
 
     def refresh(self) -> None:
         """Show what the panel asks for."""
@@ -192,6 +201,8 @@ def hosting(
     dark: bool = False,
 ) -> Iterator[Built]:
     """A server of this machine and the page built on it; the rest is as of `serving`."""
+    if not 0 <= port <= _LAST_PORT:
+        raise BadInputError(f"--port {port}: expected 0 to {_LAST_PORT}.")
     others = set(threading.enumerate())
     server = _server(port, checked_hosts(allowed))
     own = set(threading.enumerate()) - others

@@ -82,7 +82,7 @@ def from_results(folder: Path, inputs: Path | None = None) -> Source:
         inputs: where the scans are now, if they have moved.
 
     Raises:
-        BadInputError: nothing of the kind is there.
+        BadInputError: nothing of the kind is there, or no scans at `inputs`.
     """
     folders = [path.parent for path in find(folder, OBJECTS)]
     if not folders:
@@ -90,6 +90,7 @@ def from_results(folder: Path, inputs: Path | None = None) -> Source:
     names = [place.relative_to(folder).as_posix() for place in folders]
     labels = [as_text(folder.resolve().name if name == "." else name) for name in names]
     where, kept = Inputs(inputs), {}
+    where.check(folders[0])
 
     def result(number: int) -> TrackResult:
         if number not in kept:
