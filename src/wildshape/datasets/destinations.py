@@ -26,6 +26,7 @@ from wildshape.io.progress import SILENT, Progress
 from wildshape.io.store.join import finish_join, is_joining, join_stores
 from wildshape.io.store.layout import FORMAT, JOINING_JSON, PARTS, VERSION, WRITING_JSON
 from wildshape.io.store.writer import check_room
+from wildshape.io.tracks import place_track
 from wildshape.io.write_tracks import FILES
 
 _COMMAND = "convert"
@@ -177,7 +178,7 @@ class TrackFolders(_Folder):
             for number, name in enumerate(result.names):
                 made = place / TRACKS / f"{number:06d}"
                 if made.exists():  # not moved by an earlier run
-                    made.replace(self.path / name)
+                    place_track(made, self.path / name)
         # Finished first: a part without its result, but with its tracks moved, would be made anew.
         self._output.finish(**_told([result for _, result in done]))
         shutil.rmtree(self.path / PARTS, ignore_errors=True)

@@ -5,6 +5,9 @@
 import re
 from collections.abc import Sequence
 from itertools import pairwise
+from pathlib import Path
+
+from wildshape.errors import BadInputError
 
 _COUNTED = re.compile(r"(?P<before>|.*[^0-9.-]|.*[^0-9]-)(?P<number>[0-9]+)")  # no dates
 
@@ -24,3 +27,17 @@ def out_of_order(stems: Sequence[str]) -> int | None:
         return None
     numbers = [int(count["number"]) for count in counts if count]
     return next((i for i, (one, other) in enumerate(pairwise(numbers)) if one > other), None)
+
+
+def check_counted(files: Sequence[Path]) -> None:
+    """Refuse files, sorted by name, whose numbers go back for want of leading zeros.
+
+    Raises:
+        BadInputError: two do.
+    """
+    row = out_of_order([file.stem for file in files])
+    if row is not None:
+        raise BadInputError(
+            f"{files[row].parent}: {files[row].name} is sorted before {files[row + 1].name}, for"
+            " names are sorted as text; write their numbers with leading zeros."
+        )

@@ -25,6 +25,7 @@ from wildshape.io.atomic import lock_folder, write_json
 from wildshape.io.progress import SILENT, Progress
 
 MARKER = "wildshape.json"
+_REMOVED = "wildshape-removed.json"  # the marker of an output while it is removed
 _LONGEST_BYTES, _SHOWN = 251, 60  # of a name before `.ply`; file systems end at 255
 _LEFTOVER = ".*.part"  # as `io/atomic.py` names what it has not finished
 
@@ -107,6 +108,7 @@ def begin(
         "provenance": provenance(line or command_line()),
     }
     write_json(path / MARKER, record)
+    (path / _REMOVED).unlink(missing_ok=True)
     return Output(path, record, resumed)
 
 
@@ -205,6 +207,11 @@ def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: 
     if overwrite:
         _remove(path, record.get("files", []))
         return False
+    if not (path / MARKER).is_file():
+        raise BadInputError(
+            f"{path}: holds what is left of an output that was being replaced; pass --overwrite"
+            " again, or choose another --out."
+        )
     same = record.get("command") == command and record.get("settings") == settings
     if record.get("status") == "finished":
         other = "" if same else " with other settings"
@@ -221,8 +228,8 @@ def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: 
 
 
 def _read(path: Path) -> dict[str, Any]:
-    marker = path / MARKER
-    if not marker.is_file():
+    marker = next((path / n for n in (MARKER, _REMOVED) if (path / n).is_file()), None)
+    if marker is None:
         raise BadInputError(
             f"{path}: is not empty and was not written by this command; choose another --out."
         )
@@ -234,10 +241,15 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _remove(path: Path, patterns: Sequence[str]) -> None:
-    """Remove our files and the folders that are empty then."""
-    (path / MARKER).unlink()
+    """Remove our files and the folders that are empty then.
+
+    The marker is renamed first, so that nobody takes the output for whole, and stays under that
+    name until there is a new one, so that a removal that was stopped is repeated.
+    """
+    if (path / MARKER).is_file():
+        (path / MARKER).replace(path / _REMOVED)
     for file in [file for pattern in patterns for file in path.glob(pattern)]:
-        if file.is_file():
+        if file.is_file() and file != path / _REMOVED:
             file.unlink()
     folders = sorted((f for f in path.rglob("*") if f.is_dir()), reverse=True)
     for folder in folders:

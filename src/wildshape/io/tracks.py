@@ -46,6 +46,7 @@ __all__ = [
 Skipped = tuple[tuple[str, str], ...]
 
 _MOST_PIXELS, _MOST_METRES = 1e9, 1e3
+_INFO = "track.json"
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ def read_track_file(folder: Path | str, coordinates: Coordinates = SENSOR_METRES
     """
     folder = Path(folder)
     files = scan_files(folder / "scans")
-    info = read_info(folder / "track.json")
+    info = read_info(folder / _INFO)
     coordinates = coordinates.in_unit(info["unit"])
     kept, skipped, dropped = _read_scans(files, folder, coordinates)
     rows = [row for row, file in enumerate(files) if file in kept]
@@ -296,11 +297,31 @@ def write_track(folder: Path | str, track: Track) -> None:
     info: dict[str, Any] = {"category": track.category, "source": track.source, "unit": "m"}
     if track.label_size_m is not None:
         info["label_size_m"] = list(track.label_size_m)
-    write_json(folder / "track.json", sensor_to_json(track.sensor) | info)
+    write_json(folder / _INFO, sensor_to_json(track.sensor) | info)
     for name, rays in zip(file_names(track.scan_names), track.rays):
         if rays is not None:
             write_rays(folder / "rays" / f"{name}.npz", rays)
     _write_scans(folder, track)
+
+
+def is_placed(folder: Path) -> bool:
+    """Whether a track that `place_track` moved is whole."""
+    return (folder / _INFO).is_file()
+
+
+def place_track(made: Path, folder: Path) -> None:
+    """Move a track folder to its name; files of others that lie there already stay.
+
+    Between these a track comes file by file, track.json last; a move that was killed is repeated.
+    """
+    if not folder.exists():
+        made.replace(folder)
+        return
+    files = [file for file in made.rglob("*") if file.is_file()]
+    for file in sorted(files, key=lambda file: file.name == _INFO):
+        place = folder / file.relative_to(made)
+        place.parent.mkdir(exist_ok=True)
+        file.replace(place)
 
 
 def _write_scans(folder: Path, track: Track) -> None:

@@ -16,7 +16,7 @@ from wildshape.io.output import begin, command_line, file_name, provenance
 from wildshape.io.progress import SILENT, Progress
 from wildshape.io.store.layout import INDEX_JSON, WRITING_JSON
 from wildshape.io.store.store import StoreWriter
-from wildshape.io.tracks import write_track
+from wildshape.io.tracks import is_placed, place_track, write_track
 from wildshape.records import Track
 
 Layout = Literal["packed", "folders"]
@@ -145,9 +145,9 @@ def _folders(tracks: Iterable[Track], wanted: _Output) -> Iterator[Track]:
         return output.abandon()
     for track in chain(first, tracks):
         folder = out / file_name(track.name)
-        if not folder.exists():
+        if not is_placed(folder):
             write_track(unfinished / track.name, track)
-            (unfinished / track.name).replace(folder)
+            place_track(unfinished / track.name, folder)
         yield track
     shutil.rmtree(unfinished, ignore_errors=True)
     output.finish()

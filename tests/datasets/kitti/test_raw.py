@@ -148,6 +148,7 @@ def write_world(drive, forward):
         record = [latitude, 0, 100, 0, 0, math.pi / 2] + [0] * 24
         path = drive / "oxts" / "data" / f"{frame:010d}.txt"
         path.write_text(" ".join(f"{value:.12f}" for value in record))
+    (drive / "oxts" / "data" / "._0000000000.txt").write_text("left by macOS")
 
 
 def moving(drive, motion):

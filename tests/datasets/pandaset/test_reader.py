@@ -140,6 +140,17 @@ def test_missing_and_corrupt_files_are_named(scene, made):
     refused(scene, r"02\.pkl\.gz: no column label among uuid")
 
 
+def test_files_that_are_no_frames_are_passed_over(scene):
+    expected = [track.scan_names for track in tracks(scene)]
+    labels = scene / "annotations" / "cuboids"
+    for name in ("._00.pkl.gz", "00_backup.pkl.gz", "²2.pkl.gz"):
+        (labels / name).write_bytes(b"left by somebody")
+    assert [track.scan_names for track in tracks(scene)] == expected
+    for number in range(FRAMES):
+        (labels / f"{number:02d}.pkl.gz").unlink()
+    refused(scene, r"cuboids: holds none of 00\.pkl\.gz to 79\.pkl\.gz; get the scene's archive")
+
+
 def test_a_malicious_label_is_refused(scene, tmp_path):
     import gzip
 

@@ -70,6 +70,23 @@ def test_selection_and_counts(tmp_path):
     assert [len(t.scans) for t in tracks(tmp_path, selection=Selection(every=2)).values()] == [2, 2]
 
 
+def test_long_scenes_and_gaps_make_several_tracks_of_different_names(tmp_path):
+    write_bop(tmp_path, count=8)
+    found = {name: track.scan_names for name, track in tracks(tmp_path, longest=4).items()}
+    assert [len(found[f"{NAMES[0]}{again}"]) for again in ("", "_1")] == [4, 4]
+    truth = tmp_path / "test" / "000001" / "scene_gt.json"
+    seen = json.loads(truth.read_text())
+    truth.write_text(json.dumps(seen | {f"{i}": [] for i in range(1, 5)}))
+    found = [(track.name, track.scan_names) for track in all_tracks(Bop(tmp_path, longest=3))]
+    assert sorted(found) == [
+        (NAMES[0], ("000000",)),
+        (NAMES[1], ("000000",)),
+        (f"{NAMES[1]}_1", ("000005", "000006", "000007")),
+        (f"{NAMES[0]}_1", ("000005", "000006", "000007")),
+    ]
+    assert len(tracks(tmp_path, longest=5)) == 2
+
+
 def test_it_is_a_source_and_travels_to_workers(tmp_path):
     write_bop(tmp_path, count=1)
     source = pickle.loads(pickle.dumps(Bop(tmp_path)))

@@ -4,6 +4,7 @@
 
 import json
 import pickle
+import shutil
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ def tracks(root, **options):
 def test_points_land_back_on_the_chairs(tmp_path, apart, inside):
     """Masks together or apart; the root is the folder of sequences or the sequence itself."""
     T_camera_world = write_sequence(tmp_path / "kitchen", apart=apart)
+    (tmp_path / "kitchen" / "depth" / "._000000.png").write_bytes(b"left by macOS")
     found = tracks(tmp_path / "kitchen" if inside else tmp_path)
     assert set(found) == {"kitchen_00001", "kitchen_00002"}
     for number, T_world_object in THINGS.items():
@@ -112,6 +114,16 @@ def test_long_sequences_and_gaps_make_several_tracks(tmp_path):
     assert again["kitchen_00002_1"] == ("000005", "000006")
     assert source.rejected == {"frame: no mask": 3}
     assert len(tracks(tmp_path, gap=5)) == 2
+
+
+def test_images_that_are_counted_without_leading_zeros_are_refused(tmp_path):
+    """They were taken in the order 0, 1, 10, 11, 2, and so were the poses."""
+    write_sequence(tmp_path / "kitchen", count=1)
+    depth = tmp_path / "kitchen" / "depth"
+    image = (depth / "000000.png").rename(depth / "0.png")
+    for number in range(1, 12):
+        shutil.copy(image, depth / f"{number}.png")
+    refused(tmp_path, r"depth: 11\.png is sorted before 2\.png, .* with leading zeros\.$")
 
 
 def test_selection(tmp_path):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tests.cars import drive_by
 
-from wildshape.datasets.destinations import PackedStore
+from wildshape.datasets.destinations import PackedStore, TrackFolders
 from wildshape.datasets.tracks.conversion import STORE, TRACKS, convert_part, finished_part
 from wildshape.datasets.tracks.source import Source
 from wildshape.datasets.tracks.truth import TruthBuilder
@@ -115,6 +115,21 @@ def test_a_conversion_killed_while_it_names_its_index_leaves_nothing(tmp_path, m
     assert PackedStore(out, {}, overwrite=False).begin() == [result]
     assert len(open_store(out)) == 2
     assert not list(out.glob(".*"))
+
+
+@pytest.mark.parametrize("place", ["notes.txt", "scans/.DS_Store"])
+def test_folders_are_replaced_beside_a_file_of_somebody_else(tmp_path, place):
+    """All work was done, and then a folder was 'not empty', at every repetition."""
+    out = tmp_path / "out"
+    for tracks in (1, 2):
+        destination = TrackFolders(out, {"tracks": tracks}, overwrite=tracks == 2)
+        destination.begin()
+        result = convert_part(Made(tracks), "part", out / PARTS / "0", layout="folders")
+        destination.finish([(out / PARTS / "0", result)])
+        (out / "part0" / place).write_text("mine")
+    assert [len(read_track(out / name).scans) for name in ("part0", "part1")] == [20, 20]
+    assert (out / "part0" / place).read_text() == "mine"
+    assert not (out / PARTS).exists()
 
 
 def test_memory_does_not_grow_with_the_part(tmp_path):

@@ -3,6 +3,9 @@
 """Recordings of ROS: every scan comes back exactly; what is cut off is read up to there."""
 
 import pickle
+import shutil
+import sqlite3
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -41,6 +44,7 @@ def written(tmp_path):
 @pytest.mark.parametrize("packed", [False, True])
 def test_every_scan_comes_back_in_time(written, kind, packed):
     path = written(kind, {TOPIC: scans()}, packed=packed, extra=["/notes"])
+    (path.parent / f"._{path.name}").write_bytes(b"left by macOS")
     for source in (path, path if kind == "bag" else path.parent):
         drive = open_drive(source)
         assert (drive.name, len(drive), drive.ticks) == ("recording", 6, tuple(range(6)))
@@ -170,6 +174,48 @@ def test_a_cut_recording_is_read_up_to_there(written, kind, part):
     (told,) = drive.warnings
     assert "is cut off or damaged" in told
     assert told.endswith(f"; {len(drive)} scans could be read")
+
+
+@contextmanager
+def recorder(path, rows):
+    """A recorder in WAL mode: `rows` of what it wrote lie beside its file, which is not closed."""
+    with closing(sqlite3.connect(path)) as database:
+        database.execute("PRAGMA journal_mode=WAL")
+        last = "SELECT * FROM messages ORDER BY id DESC LIMIT ?"
+        kept = database.execute(last, (rows,)).fetchall()
+        database.executemany("DELETE FROM messages WHERE id = ?", [row[:1] for row in kept])
+        database.commit()
+        database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        places = ", ".join("?" * len(kept[0]))
+        database.executemany(f"INSERT INTO messages VALUES ({places})", kept)
+        database.commit()
+        yield
+
+
+def test_messages_in_a_log_beside_the_file_are_said_to_be_there(written, tmp_path):
+    path = written("db3", {TOPIC: scans()})
+    with recorder(path, rows=2):
+        crashed = shutil.copytree(path.parent, tmp_path / "crashed")
+    before = {file.name: file.read_bytes() for file in crashed.iterdir()}
+    drive = open_drive(crashed)
+    assert len(drive) == 4
+    (told,) = drive.warnings
+    assert "sqlite3 recording.db3 'PRAGMA wal_checkpoint(TRUNCATE)' moves them" in told
+    assert told.endswith("; 4 scans could be read")
+    assert {file.name: file.read_bytes() for file in crashed.iterdir()} == before
+    with closing(sqlite3.connect(crashed / path.name)) as database:
+        database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    drive = open_drive(crashed)
+    assert (len(drive), drive.warnings) == (6, ())
+
+
+def test_where_all_messages_are_beside_the_file_that_is_an_error(written, tmp_path):
+    path = written("db3", {TOPIC: scans()})
+    with recorder(path, rows=6):
+        shutil.copytree(path.parent, tmp_path / "crashed")
+    refused(open_drive, tmp_path / "crashed", match=r"-wal file: .*; /velodyne_points holds no")
+    (tmp_path / "crashed" / path.name).write_bytes(b"")  # not even the tables are in it
+    refused(open_drive, tmp_path / "crashed", match="-wal file: sqlite3 recording.db3 'PRAGMA")
 
 
 def test_a_missing_library_is_named(written, monkeypatch):

@@ -53,6 +53,22 @@ def test_turns_that_are_not_whole_are_left_out(turns, tmp_path):
     assert len(open_drive(path)) == 3
 
 
+@pytest.mark.parametrize("sent_by", [(202, 2368), (201, 2369)])
+def test_of_two_sensors_the_one_of_most_packets_is_taken(turns, tmp_path, sent_by):
+    """Both were taken for one, whose turns were made of pieces of either's."""
+    path = tmp_path / "street.pcap"
+    alone = open_drive(write_velodyne(path, turns))
+    expected = [alone.scan(frame) for frame in range(3)]
+    others = [ranges[::-1] for ranges in turns[:2]]
+    both = open_drive(write_velodyne(path, turns, others=others, sent_by=sent_by))
+    assert both.times == alone.times
+    for frame in (2, 0, 1):
+        assert np.array_equal(both.scan(frame), expected[frame])
+    (told,) = both.warnings
+    assert "packets of 2 sensors; those of 192.168.1.201:2368 were taken" in told
+    assert f"those of 192.168.1.{sent_by[0]}:{sent_by[1]} left out" in told
+
+
 def test_a_cut_recording_is_read_up_to_there(turns, tmp_path):
     path = write_velodyne(tmp_path / "street.pcap", turns)
     whole = path.read_bytes()

@@ -28,7 +28,7 @@ def seen_by(points):
     return ranges.reshape(PACKETS, BLOCKS, LASERS)
 
 
-def write_velodyne(path, scans, *, start=1.0e9, turn_back=0):
+def write_velodyne(path, scans, *, start=1.0e9, turn_back=0, others=(), sent_by=(201, 2368)):
     """A recording of one turn a scan.
 
     Args:
@@ -36,6 +36,8 @@ def write_velodyne(path, scans, *, start=1.0e9, turn_back=0):
         scans: ranges of each.
         start: when it begins, seconds.
         turn_back: packets left out at the beginning.
+        others: ranges of a second sensor, of which each packet comes right before the first's.
+        sent_by: end of the second's address, and the port that it sends to.
     """
     kind = pcapng.Writer if path.suffix == ".pcapng" else pcap.Writer
     with path.open("wb") as file:
@@ -46,6 +48,9 @@ def write_velodyne(path, scans, *, start=1.0e9, turn_back=0):
                     continue
                 time = start + PERIOD * (number + place / PACKETS)
                 writer.writepkt(_framed(b"\0" * 512, 8308), ts=time)  # the sensor's position
+                if number < len(others):
+                    packet = _packet(place, others[number][place], time)
+                    writer.writepkt(_framed(packet, sent_by[1], sent_by[0]), ts=time)
                 writer.writepkt(_framed(_packet(place, blocks, time), 2368), ts=time)
     return path
 
@@ -59,9 +64,11 @@ def _packet(place, ranges, time):
     return blocks.tobytes() + micros.to_bytes(4, "little") + bytes((_STRONGEST, _VLP16))
 
 
-def _framed(data, port):
+def _framed(data, port, host=201):
     datagram = udp.UDP(sport=port, dport=port, ulen=8 + len(data), data=data)
-    packet = ip.IP(src=b"\xc0\xa8\x01\xc9", dst=b"\xff" * 4, p=ip.IP_PROTO_UDP, data=datagram)
+    packet = ip.IP(
+        src=bytes((192, 168, 1, host)), dst=b"\xff" * 4, p=ip.IP_PROTO_UDP, data=datagram
+    )
     packet.len = 20 + 8 + len(data)
     frame = ethernet.Ethernet(src=b"\0" * 6, dst=b"\xff" * 6, type=0x0800, data=packet)
     return bytes(frame)

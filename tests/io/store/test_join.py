@@ -3,6 +3,7 @@
 """Stores joined are the store that one writer would have written, whatever stops the joining."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,21 @@ def test_the_index_is_an_ordinary_safetensors_file(track, tmp_path, monkeypatch)
         assert not list(path.glob(".*"))
         prints.append(open_store(path).fingerprint)
     assert prints[0] == prints[1] != prints[2]
+
+
+def test_texts_of_all_parts_are_counted_together(track: Track, tmp_path: Path) -> None:
+    """The last part's count was taken for that of all."""
+    out = tmp_path / "store"
+    parts = [out / ".parts" / f"{number}" for number in range(3)]
+    for number, part in enumerate(parts):
+        with StoreWriter(part, {}) as writer:
+            for i, category in enumerate(("car", "van", "van")):
+                writer.add(replace(track, name=f"{number}-{i}", category=category))
+    join_stores(parts, out, {})
+    store = open_store(out)
+    assert list(store.how_often("categories").items()) == [("van", 6), ("car", 3)]
+    assert store.how_often("sources") == {track.source: 9}
+    assert list(store.how_often("sensors").values()) == [9]
 
 
 @pytest.mark.parametrize("moves", [0, 1, 99])

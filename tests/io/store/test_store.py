@@ -139,6 +139,32 @@ def test_half_written_stores_are_refused(track: Track, tmp_path: Path) -> None:
     assert names == ["index.json", "index.safetensors", "points-00000.safetensors"]
 
 
+@pytest.mark.parametrize("removed", range(4))
+def test_a_removal_that_was_stopped_is_repeated(
+    store: Store, track: Track, monkeypatch: pytest.MonkeyPatch, removed: int
+) -> None:
+    """What was left was no store, and `--overwrite` was refused for good."""
+    real, left = Path.unlink, iter([None] * removed)
+
+    def stopped(path: Path, *, missing_ok: bool = False) -> None:
+        if next(left, "stop") == "stop":
+            raise KeyboardInterrupt
+        real(path, missing_ok=missing_ok)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", stopped)
+        with pytest.raises(KeyboardInterrupt):
+            StoreWriter(store.path, {}, overwrite=True)
+    if removed:
+        with pytest.raises(BadInputError, match="half-written"):
+            open_store(store.path)
+    else:
+        open_store(store.path).verify()  # nothing was removed yet
+    with StoreWriter(store.path, {}, overwrite=True) as writer:
+        writer.add(track)
+    assert open_store(store.path).names == ("car-1",)
+
+
 def test_output_that_exists_is_refused(store: Store, tmp_path: Path, track: Track) -> None:
     with pytest.raises(BadInputError, match="--overwrite"):
         StoreWriter(store.path, {})

@@ -36,7 +36,7 @@ def drive_poses(drive: Path) -> dict[int, SE3]:
     Raises:
         BadInputError: the GPS/IMU records or their calibration are missing or damaged.
     """
-    files = sorted((drive / _OXTS).glob("*.txt"))
+    files = sorted(file for file in (drive / _OXTS).glob("*.txt") if file.stem.isdecimal())
     if not files:
         raise BadInputError(
             f"{drive / _OXTS}: no records; whether an object moves needs the GPS/IMU data that"

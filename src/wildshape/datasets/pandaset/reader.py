@@ -12,10 +12,12 @@ import numpy as np
 
 from wildshape.datasets.pandaset.scene import (
     CUBOIDS,
+    FILE,
     PANDARGT,
     SWEEPS,
     Cuboids,
     Drive,
+    frame_files,
     read_cuboids,
     read_drive,
     read_sweep,
@@ -39,7 +41,6 @@ VEHICLES = (
     "Emergency Vehicle",
     "Other Vehicle - Construction Vehicle",
 )
-_FILE = ".pkl.gz"
 _SOURCE = "PandaSet, labelled cuboid"
 
 
@@ -81,14 +82,14 @@ class PandaSet:
         """
         root = Path(self.root)
         scene = root if _is_scene(root) else root / part
-        labels = sorted((scene / CUBOIDS).glob(f"*{_FILE}"))
-        drive = read_drive(scene, 1 + max(map(_number, labels), default=-1))
+        labels = frame_files(scene / CUBOIDS)
+        drive = read_drive(scene, 1 + max(labels))
         gathering = Gathering(self.selection, PANDAR64_SENSOR, self.rejected, rays=self.rays)
         left_out: dict[str, str] = {}
-        for path in labels:
+        for number, path in labels.items():
             cuboids = read_cuboids(path)
             rows = self._wanted(cuboids, left_out)
-            self._crop_frame(_Frame(scene, _number(path), drive, cuboids), rows, gathering)
+            self._crop_frame(_Frame(scene, number, drive, cuboids), rows, gathering)
         yield from gathering.finished()
         for reason in left_out.values():
             self.rejected[reason] += 1
@@ -129,7 +130,7 @@ class PandaSet:
             T_sensor_world = frame.drive.sensor_pose(frame.number, time).inverse()
             to.add(
                 frame.track(row),
-                frame.sweep.name.removesuffix(_FILE),
+                frame.sweep.name.removesuffix(FILE),
                 T_sensor_world.apply_numpy(cloud[inside]),
                 T_sensor_world @ T_world_object,
                 T_world_object.translation.numpy(),
@@ -154,7 +155,7 @@ class _Frame:
 
     @property
     def sweep(self) -> Path:
-        return self.scene / SWEEPS / f"{self.number:02d}{_FILE}"
+        return self.scene / SWEEPS / f"{self.number:02d}{FILE}"
 
     def track(self, row: int) -> str:
         return f"{self.scene.resolve().name}_{self.cuboids.tracks[row]}"
@@ -175,17 +176,10 @@ def find_scenes(root: Path) -> list[Path]:
         if any(map(_is_scene, scenes)):
             return [scene for scene in scenes if _is_scene(scene)]
     raise BadInputError(
-        f"{root}: expected PandaSet's <scene>/{CUBOIDS}/00{_FILE} and <scene>/{SWEEPS}, "
+        f"{root}: expected PandaSet's <scene>/{CUBOIDS}/00{FILE} and <scene>/{SWEEPS}, "
         f"{found_in(root)}."
     )
 
 
 def _is_scene(folder: Path) -> bool:
     return (folder / CUBOIDS).is_dir() and (folder / SWEEPS).is_dir()
-
-
-def _number(path: Path) -> int:
-    stem = path.name.removesuffix(_FILE)
-    if not stem.isdigit():
-        raise BadInputError(f"{path}: frames are named 00{_FILE} to 79{_FILE}; move it away.")
-    return int(stem)

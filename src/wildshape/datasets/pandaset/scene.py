@@ -25,7 +25,7 @@ from wildshape.geometry.transforms.se3 import SE3, between
 from wildshape.io.guard import read_json, reading
 from wildshape.records import Points
 
-CUBOIDS, SWEEPS = "annotations/cuboids", "lidar"
+CUBOIDS, SWEEPS, FILE = "annotations/cuboids", "lidar", ".pkl.gz"
 PANDAR64 = 0
 PANDARGT = 1
 _POSES, _STAMPS = "lidar/poses.json", "lidar/timestamps.json"
@@ -66,6 +66,19 @@ class Cuboids:
     sensors: np.ndarray
     sizes: Float[np.ndarray, "b 3"]
     T_world_object: SE3
+
+
+def frame_files(folder: Path) -> dict[int, Path]:
+    """The files of a folder by the number of their frame, in order; others are passed over.
+
+    Raises:
+        BadInputError: there is none.
+    """
+    stems = {file.name.removesuffix(FILE): file for file in folder.glob(f"*{FILE}")}
+    files = {int(stem): file for stem, file in stems.items() if stem.isdecimal()}
+    if not files:
+        raise BadInputError(f"{folder}: holds none of 00{FILE} to 79{FILE}; {_BRINGS}.")
+    return dict(sorted(files.items()))
 
 
 def read_cuboids(path: Path) -> Cuboids:

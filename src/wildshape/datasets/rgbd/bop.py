@@ -21,7 +21,7 @@ import numpy as np
 
 from wildshape.datasets.rgbd.bop_scene import Frame, Scene, Thing, model_shape, open_scene
 from wildshape.datasets.rgbd.depth_image import read_png
-from wildshape.datasets.rgbd.reader import Cut, cut_out, rays_beside
+from wildshape.datasets.rgbd.reader import Cut, Names, cut_out, rays_beside
 from wildshape.datasets.tracks.gathering import Gathering
 from wildshape.datasets.tracks.parts import found_in
 from wildshape.datasets.tracks.selection import Selection
@@ -71,7 +71,7 @@ class Bop:
         return [file.relative_to(root).as_posix() for file in found]
 
     def tracks_of(self, part: str) -> Iterator[Track]:
-        """Tracks of a scene, one an object; an object seen more often than `longest` has several.
+        """Tracks of a scene, one an object; several where it is seen, or unseen, beyond `longest`.
 
         An object that occurs more than once in an image is told from its likes by the order of
         scene_gt's list, which data sets keep from image to image.
@@ -83,13 +83,11 @@ class Bop:
         gathering = Gathering(
             self.selection, Sensor("camera", intrinsics=scene.camera), self.rejected, rays=self.rays
         )
-        offers: Counter[tuple[int, int]] = Counter()
-        most = self.longest * self.selection.every
+        names = Names(self.longest, self.longest * self.selection.every)
         for number, frame in enumerate(scene.frames):
             chosen = []
             for thing in self._wanted(frame):
-                name = _name(part, thing, offers[thing.identity] // most)
-                offers[thing.identity] += 1
+                name = names.of(_name(part, thing), number)
                 source = f"BOP {scene.folder.resolve().parent.name}"
                 words = {"category": thing.category, "source": source}
                 if gathering.wants(name, number, **words):
@@ -146,8 +144,8 @@ def _sized(camera: Intrinsics, depth: np.ndarray) -> Intrinsics:
     return replace(camera, height=depth.shape[0], width=depth.shape[1])
 
 
-def _name(part: str, thing: Thing, chunk: int) -> str:
-    """For example `test_000001_obj000005`, `..._obj000005b` of a second one, `..._1` later on."""
+def _name(part: str, thing: Thing) -> str:
+    """For example `test_000001_obj000005`, `..._obj000005-1` of a second one."""
     likes = "" if thing.like == 0 else f"-{thing.like}"
     words = "" if part == "." else part.replace("/", "_") + "_"
-    return f"{words}obj{thing.object:06d}{likes}" + (f"_{chunk}" if chunk else "")
+    return f"{words}obj{thing.object:06d}{likes}"

@@ -41,11 +41,6 @@ class Thing:
     T_camera_object: SE3
 
     @property
-    def identity(self) -> tuple[int, int]:
-        """What makes it one object over the scene's images."""
-        return self.object, self.like
-
-    @property
     def category(self) -> str:
         """The name of its model."""
         return f"obj_{self.object:06d}"

@@ -99,36 +99,32 @@ class Rgbd:
         sequence = open_sequence(Path(self.root) / part)
         sensor = Sensor("camera", intrinsics=sequence.camera)
         gathering = Gathering(self.selection, sensor, self.rejected, rays=self.rays)
-        names = _Names(sequence.name, self.gap, self.longest * self.selection.every)
+        names = Names(self.gap, self.longest * self.selection.every)
         for frame, path in enumerate(sequence.depth):
             self._add_frame(sequence, frame, path, gathering, names)
             yield from gathering.finished(before=frame - self.gap)
         yield from gathering.finished()
 
     def _add_frame(
-        self, sequence: Sequence, frame: int, path: Path, to: Gathering, names: "_Names"
+        self, sequence: Sequence, frame: int, path: Path, to: Gathering, names: "Names"
     ) -> None:
         masks = to.read(lambda: dict(self._wanted(sequence, path)), 1)
         if masks is None:
             return
-        chosen = {
-            instance: mask
-            for instance, mask in masks.items()
-            if to.wants(
-                names.of(instance, frame),
-                frame,
-                category=sequence.categories.get(instance, ""),
-                source=f"RGB-D {sequence.name}",
-            )
-        }
+        chosen = {}
+        for instance, mask in masks.items():
+            name = names.of(f"{sequence.name}_{instance:05d}", frame)
+            category, source = sequence.categories.get(instance, ""), f"RGB-D {sequence.name}"
+            if to.wants(name, frame, category=category, source=source):
+                chosen[name] = mask
         depth = to.read(partial(sequence.read_depth, path), len(chosen))
         if depth is None:
             return
-        for instance, mask in chosen.items():
+        for name, mask in chosen.items():
             points = cut_out(depth, mask, sequence.camera, self.cut)
             place = sequence.place(frame, points)
             rays = partial(rays_beside, depth, mask, sequence.camera)
-            to.add(names.now(instance), path.stem, points, place=place, rays=rays)
+            to.add(name, path.stem, points, place=place, rays=rays)
 
     def _wanted(
         self, sequence: Sequence, path: Path
@@ -181,22 +177,23 @@ def rays_beside(
     return sight_lines(FullScan(back_project(depth, camera), lost=lost), rows)
 
 
-class _Names:
-    """Names of tracks: an object's number, and which of its tracks it is."""
+class Names:
+    """Names of tracks: an object's own, and which of its tracks it is.
 
-    def __init__(self, sequence: str, gap: int, longest: int) -> None:
-        self.sequence, self.gap, self.longest = sequence, gap, longest
-        self._seen: dict[int, tuple[int, int, int]] = {}  # track, offers, last frame
+    Attributes:
+        gap: an object that is not seen for more than so many frames begins a new track.
+        longest: most frames of a track.
+    """
 
-    def of(self, instance: int, frame: int) -> str:
-        """The track that a frame of an object belongs to."""
-        track, offers, last = self._seen.get(instance, (0, 0, frame))
+    def __init__(self, gap: int, longest: int) -> None:
+        """No object yet."""
+        self.gap, self.longest = gap, longest
+        self._seen: dict[str, tuple[int, int, int]] = {}  # track, offers, last frame
+
+    def of(self, thing: str, frame: int) -> str:
+        """The track that a frame of an object belongs to: `mug`, `mug_1` later on."""
+        track, offers, last = self._seen.get(thing, (0, 0, frame))
         if frame - last > self.gap or offers >= self.longest:
             track, offers = track + 1, 0
-        self._seen[instance] = (track, offers + 1, frame)
-        return self.now(instance)
-
-    def now(self, instance: int) -> str:
-        """The track of the object's last frame."""
-        track = self._seen[instance][0]
-        return f"{self.sequence}_{instance:05d}" + (f"_{track}" if track else "")
+        self._seen[thing] = (track, offers + 1, frame)
+        return thing + (f"_{track}" if track else "")

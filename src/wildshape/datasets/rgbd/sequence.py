@@ -15,6 +15,7 @@ from wildshape.datasets.rgbd.depth_image import read_png
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import read_json
+from wildshape.io.order import check_counted
 from wildshape.io.poses import read_poses
 from wildshape.io.tracks import folder_name
 from wildshape.records import Intrinsics, Points
@@ -96,9 +97,11 @@ def open_sequence(folder: Path) -> Sequence:
     Raises:
         BadInputError: camera.json, the depth images or the masks are missing or damaged.
     """
-    depth = tuple(sorted((folder / "depth").glob("*.png"), key=lambda file: file.name))
+    images = (file for file in (folder / "depth").glob("*.png") if not file.name.startswith("."))
+    depth = tuple(sorted(images, key=lambda file: file.name))
     if not depth:
         raise BadInputError(f"{folder / 'depth'}: no .png; a sequence keeps its depth images here.")
+    check_counted(depth)
     if not (folder / "masks").is_dir():
         raise BadInputError(f"{folder / 'masks'}: no such folder; a sequence keeps its masks here.")
     expected = f"JSON with {', '.join(_KEYS)} and depth_scale"

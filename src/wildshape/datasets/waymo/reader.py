@@ -69,8 +69,9 @@ class Waymo:
             BadInputError: `root` has no split with the tables needed, or an unknown category.
         """
         _check_categories(self.selection.categories)
-        files = (f for split in find_splits(Path(self.root)) for f in split.glob("lidar/*.parquet"))
-        return sorted(file.stem for file in files)
+        splits = find_splits(Path(self.root))
+        stems = (file.stem for split in splits for file in split.glob("lidar/*.parquet"))
+        return sorted(stem for stem in stems if not stem.startswith("."))
 
     def tracks_of(self, part: str) -> Iterator[Track]:
         """Tracks of a segment, at its end: an object may leave sight and come back.

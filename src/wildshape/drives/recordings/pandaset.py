@@ -7,12 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from wildshape.datasets.pandaset.scene import SWEEPS, read_drive, read_sweep
+from wildshape.datasets.pandaset.scene import FILE, SWEEPS, frame_files, read_drive, read_sweep
 from wildshape.drives.source import Drive
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.records import Turn
-
-_FILE = ".pkl.gz"
 
 
 @dataclass(frozen=True)
@@ -31,7 +29,7 @@ def find_pandaset(root: Path) -> list[Path]:
     """Scenes at, or one or two levels below a folder."""
     for level in ("", "*/", "*/*/"):
         scenes = sorted(path.parents[1] for path in root.glob(f"{level}{SWEEPS}/poses.json"))
-        found = [scene for scene in scenes if any((scene / SWEEPS).glob(f"*{_FILE}"))]
+        found = [scene for scene in scenes if any((scene / SWEEPS).glob(f"*{FILE}"))]
         if found:
             return found
     return []
@@ -43,8 +41,7 @@ def open_pandaset(path: Path) -> Drive:
     Raises:
         BadInputError: a file is missing or corrupt.
     """
-    found = sorted((path / SWEEPS).glob(f"*{_FILE}"))
-    files = {int(file.name.removesuffix(_FILE)): file for file in found}
+    files = frame_files(path / SWEEPS)
     drive = read_drive(path, max(files) + 1)
     stamps = [drive.stamps[frame] for frame in files]
     T = stack([drive.sensor_pose(frame, time) for frame, time in zip(files, stamps)])
@@ -54,4 +51,5 @@ def open_pandaset(path: Path) -> Drive:
         read=_Sweeps(tuple(files.values()), T),
         times=stamps,
         T_world_sensor=T,
+        files=files.values(),
     )

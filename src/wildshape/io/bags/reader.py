@@ -71,7 +71,8 @@ def bag_files(path: Path) -> list[Path]:
         return [path] if path.suffix in STORAGES else []
     if not path.is_dir():
         return []
-    return sorted(file for file in path.iterdir() if file.suffix in (".db3", ".mcap"))
+    files = (file for file in path.iterdir() if not file.name.startswith("."))
+    return sorted(file for file in files if file.suffix in (".db3", ".mcap"))
 
 
 def open_bag(path: Path, topic: str | None = None) -> Bag:

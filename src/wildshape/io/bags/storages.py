@@ -11,7 +11,7 @@ import sqlite3
 import struct
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -75,6 +75,17 @@ class Sqlite(Storage):
 
     def clouds(self) -> Iterator[Message]:
         """See `Storage`."""
+        beside = self.path.with_name(f"{self.path.name}-wal")
+        waits = beside.is_file() and beside.stat().st_size > 0
+        with suppress(sqlite3.Error) if waits else nullcontext():
+            yield from self._clouds()
+        if waits:  # SQLite would read it, too, but write beside the file
+            raise EOFError(
+                f"its last messages may be in its -wal file: sqlite3 {self.path.name} 'PRAGMA"
+                " wal_checkpoint(TRUNCATE)' moves them"
+            )
+
+    def _clouds(self) -> Iterator[Message]:
         with closing(self._open()) as database:
             names = {}
             for row, name, kind in database.execute("SELECT id, name, type FROM topics"):

@@ -24,6 +24,7 @@ _UDP_HEADER = 8  # bytes
 _WHOLE = 0.9  # of a turn's packets that the first and the last turn must have
 
 _Sensor = tuple[int, str] | None  # model and calibration of a sensor that sends them
+_Source = tuple[bytes, int]  # address of a sensor and the port that it sends to
 
 
 class _Packet(NamedTuple):
@@ -31,22 +32,30 @@ class _Packet(NamedTuple):
 
     Attributes:
         begin: where its record begins in the file.
+        source: the sensor that sent it.
         stamp: when it was recorded, seconds.
         data: as the sensor sent it.
     """
 
     begin: int
+    source: _Source
     stamp: float
     data: bytes
 
 
 @dataclass
 class _Turn:
-    """Where a turn is: its first packet, how many there are, and when the last was recorded."""
+    """Where a turn is: its first packet, and how many there are.
+
+    Attributes:
+        stamp: when the last was recorded, seconds.
+        turned: how far from behind the beam was then, hundredths of a degree.
+    """
 
     begin: int
     packets: int = 0
     stamp: float = 0.0
+    turned: int = 0
 
 
 @dataclass(frozen=True)
@@ -57,11 +66,13 @@ class VelodyneTurns:
         path: of the file.
         times: of each turn's last packet, seconds.
         warnings: what is odd about it, a sentence each.
+        source: the sensor whose turns they are, if there are any.
     """
 
     path: Path
     times: tuple[float, ...]
     warnings: tuple[str, ...]
+    source: _Source | None
     turns: tuple[_Turn, ...] = field(repr=False)
     sensor: _Sensor = None
 
@@ -73,7 +84,8 @@ class VelodyneTurns:
         """
         decoder, turn = _decoder(), self.turns[number]
         with self.path.open("rb") as file:
-            found = islice(_packets(file, turn.begin), turn.packets)
+            ours = (one for one in _packets(file, turn.begin) if one.source == self.source)
+            found = islice(ours, turn.packets)
             packets = [decoder.VelodynePacket(one.stamp, one.data) for one in found]
         scans = decoder.ScanDecoder(_config(self.sensor))
         _, rows = scans.decode(decoder.PacketVector(packets))
@@ -81,29 +93,46 @@ class VelodyneTurns:
 
 
 def open_velodyne(path: Path) -> VelodyneTurns:
-    """List the turns of a recording, up to where it is cut off.
+    """List the turns of a recording, up to where it is cut off; of several sensors those of one.
 
     Raises:
         MissingExtraError: velodyne-decoder is not installed.
     """
     _decoder()
-    turns: list[_Turn] = []
+    turns: dict[_Source, list[_Turn]] = {}
     warnings = []
-    last = 0
     try:
         with path.open("rb") as file:
             for packet in _packets(file):
-                since_back = (int.from_bytes(packet.data[_AZIMUTH], "little") - _BACK) % _ROUND
-                if since_back < last or not turns:
-                    turns.append(_Turn(packet.begin))
-                last = since_back
-                turns[-1].packets += 1
-                turns[-1].stamp = packet.stamp
+                _count(packet, turns.setdefault(packet.source, []))
     except Exception as error:  # noqa: BLE001 - whatever it is, the packets before it are good
         warnings.append(f"{path.name} is cut off or damaged ({first_line(error)})")
-    whole = tuple(_whole(turns))
+    source = max(turns, key=lambda one: sum(turn.packets for turn in turns[one]), default=None)
+    if source is not None and len(turns) > 1:
+        others = " and ".join(_named(one) for one in turns if one != source)
+        warnings.append(
+            f"{path.name} holds packets of {len(turns)} sensors; those of {_named(source)} were"
+            f" taken, which are most, and those of {others} left out"
+        )
+    whole = tuple(_whole(turns[source])) if source is not None else ()
     times = tuple(turn.stamp for turn in whole)
-    return VelodyneTurns(path, times, tuple(warnings), whole, _described(path) if whole else None)
+    described = _described(path) if whole else None
+    return VelodyneTurns(path, times, tuple(warnings), source, whole, described)
+
+
+def _count(packet: _Packet, turns: list[_Turn]) -> None:
+    """Add a sensor's next packet to its turns."""
+    turned = (int.from_bytes(packet.data[_AZIMUTH], "little") - _BACK) % _ROUND
+    if not turns or turned < turns[-1].turned:
+        turns.append(_Turn(packet.begin))
+    turns[-1].packets += 1
+    turns[-1].stamp, turns[-1].turned = packet.stamp, turned
+
+
+def _named(source: _Source) -> str:
+    from dpkt.utils import inet_to_str
+
+    return f"{inet_to_str(source[0])}:{source[1]}"
 
 
 def _whole(turns: list[_Turn]) -> list[_Turn]:
@@ -127,22 +156,23 @@ def _packets(file: IO[bytes], begin: int | None = None) -> Iterator[_Packet]:
         file.seek(begin)
     begin = file.tell()
     for stamp, record in records:
-        found = _datagram(record)
+        found, sender = _datagram(record)
         if found is not None and len(found.data) < found.ulen - _UDP_HEADER:
             raise EOFError("it ends in the middle of a packet")
         if found is not None and len(found.data) == size:
-            yield _Packet(begin, float(stamp), found.data)
+            yield _Packet(begin, (sender, found.dport), float(stamp), found.data)
         begin = file.tell()
 
 
-def _datagram(record: bytes) -> Any:
-    """What UDP carried; None for other packets."""
+def _datagram(record: bytes) -> tuple[Any, bytes]:
+    """What UDP carried, None for other packets; and the address that it came from."""
     from dpkt import ethernet, udp
 
     found: Any = ethernet.Ethernet(record)
+    sender = b""
     while not isinstance(found, bytes | udp.UDP):
-        found = found.data
-    return None if isinstance(found, bytes) else found
+        sender, found = getattr(found, "src", sender), found.data
+    return (None if isinstance(found, bytes) else found), sender
 
 
 def _described(path: Path) -> _Sensor:

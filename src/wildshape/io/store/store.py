@@ -4,6 +4,7 @@
 
 import json
 from bisect import bisect_right
+from collections import Counter
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
@@ -243,8 +244,10 @@ class Store:
     def how_often(self, column: str) -> dict[str, int]:
         """Tracks that bear each text of `categories`, `sources` or `sensors`, most first."""
         _, rows, counts = np.unique(self._index[column], return_index=True, return_counts=True)
-        found = [(self._text(column, int(r)), int(c)) for r, c in zip(rows, counts)]
-        return dict(sorted(found, key=lambda pair: -pair[1]))
+        found: Counter[str] = Counter()
+        for row, count in zip(rows.tolist(), counts.tolist()):
+            found[self._text(column, row)] += count  # a joined store has a text once a part
+        return dict(found.most_common())
 
     def verify(self) -> None:
         """Read everything and compare the checksums.

@@ -67,12 +67,13 @@ class StoreWriter:
         self.path = Path(path)
         self._provenance = provenance
         self._shard_bytes = shard_bytes
-        _make_room(self.path, overwrite=overwrite)
-        self.path.mkdir(parents=True, exist_ok=True)
+        check_room(self.path, overwrite=overwrite)
+        # First: a removal that was stopped then leaves a half-written store, not a foreign folder.
         write_json(
             self.path / WRITING_JSON,
             {"format": FORMAT, "version": VERSION, "provenance": provenance},
         )
+        remove_store(self.path)
         self._index = IndexWriter(self.path)
         self._names: set[str] = set()
         self._points = 0
@@ -229,12 +230,6 @@ class _Shard:
 
     def abandon(self) -> None:
         self._file.close()
-
-
-def _make_room(path: Path, *, overwrite: bool) -> None:
-    check_room(path, overwrite=overwrite)
-    if path.exists():
-        remove_store(path)
 
 
 def check_room(path: Path, *, overwrite: bool) -> None:
