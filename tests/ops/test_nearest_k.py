@@ -74,6 +74,16 @@ def test_native_is_plain_torch(level, shape, grouped):
 
 
 @needs_library
+def test_sizes_of_any_whole_type_are_read():
+    query, target = clouds(4, 30, 40)
+    sizes = torch.tensor((30, 0, 7, 12)), torch.tensor((3, 40, 9, 1))
+    wide = nearest_k_native(query, target, 2, *sizes)
+    narrow = nearest_k_native(query, target, 2, sizes[0].int(), sizes[1].int())
+    assert torch.equal(wide.index, narrow.index)
+    assert torch.equal(wide.distance_squared, narrow.distance_squared)
+
+
+@needs_library
 def test_equal_distances_are_ordered_by_place():
     query, target = clouds(2, 40, 60, grid=True)
     squared, order = by_sorting(query, target, 12)

@@ -99,18 +99,21 @@ def test_killed_before_the_first_checkpoint_starts_anew(car_store, undisturbed, 
 
 def test_resuming_a_finished_run_changes_nothing(car_store, undisturbed, tmp_path):
     trained(car_store, tmp_path)
-    run = trained(car_store, tmp_path, resume=True)
+    told = (tmp_path / "run.json").read_bytes()
+    run = setup(SMALLEST, car_store, tmp_path, seed=3, resume=True, provenance={"data": "moved"})
+    fit(run)
     assert run.state.step == SMALLEST.optim.steps
+    assert (tmp_path / "run.json").read_bytes() == told
     for name in ("model.safetensors", STATE):
         found, expected = load_file(tmp_path / name), load_file(undisturbed / name)
         assert all(torch.equal(found[k], expected[k]) for k in expected)
 
 
 def test_resume_refuses_another_seed_or_other_settings(car_store, undisturbed):
-    with pytest.raises(BadInputError, match=r"another seed; resume with the same settings"):
+    with pytest.raises(BadInputError, match=r"other seed; resume with the same settings"):
         setup(SMALLEST, car_store, undisturbed, seed=4, resume=True)
     other = replace(SMALLEST, loss=replace(SMALLEST.loss, beta=0.3))
-    with pytest.raises(BadInputError, match="another settings and seed"):
+    with pytest.raises(BadInputError, match="other settings and seed"):
         setup(other, car_store, undisturbed, seed=4, resume=True)
 
 

@@ -8,15 +8,18 @@ import numpy as np
 import pytest
 import torch
 
+from wildshape.errors import BadInputError
 from wildshape.geometry.projection.visibility import PixelBins, PolarBins
+from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.method.network import ShapePoseNet
 from wildshape.method.observation import chamfer
+from wildshape.records import Sensor
 from wildshape.training.batches.fused import FusedSampler
 from wildshape.training.batches.occlusion_augmentation import partly_hidden
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.config import learning_rate
 from wildshape.training.objectives import WeaklySupervised
-from wildshape.training.recipes import PRESETS, paper_lidar, paper_views, shape_oracle
+from wildshape.training.recipes import PRESETS, paper_lidar, paper_views, recipe_for, shape_oracle
 from wildshape.training.self_training.objective import SelfTaught
 from wildshape.training.self_training.targets import true_targets
 
@@ -54,6 +57,27 @@ def test_paper_schedules(recipe, factor):
         assert learning_rate(step, optim) == pytest.approx(1e-4 * factor**drops)
     last = optim.steps - 1
     assert learning_rate(last, optim) == pytest.approx(1e-4 * factor ** (last // 100_000))
+
+
+@pytest.mark.parametrize("name", ["paper-lidar", "small"])
+def test_other_steps_stretch_the_schedule(car_store, name):
+    own = PRESETS[name]().optim
+    few = recipe_for(car_store, name, own.steps // 20).optim
+    assert few.steps == own.steps // 20
+    for step in range(few.steps // 5, few.steps, few.steps // 10):
+        assert learning_rate(step, few) == pytest.approx(learning_rate(20 * step, own))
+
+
+def test_one_step_is_a_schedule_too(car_store):
+    assert recipe_for(car_store, "paper-lidar", 1).optim.decay_every == 1
+
+
+def test_a_store_of_two_kinds_of_sensor_is_refused(cars, tmp_path):
+    with StoreWriter(tmp_path, {}) as writer:
+        writer.add(cars[0])
+        writer.add(replace(cars[1], sensor=Sensor("camera")))
+    with pytest.raises(BadInputError, match="split it"):
+        recipe_for(open_store(tmp_path), "small", None)
 
 
 @pytest.mark.parametrize("name", PRESETS)

@@ -3,7 +3,7 @@
 """An experiment is a value: frozen dataclasses, saved with every result."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from wildshape.method.multiview import LossConfig
@@ -86,6 +86,14 @@ class Recipe:
     validate_every: int = 1000
     validation: ValidationConfig = field(default_factory=ValidationConfig)
     held_out: int = 20
+
+
+def stretched(config: OptimConfig, steps: int) -> OptimConfig:
+    """The same schedule over another number of steps."""
+    every = config.decay_every
+    if every:
+        every = max(1, every * steps // config.steps)
+    return replace(config, steps=steps, decay_every=every)
 
 
 def learning_rate(step: int, config: OptimConfig) -> float:

@@ -4,16 +4,19 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from wildshape.errors import BadInputError
 from wildshape.geometry.projection.visibility import FacingBins, PixelBins, PolarBins
 from wildshape.io.store.store import Store
 from wildshape.method.encoders.named import Backbone
 from wildshape.method.multiview import LossConfig
 from wildshape.method.network import NetworkConfig
+from wildshape.records import SensorKind
 from wildshape.training.batches.fused import DrawConfig
 from wildshape.training.batches.occlusion_augmentation import OcclusionConfig
 from wildshape.training.batches.views import ViewConfig
-from wildshape.training.config import OptimConfig, Recipe
+from wildshape.training.config import OptimConfig, Recipe, stretched
 from wildshape.training.self_training.objective import TaughtLossConfig
 
 
@@ -157,14 +160,30 @@ PRESETS = {
 }
 
 
-def recipe_for(store: Store, preset: str, steps: int | None) -> Recipe:
-    """The preset, for the kind of sensor in the store, with another number of steps if asked.
+def sensor_kind(store: Store) -> SensorKind:
+    """The kind of sensor that took all tracks; costs milliseconds however many there are.
 
     Raises:
-        BadInputError: a preset of the paper that was made for the other kind of sensor.
+        BadInputError: there are two kinds.
+    """
+    _, firsts = np.unique(store.column("sensors"), return_index=True)
+    kinds: set[SensorKind] = {store.sensor_of(int(track)).kind for track in firsts}
+    if len(kinds) > 1:
+        raise BadInputError(
+            f"{store.named}: holds lidar and camera scans, but a network is trained on one kind;"
+            " split it into a store of each."
+        )
+    return kinds.pop()
+
+
+def recipe_for(store: Store, preset: str, steps: int | None) -> Recipe:
+    """The preset, for the kind of sensor in the store, stretched to other steps if asked.
+
+    Raises:
+        BadInputError: two kinds of sensor, or a preset of the paper that was made for the other.
     """
     recipe = PRESETS[preset]()
-    kind = store.sensor_of(0).kind
+    kind = sensor_kind(store)
     if kind != recipe.views.sensor:
         if preset.startswith("paper-"):
             raise BadInputError(
@@ -174,4 +193,4 @@ def recipe_for(store: Store, preset: str, steps: int | None) -> Recipe:
         recipe = replace(recipe, views=replace(recipe.views, sensor=kind))
     if steps is None:
         return recipe
-    return replace(recipe, optim=replace(recipe.optim, steps=steps))
+    return replace(recipe, optim=stretched(recipe.optim, steps))

@@ -9,11 +9,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import lock_folder, write_json
+from wildshape.io.guard import reading
 from wildshape.io.inputs import open_tracks
-from wildshape.io.output import MARKER, Output, begin, is_begun, keep_apart, remove_leftovers
+from wildshape.io.output import MARKER, Output, begin, keep_apart, remove_leftovers
 from wildshape.io.progress import SILENT, Progress
 from wildshape.io.store.layout import INDEX_JSON
 from wildshape.io.store.store import Store, is_store, open_store
@@ -21,6 +23,7 @@ from wildshape.io.write_tracks import write_tracks
 from wildshape.training.options import TrainingOptions
 
 _PACKED = "data.store"
+_SETTINGS = ("preset", "encoder", "steps", "seed")
 _FILES = (
     "*.safetensors",
     "run.json",
@@ -36,7 +39,7 @@ def begun_run(data: Path, out: Path, options: TrainingOptions) -> Iterator[None]
     """The marker of a run; of a new one nothing stays if what is done in here is refused.
 
     Raises:
-        BadInputError: another run is there.
+        BadInputError: another run is there, or something else.
     """
     output = _begin(data, out, options)
     if output is None:
@@ -54,19 +57,40 @@ def _begin(data: Path, out: Path, options: TrainingOptions) -> Output | None:
     """None where a run is gone on with, and to processes that do not lead."""
     if int(os.environ.get("RANK", "0")) > 0:
         return None
-    if options.resume and (out / MARKER).is_file():
+    settings = {"data": str(data), **{name: str(getattr(options, name)) for name in _SETTINGS}}
+    begun = _settings_of_run(out)
+    if begun is not None and options.resume:
         lock_folder(out)
+        _refuse_other(out, begun, settings)
         remove_leftovers(out)
         return None
     keep_apart(data, out)
-    if is_begun(out) and not options.overwrite:
+    if begun is not None and not options.overwrite:
         raise BadInputError(
             f"{out}: a run is there already; pass --resume to go on with it, --overwrite"
             " to replace it, or choose another --out."
         )
-    parts = ("preset", "encoder", "steps", "seed")
-    identity = {"data": str(data), **{name: str(getattr(options, name)) for name in parts}}
-    return begin(out, "train", identity, _FILES, overwrite=options.overwrite)
+    return begin(out, "train", settings, _FILES, overwrite=options.overwrite)
+
+
+def _settings_of_run(out: Path) -> dict[str, Any] | None:
+    """As the marker has them; None where no training was begun."""
+    marker = out / MARKER
+    if not marker.is_file():
+        return None
+    with reading(marker, "how a folder was made"):
+        record = json.loads(marker.read_text("utf-8"))
+        return dict(record["settings"]) if record.get("command") == "train" else None
+
+
+def _refuse_other(out: Path, begun: dict[str, Any], settings: dict[str, str]) -> None:
+    """Data are compared where they are opened: a store may have been moved."""
+    different = [name for name in _SETTINGS if begun.get(name) != settings[name]]
+    if different:
+        raise BadInputError(
+            f"{out}: its run has other {' and '.join(different)}; resume with the same settings, or"
+            " choose a new --out."
+        )
 
 
 def open_training_data(
@@ -75,7 +99,7 @@ def open_training_data(
     """The packed store to train on; track folders are packed once into the run's folder.
 
     Raises:
-        BadInputError: no tracks there; or track folders under torchrun.
+        BadInputError: no tracks there, others than the run has; or track folders under torchrun.
     """
     if is_store(data):
         return open_store(data)
@@ -85,15 +109,16 @@ def open_training_data(
             f" `wildshape convert folder {data} OUT`."
         )
     packed = out / _PACKED
+    origin = {"input": str(data.resolve()), **asdict(options.coordinates)}
     if options.resume and (packed / INDEX_JSON).is_file():  # else it is none, or half-written
-        return open_store(packed, data)
+        return _packed_before(packed, data, origin)
     source = open_tracks(data, options.coordinates)
     write_tracks(
         source,
         packed,
         "packed",
         command="train",
-        settings={"input": str(data.resolve()), **asdict(options.coordinates)},
+        settings=origin,
         overwrite=True,
         progress=progress,
         bar=("packing tracks", len(source)),
@@ -102,6 +127,17 @@ def open_training_data(
         progress.say(told)
     progress.skipped(source.skipped)
     return open_store(packed, data)
+
+
+def _packed_before(packed: Path, data: Path, origin: dict[str, Any]) -> Store:
+    """The run's own store, if `origin` says that the same tracks would be packed again."""
+    store = open_store(packed, data)
+    if store.provenance.get("settings") != json.loads(json.dumps(origin)):
+        raise BadInputError(
+            f"{data}: the run packed tracks of another place, --unit or --origin; resume with"
+            f" those, with {packed} if they only moved, or choose a new --out."
+        )
+    return store
 
 
 def finish_run(out: Path) -> None:

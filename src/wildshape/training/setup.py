@@ -134,7 +134,7 @@ def setup(
     if state.anchors is not None:
         views.hold(state.anchors)
     described = {"recipe": asdict(recipe), "identity": identity, **(provenance or {})}
-    if processes.leads:
+    if processes.leads and state.step < recipe.optim.steps:  # a finished run is left as it is
         write_text(folder / "run.json", json.dumps(described, indent=1, default=str))
     return Run(
         recipe=recipe,

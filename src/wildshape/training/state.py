@@ -110,7 +110,9 @@ def _under(tensors: dict[str, torch.Tensor], prefix: str) -> dict[str, torch.Ten
 
 
 def _check_identity(path: Path, found: dict[str, str], expected: dict[str, str]) -> None:
-    different = [k for k in expected if found.get(k, "") != expected[k]]
+    """What either lacks counts as empty."""
+    keys = {**expected, **found}
+    different = [k for k in keys if found.get(k, "") != expected.get(k, "")]
     if different:
         raise BadInputError(
             f"{path}: was written by a run with other {' and '.join(different)};"

@@ -119,6 +119,23 @@ def test_training_lowers_the_loss_and_can_be_resumed(plane_store, tmp_path):
     assert all(torch.equal(expected[key], found[key]) for key in expected)
 
 
+def test_a_finished_run_is_left_as_it_is(plane_store, tmp_path):
+    fit_dpc(setup_dpc(tiny("dpc-small", 1), plane_store, tmp_path))
+    files = [file for file in tmp_path.rglob("*") if file.is_file()]
+    before = [file.read_bytes() for file in files]
+    again = {"resume": True, "provenance": {"data": "moved"}}
+    fit_dpc(setup_dpc(tiny("dpc-small", 1), plane_store, tmp_path, **again))
+    assert [file.read_bytes() for file in files] == before
+
+
+def test_two_kinds_of_sensor_are_refused(planes, cars, tmp_path):
+    with StoreWriter(tmp_path / "store", {}) as writer:
+        writer.add(replace(planes[0], name="plane"))
+        writer.add(cars[0])
+    with pytest.raises(BadInputError, match="split it"):
+        setup_dpc(tiny("dpc-small"), open_store(tmp_path / "store"), tmp_path)
+
+
 def test_the_wrong_data_is_refused_in_a_sentence(plane_store, car_store, tmp_path):
     with pytest.raises(BadInputError, match="choose dpc-lidar"):
         setup_dpc(tiny("dpc-small"), car_store, tmp_path)

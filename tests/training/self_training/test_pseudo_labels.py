@@ -140,6 +140,8 @@ def test_targets_of_another_run_or_damaged_ones_are_made_anew(car_store, targets
     save_targets(tmp_path, targets, IDENTITY)
     for key in IDENTITY:
         assert load_targets(tmp_path, IDENTITY | {key: "other"}, *known) is None
+    save_targets(tmp_path, targets, IDENTITY | {"headings": "ghi"})
+    assert load_targets(tmp_path, IDENTITY, *known) is None
     path = tmp_path / TARGETS
     path.write_bytes(path.read_bytes()[:-100])
     assert load_targets(tmp_path, IDENTITY, *known) is None
@@ -200,6 +202,19 @@ def test_another_teacher_is_another_run(car_store, teacher, tmp_path):
     save_state(tmp_path, run.state, run.identity)
     with pytest.raises(BadInputError, match="teacher"):
         setup(TAUGHT, car_store, tmp_path, seed=3, teacher="truth", resume=True)
+
+
+def test_a_run_with_headings_is_another_run_without(car_store, tmp_path):
+    run = setup(TAUGHT, car_store, tmp_path, seed=3, teacher="truth")
+    save_state(tmp_path, run.state, run.identity | {"headings": "abc"})
+    with pytest.raises(BadInputError, match="other headings;"):
+        setup(TAUGHT, car_store, tmp_path, seed=3, teacher="truth", resume=True)
+
+
+def test_a_teacher_of_another_kind_of_sensor_is_refused(car_store, teacher):
+    camera = ViewSampler(car_store, np.arange(2), replace(TAUGHT.views, sensor="camera"))
+    with pytest.raises(BadInputError, match="lidar scans and cannot teach camera scans"):
+        fused_targets(teacher, camera)
 
 
 def test_what_is_taught_is_learned(car_store, tmp_path):

@@ -24,6 +24,7 @@ from wildshape.io.store.store import Store
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.config import learning_rate
 from wildshape.training.loop import MODEL, Loop, Progress, run_to_end
+from wildshape.training.recipes import sensor_kind
 from wildshape.training.runtime.log import RunLog
 from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.setup import split_tracks
@@ -70,8 +71,8 @@ def setup_dpc(
     """Build the network and the sampler; load the state if resuming.
 
     Raises:
-        BadInputError: no usable scans, another kind of sensor, objects outside of the images, or a
-            state that belongs to another run.
+        BadInputError: no usable scans, another kind of sensor or two, objects outside of the
+            images, or a state that belongs to another run.
     """
     sampler = ViewSampler(store, split_tracks(len(store))[0], recipe.views)
     _refuse_unseen(recipe, store, sampler)
@@ -85,14 +86,15 @@ def setup_dpc(
     if resume and (folder / STATE).exists():
         load_state(folder, state, identity, store.scan_count)
     described = {"recipe": asdict(recipe), "identity": identity, **(provenance or {})}
-    write_text(folder / "run.json", json.dumps(described, indent=1, default=str))
+    if state.step < recipe.optim.steps:  # a finished run is left as it is
+        write_text(folder / "run.json", json.dumps(described, indent=1, default=str))
     return DpcRun(recipe, seed, folder, state, sampler, identity, described)
 
 
 def fit_dpc(
     run: DpcRun, report: Progress | None = None, stopped: Callable[[], bool] = lambda: False
 ) -> None:
-    """Train to the last step by the loop that all trainings have.
+    """Train to the last step by the loop that all trainings have; a finished run stays as it is.
 
     Args:
         run: set up.
@@ -104,6 +106,8 @@ def fit_dpc(
         BadInputError: the loss is not finite; the last checkpoint stays.
     """
     state, save = run.state, partial(_save, run)
+    if state.step >= run.recipe.optim.steps:
+        return
     device = next(state.network.parameters()).device
     objective = DpcObjective(state.network, run.recipe.loss)
     meter = Meter(run.recipe.network.candidates, state.step, device)
@@ -146,7 +150,7 @@ def _save(run: DpcRun) -> dict[str, Any]:
 
 def _refuse_unseen(recipe: DpcRecipe, store: Store, sampler: ViewSampler) -> None:
     """DPC knows neither other sensors nor where an object is."""
-    wanted, found = recipe.views.sensor, store.sensor_of(0).kind
+    wanted, found = recipe.views.sensor, sensor_kind(store)
     if wanted != found:
         other = "dpc-lidar" if found == "lidar" else "dpc or dpc-dagger"
         raise BadInputError(

@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from typing import Literal, get_args
 
 import torch
-from jaxtyping import Float, Int64
+from jaxtyping import Float, Int, Int64
 from torch import Tensor
 
 from wildshape.errors import BadInputError
@@ -50,8 +50,8 @@ _VARIABLE = "WILDSHAPE_NEAREST"
 def nearest(
     query: Float[Tensor, "B N 3"],
     target: Float[Tensor, "B M 3"],
-    query_sizes: Int64[Tensor, "B"] | None = None,
-    target_sizes: Int64[Tensor, "B"] | None = None,
+    query_sizes: Int[Tensor, "B"] | None = None,
+    target_sizes: Int[Tensor, "B"] | None = None,
 ) -> Neighbours:
     """The nearest target of each query, ties to the smallest index; no gradient.
 
@@ -87,8 +87,8 @@ def nearest(
 def nearest_both(
     a: Float[Tensor, "B N 3"],
     b: Float[Tensor, "B M 3"],
-    a_sizes: Int64[Tensor, "B"] | None = None,
-    b_sizes: Int64[Tensor, "B"] | None = None,
+    a_sizes: Int[Tensor, "B"] | None = None,
+    b_sizes: Int[Tensor, "B"] | None = None,
 ) -> tuple[Neighbours, Neighbours]:
     """`nearest` from a to b and from b to a."""
     a, b = _at_least_float32(a.detach()), _at_least_float32(b.detach())
@@ -101,8 +101,8 @@ def nearest_k(
     query: Float[Tensor, "B N 3"],
     target: Float[Tensor, "B M 3"],
     k: int,
-    query_sizes: Int64[Tensor, "B"] | None = None,
-    target_sizes: Int64[Tensor, "B"] | None = None,
+    query_sizes: Int[Tensor, "B"] | None = None,
+    target_sizes: Int[Tensor, "B"] | None = None,
     *,
     groups: tuple[Int64[Tensor, "B N"], Int64[Tensor, "B M"]] | None = None,
     most: float = math.inf,

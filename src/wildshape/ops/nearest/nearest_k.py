@@ -5,12 +5,12 @@
 import math
 
 import torch
-from jaxtyping import Float, Int64
+from jaxtyping import Float, Int, Int64
 from torch import Tensor
 
 from wildshape.errors import BadInputError
 from wildshape.ops.library import check_memory, nearest_k_kernel
-from wildshape.ops.nearest.neighbours import Neighbourhoods, check_clouds
+from wildshape.ops.nearest.neighbours import Neighbourhoods, as_int64, check_clouds
 from wildshape.ops.threads import exact_threads
 
 _CHUNK_ELEMENTS = 1 << 22
@@ -21,8 +21,8 @@ def nearest_k_native(
     query: Float[Tensor, "B N 3"],
     target: Float[Tensor, "B M 3"],
     k: int,
-    query_sizes: Int64[Tensor, "B"] | None = None,
-    target_sizes: Int64[Tensor, "B"] | None = None,
+    query_sizes: Int[Tensor, "B"] | None = None,
+    target_sizes: Int[Tensor, "B"] | None = None,
     groups: tuple[Int64[Tensor, "B N"], Int64[Tensor, "B M"]] | None = None,
     most: float = math.inf,
     level: int = _WIDEST,
@@ -41,7 +41,8 @@ def nearest_k_native(
     shape = (*query.shape[:2], k)
     found = Neighbourhoods(torch.empty(shape), torch.empty(shape, dtype=torch.int64))
     by_query, by_target = (None, None) if groups is None else groups
-    given = (query, query_sizes, by_query, target, target_sizes, by_target)
+    sizes = as_int64(query_sizes), as_int64(target_sizes)
+    given = (query, sizes[0], by_query, target, sizes[1], by_target)
     held = [None if part is None else part.contiguous() for part in given]
     failed = kernel(
         *(None if part is None else part.data_ptr() for part in held),
@@ -64,8 +65,8 @@ def nearest_k_trees(
     query: Float[Tensor, "B N 3"],
     target: Float[Tensor, "B M 3"],
     k: int,
-    query_sizes: Int64[Tensor, "B"] | None = None,
-    target_sizes: Int64[Tensor, "B"] | None = None,
+    query_sizes: Int[Tensor, "B"] | None = None,
+    target_sizes: Int[Tensor, "B"] | None = None,
     most: float = math.inf,
 ) -> Neighbourhoods:
     """By a k-d tree a cloud (scipy), on the CPU; all points finite. Ties come in any order."""
@@ -90,8 +91,8 @@ def nearest_k_torch(
     query: Float[Tensor, "B N 3"],
     target: Float[Tensor, "B M 3"],
     k: int,
-    query_sizes: Int64[Tensor, "B"] | None = None,
-    target_sizes: Int64[Tensor, "B"] | None = None,
+    query_sizes: Int[Tensor, "B"] | None = None,
+    target_sizes: Int[Tensor, "B"] | None = None,
     groups: tuple[Int64[Tensor, "B N"], Int64[Tensor, "B M"]] | None = None,
     most: float = math.inf,
 ) -> Neighbourhoods:
@@ -120,7 +121,7 @@ def nearest_k_torch(
     return Neighbourhoods(squared.masked_fill(beyond, 0.0), index.masked_fill(beyond, 0))
 
 
-def _beyond(points: Tensor, sizes: Int64[Tensor, "B"]) -> Tensor:
+def _beyond(points: Tensor, sizes: Int[Tensor, "B"]) -> Tensor:
     """`(B, n)`: which places lie past each row's size."""
     return torch.arange(points.shape[1], device=points.device) >= sizes.to(points.device)[:, None]
 

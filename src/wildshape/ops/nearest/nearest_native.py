@@ -10,11 +10,11 @@ they lie: rows must be dense, the stride between clouds is free.
 import ctypes
 
 import torch
-from jaxtyping import Float, Float32, Int64
+from jaxtyping import Float, Float32, Int, Int64
 from torch import Tensor
 
 from wildshape.ops.library import check_memory, library
-from wildshape.ops.nearest.neighbours import Neighbours, check_clouds
+from wildshape.ops.nearest.neighbours import Neighbours, as_int64, check_clouds
 from wildshape.ops.threads import exact_threads
 
 WIDEST = -1
@@ -23,8 +23,8 @@ WIDEST = -1
 def nearest_native(
     query: Float32[Tensor, "B N 3"],
     target: Float32[Tensor, "B M 3"],
-    query_sizes: Int64[Tensor, "B"] | None = None,
-    target_sizes: Int64[Tensor, "B"] | None = None,
+    query_sizes: Int[Tensor, "B"] | None = None,
+    target_sizes: Int[Tensor, "B"] | None = None,
     level: int = WIDEST,
 ) -> Neighbours:
     """Exact search; `level` picks the instruction set (0 portable, 1 AVX2, 2 AVX-512).
@@ -40,8 +40,8 @@ def nearest_native(
 def nearest_both_native(
     a: Float32[Tensor, "B N 3"],
     b: Float32[Tensor, "B M 3"],
-    a_sizes: Int64[Tensor, "B"] | None = None,
-    b_sizes: Int64[Tensor, "B"] | None = None,
+    a_sizes: Int[Tensor, "B"] | None = None,
+    b_sizes: Int[Tensor, "B"] | None = None,
     level: int = WIDEST,
 ) -> tuple[Neighbours, Neighbours]:
     """From a to b and from b to a; each cloud is sorted once.
@@ -75,7 +75,7 @@ def _search(
     for points in (a, b):
         check_memory("nearest", points, torch.float32)
     a, b = _dense_rows(a), _dense_rows(b)
-    a_sizes, b_sizes = _sizes(a_sizes), _sizes(b_sizes)
+    a_sizes, b_sizes = as_int64(a_sizes), as_int64(b_sizes)
     failed = _kernels().wildshape_nearest(
         a.data_ptr(),
         a.stride(0),
@@ -150,10 +150,6 @@ def _dense_rows(points: Float32[Tensor, "B n 3"]) -> Float32[Tensor, "B n 3"]:
     """The same points with rows of three floats one after another; a copy only if needed."""
     dense = points.stride(2) == 1 and (points.stride(1) == 3 or points.shape[1] <= 1)
     return points if dense else points.contiguous()
-
-
-def _sizes(sizes: Int64[Tensor, "B"] | None) -> Int64[Tensor, "B"] | None:
-    return None if sizes is None else sizes.to("cpu", torch.int64).contiguous()
 
 
 def _kernels() -> ctypes.CDLL:

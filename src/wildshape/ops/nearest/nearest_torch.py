@@ -3,7 +3,7 @@
 """Nearest neighbours in plain torch: the reference, and the fast form without a compiler."""
 
 import torch
-from jaxtyping import Float, Float32, Int64
+from jaxtyping import Float, Float32, Int, Int64
 from torch import Tensor
 
 from wildshape.ops.nearest.neighbours import Neighbours, check_clouds
@@ -15,8 +15,8 @@ _BLOCK = 32
 def nearest_reference(
     query: Float[Tensor, "B N 3"],
     target: Float[Tensor, "B M 3"],
-    query_sizes: Int64[Tensor, "B"] | None = None,
-    target_sizes: Int64[Tensor, "B"] | None = None,
+    query_sizes: Int[Tensor, "B"] | None = None,
+    target_sizes: Int[Tensor, "B"] | None = None,
 ) -> Neighbours:
     """Differences, squares, minimum: what the other backends must reproduce.
 
@@ -40,8 +40,8 @@ def nearest_reference(
 def nearest_blocked(
     query: Float32[Tensor, "B N 3"],
     target: Float32[Tensor, "B M 3"],
-    query_sizes: Int64[Tensor, "B"] | None = None,
-    target_sizes: Int64[Tensor, "B"] | None = None,
+    query_sizes: Int[Tensor, "B"] | None = None,
+    target_sizes: Int[Tensor, "B"] | None = None,
 ) -> Neighbours:
     """The same in far fewer passes: `amin` is some 20 times faster than `argmin` on a CPU.
 
@@ -115,7 +115,7 @@ def _without_broken(query: Float[Tensor, "B N 3"]) -> tuple[Tensor, Tensor]:
 
 
 def _far_away(
-    target: Float[Tensor, "B M 3"], sizes: Int64[Tensor, "B"] | None
+    target: Float[Tensor, "B M 3"], sizes: Int[Tensor, "B"] | None
 ) -> Float[Tensor, "B M 3"]:
     """Put targets infinitely far away that are padding or not finite."""
     gone = ~target.isfinite().all(-1)
@@ -124,7 +124,7 @@ def _far_away(
     return target.masked_fill(gone[..., None], torch.inf)
 
 
-def _cleared(found: Neighbours, broken: Tensor, sizes: Int64[Tensor, "B"] | None) -> Neighbours:
+def _cleared(found: Neighbours, broken: Tensor, sizes: Int[Tensor, "B"] | None) -> Neighbours:
     """Broken queries get distance inf, padding queries 0; both index 0."""
     squared, index = found.distance_squared, found.index
     squared, index = squared.masked_fill(broken, torch.inf), index.masked_fill(broken, 0)
@@ -134,6 +134,6 @@ def _cleared(found: Neighbours, broken: Tensor, sizes: Int64[Tensor, "B"] | None
     return Neighbours(squared.masked_fill(beyond, 0.0), index.masked_fill(beyond, 0))
 
 
-def _beyond(rows: Tensor, sizes: Int64[Tensor, "B"]) -> Tensor:
+def _beyond(rows: Tensor, sizes: Int[Tensor, "B"]) -> Tensor:
     """`(B, n)`: which places lie past each row's size."""
     return torch.arange(rows.shape[1], device=rows.device) >= sizes.to(rows.device)[:, None]

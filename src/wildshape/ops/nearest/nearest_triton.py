@@ -8,7 +8,7 @@
 import torch
 import triton
 import triton.language as tl
-from jaxtyping import Float32, Int64
+from jaxtyping import Float32, Int
 from torch import Tensor
 
 from wildshape.ops.nearest.neighbours import Neighbours, check_clouds
@@ -61,8 +61,8 @@ def _search(
 def nearest_triton(
     query: Float32[Tensor, "B N 3"],
     target: Float32[Tensor, "B M 3"],
-    query_sizes: Int64[Tensor, "B"] | None = None,
-    target_sizes: Int64[Tensor, "B"] | None = None,
+    query_sizes: Int[Tensor, "B"] | None = None,
+    target_sizes: Int[Tensor, "B"] | None = None,
 ) -> Neighbours:
     """Exact search on the tensors' own device."""
     check_clouds(query, target, query_sizes, target_sizes)

@@ -5,7 +5,7 @@
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float, Int64
+from jaxtyping import Float, Int, Int64
 from torch import Tensor
 
 from wildshape.errors import BadInputError
@@ -60,6 +60,11 @@ def check_clouds(
                 f"nearest: expected {shapes[0][0]} whole numbers as sizes, found"
                 f" {tuple(sizes.shape)} of {sizes.dtype}."
             )
+
+
+def as_int64(sizes: Int[Tensor, "B"] | None) -> Int64[Tensor, "B"] | None:
+    """Sizes as the kernels read them."""
+    return None if sizes is None else sizes.to("cpu", torch.int64).contiguous()
 
 
 def check_neighbours(found: Neighbours, query: Tensor) -> None:

@@ -56,6 +56,8 @@ class SelfTaught(nn.Module):
         distances: what counts as far.
     """
 
+    sides: Tensor
+
     def __init__(
         self,
         network: ShapePoseNet,
@@ -68,6 +70,8 @@ class SelfTaught(nn.Module):
         self.network = network
         self.complete, self.unit, self.distances = complete, unit, distances
         self.encoding: Encoding | None = encoding
+        sides = _SIDES.to(next(network.parameters()).device)  # a recorded step may not copy it
+        self.register_buffer("sides", sides, persistent=False)
 
     def forward(self, batch: FusedBatch) -> Objective:
         """Loss of one batch."""
@@ -82,6 +86,7 @@ class SelfTaught(nn.Module):
             batch.translation,
             batch.shapes,
             self.distances,
+            self.sides,
         )
         belief = poses.log_belief.gather(1, pose.winner[:, None]).mean()
         known = self._known(shapes, batch)
@@ -138,6 +143,7 @@ def pose_terms(
     true_translation: Float[Tensor, "B 3"],
     shapes: Float[Tensor, "B G 3"],
     config: TaughtLossConfig = _DEFAULT,
+    sides: Float[Tensor, "8 3"] = _SIDES,
 ) -> PoseTerms:
     """How far the corners of the object's box lie from where they belong; hindsight's winner.
 
@@ -150,10 +156,11 @@ def pose_terms(
         true_translation: the target.
         shapes: target shapes, canonical frame.
         config: how many of a shape's points are strays.
+        sides: of the box's corners, +1 or -1 on each axis; on the device of the others.
     """
     strays = int(config.strays * shapes.shape[1])
     half = shapes.abs().mT.contiguous().topk(strays + 1, dim=-1).values[..., -1]
-    corners = half[:, None] * _SIDES.to(half)
+    corners = half[:, None] * sides
     posed = corners[:, None] @ rotation.mT + translation[:, :, None]
     true = corners @ true_rotation.mT + true_translation[:, None]
     distance = (posed - true[:, None]).square().sum(-1).clamp_min(_SMALLEST).sqrt().mean(-1)

@@ -23,6 +23,7 @@ import torch
 from jaxtyping import Float, Float32, Int64
 from torch import Tensor
 
+from wildshape.errors import BadInputError
 from wildshape.geometry.box import unit_of
 from wildshape.geometry.gravity import level_turn
 from wildshape.geometry.projection.field_of_view import slope, view_top
@@ -138,13 +139,16 @@ class Teacher:
         """From checkpoints.
 
         Raises:
-            BadInputError: a checkpoint cannot be used.
+            BadInputError: a checkpoint cannot be used, or is of another kind of sensor.
         """
         network, settings = load_checkpoint(checkpoint)
+        if settings.sensor != views.config.sensor:
+            raise BadInputError(
+                f"{checkpoint}: was trained on {settings.sensor} scans and cannot teach"
+                f" {views.config.sensor} scans; choose a teacher of their kind."
+            )
         turn = "facing" if settings.facing else "none"
-        read = replace(
-            views.config, points=settings.input_points, turn=turn, sensor=settings.sensor
-        )
+        read = replace(views.config, points=settings.input_points, turn=turn)
         asked = ViewSampler(views.store, np.arange(len(views.store)), read)
         asked.scans_of = views.scans_of
         other = None if headings is None else load(headings, raw=True)

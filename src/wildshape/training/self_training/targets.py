@@ -101,12 +101,13 @@ def load_targets(
     try:
         with safe_open(path, framework="pt") as file:
             found = file.metadata() or {}
-            if any(found.get(key) != value for key, value in identity.items()):
+            complete = found.pop("complete", "") == "True"
+            if found != identity:
                 return None
             check_shapes(path, file, _shapes_of(scans, tracks, file))
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         check_numbers(path, {k: v for k, v in tensors.items() if k != "view_top"})
-        return FusedTargets(**tensors, complete=found.get("complete") == "True")
+        return FusedTargets(**tensors, complete=complete)
     except (SafetensorError, OSError, ValueError, IndexError):
         return None
 

@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The folder of a run is gone on with only by the same training on the same tracks."""
+
+from dataclasses import replace
+
+import pytest
+
+from wildshape.errors import BadInputError
+from wildshape.io.output import MARKER, begin
+from wildshape.io.scans.points import Coordinates
+from wildshape.io.write_tracks import write_tracks
+from wildshape.training.options import TrainingOptions
+from wildshape.training.run_folder import begun_run, open_training_data
+
+OPTIONS = TrainingOptions(preset="tiny", steps=2)
+AGAIN = replace(OPTIONS, resume=True)
+
+
+@pytest.fixture
+def folders(cars, tmp_path):
+    """Two folders of the same track."""
+    paths = tmp_path / "one", tmp_path / "two"
+    for path in paths:
+        write_tracks(cars[:1], path, "folders", command="x", settings={})
+    return paths
+
+
+def test_a_run_goes_on_with_its_own_tracks_alone(folders, tmp_path):
+    one, two = folders
+    out = tmp_path / "run"
+    packed = open_training_data(one, out, OPTIONS)
+    for same in (one, tmp_path / "run" / ".." / "one", packed.path):
+        assert open_training_data(same, out, AGAIN).fingerprint == packed.fingerprint
+    with pytest.raises(BadInputError, match="two: the run packed tracks of another place"):
+        open_training_data(two, out, AGAIN)
+    for other in (Coordinates(unit="cm"), Coordinates(origin=(0.0, 1.0, 0.0))):
+        with pytest.raises(BadInputError, match="--unit or --origin"):
+            open_training_data(one, out, replace(AGAIN, coordinates=other))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("preset", "small"), ("encoder", "dgcnn"), ("steps", 3), ("seed", 1)]
+)
+def test_a_run_goes_on_with_its_own_settings_alone(folders, tmp_path, name, value):
+    out = tmp_path / "run"
+    for options in (OPTIONS, AGAIN):
+        with begun_run(folders[0], out, options):
+            pass
+    other = replace(AGAIN, **{name: value})
+    with (
+        pytest.raises(BadInputError, match=f"other {name}; resume"),
+        begun_run(folders[0], out, other),
+    ):
+        pass
+
+
+@pytest.mark.parametrize("options", [OPTIONS, AGAIN], ids=["anew", "resumed"])
+@pytest.mark.parametrize("finished", [False, True])
+def test_what_another_command_wrote_is_left_alone(folders, tmp_path, options, finished):
+    out = tmp_path / "completed"
+    output = begin(out, "complete", {}, ["*.ply"])
+    if finished:
+        output.finish()
+    before = (out / MARKER).read_bytes()
+    with (
+        pytest.raises(BadInputError, match=r"output of .*`complete`"),
+        begun_run(folders[0], out, options),
+    ):
+        pass
+    assert (out / MARKER).read_bytes() == before
+
+
+def test_a_damaged_marker_is_refused(folders, tmp_path):
+    out = tmp_path / "run"
+    out.mkdir()
+    (out / MARKER).write_text('{"command": "train"}')
+    with pytest.raises(BadInputError, match=MARKER), begun_run(folders[0], out, AGAIN):
+        pass
