@@ -37,6 +37,8 @@ def test_a_run_goes_on_with_its_own_tracks_alone(folders, tmp_path):
     for other in (Coordinates(unit="cm"), Coordinates(origin=(0.0, 1.0, 0.0))):
         with pytest.raises(BadInputError, match="--unit or --origin"):
             open_training_data(one, out, replace(AGAIN, coordinates=other))
+        with pytest.raises(BadInputError, match="in metres .* already"):
+            open_training_data(packed.path, out, replace(OPTIONS, coordinates=other))
 
 
 @pytest.mark.parametrize(

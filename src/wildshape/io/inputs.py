@@ -232,17 +232,26 @@ def open_tracks(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> T
     if path.is_file():
         return _single_scan(path, coordinates)
     if is_store(path):
-        if coordinates != SENSOR_METRES:
-            raise BadInputError(
-                f"{path}: a packed store is in metres and its sensors' frames already; leave --unit"
-                " and --origin away, and give them to `convert`."
-            )
+        refuse_other_coordinates(path, coordinates)
         store = open_store(path)
         return TrackSource(path, store.names, lambda index: _checked(store.track(index)))
     if (path / "scans").is_dir():
         scan_files(path / "scans")
         return TrackSource(path, (_name(path),), lambda _: read_track_file(path, coordinates))
     return _folder(path, coordinates)
+
+
+def refuse_other_coordinates(store: Path, coordinates: Coordinates) -> None:
+    """Refuse to read a packed store in another unit or frame.
+
+    Raises:
+        BadInputError: that is asked for.
+    """
+    if coordinates != SENSOR_METRES:
+        raise BadInputError(
+            f"{store}: a packed store is in metres and its sensors' frames already; leave --unit"
+            " and --origin away, and give them to `convert`."
+        )
 
 
 def with_rays(source: TrackSource, path: Path, coordinates: Coordinates) -> TrackSource:

@@ -14,7 +14,7 @@ from typing import Any
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import lock_folder, write_json
 from wildshape.io.guard import reading
-from wildshape.io.inputs import open_tracks
+from wildshape.io.inputs import open_tracks, refuse_other_coordinates
 from wildshape.io.output import MARKER, Output, begin, keep_apart, remove_leftovers
 from wildshape.io.progress import SILENT, Progress
 from wildshape.io.store.layout import INDEX_JSON
@@ -102,6 +102,7 @@ def open_training_data(
         BadInputError: no tracks there, others than the run has; or track folders under torchrun.
     """
     if is_store(data):
+        refuse_other_coordinates(data, options.coordinates)
         return open_store(data)
     if int(os.environ.get("WORLD_SIZE", "1")) > 1:
         raise BadInputError(
