@@ -3,7 +3,11 @@
 """What a model learns of the vehicles that it found, and when that is used."""
 
 import json
+import os
+import shutil
+from contextlib import suppress
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 import pytest
@@ -11,11 +15,12 @@ import torch
 from tests.drives.finished_drive import CARS, finished_drive
 from tests.models import CONFIG, SETTINGS
 
-from wildshape.drives.adapting import adapt
+from wildshape.drives.adapting import adapt, second_pass
 from wildshape.drives.adapting.adapt import adapt_to
 from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.adapting.examples import examples_of
 from wildshape.drives.adapting.measures import Measures
+from wildshape.drives.result import DriveResult
 from wildshape.inference.predictor import Predictor, load
 from wildshape.method.checkpoint import load_checkpoint
 from wildshape.method.network import ShapePoseNet
@@ -135,3 +140,73 @@ def test_a_killed_adaptation_goes_on_to_the_same_weights(out, predictor, tmp_pat
     )
     for one, other in zip(killed_.parameters(), whole.parameters(), strict=True):
         assert torch.equal(one, other)
+
+
+def leave_results(folder, said):
+    """What a pass leaves: a line of boxes, and a vehicle named after it."""
+    for part in ("tracks", "objects", "shapes"):
+        (folder / part / said).mkdir(parents=True)
+        (folder / part / said / "file").write_text(said)
+    (folder / "boxes.csv").write_text(said)
+
+
+def results(folder):
+    """What is said in a folder of such results."""
+    said = [(folder / "boxes.csv").read_text()]
+    for part in ("tracks", "objects", "shapes"):
+        said += [one.name for one in (folder / part).iterdir()]
+    return said
+
+
+def second(out, model):
+    """A second pass that finds what the model is called."""
+    second_pass.put_in_place(out)
+    if second_pass.is_done(out, str(model)):
+        return
+    second_pass.begin_second(out, str(model))
+    found, stage = second_pass.results_of(out), second_pass.stages_of(out) / "objects"
+    for left in stage.glob("*"):
+        assert left.name == model.name
+    (stage / model.name).mkdir(parents=True, exist_ok=True)
+    if not found.is_dir():
+        leave_results(found, model.name)
+    second_pass.conclude(out, DriveResult(out, 1, 1, (model.name,), 1, 0, (), {}), str(model))
+
+
+def dying(monkeypatch, steps):
+    """From the so-many-th change of the disk on every one fails."""
+    left = iter(range(steps))
+    for name in ("rename", "replace", "unlink", "rmdir"):
+        change = getattr(os, name)
+
+        def changed(*given, change=change, **named):
+            if next(left, None) is None:
+                raise Killed
+            return change(*given, **named)
+
+        monkeypatch.setattr(os, name, changed)
+
+
+def test_a_second_adapted_model_killed_at_any_instant_keeps_the_true_first_pass(
+    tmp_path, monkeypatch
+):
+    start, models = tmp_path / "start", [tmp_path / name for name in ("one", "other")]
+    leave_results(start, "first")
+    (start / "wildshape.json").write_text("{}")
+    for model in models:
+        model.write_text(model.name)
+    for model in models:
+        out = start
+        for steps in count():
+            out = shutil.copytree(start, tmp_path / f"{model.name}-{steps}")
+            alive = False
+            with monkeypatch.context() as patched, suppress(Killed):
+                dying(patched, steps)
+                second(out, model)
+                alive = True
+            second(out, model)
+            assert results(out) == [model.name] * 4
+            assert results(out / "first") == ["first"] * 4
+            if alive:
+                break
+        start = out

@@ -7,15 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
+from tests.drives.objects import completed, still
 
 from wildshape.drives.completing.boxes import moves, smooth
 from wildshape.drives.completing.claims import claim
 from wildshape.drives.completing.completion import fullest_of_parts, keyframes, order_of_looks
 from wildshape.drives.completing.merging import Places
-from wildshape.drives.completing.placing import Completed, on_ground
+from wildshape.drives.completing.placing import on_ground
 from wildshape.drives.completing.surroundings import Surroundings
-from wildshape.drives.completing.turns import Turns
 from wildshape.drives.completing.vehicles import (
     judge,
     stated,
@@ -34,7 +33,6 @@ from wildshape.drives.config import (
 )
 from wildshape.drives.tracking.segmentation import cut_file
 from wildshape.drives.tracking.sightings import Sightings
-from wildshape.geometry.transforms.se3 import SE3
 
 
 def test_the_fullest_scan_of_each_part_is_completed():
@@ -46,19 +44,6 @@ def test_the_fullest_scan_of_each_part_is_completed():
     assert keyframes(one, CompletionConfig(scans=4, ticks=4, fewest_points=0)).frames == (1, 4, 8)
     assert order_of_looks(one, 3) == [1, 4, 8, 0, 2, 3, 5, 6, 7]
     assert order_of_looks(one.part([3, 4]), 3) == [1, 0]
-
-
-def still(count):
-    """The turns of a sensor that does not move."""
-    poses = SE3(torch.eye(3).double().expand(count, 3, 3), torch.zeros(count, 3).double())
-    return Turns(tuple(range(count)), poses)
-
-
-def completed(boxes, frames=None, name="a", size=(4.0, 1.8, 1.5), cost=0.1, parts=()):
-    frames = tuple(range(len(boxes))) if frames is None else frames
-    whole = tuple(range(frames[0], frames[-1] + 1))
-    sightings = Sightings(name, whole, ((0,),) * len(whole), (200,) * len(whole), parts)
-    return Completed(sightings, frames, np.array(boxes, float), size, cost, 0.5)
 
 
 def test_a_moving_vehicle_goes_straight_on_between_its_completed_scans():

@@ -46,7 +46,9 @@ def test_argoverse2_logs(tmp_path):
 
 
 def test_pandaset_scenes(tmp_path):
-    write_scene(tmp_path / "pandaset" / "001", SCENE)
+    scene = write_scene(tmp_path / "pandaset" / "001", SCENE)
+    for name in ("._00.pkl.gz", "00_backup.pkl.gz"):
+        (scene / "lidar" / name).write_bytes(b"left by somebody")
     what, drives = find_drives(tmp_path)
     assert what.startswith("PandaSet")
     drive = open_drive(drives[0])
@@ -55,6 +57,9 @@ def test_pandaset_scenes(tmp_path):
         assert np.allclose(in_world(drive, frame), cloud, atol=1e-4)
         assert np.median(drive.scan(frame)[:, 2]) < 0  # x forward, y left, z up
         assert np.median(drive.scan(frame)[:, 0]) > 0
+    for number in range(3):
+        (scene / "lidar" / f"{number:02d}.pkl.gz").unlink()
+    refused(open_drive, drives[0], match=r"lidar: holds none of 00\.pkl\.gz to 79\.pkl\.gz")
 
 
 def test_a_release_that_names_no_scene_is_refused(tmp_path):
@@ -139,6 +144,58 @@ def test_objects_cut_out_of_their_scans_are_refused(tmp_path):
         refused(open_drive, folder, match=r"objects that were cut out .* complete .* --track")
     write_drive(tmp_path / "raw", [], {0: np.zeros((20, 3))}, "velodyne_objects_xyz0")
     refused(open_drive, tmp_path / "raw", match="objects that were cut out")
+
+
+def a_log(folder):
+    write_log(folder, SCENE)
+    return folder
+
+
+def a_scene(folder):
+    return write_scene(folder, SCENE)
+
+
+def a_scene_of_nuscenes(folder):
+    return write_nuscenes(folder, [Scene("scene-0061", (Thing("car", keys=(0, 1)),), keys=2)])
+
+
+def a_segment(folder):
+    return write_waymo(folder, [WaymoThing("parked")], frames=3) / SEGMENT
+
+
+def a_bag(folder):
+    write = pytest.importorskip("tests.io.bags.write", exc_type=ImportError)
+    return write.write_bag(folder, "db3", {"/points": list(SCENE.clouds)})
+
+
+def packets(folder):
+    write = pytest.importorskip("tests.io.packets.write", exc_type=ImportError)
+    pytest.importorskip("velodyne_decoder")
+    ranges = np.full((write.PACKETS, write.BLOCKS, write.LASERS), 5000, np.uint16)
+    return write.write_velodyne(folder.with_suffix(".pcap"), [ranges] * 3)
+
+
+@pytest.mark.parametrize(
+    ("write", "scans"),
+    [
+        (a_log, "sensors/lidar/*.feather"),
+        (a_scene, "lidar/01.pkl.gz"),
+        (a_scene_of_nuscenes, "s*/LIDAR_TOP/*.bin"),
+        (a_segment, "lidar/*.parquet"),
+        (a_bag, "*.db3"),
+        (packets, "*.pcap"),
+    ],
+)
+def test_a_scan_that_was_cut_off_and_copied_again_is_another_recording(
+    tmp_path, monkeypatch, write, scans
+):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    path = write(tmp_path / "recording")
+    before = open_drive(path).fingerprint
+    assert open_drive(path).fingerprint == before
+    with next(tmp_path.rglob(scans)).open("ab") as file:
+        file.write(bytes(4096))
+    assert open_drive(path).fingerprint != before
 
 
 def test_the_command_says_what_it_took_the_source_for(tmp_path, capsys):

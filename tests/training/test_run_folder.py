@@ -37,7 +37,7 @@ def test_a_run_goes_on_with_its_own_tracks_alone(folders, tmp_path):
     for other in (Coordinates(unit="cm"), Coordinates(origin=(0.0, 1.0, 0.0))):
         with pytest.raises(BadInputError, match="--unit or --origin"):
             open_training_data(one, out, replace(AGAIN, coordinates=other))
-        with pytest.raises(BadInputError, match="in metres .* already"):
+        with pytest.raises(BadInputError, match=r"in metres .* already"):
             open_training_data(packed.path, out, replace(OPTIONS, coordinates=other))
 
 

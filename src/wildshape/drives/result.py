@@ -92,9 +92,20 @@ def settings_of(
         "recording": recording.fingerprint,
         **({} if topic is None else {"topic": topic}),
         "drive": asdict(config),
+        **identity_of(predictor),
+        **({} if detections is None else detections.identity()),
+    }
+
+
+def identity_of(predictor: Predictor) -> dict[str, Any]:
+    """What decides what a predictor finds, as JSON values; the defaults of `load` are left out."""
+    level = predictor.up == predictor.settings.up
+    raw = predictor.refines != predictor.settings.facing
+    return {
         "model": predictor.settings.provenance,
         "inference": asdict(predictor.config),
-        **({} if detections is None else detections.identity()),
+        **({} if level else {"level": False}),
+        **({"raw": True} if raw else {}),
     }
 
 

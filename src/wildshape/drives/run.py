@@ -274,7 +274,7 @@ class _Run:
 
     def turns(self, objects: list[Sightings], T_level_sensor: SE3) -> Turns:
         """The sensor's turns, in their sense where points have no times."""
-        found = Turns(self.drive.ticks, T_level_sensor)
+        found = Turns(self.drive.ticks, T_level_sensor, breaks=self.breaks.frames)
         if self.drive.turn(0).seconds is not None:
             return found
         shown = ((one.frames, one.boxes) for one in self.completed(objects, found))

@@ -4,9 +4,10 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -67,7 +68,7 @@ class Drive:
         warnings: what is odd about it, a sentence each.
         cut_by: how its objects are cut out, for their files.
         motion: of the sensor at each frame, once known: scans are corrected by it.
-        sizes: bytes of each scan's file, where every scan has one.
+        sizes: bytes of the files that scans are read from.
     """
 
     name: str
@@ -90,9 +91,11 @@ class Drive:
         times: Sequence[float] | None = None,
         T_world_sensor: SE3 | None = None,
         warnings: Sequence[str] = (),
-        sizes: Sequence[int] = (),
+        files: Iterable[Path] = (),
     ) -> "Drive":
         """A drive whose ticks come from the scans' times, or from their names if these count.
+
+        `files`: one a scan; where scans have none of their own, those of the recording.
 
         Raises:
             BadInputError: times, or names that count, do not rise.
@@ -113,7 +116,7 @@ class Drive:
             times=None if times is None else tuple(times),
             T_world_sensor=T_world_sensor,
             warnings=(*warnings, *missing),
-            sizes=tuple(sizes),
+            sizes=tuple(file.stat().st_size for file in files),
         )
 
     def __len__(self) -> int:

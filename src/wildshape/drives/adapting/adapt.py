@@ -16,6 +16,7 @@ from wildshape.drives.adapting.measures import Measures, clear_headed, measure
 from wildshape.drives.adapting.second_pass import like
 from wildshape.drives.adapting.teaching import taught
 from wildshape.drives.clock import Watch, silent
+from wildshape.drives.result import identity_of
 from wildshape.inference.predictor import Predictor
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import read_json, read_record, reading, record_of
@@ -118,8 +119,7 @@ def adapt_to(
     place = folder / ADAPTED
     settings = {
         "drives": [str(out.resolve()) for out in outs],
-        "model": predictor.settings.provenance,
-        "inference": asdict(predictor.config),
+        **identity_of(predictor),
         "adapt": asdict(config),
     }
     done = None if overwrite else finished(place, _COMMAND, settings, parts=())

@@ -3,7 +3,8 @@
 """Where a second pass writes, and how its results take the place of the first pass's.
 
 Until it is finished the results of the first pass stay. Then they are moved into `first/`, and the
-new ones to where they were; a run killed in between is ended before anything else is done.
+new ones to where they were; a run killed in between is ended before anything else is done. Results
+of an earlier second pass are removed: `first/` keeps those of the first one.
 """
 
 import shutil
@@ -43,10 +44,10 @@ def is_done(out: Path, model: str) -> bool:
 def begin_second(out: Path, model: str) -> None:
     """Keep of an earlier second pass what the same model found; of another remove all."""
     stages = stages_of(out)
-    known = stages / _MODEL
-    if known.is_file() and known.read_text("utf-8") != fingerprint(Path(model)):
-        shutil.rmtree(stages)
-    write_text(known, fingerprint(Path(model)))
+    known, asked = stages / _MODEL, fingerprint(Path(model))
+    if not known.is_file() or known.read_text("utf-8") != asked:
+        _remove(stages)
+    write_text(known, asked)
 
 
 def conclude(out: Path, found: DriveResult, model: str) -> DriveResult:
@@ -74,15 +75,17 @@ def put_in_place(out: Path) -> None:
     if not said.is_file():
         return
     lock_folder(out)
-    found, first = results_of(out), out / FIRST
-    if (found / BOXES).is_file():  # nothing was put in place yet: what is there is the first pass's
+    found, first, marker = results_of(out), out / FIRST, out / MARKER
+    record = read_json(marker, _SAYS)  # says whose results are there until the new ones are
+    if (found / BOXES).is_file():  # nothing was put in place yet
         first.mkdir(exist_ok=True)
         for name in (*_FOUND, *_MADE_OF_IT):
-            _move(out / name, first / name)
+            if "adapted" in record:
+                _remove(out / name)
+            else:
+                _move(out / name, first / name)
     for name in _FOUND:
         _move(found / name, out / name)
-    marker = out / MARKER
-    record = read_json(marker, _SAYS)
     write_json(marker, {**record, **read_json(said, "what a second pass found")})
     said.unlink()
 
@@ -92,10 +95,18 @@ def _move(path: Path, target: Path) -> None:
         path.rename(target)
 
 
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
 def like(first: Predictor, model: Path) -> Predictor:
     """Another model used as the first one is.
 
     Raises:
         BadInputError: the checkpoint cannot be used.
     """
-    return load(model, str(first.device), level=first.up is not None, config=first.config)
+    level, raw = first.up is not None, not first.refines
+    return load(model, str(first.device), raw=raw, level=level, config=first.config)

@@ -8,7 +8,10 @@ it, the nearer the heavier (local regression, Cleveland 1979), for vehicles brak
 Before and after them it goes straight on.
 """
 
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -19,7 +22,8 @@ from wildshape.drives.object_config import BoxConfig
 
 _LEAST_APART = 0.5  # ticks
 _ROUNDS = 10
-_ENOUGH = 4  # completed scans for a parabola: through three one goes whatever they are
+_ENOUGH = 4  # moments for a parabola: through three one goes whatever they are
+_REACH = 3.0  # widths of the kernel, to the farthest scan that a curve needs
 
 
 @dataclass(frozen=True)
@@ -32,9 +36,14 @@ class Way:
         moving: or standing.
     """
 
-    frames: tuple[int, ...]
+    frames: Sequence[int]
     boxes: Float[np.ndarray, "f 4"]
     moving: bool
+
+    @cached_property
+    def bounds(self) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2"]]:
+        """Least and largest x and y."""
+        return self.boxes[:, :2].min(0), self.boxes[:, :2].max(0)
 
 
 def smooth(one: Completed, turns: Turns, config: BoxConfig) -> Way:
@@ -54,7 +63,7 @@ def smooth(one: Completed, turns: Turns, config: BoxConfig) -> Way:
     return way_over(one, tuple(frames), turns, config)
 
 
-def way_over(one: Completed, frames: tuple[int, ...], turns: Turns, config: BoxConfig) -> Way:
+def way_over(one: Completed, frames: Sequence[int], turns: Turns, config: BoxConfig) -> Way:
     """The way of one vehicle over frames, seen or not; see `smooth`."""
     at = np.take(turns.ticks, one.frames) + one.phases
     if not moves(at, one.boxes, config):
@@ -92,19 +101,27 @@ def _on_its_way(
 ) -> Float[np.ndarray, "f 4"]:
     """Boxes of one that moves; `at`: the ticks of the completed ones, `wanted`: those asked for."""
     places, velocities = _lines(at, boxes[:, :3], wanted, config.smooth_ticks)
-    if len(at) >= _ENOUGH:
+    if len(_moments(at)) >= _ENOUGH:
         among = (wanted > at[0] - config.smooth_ticks) & (wanted < at[-1] + config.smooth_ticks)
         places[among] = _parabolas(at, boxes[:, :3], wanted[among], config.smooth_ticks)
     return np.column_stack((places, _yaws(at, boxes, wanted, velocities, config)))
 
 
 def expected(one: Completed, turns: Turns, beyond_ticks: int, config: BoxConfig) -> Way:
-    """Where one may be: standing, in every frame; moving, a little beyond its track."""
-    ticks = turns.ticks
-    low, high = ticks[one.seen.frames[0]] - beyond_ticks, ticks[one.seen.frames[-1]] + beyond_ticks
-    way = way_over(one, (one.seen.frames[0],), turns, config)
-    frames = [i for i, tick in enumerate(ticks) if not way.moving or low <= tick <= high]
-    return way_over(one, tuple(frames), turns, config)
+    """Where one may be: standing, in every frame; moving, a little beyond its track.
+
+    Frames follow each other. None is beyond a break: where things stand there is guessed.
+    """
+    first, last = one.seen.frames[0], one.seen.frames[-1]
+    frames, ticks = turns.unbroken(first, last), turns.ticks
+    way = way_over(one, (first,), turns, config)
+    if not way.moving:
+        boxes = np.broadcast_to(way.boxes, (len(frames), 4))  # held once
+        return Way(frames, boxes, moving=False)
+    start = bisect_left(ticks, ticks[first] - beyond_ticks)
+    stop = bisect_right(ticks, ticks[last] + beyond_ticks)
+    frames = range(max(start, frames.start), min(stop, frames.stop))
+    return way_over(one, frames, turns, config)
 
 
 def moves(
@@ -162,14 +179,33 @@ def _middle(boxes: Float[np.ndarray, "k 4"]) -> Float[np.ndarray, "4"]:
     return np.append(np.median(boxes[:, :3], axis=0), mean)
 
 
+def _moments(at: Float[np.ndarray, "k"]) -> Float[np.ndarray, "m"]:
+    """Ticks of the completed scans; two that lie no half tick apart are one moment."""
+    return at[np.diff(at, prepend=-np.inf) >= _LEAST_APART]
+
+
 def _weights(
-    at: Float[np.ndarray, "k"], wanted: Float[np.ndarray, "f"], smooth_ticks: float
+    at: Float[np.ndarray, "k"],
+    wanted: Float[np.ndarray, "f"],
+    smooth_ticks: float,
+    needed: int = 1,
 ) -> Float[np.ndarray, "f k"]:
-    """How much each completed scan says of each frame; the kernel is wide enough to reach two."""
+    """How much each completed scan says of each frame.
+
+    The kernel is wide enough to reach two, and as many moments as are `needed`: scans may be
+    neighbours and the next ones far away.
+    """
     apart = np.abs(wanted[:, None] - at)
-    second = np.sort(apart, axis=1)[:, min(1, len(at) - 1)]
-    width = np.maximum(smooth_ticks, second)[:, None]
+    second = _nth(apart, 2)
+    farthest = _nth(np.abs(wanted[:, None] - _moments(at)), needed)
+    width = np.maximum(np.maximum(smooth_ticks, second), farthest / _REACH)
     return np.exp(-0.5 * (apart / width) ** 2)
+
+
+def _nth(apart: Float[np.ndarray, "f k"], number: int) -> Float[np.ndarray, "f 1"]:
+    """The second smallest of each row, say, or the largest where there are fewer."""
+    place = min(number, apart.shape[1]) - 1
+    return np.sort(apart, axis=1)[:, place : place + 1]
 
 
 def _lines(
@@ -179,7 +215,7 @@ def _lines(
     smooth_ticks: float,
 ) -> tuple[Float[np.ndarray, "f 3"], Float[np.ndarray, "f 3"]]:
     """Place and velocity a tick in each frame, of the line of weighted least squares around it."""
-    weights = _weights(at, wanted, smooth_ticks)
+    weights = _weights(at, wanted, smooth_ticks, needed=2)
     weights /= weights.sum(1, keepdims=True)
     time = at - wanted[:, None]
     mean_time = (weights * time).sum(1, keepdims=True)
@@ -197,7 +233,7 @@ def _parabolas(
     trust: Float[np.ndarray, "k"] | float = 1.0,
 ) -> Float[np.ndarray, "f d"]:
     """Place in each frame, of the parabola of weighted least squares around it."""
-    weights = trust * _weights(at, wanted, smooth_ticks)
+    weights = trust * _weights(at, wanted, smooth_ticks, needed=3)
     time = (at - wanted[:, None]) / smooth_ticks
     powers = np.stack((np.ones_like(time), time, time**2), axis=-1)
     weighted = np.swapaxes(powers * weights[..., None], 1, 2)

@@ -80,10 +80,9 @@ def _claims(
     """Each cluster of a frame that lies in a vehicle's box, and whose: places in the lists."""
     centres = np.array([part.mean(0)[:2] for part in clusters]).reshape(-1, 2)
     for i, (one, way) in enumerate(zip(vehicles, ways)):
-        place = np.searchsorted(way.frames, frame)
-        if place == len(way.frames) or way.frames[place] != frame:
+        if frame not in way.frames:
             continue
-        box = way.boxes[place]
+        box = way.boxes[frame - way.frames[0]]
         near = np.hypot(*(centres - box[:2]).T) < one.size[0]
         for row in np.flatnonzero(near).tolist():
             inside = in_box(clusters[row], box, one.size, config.claims.around_m)

@@ -43,16 +43,18 @@ class Places:
         was beside something in the other: a chain of fragments would join two vehicles that follow
         each other.
         """
-        pairs = list(combinations(range(len(objects)), 2))
-        shared = {(i, j): self.overlap(objects[i], objects[j]) for i, j in pairs}
+
+        def share(i: int, j: int) -> float:
+            return self.overlap(objects[i], objects[j])
+
+        every = ((pair, share(*pair)) for pair in combinations(range(len(objects)), 2))
+        shared = {pair: part for pair, part in every if part > self.config.overlap}
         group = {i: [i] for i in range(len(objects))}
-        for i, j in sorted(pairs, key=lambda pair: -shared[pair]):
-            if shared[i, j] <= self.config.overlap:
-                break
+        for i, j in sorted(shared, key=lambda pair: -shared[pair]):
             one, other = group[i], group[j]
             if one is other:
                 continue
-            across = [shared[min(pair), max(pair)] for pair in product(one, other)]
+            across = [share(min(pair), max(pair)) for pair in product(one, other)]
             if not any(0 <= part < self.config.apart for part in across):
                 one += other
                 group.update(dict.fromkeys(other, one))
@@ -70,15 +72,20 @@ class Places:
         are none.
         """
         way, beside = self._way(one), self._way(other)
-        common = np.intersect1d(way.frames, beside.frames)
-        if not len(common):
+        first = max(way.frames[0], beside.frames[0])
+        common = range(first, min(way.frames[-1], beside.frames[-1]) + 1)
+        if not common:
             return -1.0
-        apart = _apart(common, one.frames) + _apart(common, other.frames)
+        reach = (one.size[0] + other.size[0]) / 2
+        if _apart(way, beside) >= reach:
+            return 0.0
+        frames = common[:1]  # of two that stand any one tells
+        if way.moving or beside.moving:
+            frames = _nearest(np.array(common), one.frames, other.frames)
         found = []
-        for frame in common[np.argsort(apart, kind="stable")[:_LOOKED_AT]]:
-            here = way.boxes[np.searchsorted(way.frames, frame)]
-            there = beside.boxes[np.searchsorted(beside.frames, frame)]
-            near = np.hypot(*(here[:2] - there[:2])) < (one.size[0] + other.size[0]) / 2
+        for frame in frames:
+            here, there = (of.boxes[frame - of.frames[0]] for of in (way, beside))
+            near = np.hypot(*(here[:2] - there[:2])) < reach
             found.append(near and footprint_overlap(here, one.size, there, other.size))
         return float(np.median(found))
 
@@ -89,6 +96,13 @@ class Places:
         return self._ways[name]
 
 
-def _apart(frames: np.ndarray, completed: tuple[int, ...]) -> np.ndarray:
-    """Frames between each of `frames` and the nearest completed one."""
-    return np.abs(frames[:, None] - np.array(completed)).min(1)
+def _apart(one: Way, other: Way) -> float:
+    """How far two ways stay from each other at least, metres; below 0 where they may cross."""
+    (low, high), (least, most) = one.bounds, other.bounds
+    return float(np.maximum(low - most, least - high).max())
+
+
+def _nearest(frames: np.ndarray, *completed: tuple[int, ...]) -> np.ndarray:
+    """Those of `frames` that are nearest to the completed ones, of each object, together."""
+    apart = sum(np.abs(frames[:, None] - np.array(own)).min(1) for own in completed)
+    return frames[np.argsort(apart, kind="stable")[:_LOOKED_AT]]

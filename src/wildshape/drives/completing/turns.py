@@ -32,11 +32,19 @@ class Turns:
         T_level_sensor: at their middles.
         sense: 1: the beam comes from behind over the right side and the front, counterclockwise
             from above; -1: over the left side; 0: points are as seen at the turn's middle.
+        breaks: frames whose place is guessed from the frame before.
     """
 
     ticks: tuple[int, ...]
     T_level_sensor: SE3
     sense: int = 0
+    breaks: tuple[int, ...] = ()
+
+    def unbroken(self, first: int, last: int) -> range:
+        """Two frames and all around them, up to the next breaks."""
+        start = max((frame for frame in self.breaks if frame <= first), default=0)
+        stop = min((frame for frame in self.breaks if frame > last), default=len(self.ticks))
+        return range(start, stop)
 
     def met(self, frames: _Frames, shown: _Boxes) -> tuple[_Boxes, Float[np.ndarray, "k"]]:
         """Where things stood that frames show, and when the beam met each: see `phases`.

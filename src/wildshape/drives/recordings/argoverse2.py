@@ -58,4 +58,5 @@ def open_log(path: Path) -> Drive:
         read=_Sweeps(tuple(files), T_ego_sensor.inverse()),
         times=[stamp / 1e9 for stamp in stamps],
         T_world_sensor=stack([T_city_ego[t] for t in stamps]) @ T_ego_sensor if known else None,
+        files=files,
     )

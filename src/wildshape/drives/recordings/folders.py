@@ -130,7 +130,7 @@ def _drive(
         read=_Files(tuple(files), None if times is None else tuple(times)),
         times=times,
         T_world_sensor=None if poses is None else read_poses(poses, len(files)),
-        sizes=[file.stat().st_size for file in files],
+        files=files,
     )
 
 

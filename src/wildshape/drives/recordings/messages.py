@@ -34,6 +34,7 @@ def open_recording(path: Path, topic: str | None = None) -> Drive:
         read=bag,
         times=bag.times,
         warnings=bag.warnings,
+        files=bag_files(path),
     )
 
 
@@ -51,10 +52,12 @@ def open_packet_file(path: Path) -> Drive:
     """
     file = open_packets(path)
     times = file.turns.times
+    described = path.with_suffix(".json")
     return Drive.of(
         name=path.stem,
         scan_names=[f"{frame:06d}" for frame in range(len(times))],
         read=file,
         times=times,
         warnings=file.turns.warnings,
+        files=(path, described) if described.is_file() else (path,),
     )

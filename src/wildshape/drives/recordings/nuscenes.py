@@ -61,4 +61,5 @@ def open_scene(path: Path) -> Drive:
         read=_Sweeps(tuple(file for _, file in there)),
         times=[frame.microseconds / 1e6 for frame, _ in there],
         T_world_sensor=stack([frame.T_global_sensor for frame, _ in there]),
+        files=[file for _, file in there],
     )

@@ -81,4 +81,5 @@ def open_segment(path: Path) -> Drive:
         read=_Frames(path.parent, path.name, times),
         times=[time / 1e6 for time in times],
         T_world_sensor=stack(list(T_world_vehicle.values())) @ T_vehicle_sensor,
+        files=tables.values(),
     )

@@ -12,6 +12,7 @@ from wildshape.simulate.street.street import LANE_M, LEAD_M, Actor, Motion, Stre
 
 _KINDS = {"van": "Van", "truck": "Truck"}
 _LONGEST_M, _WIDEST_PARKED_M = 9.5, 2.45
+_LEAST_ROOM_M = 1.0  # between two of one lane
 Seats = Iterator[Actor]
 
 
@@ -26,7 +27,9 @@ class _Stretch:
 
 
 def traffic(street: Street, end: float, seconds: float, seed: int) -> tuple[Actor, ...]:
-    """All actors of a street, numbered; no two vehicles meet, none comes near the sensor's.
+    """All actors of a street, numbered; no two vehicles meet on it, none comes near the sensor's.
+
+    Who is beyond its end is drawn there, far from the sensor.
 
     Args:
         street: its path, its lanes and how the sensor's vehicle moves.
@@ -100,17 +103,30 @@ def _on_plots(
 
 
 def _same_lane(stretch: _Stretch, drawn: Seats, rng: np.random.Generator) -> Iterator[Actor]:
-    """Before and behind the sensor's vehicle, at nearly its speed, never coming nearer."""
+    """Before and behind the sensor's vehicle, at nearly its speed, never coming nearer.
+
+    One that would run into its neighbour before the drive ends goes as fast as that.
+    """
     ego = stretch.street.ego
     for sign in (1.0, -1.0):
-        gap = 0.0
+        gap, neighbour = 0.0, None
         for number in range(int(rng.integers(0, 4))):
             gap += float(rng.uniform(11.0, 26.0)) + (_LONGEST_M / 2 if number else 0.0)
             more = sign * 0.05 * (number + 1) * ego.speed * float(rng.uniform(0.0, 1.0))
             motion = replace(ego, start=ego.start + sign * gap, speed=ego.speed + more)
             if ego.speed == 0:
                 motion = replace(motion, speed=0.0)
-            yield replace(next(drawn), motion=motion, lateral=-LANE_M / 2)
+            actor = replace(next(drawn), motion=motion, lateral=-LANE_M / 2)
+            if neighbour and _room(neighbour, actor, sign, stretch.seconds) < _LEAST_ROOM_M:
+                actor = replace(actor, motion=replace(motion, speed=neighbour.motion.speed))
+            neighbour = actor
+            yield actor
+
+
+def _room(one: Actor, other: Actor, sign: float, time: float) -> float:
+    """Metres between two of one lane; `sign`: 1: the other is ahead, -1: behind."""
+    ahead = float(other.motion.at(time) - one.motion.at(time))
+    return sign * ahead - (one.size[0] + other.size[0]) / 2
 
 
 def _oncoming(stretch: _Stretch, drawn: Seats, rng: np.random.Generator) -> Iterator[Actor]:

@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Boxes of long tracks, of which few scans are completed."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+from tests.drives.objects import completed, still
+
+from wildshape.drives.completing.boxes import expected, smooth
+from wildshape.drives.config import BoxConfig
+
+
+def driving(frames, phases=()):
+    """One that drives 1.2 m a tick, each of its boxes a few centimetres off."""
+    at = np.add(frames, phases or [0.0] * len(frames))
+    boxes = np.column_stack((1.2 * at, 0.3 * at, 0 * at, np.full(len(at), np.arctan2(0.3, 1.2))))
+    boxes[:, :2] += np.random.default_rng(0).normal(0, 0.03, (len(at), 2))
+    return completed(boxes, frames, phases=phases)
+
+
+def off(way):
+    """How far boxes are from where it drives, metres."""
+    at = np.array(way.frames)
+    return np.linalg.norm(way.boxes[:, :2] - np.column_stack((1.2 * at, 0.3 * at)), axis=1).max()
+
+
+@pytest.mark.parametrize(
+    "frames", [(0, 29, 30, 75, 80, 119, 120, 170), (0, 1, 70, 120, 121, 170, 230, 231)]
+)
+def test_completed_scans_that_are_neighbours_with_the_next_far_away(frames):
+    assert off(smooth(driving(frames), still(frames[-1] + 1), BoxConfig())) < 1.0
+
+
+def test_two_scans_of_one_moment_tell_no_velocity():
+    """The beam ends a turn on what is right behind the sensor, and begins the next one on it."""
+    one = driving((0, 40, 80, 81), (0.0, 0.0, 0.5, -0.499))
+    assert off(expected(one, still(120), 15, BoxConfig())) < 1.0
+    pairs = driving((0, 1, 80, 81), (0.5, -0.499, 0.5, -0.499))
+    assert off(smooth(pairs, still(82), BoxConfig())) < 1.0
+
+
+def test_what_stands_takes_no_more_memory_in_a_longer_drive():
+    one, turns = completed([(0.0, 0.0, 0.0, 0.0)] * 3), still(20000)
+    tracemalloc.start()
+    way = expected(one, turns, 15, BoxConfig())
+    taken, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(way.boxes) == len(way.frames) == 20000
+    assert taken < 10_000

@@ -1,0 +1,38 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What decides a drive's result."""
+
+from dataclasses import asdict, replace
+
+import numpy as np
+import torch
+from tests.models import CONFIG, SETTINGS
+
+from wildshape.drives.adapting.second_pass import like
+from wildshape.drives.config import DriveConfig
+from wildshape.drives.result import identity_of, settings_of
+from wildshape.drives.source import Drive
+from wildshape.inference.predictor import Predictor
+from wildshape.method.checkpoint import save_checkpoint
+from wildshape.method.network import ShapePoseNet
+from wildshape.records import Turn
+
+
+def test_how_a_predictor_is_used_decides_the_result(tmp_path):
+    torch.manual_seed(0)
+    network = ShapePoseNet(CONFIG).eval()
+    settings = replace(SETTINGS, facing=True, up=(0.0, 0.0, 1.0))
+    drive = Drive.of("drive", ["000000"], lambda _: Turn(np.empty((0, 3), np.float32)))
+    usual = Predictor(network, settings)
+    others = [Predictor(network, settings, level=False), Predictor(network, settings, raw=True)]
+
+    def said(predictor):
+        return settings_of(tmp_path, drive, None, DriveConfig(), predictor, None)
+
+    before = {"model": settings.provenance, "inference": asdict(usual.config)}
+    assert identity_of(usual) == before  # of folders written when nothing else was said
+    assert said(usual) != said(others[0]) != said(others[1]) != said(usual)
+    model = tmp_path / "model.safetensors"
+    save_checkpoint(model, network, settings)
+    for one in (usual, *others):
+        assert identity_of(like(one, model)) == identity_of(one)
