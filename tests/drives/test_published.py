@@ -92,6 +92,7 @@ def test_waymo_segments(tmp_path):
     parked = WaymoThing("parked")
     split = write_waymo(tmp_path / "waymo" / "training", [parked], frames=3)
     shutil.rmtree(split / "lidar_box")  # split test has none
+    (split / "lidar" / "._stray.parquet").touch()  # of an archive made on a Mac
     what, drives = find_drives(tmp_path / "waymo")
     assert what.startswith("the Waymo Open Dataset")
     assert drives == [tmp_path / "waymo" / SEGMENT]

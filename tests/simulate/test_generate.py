@@ -177,6 +177,7 @@ def test_bad_settings_are_refused_in_one_sentence(wrong: dict, message: str) -> 
 
 
 def test_missing_and_empty_mesh_folders(tmp_path: Path) -> None:
+    (tmp_path / "._car.ply").touch()  # of an archive made on a Mac
     for folder, message in ((tmp_path / "none", "no folder"), (tmp_path, "holds no mesh")):
         with pytest.raises(BadInputError, match=message):
             _tracks(SimulationConfig(tracks=1, meshes=folder))

@@ -28,6 +28,7 @@ def training(tmp_path):
 
 
 def test_boxes_points_and_trajectory(training):
+    (training / "label_02" / "._0001.txt").touch()  # of an archive made on a Mac
     truth = read_labels(training, Counting(range_m=math.inf, points=1))
     assert len(truth.frames) == len(truth.scans) == SCANS
     assert {label.track for label in truth.frames[0].labels} == set(IDS.values())

@@ -12,7 +12,7 @@ import numpy as np
 from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
-from wildshape.io.order import out_of_order
+from wildshape.io.order import check_counted
 from wildshape.io.poses import read_poses
 from wildshape.io.scans.points import is_scan_file, read_turn
 from wildshape.records import Turn
@@ -151,18 +151,8 @@ def _files(folder: Path) -> list[Path]:
     for one, other in pairwise(files):
         if one.stem == other.stem:
             raise BadInputError(f"{folder}: {one.name} and {other.name} are one frame; remove one.")
-    _check_counted(folder, files)
+    check_counted(files)
     return files
-
-
-def _check_counted(folder: Path, files: list[Path]) -> None:
-    """Refuse names that count without leading zeros: as text, scan_10 comes before scan_9."""
-    row = out_of_order([file.stem for file in files])
-    if row is not None:
-        raise BadInputError(
-            f"{folder}: {files[row].name} is sorted before {files[row + 1].name}, for names are"
-            " sorted as text; write their numbers with leading zeros."
-        )
 
 
 def _seconds(path: Path) -> list[float] | None:

@@ -59,7 +59,7 @@ class _Frames:
 def find_segments(root: Path) -> list[Path]:
     """The segments of a split's folder or of those in a folder, as paths below it."""
     files = (file for level in ("", "*/") for file in root.glob(f"{level}lidar/*.parquet"))
-    return sorted(root / file.stem for file in files)
+    return sorted(root / file.stem for file in files if not file.name.startswith("."))
 
 
 def open_segment(path: Path) -> Drive:

@@ -183,7 +183,7 @@ def _place(path: Path) -> _Place:
     if path.is_file():
         return _Place(path.parent.parent, path.stem)
     for root in (path, path / "training"):
-        found = sorted((root / "label_02").glob("*.txt"))
+        found = sorted((root / "label_02").glob("[!.]*.txt"))
         if len(found) > 1:
             raise BadInputError(
                 f"{path}: holds {len(found)} sequences; name one of {root}/label_02."

@@ -34,7 +34,8 @@ def mesh_files(folder: Path) -> tuple[Path, ...]:
     """
     if not folder.is_dir():
         raise BadInputError(f"{folder} is no folder, expected one with meshes.")
-    found = sorted(p for p in folder.rglob("*") if p.suffix.lower() in _READERS)
+    files = (path for path in folder.rglob("*") if not path.name.startswith("."))
+    found = sorted(path for path in files if path.suffix.lower() in _READERS)
     if not found:
         raise BadInputError(f"{folder} holds no mesh, expected files {' '.join(_READERS)}.")
     return tuple(found)
