@@ -9,7 +9,9 @@ import pytest
 from tests.drives.objects import completed, still
 
 from wildshape.drives.completing.boxes import expected, smooth
-from wildshape.drives.config import BoxConfig
+from wildshape.drives.completing.completion import keyframes
+from wildshape.drives.config import BoxConfig, CompletionConfig
+from wildshape.drives.tracking.sightings import Sightings
 
 
 def driving(frames, phases=()):
@@ -31,6 +33,20 @@ def off(way):
 )
 def test_completed_scans_that_are_neighbours_with_the_next_far_away(frames):
     assert off(smooth(driving(frames), still(frames[-1] + 1), BoxConfig())) < 1.0
+
+
+def test_one_that_brakes_and_turns_for_forty_seconds_is_where_it_drives():
+    t = np.arange(400)
+    speed, yaw = 0.6 + 0.6 * np.sin(t / 24), 0.6 * np.sin(t / 19)
+    steps = speed[:, None] * np.column_stack((np.cos(yaw), np.sin(yaw)))
+    true = np.column_stack((np.cumsum(steps, axis=0), 0 * t, yaw))
+    points = np.random.default_rng(0).poisson(300, len(t)).tolist()
+    seen = Sightings("a", tuple(t.tolist()), ((0,),) * len(t), tuple(points))
+    frames = keyframes(seen, CompletionConfig()).frames
+    way = smooth(completed(true[list(frames)], frames), still(len(t)), BoxConfig())
+    off_m = np.linalg.norm(way.boxes[:, :2] - true[list(way.frames), :2], axis=1)
+    assert np.median(off_m) < 0.1
+    assert off_m.max() < 1.0
 
 
 def test_two_scans_of_one_moment_tell_no_velocity():

@@ -23,8 +23,10 @@ class CompletionConfig:
             vehicle of three streets said less than -1.9, though fragments may; half of all else do.
         doubtful_nats: of those whose looks say less no other scans are completed.
         worst_nats: no single look says less.
-        scans: of a track that are completed together.
+        scans: of a track that are completed together; more of a long one.
         ticks: between them; neighbours at 10 Hz are nearly the same scan.
+        most_ticks: between them, of a long track: between scans that are farther apart nobody knows
+            how it braked or turned.
         fewest_points: scans of fewer are not completed where others are fuller.
         rays: whole tracks are put together with the rays beside the object.
     """
@@ -40,6 +42,7 @@ class CompletionConfig:
     worst_nats: float = -6.0
     scans: int = 16
     ticks: int = 4
+    most_ticks: int = 8
     fewest_points: int = 60
     rays: bool = True
 
