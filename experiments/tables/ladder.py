@@ -29,7 +29,10 @@ Part = Literal["network", "loss", "views"]
 
 
 def rungs(given: Given) -> tuple[Trained, ...]:
-    """What is added, in order; each keeps what stands before it."""
+    """What is added, in order; each keeps what stands before it.
+
+    Turned scans come with the bins, the window and the beta that were chosen for them.
+    """
     size, data = given.size, given.drives("train")
     base, goal = paper_form(size, data), small()
     if size.own_schedule:  # a rung changes one thing, so all have one schedule

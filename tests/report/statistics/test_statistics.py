@@ -116,6 +116,14 @@ def test_lengths_by_the_best_that_is_known(tmp_path, truth):
     assert by["length"].basis.startswith(basis)
 
 
+def test_where_only_some_have_their_truth_that_is_said(tmp_path):
+    bare = [replace(around(name), T_sensor_object=None) for name in "bcd"]
+    shaped = replace(around("a"), shape=np.eye(3, dtype=np.float32))
+    _, by = described(packed(tmp_path, [shaped, *bare]))
+    assert by["range"].basis == "object's frame, by truth; all tracks, 8 of 32 scans"
+    assert by["length"].basis == "truth shapes; all tracks, 1 of 4 of these"
+
+
 def test_folders_say_the_same_as_the_store(tmp_path):
     tracks = [drive_by(name, scans=3, points=50, seed=i) for i, name in enumerate("abc")]
     for track in tracks:

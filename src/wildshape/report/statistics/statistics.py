@@ -241,6 +241,11 @@ def _of_tracks(chosen: int, count: int) -> str:
     return "all" if chosen == count else f"a sample of {chosen:,} of {count:,}"
 
 
+def _part(measured: int, of: int, what: str) -> str:
+    """How many have what is shown, where not all do."""
+    return "" if measured >= of else f", {measured:,} of {of:,} {what}"
+
+
 _EXTENT_BASIS = {
     "shape": "truth shapes",
     "fused": "scans joined by truth",
@@ -261,8 +266,11 @@ def _quantities(distribution: RunningDistribution, read: str, indexed: str) -> t
     seen = "viewpoint" if by_truth else "object"
     basis = f"{where}; {indexed if by_truth else read} tracks"
     ranges, azimuth, elevation = distribution.seen[:3] if by_truth else distribution.sensed
+    basis += _part(ranges.count, distribution.points.count, "scans")
     kind = next((k for k, tallies in distribution.extents.items() if tallies[0].count), "scan")
+    measured = {name: tallies[0].count for name, tallies in distribution.extents.items()}
     extents = f"{_EXTENT_BASIS[kind]}; {read} tracks"
+    extents += _part(measured[kind], sum(measured.values()), "of these")
     found = (
         Quantity("points", "points per scan", "", f"{indexed} tracks", distribution.points),
         Quantity("scans", "scans per track", "", f"{indexed} tracks", distribution.scans),
