@@ -20,7 +20,7 @@ EXAMPLES = (
 )
 
 PRESETS = {
-    "default": "the shipped weights' recipe, 30,000 steps",
+    "default": "the shipped weights' network, 30,000 steps",
     "small": "fewer points, 12,000 steps: minutes on two cores",
     "views": "depth views of objects of unit size, 8,000 steps",
     "paper-lidar": "exactly the paper, LiDAR: 400,000 steps",
