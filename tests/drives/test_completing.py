@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """From tracks to vehicles, stage by stage."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from tests.drives.objects import completed, still
 
-from wildshape.drives.completing.boxes import moves, smooth
+from wildshape.drives.completing.boxes import faced, moves, smooth
 from wildshape.drives.completing.claims import claim
 from wildshape.drives.completing.completion import fullest_of_parts, keyframes, order_of_looks
 from wildshape.drives.completing.merging import Places
@@ -33,6 +34,9 @@ from wildshape.drives.config import (
 )
 from wildshape.drives.tracking.segmentation import cut_file
 from wildshape.drives.tracking.sightings import Sightings
+from wildshape.drives.writing.outputs import write_shape
+from wildshape.io.scans.points import read_points
+from wildshape.io.scans.writers import write_ply
 
 
 def test_the_fullest_scan_of_each_part_is_completed():
@@ -58,8 +62,38 @@ def test_a_moving_vehicle_goes_straight_on_between_its_completed_scans():
 
 def test_the_front_is_where_a_vehicle_drives_to():
     boxes = [(0.5 * f, 0.0, 0.0, math.pi if f < 3 else 0.0) for f in range(6)]
-    way = smooth(completed(boxes), still(6), BoxConfig())
+    found = faced(completed(boxes), still(6), BoxConfig())
+    assert found.turned
+    way = smooth(found, still(6), BoxConfig())
     assert np.abs(way.boxes[:, 3]).max() < 1e-6
+
+
+@pytest.mark.parametrize("yaw", [0.0, math.pi])
+@pytest.mark.parametrize("then", [0.0, -0.2], ids=["stops", "backs up"])
+def test_the_front_stays_the_front_whatever_comes_then(yaw, then):
+    frames = tuple(range(0, 81, 4))
+    boxes = [(0.5 * f if f < 40 else 20 + then * (f - 40), 4.0, 0.0, yaw) for f in frames]
+    found = faced(completed(boxes, frames), still(81), BoxConfig())
+    assert found.turned == (yaw != 0)
+    way = smooth(found, still(81), BoxConfig())
+    assert np.abs(np.sin(way.boxes[:, 3] / 2)).max() < 1e-6
+
+
+def test_the_shape_of_one_turned_around_is_turned_with_its_box(tmp_path):
+    """What sticks out ahead of the middle as it drives is ahead in the frame of its box."""
+    box = {"centre": (5.0, 4.0, 0.0), "size": (4.0, 1.8, 1.5), "quaternion_wxyz": (0, 0, 0, 1)}
+    write_ply(tmp_path / "completed" / "0.ply", np.array([[6.5, 4.2, 0.3]], np.float32))
+    scan = {"scan": "0", "box": box, "confidence": 0.9, "cost_m": 0.1}
+    said = {"track": "a", "sensor": "lidar", "category": "car", "scans": [scan]}
+    (tmp_path / "objects.json").write_text(json.dumps(said), encoding="utf-8")
+    one = completed([(5.0, 4.0, 0.0, 0.0)])
+    for turned, expected in ((True, (1.4, 0.2, 0.3)), (False, (-1.6, -0.2, 0.3))):
+        write_shape(
+            tmp_path / f"{turned}.ply",
+            tmp_path,
+            replace(one, turned=turned, moved_m=(0.1, 0.0, 0.0)),
+        )
+        assert read_points(tmp_path / f"{turned}.ply")[0] == pytest.approx(expected, abs=1e-5)
 
 
 def test_a_standing_vehicle_has_one_box_whatever_one_scan_says():

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from wildshape.drives.adapting import second_pass
 from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.clock import Clock, Watch, silent
-from wildshape.drives.completing.boxes import smooth
+from wildshape.drives.completing.boxes import faced, smooth
 from wildshape.drives.completing.claims import claim
 from wildshape.drives.completing.completion import Completer
 from wildshape.drives.completing.merging import Places
@@ -283,7 +283,9 @@ class _Run:
     def completed(self, objects: list[Sightings], turns: Turns) -> list[Completed]:
         """Those that were not ruled out."""
         return [
-            read_completed(seen, self.folder(seen), self.drive, turns)
+            faced(
+                read_completed(seen, self.folder(seen), self.drive, turns), turns, self.config.boxes
+            )
             for seen in objects
             if (self.folder(seen) / OBJECTS).is_file()
         ]

@@ -10,7 +10,7 @@ Before and after them it goes straight on.
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -100,11 +100,31 @@ def _on_its_way(
     config: BoxConfig,
 ) -> Float[np.ndarray, "f 4"]:
     """Boxes of one that moves; `at`: the ticks of the completed ones, `wanted`: those asked for."""
-    places, velocities = _lines(at, boxes[:, :3], wanted, config.smooth_ticks)
+    places, _ = _lines(at, boxes[:, :3], wanted, config.smooth_ticks)
     if len(_moments(at)) >= _ENOUGH:
         among = (wanted > at[0] - config.smooth_ticks) & (wanted < at[-1] + config.smooth_ticks)
         places[among] = _parabolas(at, boxes[:, :3], wanted[among], config.smooth_ticks)
-    return np.column_stack((places, _yaws(at, boxes, wanted, velocities, config)))
+    return np.column_stack((places, _yaws(at, boxes, wanted, config)))
+
+
+def faced(one: Completed, turns: Turns, config: BoxConfig) -> Completed:
+    """The same vehicle, its front where it drives to.
+
+    No scan looks away from the one before it. Then all are turned around if the vehicle would
+    drive backwards for most of its way: it may stand, or back up for a while.
+    """
+    at = np.take(turns.ticks, one.frames) + one.phases
+    if not moves(at, one.boxes, config):
+        return one
+    boxes = one.boxes.copy()
+    yaw = boxes[:, 3]
+    for i in range(1, len(yaw)):
+        yaw[i] += np.pi * (np.cos(yaw[i] - yaw[i - 1]) < 0)
+    _, velocities = _lines(at, boxes[:, :3], at, config.smooth_ticks)
+    fast = np.linalg.norm(velocities[:, :2], axis=1) > config.heading_m_per_tick
+    ahead = velocities[:, 0] * np.cos(yaw) + velocities[:, 1] * np.sin(yaw)
+    yaw += np.pi * (ahead[fast].sum() < 0)
+    return replace(one, boxes=boxes, turned=bool(np.cos(yaw[0] - one.boxes[0, 3]) < 0))
 
 
 def expected(one: Completed, turns: Turns, beyond_ticks: int, config: BoxConfig) -> Way:
@@ -244,15 +264,8 @@ def _yaws(
     at: Float[np.ndarray, "k"],
     boxes: Float[np.ndarray, "k 4"],
     wanted: Float[np.ndarray, "f"],
-    velocities: Float[np.ndarray, "f 3"],
     config: BoxConfig,
 ) -> Float[np.ndarray, "f"]:
-    """Headings between those of the completed scans, front where a vehicle drives to."""
-    nearest = np.abs(wanted[:, None] - at).argmin(0)
-    speed = np.linalg.norm(velocities[:, :2], axis=1)
-    course = np.arctan2(velocities[:, 1], velocities[:, 0])
-    fast = speed[nearest] > config.heading_m_per_tick
-    backwards = fast & (np.cos(boxes[:, 3] - course[nearest]) < 0)
-    yaw = boxes[:, 3] + np.pi * backwards
+    """Headings between those of the completed scans."""
     weights = _weights(at, wanted, config.smooth_ticks)
-    return np.arctan2(weights @ np.sin(yaw), weights @ np.cos(yaw))
+    return np.arctan2(weights @ np.sin(boxes[:, 3]), weights @ np.cos(boxes[:, 3]))

@@ -41,6 +41,7 @@ class Completed:
         moved_m: how far the boxes' middle was moved from that of the completed shape: forward, to
             the left, upward.
         phases: `(k,)` when the beam met it, in turns since the middle of each frame's.
+        turned: the front of the boxes is the rear of the first completed shape.
     """
 
     seen: Sightings
@@ -52,6 +53,7 @@ class Completed:
     p_kind: float | None = None
     moved_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     phases: Float[np.ndarray, "k"] | float = 0.0
+    turned: bool = False
 
     @property
     def fullest(self) -> int:

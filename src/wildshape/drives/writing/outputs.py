@@ -148,7 +148,7 @@ def write_vehicle(out: Path, one: Vehicle, folder: Path, cuts: Path, drive: Driv
     """
     write_vehicle_track(out / TRACKS, one.completed.seen, cuts, drive)
     copy_object(folder, out / "objects" / one.name)
-    write_shape(out / SHAPES / f"{one.name}.ply", folder, one.completed.moved_m)
+    write_shape(out / SHAPES / f"{one.name}.ply", folder, one.completed)
 
 
 def write_vehicle_track(out: Path, seen: Sightings, cuts: Path, drive: Drive) -> None:
@@ -171,15 +171,13 @@ def copy_object(folder: Path, target: Path) -> None:
     write_text(target / OBJECTS, (folder / OBJECTS).read_text("utf-8"))
 
 
-def write_shape(
-    path: Path, folder: Path, moved_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-) -> None:
+def write_shape(path: Path, folder: Path, one: Completed) -> None:
     """A vehicle's complete shape in the frame of its box: x forward, origin in the middle.
 
     Args:
         path: file to write.
         folder: of the completed object; all its scans have one shape.
-        moved_m: how far the box's middle was moved since, along the box.
+        one: where the box was moved, and turned, since.
     """
     if path.is_file():
         return
@@ -187,7 +185,9 @@ def write_shape(
     first = next(detections_of(said, 0))
     points = read_points(folder / COMPLETED / f"{first.scan}.ply")
     placed = pose_of(first.box).inverse().apply_numpy(points)
-    write_ply(path, placed - np.array(moved_m, placed.dtype))
+    if one.turned:
+        placed = placed * np.array((-1, -1, 1), placed.dtype)
+    write_ply(path, placed - np.array(one.moved_m, placed.dtype))
 
 
 def boxes_of(vehicle: Vehicle, turns: Turns) -> list[tuple[int, Box]]:
