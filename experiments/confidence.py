@@ -12,6 +12,7 @@ sees; that is said in the checkpoint. Writes OUT/confidence.json and .png and, w
 weights with their calibration.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -30,6 +31,7 @@ from wildshape.geometry.transforms.se3 import stack
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import write_json
 from wildshape.io.output import provenance
+from wildshape.io.store.layout import INDEX_JSON
 from wildshape.io.store.store import Store, open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import SHIPPED, load_checkpoint, save_checkpoint, weights_file
@@ -68,17 +70,15 @@ class Settings:
         """Categories of the manifest."""
         return _VEHICLES if self.category == "vehicle" else (self.category,)
 
-    def configs(self, source: Path | None) -> list[SimulationConfig]:
-        """What is simulated of procedural shapes, or of meshes."""
+    @property
+    def configs(self) -> list[SimulationConfig]:
+        """What is simulated of procedural shapes, and of meshes as well."""
         if self.category == "vehicle":
             return [
-                SimulationConfig(tracks=self.tracks, scans=_SCANS, sensor=sensor, meshes=source)
+                SimulationConfig(tracks=self.tracks, scans=_SCANS, sensor=sensor)
                 for sensor in _SENSORS
             ]
-        camera = SimulationConfig(
-            tracks=self.tracks, sensor="depth-camera", category=self.category, meshes=source
-        )
-        return [camera]
+        return [SimulationConfig(tracks=self.tracks, sensor="depth-camera", category=self.category)]
 
 
 class Measured(NamedTuple):
@@ -102,25 +102,32 @@ class Measured(NamedTuple):
 def drives(settings: Settings, split: str) -> Store:
     """The drives of a split, simulated once."""
     path = settings.out / split
-    if not path.exists():
-        with TemporaryDirectory() as folder, StoreWriter(path, {}) as store:
-            meshes = _meshes(settings, split, Path(folder)) if settings.cad else None
-            for source in (None, meshes) if meshes else (None,):
-                for i, config in enumerate(settings.configs(source)):
-                    seed = _SEEDS[split] + 7 * i + (50 if source else 0)
-                    for track in simulate_tracks(config, seed, workers=1):
-                        store.add(replace(track, name=f"{config.sensor}-{seed}-{track.name}"))
+    if not (path / INDEX_JSON).is_file():
+        with TemporaryDirectory() as folder, StoreWriter(path, {}, overwrite=True) as store:
+            for config, seed in _sources(settings, split, Path(folder)):
+                for track in simulate_tracks(config, seed, workers=1):
+                    store.add(replace(track, name=f"{config.sensor}-{seed}-{track.name}"))
     return open_store(path)
 
 
-def _meshes(settings: Settings, split: str, into: Path) -> Path:
-    """The meshes of a split, linked into one folder."""
-    cad = settings.cad
-    assert cad is not None
-    for row in rows_of(cad, split):
-        if row["category"] in settings.meshes:
-            file = (cad / row["file"]).resolve()
-            (into / f"{row['category']}_{file.name}").symlink_to(file)
+def _sources(
+    settings: Settings, split: str, folder: Path
+) -> Iterator[tuple[SimulationConfig, int]]:
+    """What is simulated, with its seed: procedural shapes, then meshes if there are some."""
+    seeded = [(config, _SEEDS[split] + 7 * i) for i, config in enumerate(settings.configs)]
+    yield from seeded
+    if settings.cad is not None:
+        rows = [row for row in rows_of(settings.cad, split) if row["category"] in settings.meshes]
+        files = [settings.cad / row["file"] for row in rows]
+        for config, seed in ((config, seed + 50) for config, seed in seeded):
+            yield replace(config, meshes=_mixed(files, folder / str(seed), seed)), seed
+
+
+def _mixed(files: list[Path], into: Path, seed: int) -> Path:
+    """A folder of links to the meshes in a seeded order: tracks take them one after the other."""
+    into.mkdir()
+    for place, file in zip(np.random.default_rng(seed).permutation(len(files)), files):
+        (into / f"{place:04d}_{file.name}").symlink_to(file.resolve())
     return into
 
 

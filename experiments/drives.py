@@ -4,8 +4,9 @@
 
 python experiments/drives.py --out DRIVES --first 101 --count 20 --scans 60
 
-simulates, runs and measures one drive after the other and writes `DRIVES/table.md`. A killed run
-goes on with the same command; what is finished is not done again.
+simulates, runs and measures one drive after the other and writes `table.md` into
+`DRIVES/101-120-of-60-scans`. A killed run goes on with the same command: finished drives are not
+done again, a half-finished one is begun again, as its time is measured.
 """
 
 import json
@@ -44,7 +45,7 @@ class Settings:
     """What to run.
 
     Attributes:
-        out: folder for the drives, what is found and the table.
+        out: folder; in it each choice of drives has one, with what is found and the table.
         first: seed of the first drive.
         count: drives.
         scans: of each.
@@ -60,18 +61,19 @@ class Settings:
 
 def main(settings: Settings) -> None:
     """Run every drive, then write and print the table."""
-    out = settings.out
     seeds = [str(settings.first + number) for number in range(settings.count)]
+    everything = f"{seeds[0]}-{seeds[-1]}"
+    out = settings.out / f"{everything}-of-{settings.scans}-scans"
     for seed in seeds:
         street, found = out / "streets" / seed, out / "found" / seed
         drive = ("--drive", "--scans", str(settings.scans), "--seed", seed)
         _step(street, "simulate", str(street), *drive)
         scans = str(street / "velodyne" / "0000")
-        _step(found, "drive", scans, "--out", str(found), "--workers", str(settings.workers))
+        workers = ("--workers", str(settings.workers))
+        _step(found, "drive", scans, "--out", str(found), *workers, "--overwrite")
         _measure(out / "evaluation" / seed, found, street)
-    everything = out / "evaluation" / f"{seeds[0]}-{seeds[-1]}"
-    _measure(everything, out / "found", out / "streets")
-    text = _table(out, seeds, everything.name, settings.scans)
+    _measure(out / "evaluation" / everything, out / "found", out / "streets")
+    text = _table(out, seeds, everything, settings.scans)
     write_text(out / "table.md", text)
     print(text, end="")
 

@@ -76,6 +76,7 @@ class Job:
         row: it.
         blocks: that have it.
         seeds: trainings.
+        given: size, and folder of meshes.
         known: a row before it is trained alike.
     """
 
@@ -83,13 +84,15 @@ class Job:
     row: Row
     blocks: tuple[Block, ...]
     seeds: int
+    given: Given
     known: bool
 
     @property
     def name(self) -> str:
-        """Of the row, and of the first block that has it; other seeds are another job."""
+        """Of the row, of the first block that has it, and of all else that decides its figures."""
         seeds = f"{self.seeds} seeds" if self.seeds > 1 else "1 seed"
-        return f"{self.table}, {self.blocks[0].title}: {self.row.name}, {seeds}"
+        made = f"{seeds}, size {self.given.size.name}, CAD {self.given.cad or 'none'}"
+        return f"{self.table}, {self.blocks[0].title}: {self.row.name}, {made}"
 
     @property
     def guess_s(self) -> float:
@@ -109,12 +112,12 @@ class Job:
         scans = recipe.views.tracks * recipe.views.views
         return self.seeds * recipe.optim.steps * scans * _STEP_S
 
-    def work(self, shop: Workshop, size: Size) -> None:
+    def work(self, shop: Workshop) -> None:
         """Train and measure, as far as that is not done."""
         for block in self.blocks:
             for rotate in block.rotate:
                 for seed in seeds_of(self.row, rotate, self.seeds):
-                    measure(shop, self.row, block, rotate, seed, size.max_scans)
+                    measure(shop, self.row, block, rotate, seed, self.given.size.max_scans)
 
 
 def tables(given: Given, seeds: int, words: tuple[str, ...] = ()) -> dict[str, Table]:
@@ -142,7 +145,7 @@ def _with_rows(table: Table, words: tuple[str, ...]) -> Table | None:
         return None
 
 
-def jobs(made: dict[str, Table]) -> list[Job]:
+def jobs(made: dict[str, Table], given: Given) -> list[Job]:
     """A job a row; rows that are trained alike in two blocks are one."""
     found: dict[object, Job] = {}
     trained: set[str] = set()
@@ -151,7 +154,7 @@ def jobs(made: dict[str, Table]) -> list[Job]:
             for row in block.rows:
                 of = row.key if isinstance(row, Trained) else str(block.test)
                 job = found.get((name, row.name, of)) or Job(
-                    name, row, (), table.seeds, of in trained
+                    name, row, (), table.seeds, given, of in trained
                 )
                 found[name, row.name, of] = replace(job, blocks=(*job.blocks, block))
                 trained.add(of)
@@ -209,7 +212,7 @@ def run(settings: Settings, command: str) -> None:
     words = tuple(word.strip() for word in settings.rows.split(",") if word.strip())
     made = tables(given, settings.seeds, words)
     made = {name: made[name] for name in made if settings.table in (None, name)}
-    planned, spent = jobs(made), _spent(settings.out / RECORD)
+    planned, spent = jobs(made, given), _spent(settings.out / RECORD)
     for number, job in enumerate(planned, start=1):
         if settings.plan:
             state = "done" if job.name in spent else f"about {duration(job.guess_s)}"
@@ -218,7 +221,7 @@ def run(settings: Settings, command: str) -> None:
         if job.name in spent:
             continue
         began = time.monotonic()
-        job.work(shop, size)
+        job.work(shop)
         spent[job.name] = round(time.monotonic() - began, 1)
         write_json(settings.out / RECORD, spent)
         write_pages(shop, given, made, [one for one in planned if one.name in spent])
@@ -227,6 +230,8 @@ def run(settings: Settings, command: str) -> None:
         say(
             f"{number} of {len(planned)} rows, {job.name}: {duration(spent[job.name])}; left {left}"
         )
+    if not settings.plan:  # a stopped run, or one of another size, left other pages
+        write_pages(shop, given, made, [job for job in planned if job.name in spent])
     todo = [job for job in planned if job.name not in spent]
     print(f"{len(todo)} of {len(planned)} rows are left: {duration(left_s(todo, spent, planned))}")
 

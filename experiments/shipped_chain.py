@@ -8,6 +8,7 @@ CAD holds `manifest.csv` (columns category, file, split, tier, licence, source, 
 it names. Simulated scans alone are trained on, of procedural shapes and of meshes of split `train`
 that an Apache-2.0 file may be made from. RUN/weights holds what is shipped, and its NOTICE.
 With `--start WEIGHTS` the last round alone is trained: they teach it, and it goes on from them.
+A trial (`--share 0.01`) has a folder of its own in RUN.
 The same command goes on with a run that was stopped; what is finished is not made again. RUN holds
 the weights of each finished round, `<round>.safetensors`: copied to another machine's RUN, they are
 not trained again there.
@@ -29,7 +30,8 @@ from experiments import calibrate_confidence, confidence, views_weights
 from wildshape.cli.terminal import TERMINAL, stoppable
 from wildshape.io.atomic import write_text
 from wildshape.io.output import provenance
-from wildshape.io.store.store import Store, is_store, open_store
+from wildshape.io.store.layout import INDEX_JSON
+from wildshape.io.store.store import Store, open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import MODEL, load_checkpoint, save_checkpoint, weights_file
 from wildshape.method.ray_encoder import RayConfig
@@ -123,7 +125,7 @@ class Settings:
     Attributes:
         out: folder of the run.
         cad: folder of CAD meshes with a manifest.
-        share: of all tracks and steps; below 1 to try the chain, not to ship what comes out.
+        share: of all tracks and steps; below 1 to try the chain, in a folder of its own.
         start: checkpoint, or the name of weights shipped, that teach the last round and that it
             goes on from; the rounds before are left out.
         only: weights that are made; `car` asks `default` of RUN/weights.
@@ -144,7 +146,9 @@ class Settings:
     @property
     def command(self) -> str:
         """That makes such weights."""
-        return _COMMAND if self.start is None else f"{_COMMAND} --start {self.start.name}"
+        share = "" if self.share == 1 else f" --share {self.share:g}"
+        start = "" if self.start is None else f" --start {self.start.name}"
+        return f"{_COMMAND}{share}{start}"
 
     def part(self, count: int, least: int = 1) -> int:
         """So many tracks or steps of `count`."""
@@ -164,6 +168,8 @@ class Settings:
 def main(settings: Settings) -> None:
     """Every stage that is not finished, in order; one thread: sums do not depend on the machine."""
     torch.set_num_threads(1)
+    if settings.share != 1:
+        settings = replace(settings, out=settings.out / f"share-{settings.share:g}")
     weights = settings.out / "weights"
     weights.mkdir(parents=True, exist_ok=True)
     write_text(weights / "NOTICE", notice(settings.cad))
@@ -201,10 +207,10 @@ def trained(name: str, settings: Settings) -> None:
 
 
 def _data(seed: int, settings: Settings) -> Store:
-    """Drives past procedural and CAD vehicles, simulated once; a store that opens is whole."""
+    """Drives past procedural and CAD vehicles, simulated once; begun again if half-written."""
     path = settings.out / f"tracks{seed}"
-    if not is_store(path):
-        with StoreWriter(path, provenance(_COMMAND)) as store:
+    if not (path / INDEX_JSON).is_file():
+        with StoreWriter(path, provenance(settings.command), overwrite=True) as store:
             for number in range(len(_SENSORS)):
                 _add_drives(store, number, seed, settings)
     return open_store(path)

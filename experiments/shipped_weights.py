@@ -4,8 +4,8 @@
 
 python -m experiments.shipped_weights --cad CAD --kitti KITTI --out OUT
 
-writes OUT/shipped-weights.md. Stopped, the same command goes on with what was not measured yet;
-the page names every commit that measured a part of it.
+writes OUT/shipped-weights.md. Stopped, the same command goes on with what was not measured yet,
+or with other weights; the page names every commit that measured a part of it.
 """
 
 import json
@@ -23,7 +23,8 @@ from wildshape.cli.terminal import say
 from wildshape.evaluation.summary import FIGURES
 from wildshape.evaluation.tables import COUNTED, cell, pipe_table
 from wildshape.io.atomic import write_text
-from wildshape.io.store.store import is_store
+from wildshape.io.store.layout import INDEX_JSON
+from wildshape.method.checkpoint import fingerprint
 
 PAGE = "shipped-weights.md"
 _VEHICLES = ("car", "truck", "bus")
@@ -129,7 +130,7 @@ def run(settings: Settings, command: str) -> None:
     done = []
     for data in drives(replace(settings, out=out)):
         store = out / data.name
-        if not is_store(store):
+        if not (store / INDEX_JSON).is_file():
             _make(data, store)
         for protocol, words in data.measured.items():
             if not _finished(_evaluation(store, protocol)):
@@ -152,8 +153,12 @@ def _evaluation(store: Path, protocol: str) -> Path:
 
 
 def _finished(folder: Path) -> bool:
-    record = folder / "wildshape.json"
-    return record.is_file() and json.loads(record.read_text("utf-8"))["status"] == "finished"
+    """Whether it holds figures of the weights that the package ships now."""
+    path = folder / "wildshape.json"
+    if not path.is_file():
+        return False
+    record = json.loads(path.read_text("utf-8"))
+    return record["status"] == "finished" and record["settings"]["models"] == [fingerprint(None)]
 
 
 def page(out: Path, done: list[Drives], command: str) -> str:

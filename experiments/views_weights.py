@@ -22,6 +22,7 @@ import tyro
 from experiments.meshes import stretched
 
 from wildshape.io.output import provenance
+from wildshape.io.store.layout import INDEX_JSON
 from wildshape.io.store.store import open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import load_checkpoint, save_checkpoint
@@ -63,7 +64,7 @@ class Settings:
 def make_data(settings: Settings, path: Path) -> None:
     """Write the store: CAD meshes, and half as many procedural shapes, ten views of each."""
     described = provenance(f"python -m experiments.views_weights {settings}")
-    with TemporaryDirectory() as folder, StoreWriter(path, described) as store:
+    with TemporaryDirectory() as folder, StoreWriter(path, described, overwrite=True) as store:
         count = stretched(settings.cad, Path(folder), settings.category, _COPIES, settings.seed)
         sources = ((Path(folder), _COPIES * count), (None, 2 * count))
         for seed, (meshes, tracks) in enumerate(sources, start=settings.seed + 1):
@@ -83,7 +84,7 @@ def main(settings: Settings) -> None:
     """Make the data if it is not there yet, then train both stages."""
     data = settings.out / "data"
     settings.out.mkdir(parents=True, exist_ok=True)
-    if not data.exists():
+    if not (data / INDEX_JSON).is_file():
         make_data(settings, data)
     recipe = views()
     first = replace(recipe, optim=replace(recipe.optim, steps=settings.steps))

@@ -16,7 +16,7 @@ from wildshape.cli.terminal import TERMINAL, say
 from wildshape.datasets.sources import open_source
 from wildshape.datasets.tracks.source import all_tracks
 from wildshape.errors import BadInputError
-from wildshape.io.store.store import is_store
+from wildshape.io.store.layout import INDEX_JSON
 from wildshape.io.write_tracks import write_tracks
 from wildshape.records import Track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
@@ -61,13 +61,13 @@ def key(*parts: object) -> str:
 
 
 def store_of(folder: Path, data: Data) -> Path:
-    """The packed store of the data below `folder`, made if it is not there.
+    """The packed store of the data below `folder`, made if it is not there whole.
 
     Raises:
         BadInputError: no such meshes or drives.
     """
     path = folder / "data" / f"{data.name}-{key(data)}"
-    if is_store(path):
+    if (path / INDEX_JSON).is_file():
         return path
     tracks, count = _tracks(folder, data)
     settings = cast("dict[str, Any]", as_values(data))

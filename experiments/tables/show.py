@@ -136,7 +136,6 @@ def record(table: Table, parts: Sequence[Part], made: dict[str, Any]) -> dict[st
         "title": table.title,
         "provenance": made,
         "notes": list(table.notes),
-        "rows": {row.name: _row(row, measured) for p in parts for row, measured in p.rows},
         "parts": [_part_json(part) for part in parts],
     }
 
@@ -165,6 +164,7 @@ def _part_json(part: Part) -> dict[str, Any]:
         **found,
         "block": part.block.title,
         "data": as_values(part.block.test),
+        "rows": {row.name: _row(row, measured) for row, measured in part.rows},
         "seeds": seeds,
         "provenance": made,
         "paper": [asdict(row) for row in part.block.paper],

@@ -1,9 +1,24 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""A folder of meshes to train on."""
+"""A folder of meshes to train on, and what a stopped run leaves."""
+
+from contextlib import suppress
 
 import pytest
 import trimesh
+
+from wildshape.io.store.writer import StoreWriter
+
+
+@pytest.fixture
+def half_written():
+    """Leaves at a path what is there of a store after a stop."""
+
+    def leave(path):
+        with suppress(KeyboardInterrupt), StoreWriter(path, {}):
+            raise KeyboardInterrupt
+
+    return leave
 
 
 @pytest.fixture(scope="session")

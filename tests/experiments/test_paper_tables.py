@@ -27,7 +27,8 @@ from experiments import paper_tables  # pyright: ignore
 
 @pytest.fixture(scope="module")
 def planned():
-    return jobs(tables(Given(SIZES["small"], Path("cad")), 3))
+    given = Given(SIZES["small"], Path("cad"))
+    return jobs(tables(given, 3), given)
 
 
 def test_the_plan_has_every_row_that_the_claims_need(planned):
@@ -44,8 +45,8 @@ def test_the_plan_has_every_row_that_the_claims_need(planned):
         "added, Simulated drives, ours: taught, w/o selector",
         "added, Simulated drives with occluders, ours: taught, with rays",
     ):
-        assert f"{wanted}, 3 seeds" in names
-    ours = next(job for job in planned if job.name.endswith("cars: ours, paper's form, 3 seeds"))
+        assert f"{wanted}, 3 seeds, size small, CAD cad" in names
+    ours = next(job for job in planned if "cars: ours, paper's form, 3 seeds" in job.name)
     assert [(block.accumulated, len(block.rotate)) for block in ours.blocks] == [(0, 3), (1, 1)]
 
 
@@ -76,14 +77,26 @@ def test_rows_are_made_and_found_again(tmp_path, monkeypatch, capsys):
     assert "† 3D vehicle: Local-ICP" in page
     assert (tmp_path / "views-small-0.01.md").is_file()
     monkeypatch.setattr(paper_tables, "measure", None)
+    (tmp_path / PRINTED).unlink()  # as after a stop
     run(given, "the command")
+    assert (tmp_path / PRINTED).read_text("utf-8") == page
     assert json.loads((tmp_path / RECORD).read_text("utf-8")) == spent
 
 
-def test_more_seeds_are_another_job(planned):
-    fewer = jobs(tables(Given(SIZES["small"], Path("cad")), 1))
-    assert len(fewer) == len(planned)
-    assert not {job.name for job in fewer} & {job.name for job in planned}
+@pytest.mark.parametrize(
+    ("steps", "share", "cad", "seeds"),
+    [
+        (3000, 1.0, Path("cad"), 3),
+        (None, 0.1, Path("cad"), 3),
+        (None, 1.0, None, 3),
+        (None, 1.0, Path("cad"), 1),
+    ],
+)
+def test_what_gives_other_figures_is_another_job(planned, steps, share, cad, seeds):
+    given = Given(changed(SIZES["small"], share, steps), cad)
+    others = jobs(tables(given, seeds), given)
+    assert len(others) == len(planned)
+    assert not {job.name for job in others} & {job.name for job in planned}
 
 
 def test_each_part_that_we_add_is_left_out_alone(planned):

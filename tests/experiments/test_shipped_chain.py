@@ -21,13 +21,17 @@ def quick(name):
     return replace(PRESETS[name](), validation=ValidationConfig(1, 1, 2, 4))
 
 
-def test_the_last_round_goes_on_from_weights_that_teach_it(cad, tmp_path, monkeypatch):
+def test_the_last_round_goes_on_from_weights_that_teach_it(
+    cad, tmp_path, monkeypatch, half_written
+):
+    """What a stop left of the first rounds' tracks is no hindrance."""
     monkeypatch.setattr(shipped_chain, "_SENSORS", ("hdl64",))
     monkeypatch.setattr(shipped_chain, "_SCANS", 5)
     drives = {seed: replace(tracks, varied=(True,)) for seed, tracks in DATA.items()}
     monkeypatch.setattr(shipped_chain, "DATA", drives)
     monkeypatch.setattr(shipped_chain, "PRESETS", {name: partial(quick, name) for name in PRESETS})
     few = Settings(tmp_path, cad, share=1e-4)
+    half_written(tmp_path / "tracks1")
     for name in ("first", "taught"):
         trained(name, few)
     taught = few.finished("taught")
@@ -40,7 +44,17 @@ def test_the_last_round_goes_on_from_weights_that_teach_it(cad, tmp_path, monkey
     assert other.rays is not None
     assert not torch.equal(next(one.parameters()), next(other.parameters()))
     assert [of.provenance["round"] for of in (of_one, of_other)] == ["taught", LAST]
-    assert of_other.provenance["command"].endswith(f"--start {taught.name}")
+    assert of_other.provenance["command"].endswith(f"--share 0.0001 --start {taught.name}")
+
+
+def test_a_trial_leaves_nothing_that_a_full_run_takes_for_its_own(cad, tmp_path, monkeypatch):
+    kept = []
+    monkeypatch.setattr(shipped_chain, "trained", lambda name, of: kept.append(of.finished(name)))
+    monkeypatch.setattr(shipped_chain, "_shipped", lambda *of: None)
+    for share in (0.01, 1.0):
+        shipped_chain.main(Settings(tmp_path, cad, share, only=("default",)))
+    assert len(set(kept)) == 2 * len(ROUNDS)
+    assert kept[-1] == tmp_path / f"{LAST}.safetensors"
 
 
 def test_a_finished_round_of_another_machine_is_not_trained_again(cad, tmp_path, monkeypatch):

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of the shipped weights: every row that was measured, made once."""
 
+import json
 from dataclasses import replace
 
 import pytest
@@ -32,7 +33,9 @@ def two_sets(monkeypatch):
     monkeypatch.setattr(shipped_weights, "drives", short)
 
 
-def test_the_page_has_every_row_and_is_made_once(two_sets, tmp_path, cad):
+def test_the_page_has_every_row_and_is_made_once(two_sets, tmp_path, cad, half_written):
+    """What a stop left is made again, and what other weights were measured to be."""
+    half_written(tmp_path / "share-0.01" / "cad")
     settings = Settings(tmp_path, cad, share=0.01)
     run(settings, "the command")
     page = (tmp_path / "share-0.01" / PAGE).read_text("utf-8")
@@ -47,3 +50,10 @@ def test_the_page_has_every_row_and_is_made_once(two_sets, tmp_path, cad):
     assert len(made) == 4
     run(settings, "the command")
     assert {path: path.stat().st_mtime_ns for path in made} == made
+    other = tmp_path / "share-0.01" / "procedural-raw"
+    record = json.loads((other / "wildshape.json").read_text("utf-8"))
+    record["settings"]["models"] = ["0123456789abcdef"]
+    (other / "wildshape.json").write_text(json.dumps(record), "utf-8")
+    run(settings, "the command")
+    new = {path.parent for path in made if path.stat().st_mtime_ns != made[path]}
+    assert new == {other}

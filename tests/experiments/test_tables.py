@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from experiments.tables import make, train  # pyright: ignore
+from experiments.tables import data, make, train  # pyright: ignore
 from experiments.tables.__main__ import TABLES, Settings, main  # pyright: ignore
+from experiments.tables.data import Simulated, as_values, store_of  # pyright: ignore
 from experiments.tables.given import Given  # pyright: ignore
 from experiments.tables.measure import Measured, as_results  # pyright: ignore
+from experiments.tables.show import Part, record  # pyright: ignore
 from experiments.tables.size import SIZES, sized  # pyright: ignore
 from experiments.tables.table import Trained  # pyright: ignore
 from experiments.tables.tsne import tsne  # pyright: ignore
@@ -24,6 +26,8 @@ from wildshape.evaluation.metrics import BoxScore
 from wildshape.evaluation.protocol import run
 from wildshape.evaluation.results import Results
 from wildshape.evaluation.summary import figures_of
+from wildshape.io.store.store import open_store
+from wildshape.simulate.generate import SimulationConfig
 from wildshape.training.config import learning_rate
 from wildshape.training.recipes import PRESETS, default, paper_lidar
 
@@ -51,7 +55,7 @@ def test_vehicle_table(folder):
     assert known["cd_partial"] is None
     assert fused["coverage_partial"] < fused["coverage"]
     assert known["acc30"] == fused["acc30"]
-    ours = made["rows"]["ours, paper's form"]
+    ours = made["parts"][0]["rows"]["ours, paper's form"]
     assert ours["recipe"]["optim"]["steps"] == 10
     assert len(ours["trained"]) == 2
     assert all(one["provenance"]["code"] for one in ours["trained"])
@@ -145,6 +149,31 @@ def test_size_small_keeps_the_papers_schedule_shortened_evenly():
         assert falls[0] == pytest.approx(falls[1])
     assert (ours.decay_every, ours.average) == (0, 0.998)
     assert sized(paper_lidar(), SIZES["hour"]).optim.decay_every == 0
+
+
+def test_data_that_a_stop_left_half_made_are_made_again(tmp_path, monkeypatch):
+    def stopped(config, seed):
+        yield drive_by("first", scans=2, points=60)
+        raise KeyboardInterrupt
+
+    cars = Simulated("cars", SimulationConfig(tracks=2), seed=1)
+    monkeypatch.setattr(data, "simulate_tracks", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        store_of(tmp_path, cars)
+    whole = [drive_by(name, scans=2, points=60) for name in ("first", "second")]
+    monkeypatch.setattr(data, "simulate_tracks", lambda config, seed: whole)
+    assert open_store(store_of(tmp_path, cars)).names == ("first", "second")
+
+
+def test_rows_of_equal_names_in_other_blocks_are_all_recorded():
+    table = TABLES["views"](Given(SIZES["test"]))
+    measured = (Measured(run({"m": OneScan()}, [drive_by(scans=2, points=60)]), {}, None),)
+    parts = [Part(b, "none", tuple((row, measured) for row in b.rows), {}) for b in table.blocks]
+    found = [
+        row.get("data") for p in record(table, parts, {})["parts"] for row in p["rows"].values()
+    ]
+    trained = [as_values(r.data) for b in table.blocks for r in b.rows if isinstance(r, Trained)]
+    assert [one for one in found if one] == trained
 
 
 def test_scores_are_read_as_they_were_written():

@@ -1,0 +1,26 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Drives measured: what another call left is neither pooled nor taken for one's own."""
+
+from pathlib import Path
+
+from experiments.drives import Settings, main
+
+from experiments import drives
+
+
+def test_other_drives_in_the_same_folder_are_kept_apart(tmp_path, monkeypatch):
+    pooled, folders = [], []
+
+    def noted(folder, *line):
+        folder.mkdir(parents=True)
+        folders.append(folder)
+        if line[0] == "evaluate-drive":
+            pooled.append({path.name for path in Path(line[1]).iterdir()})
+
+    monkeypatch.setattr(drives, "_step", noted)
+    monkeypatch.setattr(drives, "_table", lambda *of: "")
+    for first, scans in ((21, 60), (101, 60), (101, 20)):
+        main(Settings(tmp_path, first, count=2, scans=scans))
+        assert pooled[-1] == {str(first), str(first + 1)}
+    assert len(set(folders)) == len(folders)

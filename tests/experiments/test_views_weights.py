@@ -1,0 +1,19 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Weights for depth views: the data are whole before anything is trained."""
+
+from experiments.views_weights import Settings, main
+
+from experiments import views_weights
+from wildshape.io.store.store import open_store
+
+
+def test_views_that_a_stop_left_half_made_are_made_again(cad, tmp_path, monkeypatch, half_written):
+    trained = []
+    monkeypatch.setattr(views_weights, "train", lambda *of: trained.append(of))
+    monkeypatch.setattr(views_weights, "ship", lambda *of: None)
+    monkeypatch.setattr(views_weights, "_COPIES", 1)
+    half_written(tmp_path / "data")
+    main(Settings(tmp_path, cad, "car"))
+    assert len(open_store(tmp_path / "data")) == 3
+    assert len(trained) == 1
