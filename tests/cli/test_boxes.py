@@ -8,12 +8,15 @@ import shutil
 import numpy as np
 import pytest
 from tests.datasets.street import street
-from tests.datasets.write_argoverse2 import T_EGO_UP, write_log
+from tests.datasets.write_argoverse2 import T_EGO_UP, pose_columns, write_log, write_table
 from tests.datasets.write_kitti_tracking import EYE, write_sequence
 
 from wildshape.datasets.argoverse2.log import read_boxes as read_argoverse2
+from wildshape.datasets.argoverse2.log import read_sensor_pose
 from wildshape.datasets.kitti.tracking_labels import read_boxes as read_kitti
-from wildshape.io.boxes.detections import pose_of
+from wildshape.errors import BadInputError
+from wildshape.inference.folders.box_files import BoxFiles
+from wildshape.io.boxes.detections import Detection, pose_of
 from wildshape.records import Box
 
 FORMATS = ("json", "kitti", "nuscenes", "argoverse2")
@@ -97,6 +100,28 @@ def test_a_calibration_takes_boxes_to_the_formats_own_frame(
     velo = rows["Tr_velo_to_cam"].reshape(3, 4)
     expected = rows["R0_rect"].reshape(3, 3) @ (velo[:, :3] @ pose[:3, 3] + velo[:, 3])
     assert label.T_rect_object.translation.tolist() == pytest.approx(expected.tolist(), abs=1e-4)
+
+
+def test_argoverse2s_calibration_is_the_file_that_is_named(calibrations, tmp_path):
+    log = calibrations["argoverse2"].parents[1]
+    copy = shutil.copy(calibrations["argoverse2"], tmp_path / "calibration.feather")
+    named, plain = (BoxFiles(("argoverse2",), file) for file in (copy, None))
+    one = Detection("car", 0, "7", 7, "car", "lidar", 0.5, Box((9, 1, 0), (4, 2, 1), (1, 0, 0, 0)))
+    named.check()
+    for files, out in ((named, tmp_path / "named"), (plain, tmp_path / "plain")):
+        files.write_detections(out, [one])
+    ego, sensor = (
+        read_argoverse2(tmp_path / out / "boxes" / "argoverse2").T_ego_object[0]
+        for out in ("named", "plain")
+    )
+    expected = (read_sensor_pose(log, "both") @ sensor).matrix
+    np.testing.assert_allclose(ego.matrix, expected, atol=1e-6)
+    # Of one LiDAR there is no such frame, and no other file is read in its place.
+    beside = tmp_path / "log" / "calibration"
+    shutil.copytree(log / "calibration", beside)
+    write_table(beside / "up.feather", {"sensor_name": ["up_lidar"]} | pose_columns([T_EGO_UP]))
+    with pytest.raises(BadInputError, match=r"up\.feather: no sensor down_lidar"):
+        BoxFiles(("argoverse2",), beside / "up.feather").check()
 
 
 def test_a_calibration_that_nothing_takes_is_refused_before_work(

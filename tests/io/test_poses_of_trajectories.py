@@ -13,7 +13,7 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.smoothness import smoothness
-from wildshape.io.poses import read_tum, times_of, write_trajectory, write_tum
+from wildshape.io.poses import places_of, read_tum, times_of, write_trajectory, write_tum
 
 
 def drive(count=9, turn_deg=3.0, speed=2.0):
@@ -69,6 +69,14 @@ def test_times_are_the_names_where_those_rise():
     assert times_of(["000003", "000007"]) == [3, 7]
     assert times_of(["7", "3"]) == [0, 1]
     assert times_of(["left", "right"]) == [0, 1]
+    assert times_of(["000003", "000007"], ["000005.ply"]) == [3, 7]
+    assert times_of(["scan_00", "scan_02"], ["scan_01.ply"]) == [0, 2]
+
+
+def test_places_count_skipped_files_in_the_order_of_names():
+    assert places_of(["b", "c", "e"], ["d.ply", "a.ply"]) == [1, 2, 4]
+    assert places_of(["a-1", "a"], ["a-0.ply"]) == [1, 2]  # as files are sorted: a-1.ply, a.ply
+    assert places_of(["e", "b"], ["c.ply"]) == [0, 1]
 
 
 def test_json_has_poses_and_figures(tmp_path):
@@ -76,6 +84,9 @@ def test_json_has_poses_and_figures(tmp_path):
     found = json.loads((tmp_path / "t.json").read_text())
     assert [row["time"] for row in found["poses"]] == [1, 2, 5]
     np.testing.assert_allclose(found["poses"][1]["T_sensor_canonical"], drive(3).matrix[1])
+    write_trajectory(tmp_path / "skipped.json", drive(2), ["a", "c"], ["b.ply"])
+    skipped = json.loads((tmp_path / "skipped.json").read_text())
+    assert [row["time"] for row in skipped["poses"]] == [0, 2]
     assert found["smoothness"]["translation_p95_m"] == pytest.approx(0, abs=1e-12)
     write_trajectory(tmp_path / "t.json", drive(1), ["0"])
     assert json.loads((tmp_path / "t.json").read_text())["smoothness"] is None

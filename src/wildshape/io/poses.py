@@ -6,6 +6,7 @@
 `time x y z qx qy qz qw`.
 """
 
+from bisect import bisect
 from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import pairwise
@@ -81,13 +82,26 @@ def write_poses(path: Path | str, poses: SE3) -> None:
     write_text(path, "".join(" ".join(map(repr, map(float, row))) + "\n" for row in rows))
 
 
-def times_of(scan_names: Sequence[str]) -> list[int]:
-    """What the scans' names count, if all do and rise; else 0, 1, 2, ..."""
+def places_of(scan_names: Sequence[str], skipped: Sequence[str] = ()) -> list[int]:
+    """Each scan's place in its track, from 0, those counted that were skipped.
+
+    Args:
+        scan_names: those that are left, in the order of their files' names; scans in another order
+            are counted alone.
+        skipped: names of the other scans' files.
+    """
+    files = [f"{name}." for name in scan_names]  # a suffix follows: a-1.ply is before a.ply
+    others = sorted(skipped) if files == sorted(files) else []
+    return [place + bisect(others, file) for place, file in enumerate(files)]
+
+
+def times_of(scan_names: Sequence[str], skipped: Sequence[str] = ()) -> list[int]:
+    """What the scans' names count, if all do and rise; else their places (`places_of`)."""
     if all(name.isascii() and name.isdigit() for name in scan_names):
         times = [int(name) for name in scan_names]
         if all(a < b for a, b in pairwise(times)):
             return times
-    return list(range(len(scan_names)))
+    return places_of(scan_names, skipped)
 
 
 def write_tum(path: Path, poses: SE3, times: Sequence[float] | Sequence[int]) -> None:
@@ -115,13 +129,18 @@ def read_tum(path: Path) -> tuple[list[float], SE3]:
     return numbers[:, 0].tolist(), SE3(rotation_from_quaternion(wxyz), numbers[:, 1:4])
 
 
-def write_trajectory(path: Path, poses: SE3, scan_names: Sequence[str]) -> None:
-    """Write poses by scan with the figures of `Smoothness` (null for fewer than three scans)."""
+def write_trajectory(
+    path: Path, poses: SE3, scan_names: Sequence[str], skipped: Sequence[str] = ()
+) -> None:
+    """Write poses by scan with the figures of `Smoothness` (null for fewer than three scans).
+
+    `skipped`: names of the files of scans that have no pose.
+    """
     found = smoothness(poses)
     rows = [
         {"scan": name, "time": time, "T_sensor_canonical": matrix}
         for name, time, matrix in zip(
-            scan_names, times_of(scan_names), poses.matrix.tolist(), strict=True
+            scan_names, times_of(scan_names, skipped), poses.matrix.tolist(), strict=True
         )
     ]
     figures = None if found is None else asdict(found)

@@ -13,9 +13,12 @@ import numpy as np
 import pytest
 import torch
 
+from wildshape.errors import BadInputError
 from wildshape.geometry.projection.visibility import Bins, FacingBins, PixelBins, PolarBins
 from wildshape.geometry.sampling import drawn, sorted_points
 from wildshape.inference.config import HypothesisRule, InferenceConfig
+from wildshape.inference.export import onnx, verify
+from wildshape.inference.export.graph import OUTPUTS
 from wildshape.inference.export.onnx import describe, graph_of
 from wildshape.inference.export.plain_scores import nearest_both_plain, score_plain, visible_plain
 from wildshape.inference.export.verify import (
@@ -223,6 +226,47 @@ def test_command_says_how_far_from_torch(exported):
     assert said["largest_m"] < 1e-4
     assert (said["scans"], said["other_branch"]) == (4, 0)
     assert said["bytes"] == (folder / said["out"]).stat().st_size
+
+
+@pytest.fixture
+def export_with(tmp_path, monkeypatch):
+    """Exports a model to a file that adds `value` to an output of its first `scans` scans."""
+
+    def export(output, value, scans):
+        made, out = predictor(), tmp_path / "out.pt2"
+        save_checkpoint(tmp_path / "model.safetensors", made.network, made.settings)
+        graph, left = graph_of(made), iter([value] * scans)
+
+        def runner(*inputs):
+            with torch.inference_mode():
+                found = graph(*map(torch.from_numpy, inputs))._asdict()
+            found[output] = found[output] + next(left, 0.0)
+            return [part.numpy() for part in found.values()]
+
+        monkeypatch.setattr(onnx, "trace", lambda _: None)
+        monkeypatch.setattr(onnx, "write_torch", lambda path, *_: path.touch())
+        monkeypatch.setattr(verify, "open_exported", lambda _: runner)
+        return out, export_model(tmp_path / "model.safetensors", out, scans=10)
+
+    return export
+
+
+@pytest.mark.parametrize("output", OUTPUTS[:-1])
+@pytest.mark.parametrize(("value", "scans"), [(np.nan, 1), (np.inf, 1), (0.01, 2)])
+def test_a_file_that_gives_something_else_is_not_written(
+    output, value, scans, export_with, tmp_path
+):
+    with pytest.raises(BadInputError, match=r"out\.pt2: not written"):
+        export_with(output, value, scans)
+    assert not (tmp_path / "out.pt2").exists()
+
+
+@pytest.mark.parametrize("output", ["confidence", "cost"])
+def test_a_cost_that_rounding_moves_over_a_border_is_said(output, export_with):
+    out, found = export_with(output, 0.01, 1)
+    assert (found.other_cost, found.scans, found.other_branch) == (1, 10, 0)
+    assert found.largest_m < 1e-4
+    assert out.exists()
 
 
 def test_example_needs_no_torch(facing, onnx_file, tmp_path, monkeypatch, capsys):

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from pyarrow import feather
 from tests.cars import poses_of
 from tests.datasets.street import SIZE, street
 from tests.datasets.write_argoverse2 import LOG, STAMPS, write_log
@@ -25,7 +26,14 @@ from wildshape.datasets.nuscenes.reader import NuScenes
 from wildshape.errors import BadInputError, MissingExtraError
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.io.boxes.argoverse2 import write_argoverse2_boxes
-from wildshape.io.boxes.detections import Detection, number_of, read_detections, write_box_list
+from wildshape.io.boxes.detections import (
+    Detection,
+    detections_of,
+    frame_number,
+    number_of,
+    read_detections,
+    write_box_list,
+)
 from wildshape.io.boxes.kitti import KittiCamera, camera_at_the_lidar, write_kitti_labels
 from wildshape.io.boxes.nuscenes import write_nuscenes_boxes
 from wildshape.records import Box
@@ -153,6 +161,26 @@ def test_an_argoverse2_table_comes_back_as_the_labels_it_was_read_from(tmp_path)
     assert found.timestamps.max() == STAMPS[2]
 
 
+@pytest.mark.parametrize("name", ["1700000000123456789", "315966265659927216"])
+def test_argoverse2_has_the_time_that_a_scan_is_named_by(name, tmp_path):
+    scan = {"scan": name, "confidence": 0.5, "box": json.loads(_BOX)}
+    (of_track,) = detections_of({"track": "car", "scans": [scan]}, 0)
+    of_drive = replace(of_track, sequence="drive", scan_number=frame_number(name, 3))
+    path = tmp_path / "annotations.feather"
+    write_argoverse2_boxes(path, [of_track, of_drive, replace(of_drive, time_ns=5)])
+    stamps = feather.read_table(path).column("timestamp_ns").to_pylist()
+    assert stamps == [int(name), int(name), 5]
+
+
+def test_an_argoverse2_table_without_boxes_has_the_types_of_one_with(tmp_path):
+    one = Detection("car", 0, "7", 7, "car", "lidar", 0.5, Box((0, 0, 0), (4, 2, 1), (1, 0, 0, 0)))
+    for name, given in (("none", []), ("one", [one])):
+        write_argoverse2_boxes(tmp_path / name, given)
+    none, some = (feather.read_table(tmp_path / name).schema for name in ("none", "one"))
+    assert none.equals(some)
+    assert str(none.field("category").type) == "string"
+
+
 def _keys(boxes):
     return list(zip(boxes.tracks.tolist(), boxes.timestamps.tolist(), strict=True))
 
@@ -173,13 +201,31 @@ def test_json_holds_every_box_as_it_is(tmp_path):
     assert (row["track"], row["scan"], row["score"]) == ("a", "000004", 0.25)
 
 
-def test_the_number_of_a_scan_is_its_name_where_that_counts():
-    assert [number_of(name, 5) for name in ("000012", "315966253660357000", "left", "-3")] == [
-        12,
-        315966253660357000,
-        5,
-        5,
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [
+        ("000012", 12),
+        ("00000000000000000000000012", 12),
+        ("315966253660357000", 315966253660357000),
+        (str(2**63 - 1), 2**63 - 1),
+        (str(2**63), 5),  # no file has a column for it
+        ("9" * 5000, 5),
+        ("left", 5),
+        ("-3", 5),
+    ],
+)
+def test_the_number_of_a_scan_is_its_name_where_that_counts(name, number):
+    assert number_of(name, 5) == number
+
+
+def test_the_place_of_a_scan_counts_those_skipped_before_it():
+    scans = [
+        {"scan": f"scan_{place:02d}", "confidence": 0.5, "box": json.loads(_BOX)}
+        for place in (0, 2, 4)
     ]
+    skipped = [{"scan": f"scan_{place:02d}.ply", "reason": "few points"} for place in (1, 3, 5)]
+    said = {"track": "car", "scans": scans, "skipped": skipped}
+    assert [one.scan_number for one in detections_of(said, 0)] == [0, 2, 4]
 
 
 def test_leaning_boxes_stand_upright_in_kitti(tmp_path):
@@ -205,6 +251,7 @@ _BOX = '{"centre": [1, 2, 3], "size": [4, 2, 1], "quaternion_wxyz": [1, 0, 0, 0]
         ('"car-1"', '"../car-1"'),
         ("[1, 2, 3]", "[1, 2]"),
         ("[4, 2, 1]", "[4, 2, 1e400]"),
+        ("[1, 0, 0, 0]", "[0, 0, 0, 0]"),
         ('"lidar"', '"radar"'),
         ("0.5", "null"),
         ("0.5", "NaN"),

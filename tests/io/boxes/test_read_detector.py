@@ -105,6 +105,8 @@ def test_a_fingerprint_tells_names_and_contents(tmp_path):
         ("a.json", 7, "results of nuScenes"),
         ("a.json", nuscenes(size=[1, 2]), "results of nuScenes"),
         ("a.json", nuscenes(rotation=[math.nan, 0, 0, 0]), "not finite"),
+        ("a.json", nuscenes(rotation=[0, 0, 0, 0]), "no unit quaternion"),
+        ("a.json", nuscenes(rotation=[1, 0, 0, 0.2]), "no unit quaternion"),
         ("a.json", [{"boxes_lidar": [LEFT], "pred_labels": [1]}], "no 'name'"),
         ("a.json", [{"boxes_lidar": [LEFT], "name": []}], "results of nuScenes"),
         ("a.json", [{"boxes_lidar": [LEFT[:6]], "name": ["Car"]}], "results of nuScenes"),

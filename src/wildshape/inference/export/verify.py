@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """An exported file held against the predictor that it was made from."""
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,7 +18,7 @@ from wildshape.inference.export import onnx
 from wildshape.inference.export.onnx import INPUTS
 from wildshape.inference.predictor import Predictor, load
 from wildshape.method.checkpoint import ModelSettings
-from wildshape.records import Points
+from wildshape.records import Completion, Points
 
 SUFFIXES = (".onnx", ".pt2")
 _RULE = ExportRule()
@@ -29,14 +30,18 @@ class Difference(NamedTuple):
     """How far an exported file is from torch.
 
     Attributes:
-        largest_m: of any coordinate of any completed point, where both chose the same branch.
+        largest_m: of any coordinate of any completed point or translation, and of any entry of a
+            rotation, where both chose the same branch; infinite where any number is not finite.
         other_branch: scans whose branches cost the same to the last digits, so that another won.
         scans: compared.
+        other_cost: scans with the same branch and another cost or confidence: rounding moves a
+            point over the border of a bin of the cost.
     """
 
     largest_m: float
     other_branch: int
     scans: int
+    other_cost: int
 
 
 def export_model(
@@ -73,7 +78,7 @@ def export_model(
         draft = Path(folder) / f"model{suffix}"  # no file under its final name before it is checked
         write(draft, onnx.trace(predictor), onnx.describe(predictor))
         rehearsed = rehearsal_scans(predictor.settings, scans)
-        found = compare(open_exported(draft), predictor, rehearsed)
+        found = compare(open_exported(draft), predictor, rehearsed, rule)
         _refuse_other(out, found, rule)
         draft.replace(out)
     return found
@@ -81,11 +86,13 @@ def export_model(
 
 def _refuse_other(path: Path, found: Difference, rule: ExportRule) -> None:
     """Raise if an exported model does something else than torch."""
-    if found.largest_m > rule.largest_m or found.other_branch > rule.other_share * found.scans:
+    most = rule.other_share * found.scans
+    if found.largest_m > rule.largest_m or max(found.other_branch, found.other_cost) > most:
         raise BadInputError(
             f"{path}: not written, the exported model differs from torch by"
-            f" {found.largest_m:.3g} m and chose another pose for {found.other_branch} of"
-            f" {found.scans} scans; please report this with the model."
+            f" {found.largest_m:.3g} m, chose another pose for {found.other_branch} of"
+            f" {found.scans} scans and gave another cost or confidence for {found.other_cost};"
+            " please report this with the model."
         )
 
 
@@ -104,16 +111,35 @@ def open_exported(path: Path, threads: int = 0) -> Runner:
     ]
 
 
-def compare(runner: Runner, predictor: Predictor, scans: Sequence[Points]) -> Difference:
-    """Both complete the same scans."""
-    largest, other = 0.0, 0
+def compare(
+    runner: Runner, predictor: Predictor, scans: Sequence[Points], rule: ExportRule = _RULE
+) -> Difference:
+    """Both complete the same scans; costs (metres) and confidences are others beyond `largest_m`."""
+    largest, branches, costs = 0.0, 0, 0
     for scan, done in zip(scans, predictor.complete_many(scans)):
-        points, *_, branch = runner(*prepared(scan, predictor.settings.input_points))
-        if int(branch[0]) == done.branch:
-            largest = max(largest, float(np.abs(points[0] - done.points).max()))
+        *found, branch = runner(*prepared(scan, predictor.settings.input_points))
+        *places, confidence, cost = _apart(found, done)
+        if not np.isfinite((*places, confidence, cost)).all():
+            largest = math.inf
+        elif int(branch[0]) != done.branch:
+            branches += 1
         else:
-            other += 1
-    return Difference(largest, other, len(scans))
+            largest = max(largest, *places)
+            costs += max(confidence, cost) > rule.largest_m
+    return Difference(largest, branches, len(scans), costs)
+
+
+def _apart(found: Sequence[np.ndarray], done: Completion) -> list[float]:
+    """The largest difference of each output but the branch, in the order of `OUTPUTS`."""
+    pose = done.pose
+    same = (
+        done.points,
+        pose.rotation.numpy(),
+        pose.translation.numpy(),
+        done.confidence,
+        done.cost,
+    )
+    return [float(np.abs(a[0] - b).max()) for a, b in zip(found, same, strict=True)]
 
 
 def prepared(scan: Points, count: int) -> tuple[np.ndarray, np.ndarray]:

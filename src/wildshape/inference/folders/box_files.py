@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _FOLDER = "boxes"
 _CURE = "KITTI's calibration brings it"
+_EGO_CURE = "a log of Argoverse 2 brings it as calibration/egovehicle_SE3_sensor.feather"
 
 
 @dataclass(frozen=True)
@@ -143,9 +144,22 @@ def read_camera(path: Path) -> "KittiCamera":
 
 
 def _ego(path: Path) -> "SE3":
-    from wildshape.datasets.argoverse2.log import read_sensor_pose
+    """`T_ego_sensor` of scans of both LiDARs, as `read_sensor_pose` has it, of the file itself.
 
-    return read_sensor_pose(path.resolve().parent.parent, "both")
+    Raises:
+        BadInputError: it is missing, corrupt or lacks a LiDAR.
+    """
+    from wildshape.datasets.argoverse2.feather import POSE, poses, read_feather
+    from wildshape.geometry.transforms.se3 import SE3
+
+    table = read_feather(path, ("sensor_name", *POSE), _EGO_CURE)
+    T_ego_any = poses(table, path)
+    rows = {name: i for i, name in enumerate(table["sensor_name"])}
+    absent = {"up_lidar", "down_lidar"} - set(rows)
+    if absent:
+        raise BadInputError(f"{path}: no sensor {min(absent)} in it; {_EGO_CURE}.")
+    up, down = (T_ego_any[rows[name]] for name in ("up_lidar", "down_lidar"))
+    return SE3(up.rotation, (up.translation + down.translation) / 2)
 
 
 @dataclass(frozen=True)

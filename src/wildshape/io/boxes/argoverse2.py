@@ -9,7 +9,7 @@ from typing import Any
 from wildshape.errors import load_library
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import atomic_write
-from wildshape.io.boxes.detections import Detection, moved
+from wildshape.io.boxes.detections import Detection, moved, number_of
 
 _CATEGORIES = {"": "REGULAR_VEHICLE", "car": "REGULAR_VEHICLE"}
 
@@ -35,7 +35,7 @@ def write_argoverse2_boxes(
         one.box if T_ego_sensor is None else moved(one.box, T_ego_sensor) for one in detections
     ]
     numbers = {
-        name: [getattr(box, part)[i] for box in boxes]
+        name: pyarrow.array([getattr(box, part)[i] for box in boxes], pyarrow.float64())
         for part, names in (
             ("size", ("length_m", "width_m", "height_m")),
             ("quaternion_wxyz", ("qw", "qx", "qy", "qz")),
@@ -43,16 +43,15 @@ def write_argoverse2_boxes(
         )
         for i, name in enumerate(names)
     }
-    table = pyarrow.table(
+    kinds = [_CATEGORIES.get(c, c.upper()) for c in (one.category for one in detections)]
+    table = pyarrow.table(  # every type is said, for a drive may have no vehicle
         {
             "timestamp_ns": pyarrow.array(list(map(_time, detections)), pyarrow.int64()),
             "track_uuid": pyarrow.array([one.track for one in detections], pyarrow.string()),
-            "category": [
-                _CATEGORIES.get(c, c.upper()) for c in (one.category for one in detections)
-            ],
+            "category": pyarrow.array(kinds, pyarrow.string()),
             **numbers,
             "num_interior_pts": pyarrow.array(list(map(_points, detections)), pyarrow.int64()),
-            "score": [one.score for one in detections],
+            "score": pyarrow.array([one.score for one in detections], pyarrow.float64()),
         }
     )
     with atomic_write(path) as file:
@@ -60,8 +59,8 @@ def write_argoverse2_boxes(
 
 
 def _time(one: Detection) -> int:
-    """The scan's time, or else its number, which is a time where the data set named the scans."""
-    return one.scan_number if one.time_ns is None else one.time_ns
+    """The scan's time, or else what its name counts, which may be a time, or else its number."""
+    return number_of(one.scan, one.scan_number) if one.time_ns is None else one.time_ns
 
 
 def _points(one: Detection) -> int:

@@ -17,7 +17,9 @@ from wildshape.geometry.transforms.rotation import (
 )
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import write_json
+from wildshape.io.boxes.detector import check_turn
 from wildshape.io.guard import reading
+from wildshape.io.poses import places_of
 from wildshape.records import Box, SensorKind
 
 FRAME = (
@@ -27,7 +29,8 @@ FRAME = (
 
 _IF_KNOWN = ("sequence", "time_ns", "points", "velocity")
 
-_MOST_DIGITS = 18  # of a number that data sets hold
+_MOST_DIGITS = 255  # no file has a longer name
+_TOO_LARGE = 2**63  # for a column of int64
 _LARGEST_COUNT = 10**10  # larger numbers are times
 
 
@@ -81,7 +84,7 @@ def moved(box: Box, T_target_sensor: SE3) -> Box:
 def number_of(scan: str, place: int) -> int:
     """What a scan's name counts, or else its place in the track."""
     counts = scan.isascii() and scan.isdigit() and len(scan) <= _MOST_DIGITS
-    return int(scan) if counts else place
+    return int(scan) if counts and int(scan) < _TOO_LARGE else place
 
 
 def frame_number(scan: str, frame: int) -> int:
@@ -115,8 +118,9 @@ def detections_of(said: dict[str, Any], number: int) -> Iterator[Detection]:
     kind = said.get("sensor", "lidar")
     if kind not in get_args(SensorKind):
         raise ValueError(f"sensor {kind!r}")
-    for place, scan in enumerate(said["scans"]):
-        name = _text(scan["scan"])
+    names = [_text(scan["scan"]) for scan in said["scans"]]
+    skipped = [_text(scan["scan"]) for scan in said.get("skipped", ())]
+    for place, name, scan in zip(places_of(names, skipped), names, said["scans"]):
         yield Detection(
             track=_text(said["track"]),
             track_number=number,
@@ -140,7 +144,7 @@ def _box(raw: dict[str, Any]) -> Box:
     x, y, z = _finite(raw["centre"])
     length, width, height = _finite(raw["size"])
     qw, qx, qy, qz = _finite(raw["quaternion_wxyz"])
-    return Box((x, y, z), (length, width, height), (qw, qx, qy, qz))
+    return check_turn(Box((x, y, z), (length, width, height), (qw, qx, qy, qz)))
 
 
 def _finite(raw: Sequence[Any]) -> list[float]:

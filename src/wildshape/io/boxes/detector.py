@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 from wildshape.records import Box
 
+_UNIT = 0.01  # rounding to two decimals leaves a quaternion's length as near to 1
+
 
 @dataclass(frozen=True)
 class DetectorBox:
@@ -32,13 +34,24 @@ def checked(box: Box) -> Box:
     """The box itself.
 
     Raises:
-        ValueError: a number is not finite, or a size is not positive.
+        ValueError: a number is not finite, a size is not positive, or a quaternion is no unit one.
     """
     numbers = (*box.centre, *box.size, *box.quaternion_wxyz)
     if not all(map(math.isfinite, numbers)):
         raise ValueError("a box with a number that is not finite")
     if min(box.size) <= 0:
         raise ValueError(f"a box of size {box.size}")
+    return check_turn(box)
+
+
+def check_turn(box: Box) -> Box:
+    """The box itself.
+
+    Raises:
+        ValueError: its quaternion is no unit one.
+    """
+    if abs(math.hypot(*box.quaternion_wxyz) - 1) > _UNIT:
+        raise ValueError(f"a box turned by {box.quaternion_wxyz}, no unit quaternion")
     return box
 
 
