@@ -61,11 +61,22 @@ def test_a_moving_vehicle_goes_straight_on_between_its_completed_scans():
 
 
 def test_the_front_is_where_a_vehicle_drives_to():
-    boxes = [(0.5 * f, 0.0, 0.0, math.pi if f < 3 else 0.0) for f in range(6)]
+    boxes = [(0.5 * f, 0.0, 0.0, math.pi if f < 4 else 0.0) for f in range(6)]
     found = faced(completed(boxes), still(6), BoxConfig())
     assert found.turned
     way = smooth(found, still(6), BoxConfig())
     assert np.abs(way.boxes[:, 3]).max() < 1e-6
+
+
+def test_one_scan_that_looks_aside_turns_no_other_around():
+    """As a network had it in a curve; the fourth is half seen."""
+    degrees = (-173, -164, -158, 115, -147, -147, -147)
+    yaws = np.radians(degrees)
+    places = np.cumsum(4 * np.column_stack((np.cos(yaws), np.sin(yaws))), axis=0)
+    boxes = [(x, y, 0.0, yaw) for (x, y), yaw in zip(places, yaws)]
+    found = faced(completed(boxes), still(len(boxes)), BoxConfig())
+    assert not found.turned
+    np.testing.assert_array_equal(found.boxes[:, 3], yaws)
 
 
 @pytest.mark.parametrize("yaw", [0.0, math.pi])

@@ -23,6 +23,7 @@ from wildshape.drives.object_config import BoxConfig
 _LEAST_APART = 0.5  # ticks
 _ROUNDS = 10
 _ENOUGH = 4  # moments for a parabola: through three one goes whatever they are
+_BEFORE = 3  # completed scans that the next one has to agree with
 _REACH = 3.0  # widths of the kernel, to the farthest scan that a curve needs
 
 
@@ -110,21 +111,21 @@ def _on_its_way(
 def faced(one: Completed, turns: Turns, config: BoxConfig) -> Completed:
     """The same vehicle, its front where it drives to.
 
-    No scan looks away from the one before it. Then all are turned around if the vehicle would
-    drive backwards for most of its way: it may stand, or back up for a while.
+    No scan looks away from those before it. Then all are turned around if the vehicle would drive
+    backwards for most of its way: it may stand, or back up for a while.
     """
     at = np.take(turns.ticks, one.frames) + one.phases
     if not moves(at, one.boxes, config):
         return one
     boxes = one.boxes.copy()
     yaw = boxes[:, 3]
-    for i in range(1, len(yaw)):
-        yaw[i] += np.pi * (np.cos(yaw[i] - yaw[i - 1]) < 0)
+    for i in range(1, len(yaw)):  # some before it: a single one may look aside
+        yaw[i] += np.pi * (np.cos(yaw[i] - yaw[max(i - _BEFORE, 0) : i]).sum() < 0)
     _, velocities = _lines(at, boxes[:, :3], at, config.smooth_ticks)
     fast = np.linalg.norm(velocities[:, :2], axis=1) > config.heading_m_per_tick
     ahead = velocities[:, 0] * np.cos(yaw) + velocities[:, 1] * np.sin(yaw)
     yaw += np.pi * (ahead[fast].sum() < 0)
-    return replace(one, boxes=boxes, turned=bool(np.cos(yaw[0] - one.boxes[0, 3]) < 0))
+    return replace(one, boxes=boxes, turned=bool(np.cos(yaw - one.boxes[:, 3]).sum() < 0))
 
 
 def expected(one: Completed, turns: Turns, beyond_ticks: int, config: BoxConfig) -> Way:

@@ -41,7 +41,7 @@ class Completed:
         moved_m: how far the boxes' middle was moved from that of the completed shape: forward, to
             the left, upward.
         phases: `(k,)` when the beam met it, in turns since the middle of each frame's.
-        turned: the front of the boxes is the rear of the first completed shape.
+        turned: the front of the boxes is the rear of the completed shape.
     """
 
     seen: Sightings
