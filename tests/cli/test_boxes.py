@@ -106,7 +106,8 @@ def test_argoverse2s_calibration_is_the_file_that_is_named(calibrations, tmp_pat
     log = calibrations["argoverse2"].parents[1]
     copy = shutil.copy(calibrations["argoverse2"], tmp_path / "calibration.feather")
     named, plain = (BoxFiles(("argoverse2",), file) for file in (copy, None))
-    one = Detection("car", 0, "7", 7, "car", "lidar", 0.5, Box((9, 1, 0), (4, 2, 1), (1, 0, 0, 0)))
+    box = Box((9.0, 1.0, 0.0), (4.0, 2.0, 1.0), (1.0, 0.0, 0.0, 0.0))
+    one = Detection("car", 0, "7", 7, "car", "lidar", 0.5, box)
     named.check()
     for files, out in ((named, tmp_path / "named"), (plain, tmp_path / "plain")):
         files.write_detections(out, [one])

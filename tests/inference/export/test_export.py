@@ -160,10 +160,11 @@ def test_costs_are_those_of_the_loss(projection):
         {"facing": True, "calibration": CALIBRATION},
         {"facing": True, "calibration": CALIBRATION, "up": UP},
         {"sensor": "camera", "projection": PixelBins()},
+        {"projection": PolarBins(0.03, 0.04, flat=True), "calibration": CALIBRATION},
         {"extent_m": (20.0, 30.0)},
         {"extent_m": (0.5, 1.0)},
     ],
-    ids=["centred", "facing", "level", "camera", "too small", "too large"],
+    ids=["centred", "facing", "level", "camera", "flat", "too small", "too large"],
 )
 def test_graph_is_the_predictor(changes):
     made = predictor(**changes)

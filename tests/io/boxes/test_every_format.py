@@ -173,7 +173,8 @@ def test_argoverse2_has_the_time_that_a_scan_is_named_by(name, tmp_path):
 
 
 def test_an_argoverse2_table_without_boxes_has_the_types_of_one_with(tmp_path):
-    one = Detection("car", 0, "7", 7, "car", "lidar", 0.5, Box((0, 0, 0), (4, 2, 1), (1, 0, 0, 0)))
+    box = Box((0.0, 0.0, 0.0), (4.0, 2.0, 1.0), (1.0, 0.0, 0.0, 0.0))
+    one = Detection("car", 0, "7", 7, "car", "lidar", 0.5, box)
     for name, given in (("none", []), ("one", [one])):
         write_argoverse2_boxes(tmp_path / name, given)
     none, some = (feather.read_table(tmp_path / name).schema for name in ("none", "one"))

@@ -18,7 +18,13 @@ from wildshape.geometry.projection.visibility import Bins, Projection, bin_point
 def nearest_both_plain(
     a: Float[Tensor, "B N 3"], b: Float[Tensor, "B M 3"]
 ) -> tuple[Float[Tensor, "B N"], Float[Tensor, "B M"]]:
-    """Distance of each point to the other set, from all pairs at once.
+    """Distance of each point to the other set, from all pairs at once."""
+    squared = _squared(a, b)
+    return _root(squared.amin(2)), _root(squared.amin(1))
+
+
+def _squared(a: Float[Tensor, "B N 3"], b: Float[Tensor, "B M 3"]) -> Float[Tensor, "B N M"]:
+    """Squared distances of all pairs.
 
     One product gives |a|^2 + |b|^2 - 2 a.b, whose rounding is harmless near the origin: centred
     scans are given, so a distance errs by less than a millimetre where it is zero.
@@ -26,8 +32,7 @@ def nearest_both_plain(
     ones_a, ones_b = torch.ones_like(a[..., :1]), torch.ones_like(b[..., :1])
     left = torch.cat((a, a.square().sum(-1, keepdim=True), ones_a), dim=-1)
     right = torch.cat((-2 * b, ones_b, b.square().sum(-1, keepdim=True)), dim=-1)
-    squared = left @ right.mT
-    return _root(squared.amin(2)), _root(squared.amin(1))
+    return left @ right.mT
 
 
 def _root(squared: Tensor) -> Tensor:
@@ -53,12 +58,12 @@ def visible_plain(bins: Bins) -> Bool[Tensor, "B N"]:
 
 
 class PlainScores(NamedTuple):
-    """Both terms of the loss for every hypothesis, and the distances behind the second.
+    """Both terms of the loss for every hypothesis, and how far shapes are from their scans.
 
     Attributes:
         observation: `CD(X -> Y)`, metres (paper eq. 2).
         projection: `CD(visible(Y) -> X)`, metres (paper eq. 3).
-        to_scan: of every posed point, metres.
+        to_scan: of every posed point, metres: in space, also where the terms compare projections.
     """
 
     observation: Float[Tensor, "B H"]
@@ -80,10 +85,14 @@ def score_plain(
     hypotheses = posed.shape[1]
     flat = posed.flatten(0, 1)
     repeated, middle = _repeat(scans, hypotheses), _repeat(centres, hypotheses)
-    both = (compared(cloud, middle, projection) for cloud in (repeated, flat))
+    both = tuple(compared(cloud, middle, projection) for cloud in (repeated, flat))
     to_shape, to_scan = nearest_both_plain(*both)
     seen = visible_plain(bin_points(flat + middle[:, None], middle, projection))
-    found = (to_shape.mean(-1), _mean_of(to_scan, seen), to_scan)
+    terms = (to_shape.mean(-1), _mean_of(to_scan, seen))
+    if projection.flat:
+        nearest = _squared(*both).argmin(1)
+        to_scan = (flat - repeated.gather(1, nearest[..., None].expand(-1, -1, 3))).norm(dim=-1)
+    found = (*terms, to_scan)
     return PlainScores(*(part.unflatten(0, (-1, hypotheses)) for part in found))
 
 

@@ -114,7 +114,14 @@ def open_exported(path: Path, threads: int = 0) -> Runner:
 def compare(
     runner: Runner, predictor: Predictor, scans: Sequence[Points], rule: ExportRule = _RULE
 ) -> Difference:
-    """Both complete the same scans; costs (metres) and confidences are others beyond `largest_m`."""
+    """Both complete the same scans.
+
+    Args:
+        runner: runs the file.
+        predictor: that it was made from.
+        scans: sensor frame, metres.
+        rule: its `largest_m` is how far costs, metres, and confidences may be apart, too.
+    """
     largest, branches, costs = 0.0, 0, 0
     for scan, done in zip(scans, predictor.complete_many(scans)):
         *found, branch = runner(*prepared(scan, predictor.settings.input_points))
