@@ -3,6 +3,7 @@
 """`--track` says that it was used, never mixes with what was made without, and gets its row."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -83,3 +84,17 @@ def test_a_track_registered_together_has_its_trajectory(
     refused(*order)
     fused = ("fuse", first_track, "--out", tmp_path / "fused.ply", "--model", trained)
     assert wildshape(*fused, "--track").code == 0
+
+
+def test_a_scan_that_is_left_out_keeps_its_place_in_the_trajectory(
+    wildshape, first_track, trained, tmp_path
+):
+    track = shutil.copytree(first_track, tmp_path / "named")
+    for number, file in enumerate(sorted((track / "scans").iterdir())):
+        file.rename(file.with_name(f"scan_{number:02d}.ply"))
+    (track / "scans" / "scan_01.ply").write_bytes(b"ply\n")
+    (track / "poses.txt").unlink(missing_ok=True)
+    done = wildshape("register", track, "--out", tmp_path / "out", "--model", trained)
+    assert done.code == 0, done.err
+    times, _ = read_tum(tmp_path / "out" / "named" / "trajectory.tum")
+    assert times == [0, *range(2, len(times) + 1)]

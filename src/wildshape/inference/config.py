@@ -275,8 +275,10 @@ class ExportRule:
     """How near an exported file must come to torch (`export/verify.py`).
 
     Attributes:
-        largest_m: of any coordinate of any completed point: float32 of another runtime.
-        other_share: of the scans that may be given another pose that costs as much.
+        largest_m: of any coordinate of any completed point, of the pose, the cost and the
+            confidence: float32 of another runtime.
+        other_share: of the scans that may be given another pose that costs as much, or another cost
+            or confidence: rounding may move a point over the border of a bin.
     """
 
     largest_m: float = 1e-4

@@ -214,14 +214,15 @@ def write_results(
         for track, scans in _whole_tracks(helpers.in_order(task, parts), bar):
             folder = output.path / file_name(track.name)
             poses = stack([one.pose for one in scans])
-            _write_poses(folder, track, poses, registers=registers)
+            skipped = source.skipped_in(track.name)
+            _write_poses(folder, track, poses, skipped, registers=registers)
             described = objects_of(
                 track,
                 scans,
                 predictor,
                 source.path,
                 together=options.track,
-                skipped=source.skipped_in(track.name),
+                skipped=skipped,
             )
             write_json(folder / OBJECTS, described)
             summary.tracks, summary.scans = summary.tracks + 1, summary.scans + len(scans)
@@ -294,12 +295,15 @@ def _written_before(path: Path) -> list[dict[str, str]] | None:
         return json.loads(path.read_text("utf-8"))["skipped"]
 
 
-def _write_poses(folder: Path, track: Track, poses: SE3, *, registers: bool) -> None:
+def _write_poses(
+    folder: Path, track: Track, poses: SE3, skipped: Sequence[tuple[str, str]], *, registers: bool
+) -> None:
     write_poses(folder / POSES, poses)
     if registers:
         write_poses(folder / MIDDLE, to_middle(poses))
-        write_tum(folder / TUM, poses, times_of(track.scan_names))
-        write_trajectory(folder / TRAJECTORY, poses, track.scan_names)
+        without = [name for name, _ in skipped]
+        write_tum(folder / TUM, poses, times_of(track.scan_names, without))
+        write_trajectory(folder / TRAJECTORY, poses, track.scan_names, without)
 
 
 def objects_of(
