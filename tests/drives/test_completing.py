@@ -79,6 +79,20 @@ def test_one_scan_that_looks_aside_turns_no_other_around():
     np.testing.assert_array_equal(found.boxes[:, 3], yaws)
 
 
+def test_one_scan_turns_no_vehicle_around_that_creeps():
+    boxes = [(0.28 * f, 0.0, 0.0, 0.0 if f else math.pi) for f in range(12)]
+    found = faced(completed(boxes, tuple(range(0, 48, 4))), still(48), BoxConfig())
+    assert not found.turned
+    assert np.abs(np.sin(found.boxes[:, 3] / 2)).max() < 1e-6
+
+
+def test_a_stray_place_at_the_end_turns_no_vehicle_around():
+    boxes = [(1.2 * f, 0.0, 0.0, 0.0) for f in range(7)]
+    boxes.append((-3.0, 0.0, 0.0, 0.0))
+    found = faced(completed(boxes, tuple(range(0, 32, 4))), still(32), BoxConfig())
+    assert not found.turned
+
+
 @pytest.mark.parametrize("yaw", [0.0, math.pi])
 @pytest.mark.parametrize("then", [0.0, -0.2], ids=["stops", "backs up"])
 def test_the_front_stays_the_front_whatever_comes_then(yaw, then):

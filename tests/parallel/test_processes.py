@@ -11,11 +11,13 @@ import time
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
+from threading import Event, Thread
 
 import pytest
 
 from wildshape.errors import BadInputError
 from wildshape.parallel import processes
+from wildshape.parallel.handout import Handout
 from wildshape.parallel.team import ALONE, cores, team
 
 PLAIN_SCRIPT = """
@@ -192,6 +194,23 @@ def test_errors_of_the_items_come_too(two, tmp_path):
 def test_work_that_is_left_ends_with_the_team(tmp_path):
     with team(2) as two:
         next(two.as_done(Task(tmp_path), count()))
+
+
+def test_who_reads_an_item_is_not_waited_for():
+    reading, go_on = Event(), Event()
+
+    def items():
+        reading.set()
+        go_on.wait(60)
+        yield 1
+
+    handout = Handout(items())
+    reader = Thread(target=handout.take, args=(lambda: False,))
+    reader.start()
+    reading.wait(60)
+    handout.wake()  # would hang
+    go_on.set()
+    reader.join()
 
 
 def test_a_team_may_end_while_its_helpers_start():

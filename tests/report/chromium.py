@@ -34,6 +34,7 @@ FLAGS = [
     "--window-size=1200,900",
 ]
 SECONDS = 240.0  # patience only: a loaded machine without a GPU draws slowly
+BETWEEN_PAGES = "Not attached to an active page"  # while one is put in place of another
 
 
 class Page:
@@ -53,17 +54,22 @@ class Page:
         self.call("Page.navigate", url=url)
 
     def call(self, method: str, **params: Any) -> dict[str, Any]:
+        deadline = time.monotonic() + SECONDS
+        while "error" in (answer := self._answer(method, params)):
+            between = answer["error"]["message"] == BETWEEN_PAGES and time.monotonic() < deadline
+            assert between, answer
+            time.sleep(0.01)
+        return answer["result"]
+
+    def _answer(self, method: str, params: dict[str, Any]) -> dict[str, Any]:
         self.count += 1
         message = {"id": self.count, "method": method, "params": params}
         if self.session:
             message["sessionId"] = self.session
         os.write(self.commands, json.dumps(message).encode() + b"\0")
-        while True:
-            answer = self._next()
-            if answer.get("id") == self.count:
-                assert "error" not in answer, answer
-                return answer["result"]
+        while (answer := self._next()).get("id") != self.count:
             self.events.append(answer)
+        return answer
 
     def ask(self, expression: str) -> Any:
         return self.call("Runtime.evaluate", expression=expression, returnByValue=True)[

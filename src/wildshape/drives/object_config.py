@@ -27,6 +27,7 @@ class CompletionConfig:
         ticks: between them; neighbours at 10 Hz are nearly the same scan.
         most_ticks: between them, of a long track: between scans that are farther apart nobody knows
             how it braked or turned.
+        most_scans: of any track.
         fewest_points: scans of fewer are not completed where others are fuller.
         rays: whole tracks are put together with the rays beside the object.
     """
@@ -43,6 +44,7 @@ class CompletionConfig:
     scans: int = 16
     ticks: int = 4
     most_ticks: int = 8
+    most_scans: int = 64
     fewest_points: int = 60
     rays: bool = True
 

@@ -10,6 +10,8 @@ from typing import Generic, TypeVar
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+_MOMENT_S = 0.1
+
 
 class Handout(Generic[Item, Result]):
     """Items are read when they are taken, each by one taker; results are collected by one thread.
@@ -28,11 +30,20 @@ class Handout(Generic[Item, Result]):
         self._results: dict[int, Future[Result]] = {}
         self._taken = self._given = 0
 
-    def take(self) -> tuple[int, Item] | None:
-        """The next item and its number, as soon as there is room; None where none is left."""
+    def take(self, leaves: Callable[[], bool]) -> tuple[int, Item] | None:
+        """The next item and its number, as soon as there is room.
+
+        None where none is left, or to a taker that leaves (`wake`).
+        """
         with self._change:
-            self._change.wait_for(lambda: self._over.is_set() or self._has_room())
-            return self._next()
+            self._change.wait_for(lambda: leaves() or self._over.is_set() or self._has_room())
+            return None if leaves() else self._next()
+
+    def wake(self) -> None:
+        """Let takers see that they leave; one that reads an item meanwhile is not waited for."""
+        if self._change.acquire(timeout=_MOMENT_S):
+            self._change.notify_all()
+            self._change.release()
 
     def put(self, number: int, result: Result) -> None:
         """The result of an item that was taken."""

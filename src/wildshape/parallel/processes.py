@@ -4,6 +4,7 @@
 
 import atexit
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from queue import SimpleQueue
@@ -17,7 +18,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 _AHEAD = 16
-_PATIENCE_S = 10.0  # at the end of Python, for a thread that reads an item
+_PATIENCE_S = 10.0  # at the end of Python, for threads that read an item
 _WORTH_S = 1.0
 """Shorter work is done here: a helper needs as long to import what it needs."""
 
@@ -107,9 +108,9 @@ class _Assistant:
         """End the helper, and soon this thread: it may wait for an import of the caller's."""
         self._closed = True
         self._jobs.put(None)
-        if (handout := self._handout) is not None:
-            handout.end()
         self._helper.close()
+        if (handout := self._handout) is not None:
+            handout.wake()
 
     def join(self, seconds: float) -> None:
         """Wait so long at most for this thread to end."""
@@ -134,7 +135,7 @@ class _Assistant:
 
     def _serve(self, handout: Handout[Any, Any]) -> None:
         self.ready = True
-        while (taken := handout.take()) is not None:
+        while (taken := handout.take(lambda: self._closed)) is not None:
             number, item = taken
             try:
                 handout.put(number, self._helper.work(item))
@@ -149,11 +150,11 @@ _AT_WORK: set[_Assistant] = set()
 @atexit.register
 def _end_all() -> None:
     """Python may not end before these threads: one that is cut off inside of torch aborts it."""
-    assistants = tuple(_AT_WORK)
+    assistants, until = tuple(_AT_WORK), time.monotonic() + _PATIENCE_S
     for one in assistants:
         one.close()
     for one in assistants:
-        one.join(_PATIENCE_S)
+        one.join(max(0.0, until - time.monotonic()))
 
 
 class _Threads:

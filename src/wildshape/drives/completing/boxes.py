@@ -112,7 +112,8 @@ def faced(one: Completed, turns: Turns, config: BoxConfig) -> Completed:
     """The same vehicle, its front where it drives to.
 
     No scan looks away from those before it. Then all are turned around if the vehicle would drive
-    backwards for most of its way: it may stand, or back up for a while.
+    backwards for most of its way: it may stand, or back up for a while. Of one that is nowhere fast
+    most scans decide.
     """
     at = np.take(turns.ticks, one.frames) + one.phases
     if not moves(at, one.boxes, config):
@@ -121,11 +122,14 @@ def faced(one: Completed, turns: Turns, config: BoxConfig) -> Completed:
     yaw = boxes[:, 3]
     for i in range(1, len(yaw)):  # some before it: a single one may look aside
         yaw[i] += np.pi * (np.cos(yaw[i] - yaw[max(i - _BEFORE, 0) : i]).sum() < 0)
-    _, velocities = _lines(at, boxes[:, :3], at, config.smooth_ticks)
+    kept = _believed(at, boxes[:, :2], config)
+    _, velocities = _lines(at[kept], boxes[kept, :3], at[kept], config.smooth_ticks)
     fast = np.linalg.norm(velocities[:, :2], axis=1) > config.heading_m_per_tick
-    ahead = velocities[:, 0] * np.cos(yaw) + velocities[:, 1] * np.sin(yaw)
-    yaw += np.pi * (ahead[fast].sum() < 0)
-    return replace(one, boxes=boxes, turned=bool(np.cos(yaw - one.boxes[:, 3]).sum() < 0))
+    ahead = velocities[:, 0] * np.cos(yaw[kept]) + velocities[:, 1] * np.sin(yaw[kept])
+    as_said = np.cos(yaw - one.boxes[:, 3]).sum()
+    backwards = (ahead[fast].sum() if fast.any() else as_said) < 0
+    yaw += np.pi * backwards
+    return replace(one, boxes=boxes, turned=bool((as_said < 0) != backwards))
 
 
 def expected(one: Completed, turns: Turns, beyond_ticks: int, config: BoxConfig) -> Way:

@@ -239,7 +239,8 @@ def order_of_looks(seen: Sightings, parts: int) -> list[int]:
 def keyframes(seen: Sightings, config: CompletionConfig) -> Sightings:
     """The scans that are completed together: the fullest of equal parts of the track."""
     span = seen.frames[-1] - seen.frames[0]
-    parts = max(min(config.scans, span // config.ticks + 1), span // config.most_ticks + 1)
+    long = min(config.most_scans, span // config.most_ticks + 1)
+    parts = max(min(config.scans, span // config.ticks + 1), long)
     return fullest_of_parts(seen, parts, config.fewest_points)
 
 

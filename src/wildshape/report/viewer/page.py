@@ -56,7 +56,7 @@ class Page:
         self.status = ""
         self.turn = 0  # which choice of a track is the latest
         self.workers: list[threading.Thread] = []
-        self.opened = False  # by a browser
+        self.opened = self.closed = False  # by a browser; for good
         self.panel = Panel(server, source.labels, self.refresh, self.choose)
         self.choose(0)
 
@@ -68,6 +68,8 @@ class Page:
     def choose(self, number: int) -> None:
         """Show another track: its scans at once, what is made of them as it is made."""
         with self.lock:
+            if self.closed:
+                return
             self.turn += 1
             turn = self.turn
             worker = threading.Thread(target=self._work, args=(number, turn), daemon=True)
@@ -80,6 +82,7 @@ class Page:
         Its threads end, too: one that Python cuts off inside of torch aborts the process.
         """
         with self.lock:
+            self.closed = True
             self.turn += 1
             self.stage = None
             workers, self.workers = self.workers, []
