@@ -24,11 +24,10 @@ def main(folder: str = "", out: str = "fused.ply") -> None:
     fused = fuse_scans(track.scans, T_middle_scan)
     write_ply(out, fused)
     print(f"{len(track.scans)} scans of {track.name}: {len(fused)} points in {out}")
-    if (true := track.T_sensor_object) is not None:
+    if (true := track.T_sensor_object) is not None and len(track.scans) > 1:
         error = T_middle_scan.inverse() @ true[track.middle] @ true.inverse()
-        degrees = np.delete(
-            error.angle().rad2deg().numpy(), track.middle
-        )  # against itself: no test
+        # The middle scan is registered to itself: no test.
+        degrees = np.delete(error.angle().rad2deg().numpy(), track.middle)
         print(f"median rotation error against the truth: {np.median(degrees):.2f} degrees")
 
 

@@ -5,7 +5,6 @@
 python experiments/curve_picture.py RUN benchmarks/results/paper-lidar.svg
 """
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,6 +14,7 @@ import numpy as np
 import tyro
 
 from wildshape.io.atomic import atomic_write
+from wildshape.report.page.curves import whole_entries
 
 _TRUTH = {
     "validation/truth_cd": ("CD, m", 1.0),
@@ -45,8 +45,7 @@ class Settings:
 
 
 def main(settings: Settings) -> None:
-    log = (settings.run / "log.jsonl").read_text(encoding="utf-8")
-    draw(settings.out, [json.loads(line) for line in log.splitlines()])
+    draw(settings.out, list(whole_entries(settings.run / "log.jsonl")))
 
 
 def series(entries: list[dict[str, Any]], key: str, of: int = 1) -> tuple[np.ndarray, np.ndarray]:

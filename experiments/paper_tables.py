@@ -38,6 +38,7 @@ PRINTED = "printed.md"
 
 # Seconds at size small, a first guess: of a step, for each scan in its batch, and of a measurement.
 _STEP_S, _MEASURE_S = 0.004, 30.0
+_LEAST_S = 1.0  # what took less was found, not made, and tells no pace
 
 
 @dataclass(frozen=True)
@@ -175,8 +176,8 @@ def changed(size: Size, share: float, steps: int | None) -> Size:
 
 
 def left_s(todo: list[Job], spent: dict[str, float], all_jobs: list[Job]) -> float:
-    """Seconds left: what is guessed, by what the finished rows took of their guesses."""
-    done = [job for job in all_jobs if job.name in spent]
+    """Seconds left: what is guessed, by what the rows that were made took of their guesses."""
+    done = [job for job in all_jobs if spent.get(job.name, 0.0) >= _LEAST_S]
     guessed = sum(job.guess_s for job in done)
     pace = sum(spent[job.name] for job in done) / guessed if guessed else 1.0
     return pace * sum(job.guess_s for job in todo)
@@ -207,7 +208,7 @@ def write_pages(shop: Workshop, given: Given, made: dict[str, Table], finished: 
 def run(settings: Settings, command: str) -> None:
     """Work through the plan."""
     size = changed(SIZES["small"], settings.share, settings.steps)
-    given = Given(size, settings.cad)
+    given = Given(size, settings.cad and settings.cad.resolve())
     shop = Workshop(settings.out, settings.device, command)
     words = tuple(word.strip() for word in settings.rows.split(",") if word.strip())
     made = tables(given, settings.seeds, words)
@@ -223,14 +224,14 @@ def run(settings: Settings, command: str) -> None:
         began = time.monotonic()
         job.work(shop)
         spent[job.name] = round(time.monotonic() - began, 1)
-        write_json(settings.out / RECORD, spent)
         write_pages(shop, given, made, [one for one in planned if one.name in spent])
+        write_json(settings.out / RECORD, spent)  # after the pages: what it names is on them
         todo = [one for one in planned if one.name not in spent]
         left = duration(left_s(todo, spent, planned))
         say(
             f"{number} of {len(planned)} rows, {job.name}: {duration(spent[job.name])}; left {left}"
         )
-    if not settings.plan:  # a stopped run, or one of another size, left other pages
+    if not (settings.plan or (settings.out / PRINTED).is_file()):
         write_pages(shop, given, made, [job for job in planned if job.name in spent])
     todo = [job for job in planned if job.name not in spent]
     print(f"{len(todo)} of {len(planned)} rows are left: {duration(left_s(todo, spent, planned))}")

@@ -58,6 +58,12 @@ def test_register_and_fuse_a_track(example):
     assert float(printed.split()[-2]) < 10  # degrees
 
 
+def test_a_track_of_one_scan_has_no_error(example, tmp_path):
+    one = next(simulate_tracks(SimulationConfig(tracks=1, scans=1), seed=3, workers=1))
+    write_track(tmp_path / "one", one)
+    assert "median" not in example(2, tmp_path / "one")
+
+
 def test_train_on_a_folder(example, folders):
     printed = example(3, folders, "run", 2, "tiny")
     assert "step 2: loss" in printed

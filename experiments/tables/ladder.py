@@ -35,7 +35,7 @@ def rungs(given: Given) -> tuple[Trained, ...]:
     """
     size, data = given.size, given.drives("train")
     base, goal = paper_form(size, data), small()
-    if size.own_schedule:  # a rung changes one thing, so all have one schedule
+    if size.own_schedule:  # all rungs have one schedule
         base = replace(base, recipe=replace(base.recipe, optim=_ours(given).recipe.optim))
     facing = _with(base, "views", turn="facing", window=goal.views.window)
     facing = _with(facing, "loss", projection=goal.loss.projection, beta=goal.loss.beta)

@@ -7,7 +7,7 @@ from typing import Literal
 
 from wildshape.baselines.dpc.objective import DpcRecipe
 from wildshape.baselines.dpc.objective import small as small_dpc
-from wildshape.training.config import OptimConfig, Recipe
+from wildshape.training.config import OptimConfig, Recipe, stretched
 from wildshape.training.recipes import small, tiny
 
 Like = Literal["tiny", "small"]
@@ -27,8 +27,7 @@ class Size:
         train: tracks.
         test: tracks measured; at most 141, the CAD cars of the test split.
         steps: of each training; None: the preset's own number, network and schedule.
-        seeds: trainings of each method; ablations take one where this is under five, and so do
-            views and trucks where `like` is tiny.
+        seeds: trainings of each method; some tables take fewer (`ablation_seeds`, `side_seeds`).
         max_scans: of a tested track, evenly; None: all.
         like: the preset whose widths, points and schedule are used where `steps` is given.
         own_schedule: recipes of the paper keep the shape of their schedule instead, shortened
@@ -116,8 +115,7 @@ def schedule(recipe: Recipe, base: Recipe, size: Size) -> OptimConfig:
     own = recipe.optim
     if not (size.own_schedule and own.decay_every):
         return replace(base.optim, steps=size.steps)
-    every = max(1, own.decay_every * size.steps // own.steps)
-    return replace(own, steps=size.steps, decay_every=every, lr=base.optim.lr)
+    return replace(stretched(own, size.steps), lr=base.optim.lr)
 
 
 def sized_dpc(recipe: DpcRecipe, size: Size) -> DpcRecipe:

@@ -22,9 +22,10 @@ def test_a_log_becomes_a_picture_that_is_always_the_same(tmp_path):
     held_out = {f"validation/{key}": 0.1 for key in ("observation", "projection")}
     truth = {f"validation/truth_{key}": value for key, value in TRUTH.items()}
     lines += [{"step": step, **held_out, **truth} for step in (10, 20)]
-    (tmp_path / "log.jsonl").write_text("\n".join(map(json.dumps, lines)), encoding="utf-8")
+    log = "\n".join(map(json.dumps, lines))
     pictures = []
-    for name in ("a.svg", "b.svg"):
+    for name, cut_off in (("a.svg", ""), ("b.svg", '\n{"step": 31, "obs')):
+        (tmp_path / "log.jsonl").write_text(log + cut_off, encoding="utf-8")
         main(Settings(tmp_path, tmp_path / name))
         pictures.append((tmp_path / name).read_text(encoding="utf-8"))
     assert pictures[0] == pictures[1]

@@ -63,6 +63,9 @@ def test_what_is_left_goes_by_what_was_spent(planned):
     first, *todo = planned
     slow = {first.name: 3 * first.guess_s}
     assert left_s(todo, slow, planned) == pytest.approx(3 * sum(job.guess_s for job in todo))
+    found, *todo = todo
+    spent = slow | {found.name: 0.1}  # nothing was made for it
+    assert left_s(todo, spent, planned) == pytest.approx(3 * sum(job.guess_s for job in todo))
 
 
 def test_rows_are_made_and_found_again(tmp_path, monkeypatch, capsys):
@@ -81,6 +84,32 @@ def test_rows_are_made_and_found_again(tmp_path, monkeypatch, capsys):
     run(given, "the command")
     assert (tmp_path / PRINTED).read_text("utf-8") == page
     assert json.loads((tmp_path / RECORD).read_text("utf-8")) == spent
+    run(replace(given, table="vehicle"), "the command")
+    assert (tmp_path / PRINTED).read_text("utf-8") == page
+
+
+def test_a_stop_at_the_pages_leaves_their_row_to_be_done(tmp_path, monkeypatch):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    given = Settings(tmp_path, share=0.01, table="vehicle", rows="identity")
+    with monkeypatch.context() as patched:
+        patched.setattr(paper_tables, "write_pages", stop)
+        with pytest.raises(KeyboardInterrupt):
+            run(given, "the command")
+    assert not (tmp_path / RECORD).exists()
+    run(given, "the command")
+    assert "| identity | " in (tmp_path / PRINTED).read_text("utf-8")
+
+
+def test_a_folder_of_meshes_has_one_name(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    plans = []
+    for cad in (Path("CAD"), Path("x/../CAD"), tmp_path / "CAD"):
+        run(Settings(tmp_path, cad=cad, plan=True), "the command")
+        plans.append(capsys.readouterr().out)
+    assert plans[0] == plans[1] == plans[2]
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,10 @@ from wildshape.io.output import MARKER, begin
 from wildshape.io.scans.points import Coordinates
 from wildshape.io.write_tracks import write_tracks
 from wildshape.training.options import TrainingOptions
+from wildshape.training.recipes import PRESETS, tiny
 from wildshape.training.run_folder import begun_run, open_training_data
+from wildshape.training.state import STATE
+from wildshape.training.train import train
 
 OPTIONS = TrainingOptions(preset="tiny", steps=2)
 AGAIN = replace(OPTIONS, resume=True)
@@ -44,7 +47,9 @@ def test_a_run_goes_on_with_its_own_tracks_alone(folders, tmp_path):
 @pytest.mark.parametrize(
     ("name", "value"), [("preset", "small"), ("encoder", "dgcnn"), ("steps", 3), ("seed", 1)]
 )
-def test_a_run_goes_on_with_its_own_settings_alone(folders, tmp_path, name, value):
+def test_before_its_first_state_a_run_goes_on_with_its_own_settings_alone(
+    folders, tmp_path, name, value
+):
     out = tmp_path / "run"
     for options in (OPTIONS, AGAIN):
         with begun_run(folders[0], out, options):
@@ -55,6 +60,20 @@ def test_a_run_goes_on_with_its_own_settings_alone(folders, tmp_path, name, valu
         begun_run(folders[0], out, other),
     ):
         pass
+    (out / STATE).touch()  # whose identity decides from here on
+    with begun_run(folders[0], out, other):
+        pass
+
+
+def test_the_presets_own_number_of_steps_may_be_said_or_not(folders, tmp_path, monkeypatch):
+    two = replace(tiny(), optim=replace(tiny().optim, steps=2))
+    monkeypatch.setitem(PRESETS, "tiny", lambda: two)
+    unsaid = replace(OPTIONS, steps=None)
+    train(folders[0], tmp_path / "run", unsaid)
+    again = train(folders[0], tmp_path / "run", AGAIN)
+    assert "finished already" in again.sentence
+    with pytest.raises(BadInputError, match="other settings; resume"):
+        train(folders[0], tmp_path / "run", replace(AGAIN, steps=3))
 
 
 @pytest.mark.parametrize("options", [OPTIONS, AGAIN], ids=["anew", "resumed"])

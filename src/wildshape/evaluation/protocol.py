@@ -206,7 +206,8 @@ def complete_scans(method: Completer, case: Case) -> Sequence[Answer | None]:
 
 def _sighted(method: SightedCompleter, case: Case, i: int) -> Answer | None:
     with suppress(BadInputError):
-        return next(iter(method.complete_sighted([case.inputs()[i]], case.sensor, [case.rays[i]])))
+        scan = case.scans[i].copy()
+        return next(iter(method.complete_sighted([scan], case.sensor, [case.rays[i]])))
     return None
 
 

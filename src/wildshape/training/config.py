@@ -89,7 +89,7 @@ class Recipe:
 
 
 def stretched(config: OptimConfig, steps: int) -> OptimConfig:
-    """The same schedule over another number of steps."""
+    """The same schedule over another number of steps, all but the warm-up."""
     every = config.decay_every
     if every:
         every = max(1, every * steps // config.steps)

@@ -16,7 +16,8 @@ class TrainingOptions:
     Attributes:
         preset: of `recipes.PRESETS`; DPC's have a training of their own (`baselines/dpc`).
         encoder: point network that reads a scan; None: the preset's.
-        steps: gradient steps instead of the preset's; the schedule is stretched to them.
+        steps: gradient steps instead of the preset's; the schedule is stretched to them, all but
+            the warm-up.
         seed: of weights and batches.
         resume: go on with the run; a finished one is left as it is.
         start: fine-tune these weights, a checkpoint of the same preset or `shipped`.

@@ -21,6 +21,7 @@ from wildshape.io.store.layout import INDEX_JSON
 from wildshape.io.store.store import Store, is_store, open_store
 from wildshape.io.write_tracks import write_tracks
 from wildshape.training.options import TrainingOptions
+from wildshape.training.state import STATE
 
 _PACKED = "data.store"
 _SETTINGS = ("preset", "encoder", "steps", "seed")
@@ -61,7 +62,8 @@ def _begin(data: Path, out: Path, options: TrainingOptions) -> Output | None:
     begun = _settings_of_run(out)
     if begun is not None and options.resume:
         lock_folder(out)
-        _refuse_other(out, begun, settings)
+        if not (out / STATE).exists():  # which knows better: one setting has several spellings
+            _refuse_other(out, begun, settings)
         remove_leftovers(out)
         return None
     keep_apart(data, out)

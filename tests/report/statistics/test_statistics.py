@@ -98,6 +98,12 @@ def test_without_truth_the_sensors_frame_is_said_and_used(tmp_path):
     assert by["width"].tally.mean == pytest.approx(2.0, abs=0.3)
 
 
+def test_a_sample_without_truth_is_said_once(tmp_path):
+    bare = [replace(around(name), T_sensor_object=None) for name in "abc"]
+    _, by = described(packed(tmp_path, bare), sample=1)
+    assert by["range"].basis == "sensor's frame, middle of each scan; a sample of 1 of 3 tracks"
+
+
 def test_a_cameras_axes_are_turned_to_forward_left_up(tmp_path):
     ahead = np.random.default_rng(0).normal((1.0, 2.0, 10.0), 0.05, (50, 3)).astype(np.float32)
     camera = Sensor("camera", intrinsics=Intrinsics(240.0, 240.0, 64.0, 64.0, 128, 128))

@@ -59,7 +59,8 @@ class Settings:
 
     Attributes:
         encoder: point network that reads a scan, at the preset's widths; by default PCN's.
-        steps: gradient steps instead of the preset's; the schedule is stretched to them.
+        steps: gradient steps instead of the preset's; the schedule is stretched to them, all but
+            the warm-up.
         seed: of weights and batches.
         resume: go on with RUN; a finished one is left as it is.
         profile: write where a step's time goes to RUN/profile.txt; the weights are the same.

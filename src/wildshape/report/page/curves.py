@@ -15,8 +15,8 @@ _NO_TERMS = ("step", "branch_shares", "steps_per_second")
 
 
 def training_curves(log: Path) -> tuple[Curve, ...]:
-    """The curves of a run's `log.jsonl`; a line cut off by a kill is left out."""
-    entries = list(_entries(log))
+    """The curves of a run's `log.jsonl`."""
+    entries = list(whole_entries(log))
     loss = _series(entries, _terms(entries))
     held_out = _series(entries, tuple(f"{_VALIDATION}{k}" for k in ("observation", "projection")))
     cycle = _series(entries, (f"{_VALIDATION}cycle_deg",))
@@ -29,7 +29,8 @@ def training_curves(log: Path) -> tuple[Curve, ...]:
     return tuple(curve for curve in curves if curve.series)
 
 
-def _entries(log: Path) -> Iterable[dict[str, Any]]:
+def whole_entries(log: Path) -> Iterable[dict[str, Any]]:
+    """The entries of a run's `log.jsonl`; a line cut off by a kill is left out."""
     for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
         try:
             entry = json.loads(line)

@@ -266,7 +266,8 @@ def _quantities(distribution: RunningDistribution, read: str, indexed: str) -> t
     seen = "viewpoint" if by_truth else "object"
     basis = f"{where}; {indexed if by_truth else read} tracks"
     ranges, azimuth, elevation = distribution.seen[:3] if by_truth else distribution.sensed
-    basis += _part(ranges.count, distribution.points.count, "scans")
+    if by_truth:
+        basis += _part(ranges.count, distribution.points.count, "scans")
     kind = next((k for k, tallies in distribution.extents.items() if tallies[0].count), "scan")
     measured = {name: tallies[0].count for name, tallies in distribution.extents.items()}
     extents = f"{_EXTENT_BASIS[kind]}; {read} tracks"
