@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Names of files that are no UTF-8, or as long as the system allows, through all commands."""
 
+import json
 import os
 import shutil
 import sys
@@ -69,6 +70,19 @@ def test_converted_and_reported(wildshape, data, trained, tmp_path, layout):
     assert (done / SPELT[0] / "completed" / f"{SPELT[1]}.ply").is_file()
     page = (done / "report.html").read_text("utf-8")
     assert SPELT[0].replace("\\", "\\\\") in page or SPELT[0] in page
+
+
+def test_boxes_beside_a_skipped_scan(wildshape, data, trained, tmp_path):
+    """Its raw name could not be encoded when the boxes were written."""
+    track = shutil.copytree(data / TRACK, tmp_path / "track")
+    (track / "scans" / SCAN).write_bytes(b"ply")
+    found = wildshape(
+        "complete", track, "--out", tmp_path / "out", "--model", trained, "--boxes", "json"
+    )
+    assert found.code == 0, found
+    said = json.loads((tmp_path / "out" / "track" / "objects.json").read_text("utf-8"))
+    assert [one["scan"] for one in said["skipped"]] == [f"{SPELT[1]}.ply"]
+    assert (tmp_path / "out" / "boxes" / "boxes.json").is_file()
 
 
 def test_evaluated_and_reported(wildshape, data, tmp_path):

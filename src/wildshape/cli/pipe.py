@@ -70,7 +70,7 @@ def _all_of_stdin() -> bytes:
 
 
 def _suffix(data: bytes, kind: str) -> str:
-    from wildshape.io.scans.points import suffix_of
+    from wildshape.io.scans.recognise import suffix_of
 
     found = suffix_of(data) if kind == "auto" else f".{kind}"
     if not found:

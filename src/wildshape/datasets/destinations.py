@@ -149,7 +149,7 @@ class PackedStore(_Folder):
 
 
 class TrackFolders(_Folder):
-    """A DATASET folder; each track appears in it whole."""
+    """A DATASET folder; each track appears in it whole, but for what `place_track` says."""
 
     def begin(self) -> list[PartResult] | None:
         """See `Destination`."""

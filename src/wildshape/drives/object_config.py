@@ -216,7 +216,8 @@ class BoxConfig:
         moving_m: an object that gets farther than this through its track may be moving.
         moving_m_per_tick: and it must be as fast as this: 0.5 m/s at 10 Hz.
         moving_scans: or through so many successive ones of its completed scans.
-        heading_m_per_tick: an object as fast as this looks where it goes: 1 m/s at 10 Hz.
+        heading_m_per_tick: only scans in which an object is as fast as this tell which end is its
+            front: 1 m/s at 10 Hz.
         smooth_ticks: over which the way of a moving object is smoothed, standard deviation.
         stray_m: completed scans that lie this far from the way of those around are left out.
         stray_ticks: around, standard deviation.

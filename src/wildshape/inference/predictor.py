@@ -107,10 +107,8 @@ class Predictor:
     def compile(self) -> "Predictor":
         """The same with its network compiled by `torch.compile`, ready when this returns.
 
-        What the network says is equal to 1e-4 m. Refinement may turn that into another choice of
-        a point, as it may among the scans of a batch: single points then move by centimetres. On a
-        CPU it takes a minute and is worth it for large batches alone (docs/performance.md). Where
-        torch finds no compiler, a RuntimeWarning says so and the network runs as it did.
+        What the network says is equal to 1e-4 m; refinement may then match other points, and move
+        single ones by centimetres. Where torch finds no compiler, a RuntimeWarning says so.
         """
         other = copy(self)
         other.network = compiled(self.network, self.settings.input_points)
@@ -128,7 +126,7 @@ class Predictor:
                 them, or `directions`, `ranges` and perhaps `origins` as a dict or a tuple.
 
         Raises:
-            BadInputError: not `(n, 3)`, fewer than 16 finite points, or no rays.
+            BadInputError: not `(n, 3)`, fewer than 16 finite points, over 100 m across, or no rays.
         """
         return next(self.complete_many([points], sensor, rays=[rays]))
 
@@ -244,11 +242,7 @@ class Predictor:
     def poses(
         self, scans: Sequence[object], sensor: Sensor | None = None, *, track: bool = False
     ) -> SE3:
-        """`T_sensor_canonical` of each scan; `track` as in `register_track`.
-
-        Raises:
-            BadInputError: there is no scan, or one that cannot be used.
-        """
+        """`T_sensor_canonical` of each scan; `track` as in `register_track`."""
         if not len(scans):
             raise BadInputError("no scans; hand in at least one.")
         done = self.complete_checked(all_as_points(scans), sensor, track=track)

@@ -30,7 +30,7 @@ from wildshape.io.scans.points import (
     read_scan,
 )
 from wildshape.io.scans.writers import ply_bytes, write_ply
-from wildshape.records import Intrinsics, Sensor, SightLines, Track
+from wildshape.records import Intrinsics, Sensor, SightLines, Track, as_text
 
 __all__ = [
     "NoUsableScanError",
@@ -159,7 +159,7 @@ def _read_scans(
         try:
             scan = read_scan(file, coordinates)
         except BadInputError as error:
-            skipped.append((file.name, str(error)))
+            skipped.append((as_text(file.name), str(error)))
             continue
         kept[file] = scan.points
         if scan.dropped_nonfinite:
@@ -312,16 +312,19 @@ def is_placed(folder: Path) -> bool:
 def place_track(made: Path, folder: Path) -> None:
     """Move a track folder to its name; files of others that lie there already stay.
 
-    Between these a track comes file by file, track.json last; a move that was killed is repeated.
+    Beside these a track comes in pieces, and a move that was killed is repeated: scans/, which
+    makes it a track, comes last but for track.json, and at once unless files of others lie there.
     """
     if not folder.exists():
         made.replace(folder)
         return
-    files = [file for file in made.rglob("*") if file.is_file()]
-    for file in sorted(files, key=lambda file: file.name == _INFO):
-        place = folder / file.relative_to(made)
-        place.parent.mkdir(exist_ok=True)
-        file.replace(place)
+    for entry in sorted(
+        made.iterdir(), key=lambda entry: (entry.name == _INFO, entry.name == "scans")
+    ):
+        if entry.is_dir():
+            place_track(entry, folder / entry.name)
+        else:
+            entry.replace(folder / entry.name)
 
 
 def _write_scans(folder: Path, track: Track) -> None:

@@ -131,7 +131,7 @@ def _half_written(out: Path, origin: dict[str, Any]) -> bool:
 
 
 def _folders(tracks: Iterable[Track], wanted: _Output) -> Iterator[Track]:
-    """Into track folders; each appears under its name only when it is whole."""
+    """Into track folders; each appears under its name whole, but for what `place_track` says."""
     out, command, settings, overwrite, progress = wanted
     output = begin(out, command, settings, FILES, overwrite=overwrite, progress=progress)
     unfinished = out / _UNFINISHED

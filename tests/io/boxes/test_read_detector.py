@@ -40,6 +40,7 @@ FILES = {
     "000003.txt": (f"{LABEL.format(turn=-math.pi)} 0.5\n\n", "000003", None),
     "nuscenes.json": (nuscenes(), "000003", None),
     "tracks.json": (nuscenes(tracking_id=12), "000003", "12"),
+    "any_length.json": (nuscenes(rotation=[3, 0, 0, 3]), "000003", None),
     "openpcdet.json": (
         [{"frame_id": "000003", "name": ["Car"], "score": [0.5], "boxes_lidar": [LEFT]}],
         "000003",
@@ -106,7 +107,7 @@ def test_a_fingerprint_tells_names_and_contents(tmp_path):
         ("a.json", nuscenes(size=[1, 2]), "results of nuScenes"),
         ("a.json", nuscenes(rotation=[math.nan, 0, 0, 0]), "not finite"),
         ("a.json", nuscenes(rotation=[0, 0, 0, 0]), "no unit quaternion"),
-        ("a.json", nuscenes(rotation=[1, 0, 0, 0.2]), "no unit quaternion"),
+        ("a.json", nuscenes(rotation=[0.05, 0, 0, 0.05]), "no unit quaternion"),
         ("a.json", [{"boxes_lidar": [LEFT], "pred_labels": [1]}], "no 'name'"),
         ("a.json", [{"boxes_lidar": [LEFT], "name": []}], "results of nuScenes"),
         ("a.json", [{"boxes_lidar": [LEFT[:6]], "name": ["Car"]}], "results of nuScenes"),

@@ -69,6 +69,16 @@ def test_of_two_sensors_the_one_of_most_packets_is_taken(turns, tmp_path, sent_b
     assert f"those of 192.168.1.{sent_by[0]}:{sent_by[1]} left out" in told
 
 
+def test_an_hdl64e_beside_another_sensor(turns, tmp_path):
+    """Its calibration was looked for in both sensors' packets."""
+    path = tmp_path / "street.pcap"
+    alone = open_drive(write_velodyne(path, turns)).scan(0)
+    write_velodyne(path, turns, others=turns[:2], sent_by=(202, 2368), hdl64e=True)
+    assert np.array_equal(open_drive(path).scan(0), alone)
+    write_velodyne(path, turns, others=turns, sent_by=(202, 2368), hdl64e=True)
+    refused(open_drive, path, match=r"an HDL-64E \(192\.168\.1\.202:2368\) and of other sensors")
+
+
 def test_a_cut_recording_is_read_up_to_there(turns, tmp_path):
     path = write_velodyne(tmp_path / "street.pcap", turns)
     whole = path.read_bytes()

@@ -28,7 +28,9 @@ def seen_by(points):
     return ranges.reshape(PACKETS, BLOCKS, LASERS)
 
 
-def write_velodyne(path, scans, *, start=1.0e9, turn_back=0, others=(), sent_by=(201, 2368)):
+def write_velodyne(
+    path, scans, *, start=1.0e9, turn_back=0, others=(), sent_by=(201, 2368), hdl64e=False
+):
     """A recording of one turn a scan.
 
     Args:
@@ -38,6 +40,7 @@ def write_velodyne(path, scans, *, start=1.0e9, turn_back=0, others=(), sent_by=
         turn_back: packets left out at the beginning.
         others: ranges of a second sensor, of which each packet comes right before the first's.
         sent_by: end of the second's address, and the port that it sends to.
+        hdl64e: the second's packets end as those of an HDL-64E, in bytes that change.
     """
     kind = pcapng.Writer if path.suffix == ".pcapng" else pcap.Writer
     with path.open("wb") as file:
@@ -50,6 +53,7 @@ def write_velodyne(path, scans, *, start=1.0e9, turn_back=0, others=(), sent_by=
                 writer.writepkt(_framed(b"\0" * 512, 8308), ts=time)  # the sensor's position
                 if number < len(others):
                     packet = _packet(place, others[number][place], time)
+                    packet = packet[:-2] + bytes((place, number)) if hdl64e else packet
                     writer.writepkt(_framed(packet, sent_by[1], sent_by[0]), ts=time)
                 writer.writepkt(_framed(_packet(place, blocks, time), 2368), ts=time)
     return path

@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from wildshape.io.scans.points import suffix_of
+from wildshape.io.scans.recognise import suffix_of
 from wildshape.io.scans.writers import CLOUD_SUFFIXES, save
 
 POINTS = np.random.default_rng(0).normal(size=(50, 3)).astype(np.float32)

@@ -58,5 +58,7 @@ def run(settings: Settings) -> None:
     )
     if found.other_branch:
         text += f"; {found.other_branch} took another pose that costs as much"
+    if found.other_cost:
+        text += f"; {found.other_cost} got another cost or confidence by rounding"
     data = {"out": str(settings.out), "bytes": size, **found._asdict()}
     answer(text, data, as_json=settings.json)

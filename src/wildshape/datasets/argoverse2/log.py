@@ -100,13 +100,21 @@ def read_sensor_pose(log: Path, lidar: Lidar) -> SE3:
     Raises:
         BadInputError: the file is missing, corrupt or lacks a LiDAR.
     """
-    path = log / _CALIBRATION
-    table = read_feather(path, ("sensor_name", *POSE), _BRINGS)
+    return sensor_pose_in(log / _CALIBRATION, lidar, _BRINGS)
+
+
+def sensor_pose_in(path: Path, lidar: Lidar, brings: str) -> SE3:
+    """The same from the file itself; `brings`: what to get where it is missing, in words.
+
+    Raises:
+        BadInputError: as `read_sensor_pose`.
+    """
+    table = read_feather(path, ("sensor_name", *POSE), brings)
     T_ego_any = poses(table, path)
     rows = {name: i for i, name in enumerate(table["sensor_name"])}
     absent = {"up_lidar", "down_lidar"} - set(rows)
     if absent:
-        raise BadInputError(f"{path}: no sensor {min(absent)} in it; {_BRINGS}.")
+        raise BadInputError(f"{path}: no sensor {min(absent)} in it; {brings}.")
     up, down = (T_ego_any[rows[name]] for name in ("up_lidar", "down_lidar"))
     share = {"up": 0.0, "both": 0.5, "down": 1.0}[lidar]
     return SE3(up.rotation, (1 - share) * up.translation + share * down.translation)

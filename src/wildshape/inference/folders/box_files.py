@@ -144,22 +144,9 @@ def read_camera(path: Path) -> "KittiCamera":
 
 
 def _ego(path: Path) -> "SE3":
-    """`T_ego_sensor` of scans of both LiDARs, as `read_sensor_pose` has it, of the file itself.
+    from wildshape.datasets.argoverse2.log import sensor_pose_in
 
-    Raises:
-        BadInputError: it is missing, corrupt or lacks a LiDAR.
-    """
-    from wildshape.datasets.argoverse2.feather import POSE, poses, read_feather
-    from wildshape.geometry.transforms.se3 import SE3
-
-    table = read_feather(path, ("sensor_name", *POSE), _EGO_CURE)
-    T_ego_any = poses(table, path)
-    rows = {name: i for i, name in enumerate(table["sensor_name"])}
-    absent = {"up_lidar", "down_lidar"} - set(rows)
-    if absent:
-        raise BadInputError(f"{path}: no sensor {min(absent)} in it; {_EGO_CURE}.")
-    up, down = (T_ego_any[rows[name]] for name in ("up_lidar", "down_lidar"))
-    return SE3(up.rotation, (up.translation + down.translation) / 2)
+    return sensor_pose_in(path, "both", _EGO_CURE)
 
 
 @dataclass(frozen=True)

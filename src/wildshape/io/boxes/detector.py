@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from wildshape.records import Box
 
-_UNIT = 0.01  # rounding to two decimals leaves a quaternion's length as near to 1
+_SHORTEST = 0.1  # a quaternion of any other length is normalised
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ def checked(box: Box) -> Box:
     """The box itself.
 
     Raises:
-        ValueError: a number is not finite, a size is not positive, or a quaternion is no unit one.
+        ValueError: a number is not finite, a size is not positive, or a quaternion tells no turn.
     """
     numbers = (*box.centre, *box.size, *box.quaternion_wxyz)
     if not all(map(math.isfinite, numbers)):
@@ -48,9 +48,9 @@ def check_turn(box: Box) -> Box:
     """The box itself.
 
     Raises:
-        ValueError: its quaternion is no unit one.
+        ValueError: its quaternion is next to 0.
     """
-    if abs(math.hypot(*box.quaternion_wxyz) - 1) > _UNIT:
+    if math.hypot(*box.quaternion_wxyz) < _SHORTEST:
         raise ValueError(f"a box turned by {box.quaternion_wxyz}, no unit quaternion")
     return box
 

@@ -13,7 +13,7 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from wildshape.errors import load_library
+from wildshape.errors import BadInputError, load_library
 from wildshape.io.guard import first_line
 from wildshape.records import Turn
 
@@ -84,8 +84,7 @@ class VelodyneTurns:
         """
         decoder, turn = _decoder(), self.turns[number]
         with self.path.open("rb") as file:
-            ours = (one for one in _packets(file, turn.begin) if one.source == self.source)
-            found = islice(ours, turn.packets)
+            found = _packets_of(file, self.source, turn)
             packets = [decoder.VelodynePacket(one.stamp, one.data) for one in found]
         scans = decoder.ScanDecoder(_config(self.sensor))
         _, rows = scans.decode(decoder.PacketVector(packets))
@@ -97,6 +96,7 @@ def open_velodyne(path: Path) -> VelodyneTurns:
 
     Raises:
         MissingExtraError: velodyne-decoder is not installed.
+        BadInputError: the sensor is an HDL-64E, and not alone.
     """
     _decoder()
     turns: dict[_Source, list[_Turn]] = {}
@@ -116,8 +116,19 @@ def open_velodyne(path: Path) -> VelodyneTurns:
         )
     whole = tuple(_whole(turns[source])) if source is not None else ()
     times = tuple(turn.stamp for turn in whole)
-    described = _described(path) if whole else None
+    if source is not None and len(turns) > 1 and whole and _is_hdl64e(path, source, whole[0]):
+        raise BadInputError(
+            f"{path}: holds packets of an HDL-64E ({_named(source)}) and of other sensors; copy"
+            " those of the HDL-64E to a file of their own."
+        )
+    described = _described(path) if whole and len(turns) == 1 else None
     return VelodyneTurns(path, times, tuple(warnings), source, whole, described)
+
+
+def _is_hdl64e(path: Path, source: _Source, turn: _Turn) -> bool:
+    """Whether packets end in bytes that change; those of all others end in their model."""
+    with path.open("rb") as file:
+        return len({one.data[-2:] for one in _packets_of(file, source, turn)}) > 1
 
 
 def _count(packet: _Packet, turns: list[_Turn]) -> None:
@@ -162,6 +173,12 @@ def _packets(file: IO[bytes], begin: int | None = None) -> Iterator[_Packet]:
         if found is not None and len(found.data) == size:
             yield _Packet(begin, (sender, found.dport), float(stamp), found.data)
         begin = file.tell()
+
+
+def _packets_of(file: IO[bytes], source: _Source | None, turn: _Turn) -> Iterator[_Packet]:
+    """The packets of a sensor's turn."""
+    ours = (one for one in _packets(file, turn.begin) if one.source == source)
+    return islice(ours, turn.packets)
 
 
 def _datagram(record: bytes) -> tuple[Any, bytes]:

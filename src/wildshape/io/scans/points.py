@@ -192,7 +192,7 @@ def read_turn(path: Path, scan_time: float | None) -> Turn:
     clock = None if read_clock is None else read_clock(path, TIME_FIELDS)
     if clock is None:
         return Turn(drop_nonfinite(points).points)
-    kept = _finite(points)
+    kept = _is_finite(points)
     whole = np.ascontiguousarray(points[kept], np.float32)
     return Turn(whole, seconds_since(clock[kept], scan_time))
 
@@ -212,6 +212,23 @@ def drop_nonfinite(points: Float[np.ndarray, "n 3"]) -> ScanFile:
     """The points as float32, without those that are NaN, infinite or beyond float32."""
     kept = _only_finite(points)
     return ScanFile(np.ascontiguousarray(kept, np.float32), len(points) - len(kept))
+
+
+def _read(path: Path, coordinates: Coordinates) -> Float[np.ndarray, "n 3"]:
+    """All points, NaN included, in the sensor's frame, metres, in the precision of the file."""
+    suffix = path.suffix.lower()
+    if suffix not in _READERS:
+        raise BadInputError(
+            f"{path}: the suffix '{suffix}' is none of a scan file; use one of "
+            f"{' '.join(SUFFIXES)}."
+        )
+    expected, reader = _READERS[suffix]
+    with reading(path, expected):
+        if not path.stat().st_size:
+            raise BadInputError(f"{path}: is empty (0 bytes); write or copy it again.")
+        if reader is read_text:
+            coordinates = coordinates.agreeing(header_unit(path), path)
+        return coordinates.to_sensor(reader(path), path)
 
 
 def check_scan(points: Float[np.ndarray, "n 3"], name: str) -> None:
@@ -303,7 +320,7 @@ def check_near(points: Float[np.ndarray, "n 3"], name: str) -> None:
         )
 
 
-def _finite(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
+def _is_finite(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
     """Which points are neither NaN nor infinite nor beyond float32."""
     largest, finite = np.finfo(np.float32).max, np.ones(len(points), bool)
     for axis in points.T:  # one at a time: less memory
@@ -313,52 +330,5 @@ def _finite(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
 
 def _only_finite(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "k 3"]:
     """Those points; the same array where all are."""
-    finite = _finite(points)
+    finite = _is_finite(points)
     return points if finite.all() else points[finite]
-
-
-def _read(path: Path, coordinates: Coordinates) -> Float[np.ndarray, "n 3"]:
-    """All points, NaN included, in the sensor's frame, metres, in the precision of the file."""
-    suffix = path.suffix.lower()
-    if suffix not in _READERS:
-        raise BadInputError(
-            f"{path}: the suffix '{suffix}' is none of a scan file; use one of "
-            f"{' '.join(SUFFIXES)}."
-        )
-    expected, reader = _READERS[suffix]
-    with reading(path, expected):
-        if not path.stat().st_size:
-            raise BadInputError(f"{path}: is empty (0 bytes); write or copy it again.")
-        if reader is read_text:
-            coordinates = coordinates.agreeing(header_unit(path), path)
-        return coordinates.to_sensor(reader(path), path)
-
-
-_TEXT_BYTES = 512
-_LAS_COMPRESSED_AT = 104  # the point format's byte; LAZ sets its highest bit
-
-
-def suffix_of(data: bytes) -> str:
-    """The suffix that a scan file with this content would have; empty if nothing is recognised.
-
-    A KITTI .bin is bare numbers and cannot be told from damage: it is never guessed.
-    """
-    if data[:3] == b"ply" and data[3:4].isspace():
-        return ".ply"
-    if data[:6] == b"\x93NUMPY":
-        return ".npy"
-    if data[:4] == b"PK\x03\x04":
-        return ".npz"
-    if data[:4] == b"LASF":
-        return ".laz" if data[_LAS_COMPRESSED_AT : _LAS_COMPRESSED_AT + 1] >= b"\x80" else ".las"
-    if data.lstrip()[:6].upper().startswith((b"# .PCD", b"VERSIO")):
-        return ".pcd"
-    return ".xyz" if _is_text(data[:_TEXT_BYTES]) else ""
-
-
-def _is_text(start: bytes) -> bool:
-    """Whether it reads as text with a number in it."""
-    text = start.decode("utf-8-sig", errors="ignore")
-    lost = len(start) - len(text.encode())
-    readable = all(c.isprintable() or c.isspace() for c in text)
-    return readable and lost < 4 and any(c.isdigit() for c in text)

@@ -29,7 +29,7 @@ class _Stretch:
 def traffic(street: Street, end: float, seconds: float, seed: int) -> tuple[Actor, ...]:
     """All actors of a street, numbered; no two vehicles meet on it, none comes near the sensor's.
 
-    Who is beyond its end is drawn there, far from the sensor.
+    Those that have driven past its end all stand there, one in another, far from the sensor.
 
     Args:
         street: its path, its lanes and how the sensor's vehicle moves.
