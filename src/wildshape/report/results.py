@@ -104,10 +104,13 @@ class Inputs:
         """Open the place that was named for the results of a folder.
 
         Raises:
-            BadInputError: there are no scans.
+            BadInputError: there are no scans, or how they were read is damaged.
         """
         if self.place is not None:
-            self._open(self.place, coordinates_of(_settings(folder.parent / MARKER)))
+            marker = folder.parent / MARKER
+            with reading(marker, "how the scans of results were read"):
+                coordinates = coordinates_of(_settings(marker))
+            self._open(self.place, coordinates)
 
     def _open(self, path: Path, coordinates: Coordinates) -> TrackSource:
         if (path, coordinates) not in self.opened:

@@ -230,6 +230,11 @@ def test_scans_that_are_named_must_be_there(tmp_path: Path) -> None:
     for read in (report_from_folder, from_results):
         with pytest.raises(BadInputError, match="absent"):
             read(tmp_path, tmp_path / "absent")
+        for damaged in ({"settings": 3}, {"settings": {"unit": {}}}):
+            (tmp_path / "wildshape.json").write_text(json.dumps(damaged), encoding="utf-8")
+            with pytest.raises(BadInputError, match=r"wildshape\.json"):
+                read(tmp_path, tmp_path / "absent")
+        (tmp_path / "wildshape.json").unlink()
 
 
 def test_the_middle_scan_against_itself_says_nothing_of_poses(tmp_path: Path) -> None:
