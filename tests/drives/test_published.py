@@ -45,6 +45,19 @@ def test_argoverse2_logs(tmp_path):
         assert np.abs(in_world(drive, frame) - cloud).max() < 0.03  # the file's float16
 
 
+def test_a_sweep_without_a_pose_is_told(tmp_path):
+    """The poses of all were left out without a word."""
+    log = write_log(tmp_path / "log", SCENE)
+    assert open_drive(log).warnings == ()
+    sweep = log / f"sensors/lidar/{STAMPS[1]}.feather"
+    sweep.rename(sweep.with_name(f"{STAMPS[1] + 1}.feather"))
+    drive = open_drive(log)
+    assert drive.T_world_sensor is None
+    assert "city_SE3_egovehicle.feather lacks 1 of 3 sweeps; none of its poses are taken" in (
+        drive.warnings
+    )
+
+
 def test_pandaset_scenes(tmp_path):
     scene = write_scene(tmp_path / "pandaset" / "001", SCENE)
     for name in ("._00.pkl.gz", "00_backup.pkl.gz"):

@@ -11,11 +11,22 @@ from tests.refusal import refused
 
 from wildshape.drives.recordings.opening import find_drives, open_drive
 from wildshape.errors import MissingExtraError
+from wildshape.io.packets.ouster import columns_sent
+from wildshape.io.packets.reader import open_packets
 from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
 
 pytest.importorskip("velodyne_decoder")
 
-from tests.io.packets.write import PACKETS, PERIOD, points_of, seen_by, write_velodyne
+import velodyne_decoder
+from tests.io.packets.write import (
+    PACKETS,
+    PERIOD,
+    hdl64e_ends,
+    points_of,
+    rewrite,
+    seen_by,
+    write_velodyne,
+)
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +64,90 @@ def test_turns_that_are_not_whole_are_left_out(turns, tmp_path):
     assert len(open_drive(path)) == 3
 
 
+@pytest.mark.parametrize(
+    ("begin", "count", "pieces", "whole"),
+    [
+        (20, 20, 1, 5),
+        (PACKETS // 2, PACKETS, 2, 4),  # two halves of different turns were taken for one
+    ],
+)
+def test_turns_amid_which_packets_are_missing(turns, tmp_path, begin, count, pieces, whole):
+    path = write_velodyne(tmp_path / "street.pcap", [turns[0]] * 6)
+
+    def lose(records):
+        first = 2 * (2 * PACKETS + begin)
+        del records[first : first + 2 * count]
+
+    drive = open_drive(rewrite(path, lose))
+    assert len(drive) == whole
+    assert f"{pieces} turns with missing packets are left out" in drive.warnings
+
+
+@pytest.mark.parametrize("place", [PACKETS + 30, 2 * PACKETS - 1])  # amid a turn, and at its end
+def test_packets_that_overtook_each_other_begin_no_turn(turns, tmp_path, place):
+    path = write_velodyne(tmp_path / "street.pcap", [turns[0]] * 4)
+
+    def swap(records):
+        one, other = records[2 * place + 1], records[2 * place + 3]
+        one[1], other[1] = other[1], one[1]
+
+    drive = open_drive(rewrite(path, swap))
+    assert (len(drive), drive.warnings) == (4, ())
+    assert len(drive.turn(1).points) == pytest.approx(len(points_of(turns[0])), rel=0.03)
+
+
+def test_a_file_of_the_next_generation_may_bear_the_old_suffix(turns, tmp_path):
+    """So dumpcap writes it."""
+    path = write_velodyne(tmp_path / "street.pcapng", turns)
+    assert len(open_drive(path.rename(path.with_suffix(".pcap")))) == 3
+
+
+def test_a_damaged_model_makes_no_hdl64e(turns, tmp_path):
+    path = write_velodyne(tmp_path / "street.pcap", turns)
+
+    def damage(records):
+        records[5][1] = records[5][1][:-1] + b"\0"
+
+    drive = open_drive(rewrite(path, damage))
+    assert len(drive) == 3
+    assert len(drive.scan(0)) == pytest.approx(len(points_of(turns[0])), rel=0.03)
+
+
+def with_calibration(records):
+    ends = hdl64e_ends()
+    for place, record in enumerate(records[1::2]):
+        record[1] = record[1][:-2] + ends[place % len(ends)]
+
+
+def test_an_hdl64e_brings_its_calibration(turns, tmp_path):
+    path = rewrite(write_velodyne(tmp_path / "street.pcap", [turns[0]] * 25), with_calibration)
+    packets = pickle.loads(pickle.dumps(open_packets(path)))
+    assert len(packets.turns.times) == 25
+    model, calibration = packets.turns.sensor
+    assert model == velodyne_decoder.Model.HDL64E_S2
+    read = velodyne_decoder.Calibration.from_string(calibration)
+    assert read.to_string().count("laser_id") == 64
+    assert len(packets(0).points) > 0
+
+
+def test_an_hdl64e_recorded_too_briefly_is_refused(turns, tmp_path):
+    path = rewrite(write_velodyne(tmp_path / "street.pcap", turns), with_calibration)
+    refused(open_drive, path, match=r"an HDL-64E's calibration, .*Not enough metadata")
+
+
+@pytest.mark.parametrize(
+    ("window", "columns"),
+    [
+        (None, [0, 1, 2, 3, 4, 5, 6, 7]),
+        ((0, 7), [0, 1, 2, 3, 4, 5, 6, 7]),
+        ((2, 4), [2, 3, 4]),
+        ((6, 1), [6, 7, 0, 1]),
+    ],
+)
+def test_the_columns_of_an_ouster_s_window(window, columns):
+    assert columns_sent(window, 8).tolist() == columns
+
+
 @pytest.mark.parametrize("sent_by", [(202, 2368), (201, 2369)])
 def test_of_two_sensors_the_one_of_most_packets_is_taken(turns, tmp_path, sent_by):
     """Both were taken for one, whose turns were made of pieces of either's."""
@@ -76,7 +171,7 @@ def test_an_hdl64e_beside_another_sensor(turns, tmp_path):
     write_velodyne(path, turns, others=turns[:2], sent_by=(202, 2368), hdl64e=True)
     assert np.array_equal(open_drive(path).scan(0), alone)
     write_velodyne(path, turns, others=turns, sent_by=(202, 2368), hdl64e=True)
-    refused(open_drive, path, match=r"an HDL-64E \(192\.168\.1\.202:2368\) and of other sensors")
+    refused(open_drive, path, match=r"an HDL-64E's calibration, .*Not enough metadata")
 
 
 def test_a_cut_recording_is_read_up_to_there(turns, tmp_path):

@@ -88,3 +88,27 @@ def points_of(ranges):
         (level * np.cos(around), level * np.sin(around), np.sin(up) * distances), axis=-1
     )
     return places[distances > 0.5]
+
+
+def rewrite(path, change):
+    """Write a `.pcap` again, its records `[seconds, bytes]` changed; every second holds points."""
+    with path.open("rb") as file:
+        records = [[float(stamp), data] for stamp, data in pcap.Reader(file)]
+    change(records)
+    with path.open("wb") as file:
+        writer = pcap.Writer(file)
+        for stamp, data in records:
+            writer.writepkt(data, ts=stamp)
+    return path
+
+
+def hdl64e_ends():
+    """What the packets of an HDL-64E S2 end in: the date and state, and a calibration."""
+    lasers = [bytes((laser,)) + bytes(20 + 7) for laser in range(64)]
+    calibrated = bytes((10, 1, 1, 0, 0, 0, 0))
+    sent = b"UNIT#\0\0" + b"".join(lasers)[:-7] + calibrated + bytes(19)
+    sent += (len(sent) + 2).to_bytes(2, "little")
+    state = dict(zip(b"HMSDNYGTV", (1, 2, 3, 4, 5, 10, 0, 20, 7)))
+    return [
+        bytes(pair) for pair in [*state.items(), *((49 + k % 7, v) for k, v in enumerate(sent))]
+    ]

@@ -51,12 +51,14 @@ def open_log(path: Path) -> Drive:
     stamps = [int(file.stem) for file in files]
     T_ego_sensor = read_sensor_pose(path, "both")
     T_city_ego = read_city_poses(path)
-    known = all(stamp in T_city_ego for stamp in stamps)
+    lacking = sum(stamp not in T_city_ego for stamp in stamps)
+    told = f"{_POSES} lacks {lacking} of {len(stamps)} sweeps; none of its poses are taken"
     return Drive.of(
         name=path.resolve().name,
         scan_names=[file.stem for file in files],
         read=_Sweeps(tuple(files), T_ego_sensor.inverse()),
         times=[stamp / 1e9 for stamp in stamps],
-        T_world_sensor=stack([T_city_ego[t] for t in stamps]) @ T_ego_sensor if known else None,
+        T_world_sensor=None if lacking else stack([T_city_ego[t] for t in stamps]) @ T_ego_sensor,
+        warnings=(told,) if lacking else (),
         files=files,
     )

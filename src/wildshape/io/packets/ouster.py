@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 
 from wildshape.errors import load_library
 from wildshape.io.guard import reading
 from wildshape.records import Turn
 
 _INSTALL = "pip install 'wildshape[ouster]'"
-_WHOLE = 0.9  # of a turn's columns that it must have
+_WHOLE = 0.9  # of the columns that the sensor was told to send in a turn
 _S_PER_NS = 1e-9
 
 
@@ -60,15 +60,28 @@ def open_ouster(path: Path, described: Path) -> OusterTurns:
     _library("pcap")
     with reading(path, f"Ouster's packets of the sensor of {described.name}"):
         source, _ = _opened(path, described)
+        window = getattr(source.sensor_info[0].format, "column_window", None)
         times, numbers = [], []
         for number, (frame, *_) in enumerate(source):
             there = _columns(frame)
-            if there.mean() >= _WHOLE:
+            if there[columns_sent(window, len(there))].mean() >= _WHOLE:
                 times.append(float(frame.timestamp[there].min()) * _S_PER_NS)
                 numbers.append(number)
         left = len(source) - len(numbers)
     told = (f"{left} turns lack packets and were left out",) if left else ()
     return OusterTurns(path, described, tuple(times), told, tuple(numbers))
+
+
+def columns_sent(window: tuple[int, int] | None, count: int) -> Int[np.ndarray, "n"]:
+    """The columns of a turn that a sensor sends.
+
+    Args:
+        window: the first and the last that it was told to send; past the last column it goes on
+            with the first. None: all.
+        count: of a turn's columns.
+    """
+    first, last = window or (0, count - 1)
+    return (first + np.arange((last - first) % count + 1)) % count
 
 
 def _columns(frame: Any) -> Bool[np.ndarray, "w"]:

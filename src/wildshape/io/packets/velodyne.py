@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Velodyne's packets, decoded by velodyne-decoder.
 
-A turn ends where the beam looks back: what is ahead is seen at one time.
+A turn ends where the beam looks back: what is ahead is seen at one time. It ends as well where
+nothing came for a while, and turns that lack packets are left out.
 """
 
+import json
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import islice
@@ -13,15 +16,19 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from wildshape.errors import BadInputError, load_library
-from wildshape.io.guard import first_line
+from wildshape.errors import load_library
+from wildshape.io.guard import first_line, reading
 from wildshape.records import Turn
 
 _INSTALL = "pip install 'wildshape[pcap]'"
 _AZIMUTH = slice(2, 4)  # of a packet's first block, hundredths of a degree, clockwise from ahead
 _BACK, _ROUND = 18000, 36000
 _UDP_HEADER = 8  # bytes
-_WHOLE = 0.9  # of a turn's packets that the first and the last turn must have
+_WHOLE = 0.9  # of the usual turn's packets that a turn must have
+_PAUSE_S = 0.05  # a turn at the highest speed: after a longer one the angle tells no turns apart
+_LATE = 2000  # hundredths of a degree that a late packet may be behind: two at the highest speed
+_FIRST = 100  # packets that tell an HDL-64E; the others' ends change at most where damaged
+_LASERS = 64
 
 _Sensor = tuple[int, str] | None  # model and calibration of a sensor that sends them
 _Source = tuple[bytes, int]  # address of a sensor and the port that it sends to
@@ -49,7 +56,7 @@ class _Turn:
 
     Attributes:
         stamp: when the last was recorded, seconds.
-        turned: how far from behind the beam was then, hundredths of a degree.
+        turned: how far from behind the beam has come, hundredths of a degree.
     """
 
     begin: int
@@ -84,8 +91,9 @@ class VelodyneTurns:
         """
         decoder, turn = _decoder(), self.turns[number]
         with self.path.open("rb") as file:
-            found = _packets_of(file, self.source, turn)
-            packets = [decoder.VelodynePacket(one.stamp, one.data) for one in found]
+            found = list(_packets_of(file, self.source, turn.begin, turn.packets))
+        sound = found if self.sensor else _of_one_model(found)
+        packets = [decoder.VelodynePacket(one.stamp, one.data) for one in sound]
         scans = decoder.ScanDecoder(_config(self.sensor))
         _, rows = scans.decode(decoder.PacketVector(packets))
         return Turn(np.ascontiguousarray(rows[:, :3]), rows[:, 4].astype(np.float64))
@@ -96,7 +104,7 @@ def open_velodyne(path: Path) -> VelodyneTurns:
 
     Raises:
         MissingExtraError: velodyne-decoder is not installed.
-        BadInputError: the sensor is an HDL-64E, and not alone.
+        BadInputError: the sensor is an HDL-64E, whose calibration is not whole.
     """
     _decoder()
     turns: dict[_Source, list[_Turn]] = {}
@@ -114,43 +122,41 @@ def open_velodyne(path: Path) -> VelodyneTurns:
             f"{path.name} holds packets of {len(turns)} sensors; those of {_named(source)} were"
             f" taken, which are most, and those of {others} left out"
         )
-    whole = tuple(_whole(turns[source])) if source is not None else ()
+    found = turns[source] if source is not None else []
+    least = _WHOLE * float(np.median([turn.packets for turn in found] or [0]))
+    whole = tuple(turn for turn in found if turn.packets >= least)
+    # A recording begins and ends amid a turn, which is no loss.
+    if lacking := sum(turn.packets < least for turn in found[1:-1]):
+        warnings.append(f"{lacking} turns with missing packets are left out")
+    described = _described(path, source, found) if whole else None
     times = tuple(turn.stamp for turn in whole)
-    if source is not None and len(turns) > 1 and whole and _is_hdl64e(path, source, whole[0]):
-        raise BadInputError(
-            f"{path}: holds packets of an HDL-64E ({_named(source)}) and of other sensors; copy"
-            " those of the HDL-64E to a file of their own."
-        )
-    described = _described(path) if whole and len(turns) == 1 else None
     return VelodyneTurns(path, times, tuple(warnings), source, whole, described)
 
 
-def _is_hdl64e(path: Path, source: _Source, turn: _Turn) -> bool:
-    """Whether packets end in bytes that change; those of all others end in their model."""
-    with path.open("rb") as file:
-        return len({one.data[-2:] for one in _packets_of(file, source, turn)}) > 1
-
-
 def _count(packet: _Packet, turns: list[_Turn]) -> None:
-    """Add a sensor's next packet to its turns."""
+    """Add a sensor's next packet to its turns; a late one goes where the one before it went."""
     turned = (int.from_bytes(packet.data[_AZIMUTH], "little") - _BACK) % _ROUND
-    if not turns or turned < turns[-1].turned:
-        turns.append(_Turn(packet.begin))
-    turns[-1].packets += 1
-    turns[-1].stamp, turns[-1].turned = packet.stamp, turned
+    if not turns or _begins(turns[-1], turned, packet.stamp):
+        turns.append(_Turn(packet.begin, turned=turned))
+    turn = turns[-1]
+    turn.packets, turn.stamp = turn.packets + 1, packet.stamp
+    turn.turned = turn.turned if _is_late(turn, turned) else turned
+
+
+def _begins(turn: _Turn, turned: int, stamp: float) -> bool:
+    """Whether a packet begins the turn after this one."""
+    passed = turned < turn.turned and not _is_late(turn, turned)
+    return passed or abs(stamp - turn.stamp) > _PAUSE_S
+
+
+def _is_late(turn: _Turn, turned: int) -> bool:
+    return 0 < (turn.turned - turned) % _ROUND <= _LATE
 
 
 def _named(source: _Source) -> str:
     from dpkt.utils import inet_to_str
 
     return f"{inet_to_str(source[0])}:{source[1]}"
-
-
-def _whole(turns: list[_Turn]) -> list[_Turn]:
-    """All but a first or last that is not a whole turn."""
-    least = _WHOLE * float(np.median([turn.packets for turn in turns] or [0]))
-    ends = (0, len(turns) - 1)
-    return [turn for place, turn in enumerate(turns) if place not in ends or turn.packets >= least]
 
 
 def _packets(file: IO[bytes], begin: int | None = None) -> Iterator[_Packet]:
@@ -175,10 +181,11 @@ def _packets(file: IO[bytes], begin: int | None = None) -> Iterator[_Packet]:
         begin = file.tell()
 
 
-def _packets_of(file: IO[bytes], source: _Source | None, turn: _Turn) -> Iterator[_Packet]:
-    """The packets of a sensor's turn."""
-    ours = (one for one in _packets(file, turn.begin) if one.source == source)
-    return islice(ours, turn.packets)
+def _packets_of(
+    file: IO[bytes], source: _Source | None, begin: int, count: int
+) -> Iterator[_Packet]:
+    """So many packets of a sensor, from a record on."""
+    return islice((one for one in _packets(file, begin) if one.source == source), count)
 
 
 def _datagram(record: bytes) -> tuple[Any, bytes]:
@@ -192,15 +199,48 @@ def _datagram(record: bytes) -> tuple[Any, bytes]:
     return (None if isinstance(found, bytes) else found), sender
 
 
-def _described(path: Path) -> _Sensor:
+def _described(path: Path, source: _Source | None, turns: list[_Turn]) -> _Sensor:
     """An HDL-64E, which sends its own calibration; all others tell their model in each packet.
 
-    The decoder looks for a calibration in .pcap alone.
+    Raises:
+        BadInputError: it sent too little of it.
     """
-    if path.suffix.lower() != ".pcap":
-        return None
-    model, calibration = _decoder().hdl64e.detect_hdl64e(path)
-    return None if model is None else (int(model), calibration.to_string())
+    count = sum(turn.packets for turn in turns)
+    told = "an HDL-64E's calibration, which it sends piece by piece, over seconds"
+    with reading(path, told), path.open("rb") as file:
+        if not _is_hdl64e(_packets_of(file, source, turns[0].begin, min(count, _FIRST))):
+            return None
+        file.seek(0)
+        sent = _packets_of(file, source, turns[0].begin, count)
+        return _calibrated(one.data for one in sent)
+
+
+def _is_hdl64e(packets: Iterator[_Packet]) -> bool:
+    """Whether packets end in bytes that change; those of all others end in their model."""
+    ends = Counter(one.data[-2:] for one in packets)
+    return max(ends.values()) < ends.total() / 2
+
+
+def _calibrated(sent: Iterator[bytes]) -> _Sensor:
+    """The HDL-64E whose packets these are.
+
+    Raises:
+        ValueError: they hold no whole calibration.
+    """
+    decoder = _decoder()
+    status = decoder.hdl64e.read_status_info(sent)
+    calibration = decoder.hdl64e.status_info_to_calib_dict(status)
+    lasers = [laser["laser_id"] for laser in calibration["lasers"]]
+    if status["Calibration Time"] is None or lasers != list(range(_LASERS)):
+        raise ValueError("it was never calibrated")
+    kind = decoder.Model.HDL64E_S2 if status["Model"] == "S2" else decoder.Model.HDL64E_S3
+    return int(kind), json.dumps(calibration, default=str)
+
+
+def _of_one_model(packets: list[_Packet]) -> list[_Packet]:
+    """Those that end in the model that most end in: the decoder refuses a turn with others."""
+    models = Counter(one.data[-1] for one in packets)
+    return [one for one in packets if one.data[-1] == models.most_common(1)[0][0]]
 
 
 def _config(sensor: _Sensor) -> Any:
