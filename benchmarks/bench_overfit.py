@@ -34,7 +34,7 @@ STEPS, ROTATION_BAR_DEG, CD_BAR_M, MINUTES_BAR = 3600, 3.0, 0.15, 10.0
 def main() -> None:
     parser = options(__doc__)
     parser.set_defaults(threads=1)
-    parser.add_argument("--steps", type=int, help=f"{STEPS}: 9 minutes of one core")
+    parser.add_argument("--steps", type=int, help=f"{STEPS}: 10 minutes of one core")
     parser.add_argument("--seed", type=int, default=0, help="of the cars and of training")
     arguments = begin(parser)
     print(header("bench_overfit.py"))

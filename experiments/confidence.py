@@ -31,8 +31,7 @@ from wildshape.geometry.transforms.se3 import stack
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import write_json
 from wildshape.io.output import provenance
-from wildshape.io.store.layout import INDEX_JSON
-from wildshape.io.store.store import Store, open_store
+from wildshape.io.store.store import Store, is_finished_store, open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import SHIPPED, load_checkpoint, save_checkpoint, weights_file
 from wildshape.method.confidence import ConfidenceFeatures, fit_calibration
@@ -102,7 +101,7 @@ class Measured(NamedTuple):
 def drives(settings: Settings, split: str) -> Store:
     """The drives of a split, simulated once."""
     path = settings.out / split
-    if not (path / INDEX_JSON).is_file():
+    if not is_finished_store(path):
         with TemporaryDirectory() as folder, StoreWriter(path, {}, overwrite=True) as store:
             for config, seed in _sources(settings, split, Path(folder)):
                 for track in simulate_tracks(config, seed, workers=1):

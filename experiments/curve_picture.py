@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The curves of a training, from the log that it left: loss, held-out loss, and truth held out.
 
-python experiments/curve_picture.py RUN benchmarks/results/paper-lidar.svg
+python experiments/curve_picture.py RUN OUT.svg
 """
 
 from dataclasses import dataclass

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """How well `wildshape drive` finds the vehicles of simulated drives, and how long it takes.
 
-python experiments/drives.py --out DRIVES --first 101 --count 20 --scans 60
+python experiments/drives.py --out DRIVES --first 21 --count 20 --scans 60
 
 simulates, runs and measures one drive after the other and writes `table.md` into
-`DRIVES/101-120-of-60-scans`. A killed run goes on with the same command: finished drives are not
+`DRIVES/21-40-of-60-scans`. A killed run goes on with the same command: finished drives are not
 done again, a half-finished one is begun again, as its time is measured.
 """
 

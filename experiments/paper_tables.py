@@ -231,7 +231,8 @@ def run(settings: Settings, command: str) -> None:
         say(
             f"{number} of {len(planned)} rows, {job.name}: {duration(spent[job.name])}; left {left}"
         )
-    if not (settings.plan or (settings.out / PRINTED).is_file()):
+    whole = not (settings.table or settings.rows)
+    if not settings.plan and (whole or not (settings.out / PRINTED).is_file()):
         write_pages(shop, given, made, [job for job in planned if job.name in spent])
     todo = [job for job in planned if job.name not in spent]
     print(f"{len(todo)} of {len(planned)} rows are left: {duration(left_s(todo, spent, planned))}")

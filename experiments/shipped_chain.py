@@ -30,8 +30,7 @@ from experiments import calibrate_confidence, confidence, views_weights
 from wildshape.cli.terminal import TERMINAL, stoppable
 from wildshape.io.atomic import write_text
 from wildshape.io.output import provenance
-from wildshape.io.store.layout import INDEX_JSON
-from wildshape.io.store.store import Store, open_store
+from wildshape.io.store.store import Store, is_finished_store, open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import MODEL, load_checkpoint, save_checkpoint, weights_file
 from wildshape.method.ray_encoder import RayConfig
@@ -209,7 +208,7 @@ def trained(name: str, settings: Settings) -> None:
 def _data(seed: int, settings: Settings) -> Store:
     """Drives past procedural and CAD vehicles, simulated once; begun again if half-written."""
     path = settings.out / f"tracks{seed}"
-    if not (path / INDEX_JSON).is_file():
+    if not is_finished_store(path):
         with StoreWriter(path, provenance(settings.command), overwrite=True) as store:
             for number in range(len(_SENSORS)):
                 _add_drives(store, number, seed, settings)

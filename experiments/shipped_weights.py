@@ -23,7 +23,7 @@ from wildshape.cli.terminal import say
 from wildshape.evaluation.summary import FIGURES
 from wildshape.evaluation.tables import COUNTED, cell, pipe_table
 from wildshape.io.atomic import write_text
-from wildshape.io.store.layout import INDEX_JSON
+from wildshape.io.store.store import is_finished_store
 from wildshape.method.checkpoint import fingerprint
 
 PAGE = "shipped-weights.md"
@@ -130,7 +130,7 @@ def run(settings: Settings, command: str) -> None:
     done = []
     for data in drives(replace(settings, out=out)):
         store = out / data.name
-        if not (store / INDEX_JSON).is_file():
+        if not is_finished_store(store):
             _make(data, store)
         for protocol, words in data.measured.items():
             if not _finished(_evaluation(store, protocol)):

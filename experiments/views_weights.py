@@ -22,8 +22,7 @@ import tyro
 from experiments.meshes import stretched
 
 from wildshape.io.output import provenance
-from wildshape.io.store.layout import INDEX_JSON
-from wildshape.io.store.store import open_store
+from wildshape.io.store.store import is_finished_store, open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import load_checkpoint, save_checkpoint
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
@@ -84,7 +83,7 @@ def main(settings: Settings) -> None:
     """Make the data if it is not there yet, then train both stages."""
     data = settings.out / "data"
     settings.out.mkdir(parents=True, exist_ok=True)
-    if not (data / INDEX_JSON).is_file():
+    if not is_finished_store(data):
         make_data(settings, data)
     recipe = views()
     first = replace(recipe, optim=replace(recipe.optim, steps=settings.steps))

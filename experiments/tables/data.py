@@ -16,7 +16,7 @@ from wildshape.cli.terminal import TERMINAL, say
 from wildshape.datasets.sources import open_source
 from wildshape.datasets.tracks.source import all_tracks
 from wildshape.errors import BadInputError
-from wildshape.io.store.layout import INDEX_JSON
+from wildshape.io.store.store import is_finished_store
 from wildshape.io.write_tracks import write_tracks
 from wildshape.records import Track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
@@ -67,7 +67,7 @@ def store_of(folder: Path, data: Data) -> Path:
         BadInputError: no such meshes or drives.
     """
     path = folder / "data" / f"{data.name}-{key(data)}"
-    if (path / INDEX_JSON).is_file():
+    if is_finished_store(path):
         return path
     tracks, count = _tracks(folder, data)
     settings = cast("dict[str, Any]", as_values(data))

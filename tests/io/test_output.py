@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from tests.refusal import refused
+from tests.stopping import stopped_at_removal
 
 from wildshape.io.output import MARKER, begin, finished, provenance
 
@@ -31,20 +32,12 @@ def test_a_removal_that_was_stopped_is_repeated(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, removed: int
 ) -> None:
     """What was left was of no command's making, and `--overwrite` was refused for good."""
-    out, real, left = tmp_path / "out", Path.unlink, iter([None] * removed)
+    out = tmp_path / "out"
     begin(out, "complete", {"a": 1}, ["*.ply"]).finish()
     for name in ("0.ply", "1.ply", "notes.txt"):
         (out / name).write_text("")
-
-    def stopped(path: Path, *, missing_ok: bool = False) -> None:
-        if next(left, "stop") == "stop":
-            raise KeyboardInterrupt
-        real(path, missing_ok=missing_ok)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, "unlink", stopped)
-        with pytest.raises(KeyboardInterrupt):
-            begin(out, "complete", {"a": 2}, ["*.ply"], overwrite=True)
+    with stopped_at_removal(removed, monkeypatch):
+        begin(out, "complete", {"a": 2}, ["*.ply"], overwrite=True)
     if removed < 2:
         assert not (out / MARKER).exists()
         for settings in ({"a": 1}, {"a": 2}):

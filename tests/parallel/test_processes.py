@@ -197,20 +197,21 @@ def test_work_that_is_left_ends_with_the_team(tmp_path):
 
 
 def test_who_reads_an_item_is_not_waited_for():
-    reading, go_on = Event(), Event()
+    reading, go_on, waited = Event(), Event(), []
 
     def items():
         reading.set()
-        go_on.wait(60)
+        waited.append(go_on.wait(10))
         yield 1
 
     handout = Handout(items())
     reader = Thread(target=handout.take, args=(lambda: False,))
     reader.start()
     reading.wait(60)
-    handout.wake()  # would hang
+    handout.wake()
     go_on.set()
     reader.join()
+    assert waited == [True]  # while it read
 
 
 def test_a_team_may_end_while_its_helpers_start():

@@ -5,7 +5,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import torch
@@ -46,6 +46,8 @@ ALL_SCANS = Limits()
 Progress = Callable[[int, str], None]
 REFUSED = "refused by the method"
 NOT_FINITE = "prediction empty or not finite"
+
+Found = TypeVar("Found")
 
 
 @dataclass
@@ -172,12 +174,9 @@ def _score_canonical(method: CanonicalCompleter, case: Case, ledger: _Ledger) ->
     if case.truth is None:
         _skip_scans(case, ledger)
         return
-
-    def alone(scan: Any, sensor: Sensor) -> Points:
-        return next(iter(method.complete_canonical([scan], sensor)))
-
-    for i, scan in enumerate(case.inputs()):
-        answer = _spoken(alone, scan, case)
+    found = _of_each(case, lambda scans, _: method.complete_canonical(scans, case.sensor))
+    for i, points in enumerate(found):
+        answer = None if points is None else Spoken(points)
         _score_completion(answer, case, case.truth, SE3.identity(), i, ledger)
 
 
@@ -194,21 +193,21 @@ class Spoken(NamedTuple):
 def complete_scans(method: Completer, case: Case) -> Sequence[Answer | None]:
     """One answer a scan, in that scan's frame; None where the method refused it."""
     if case.rays and isinstance(method, SightedCompleter):
-        with suppress(BadInputError):
-            return list(method.complete_sighted(case.inputs(), case.sensor, case.rays))
-        # One scan's refusal must not cost the others theirs: then each goes alone.
-        return [_sighted(method, case, i) for i in range(len(case.scans))]
+        return _of_each(case, lambda scans, rays: method.complete_sighted(scans, case.sensor, rays))
     if isinstance(method, BatchCompleter):
-        with suppress(BadInputError):
-            return list(method.complete_many(case.inputs(), case.sensor))
+        return _of_each(case, lambda scans, _: method.complete_many(scans, case.sensor))
     return [_spoken(method.complete, scan, case) for scan in case.inputs()]
 
 
-def _sighted(method: SightedCompleter, case: Case, i: int) -> Answer | None:
+def _of_each(case: Case, ask: Callable[[Any, Any], Iterable[Found]]) -> Sequence[Found | None]:
+    """What `ask` has of all scans and their rays; if it refuses one, of each alone."""
     with suppress(BadInputError):
-        scan = case.scans[i].copy()
-        return next(iter(method.complete_sighted([scan], case.sensor, [case.rays[i]])))
-    return None
+        return list(ask(case.inputs(), case.rays))
+    found: list[Found | None] = [None] * len(case.scans)
+    for i, scan in enumerate(case.inputs()):
+        with suppress(BadInputError):
+            (found[i],) = ask([scan], case.rays[i : i + 1])
+    return found
 
 
 def _spoken(complete: Callable[[Any, Sensor], Points], given: Any, case: Case) -> Spoken | None:

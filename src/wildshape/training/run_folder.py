@@ -13,12 +13,11 @@ from typing import Any
 
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import lock_folder, write_json
-from wildshape.io.guard import reading
+from wildshape.io.guard import read_json, reading
 from wildshape.io.inputs import open_tracks, refuse_other_coordinates
 from wildshape.io.output import MARKER, Output, begin, keep_apart, remove_leftovers
 from wildshape.io.progress import SILENT, Progress
-from wildshape.io.store.layout import INDEX_JSON
-from wildshape.io.store.store import Store, is_store, open_store
+from wildshape.io.store.store import Store, is_finished_store, is_store, open_store
 from wildshape.io.write_tracks import write_tracks
 from wildshape.training.options import TrainingOptions
 from wildshape.training.state import STATE
@@ -59,11 +58,12 @@ def _begin(data: Path, out: Path, options: TrainingOptions) -> Output | None:
     if int(os.environ.get("RANK", "0")) > 0:
         return None
     settings = {"data": str(data), **{name: str(getattr(options, name)) for name in _SETTINGS}}
-    begun = _settings_of_run(out)
+    begun = _record_of_run(out)
     if begun is not None and options.resume:
         lock_folder(out)
         if not (out / STATE).exists():  # which knows better: one setting has several spellings
-            _refuse_other(out, begun, settings)
+            _refuse_other(out, begun["settings"], settings)
+            write_json(out / MARKER, {**begun, "settings": settings})
         remove_leftovers(out)
         return None
     keep_apart(data, out)
@@ -75,14 +75,18 @@ def _begin(data: Path, out: Path, options: TrainingOptions) -> Output | None:
     return begin(out, "train", settings, _FILES, overwrite=options.overwrite)
 
 
-def _settings_of_run(out: Path) -> dict[str, Any] | None:
-    """As the marker has them; None where no training was begun."""
+def _record_of_run(out: Path) -> dict[str, Any] | None:
+    """What the marker holds; None where no training was begun."""
     marker = out / MARKER
     if not marker.is_file():
         return None
+    record = read_json(marker, "how a folder was made", dict)
     with reading(marker, "how a folder was made"):
-        record = json.loads(marker.read_text("utf-8"))
-        return dict(record["settings"]) if record.get("command") == "train" else None
+        return {**record, "settings": dict(record["settings"])} if _is_run(record) else None
+
+
+def _is_run(record: dict[str, Any]) -> bool:
+    return record.get("command") == "train"
 
 
 def _refuse_other(out: Path, begun: dict[str, Any], settings: dict[str, str]) -> None:
@@ -113,7 +117,7 @@ def open_training_data(
         )
     packed = out / _PACKED
     origin = {"input": str(data.resolve()), **asdict(options.coordinates)}
-    if options.resume and (packed / INDEX_JSON).is_file():  # else it is none, or half-written
+    if options.resume and is_finished_store(packed):  # else it is none, or half-written
         return _packed_before(packed, data, origin)
     source = open_tracks(data, options.coordinates)
     write_tracks(

@@ -65,13 +65,14 @@ def test_turns_that_are_not_whole_are_left_out(turns, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("begin", "count", "pieces", "whole"),
+    ("begin", "count", "whole"),
     [
-        (20, 20, 1, 5),
-        (PACKETS // 2, PACKETS, 2, 4),  # two halves of different turns were taken for one
+        (20, 20, 5),
+        (PACKETS // 2, PACKETS, 4),  # two halves of different turns were taken for one
+        (PACKETS // 2, 2 * PACKETS, 3),
     ],
 )
-def test_turns_amid_which_packets_are_missing(turns, tmp_path, begin, count, pieces, whole):
+def test_turns_amid_which_packets_are_missing(turns, tmp_path, begin, count, whole):
     path = write_velodyne(tmp_path / "street.pcap", [turns[0]] * 6)
 
     def lose(records):
@@ -80,7 +81,32 @@ def test_turns_amid_which_packets_are_missing(turns, tmp_path, begin, count, pie
 
     drive = open_drive(rewrite(path, lose))
     assert len(drive) == whole
-    assert f"{pieces} turns with missing packets are left out" in drive.warnings
+    assert "1 turns with missing packets are left out" in drive.warnings
+
+
+def test_a_sensor_that_looks_back_alone_has_whole_turns(turns, tmp_path):
+    """Nothing comes for half of each turn."""
+    path = write_velodyne(tmp_path / "street.pcap", [turns[0]] * 4)
+
+    def ahead(records):
+        places = [number // 2 % PACKETS for number in range(len(records))]
+        records[:] = [one for one, at in zip(records, places) if at < 19 or at >= 57]
+
+    drive = open_drive(rewrite(path, ahead))
+    assert (len(drive), drive.warnings) == (4, ())
+
+
+def test_turns_of_another_mode_are_whole_too(turns, tmp_path):
+    """From the middle on every second packet comes, as after a change to fewer returns."""
+    path = write_velodyne(tmp_path / "street.pcap", [turns[0]] * 60)
+
+    def thin(records):
+        half = len(records) // 2
+        later = [one for i, one in enumerate(records[half:]) if i % 4 < 2]
+        records[:] = records[:half] + later
+
+    drive = open_drive(rewrite(path, thin))
+    assert len(drive) >= 50  # right after the change a turn has fewer than most around it
 
 
 @pytest.mark.parametrize("place", [PACKETS + 30, 2 * PACKETS - 1])  # amid a turn, and at its end
@@ -132,7 +158,7 @@ def test_an_hdl64e_brings_its_calibration(turns, tmp_path):
 
 def test_an_hdl64e_recorded_too_briefly_is_refused(turns, tmp_path):
     path = rewrite(write_velodyne(tmp_path / "street.pcap", turns), with_calibration)
-    refused(open_drive, path, match=r"an HDL-64E's calibration, .*Not enough metadata")
+    refused(open_drive, path, match=r"an HDL-64E's calibration, .* is not whole .*record longer")
 
 
 @pytest.mark.parametrize(
@@ -171,7 +197,7 @@ def test_an_hdl64e_beside_another_sensor(turns, tmp_path):
     write_velodyne(path, turns, others=turns[:2], sent_by=(202, 2368), hdl64e=True)
     assert np.array_equal(open_drive(path).scan(0), alone)
     write_velodyne(path, turns, others=turns, sent_by=(202, 2368), hdl64e=True)
-    refused(open_drive, path, match=r"an HDL-64E's calibration, .*Not enough metadata")
+    refused(open_drive, path, match=r"an HDL-64E's calibration, .* is not whole .*record longer")
 
 
 def test_a_cut_recording_is_read_up_to_there(turns, tmp_path):

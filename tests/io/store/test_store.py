@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tests.stopping import stopped_at_removal
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
@@ -144,17 +145,8 @@ def test_a_removal_that_was_stopped_is_repeated(
     store: Store, track: Track, monkeypatch: pytest.MonkeyPatch, removed: int
 ) -> None:
     """What was left was no store, and `--overwrite` was refused for good."""
-    real, left = Path.unlink, iter([None] * removed)
-
-    def stopped(path: Path, *, missing_ok: bool = False) -> None:
-        if next(left, "stop") == "stop":
-            raise KeyboardInterrupt
-        real(path, missing_ok=missing_ok)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, "unlink", stopped)
-        with pytest.raises(KeyboardInterrupt):
-            StoreWriter(store.path, {}, overwrite=True)
+    with stopped_at_removal(removed, monkeypatch):
+        StoreWriter(store.path, {}, overwrite=True)
     if removed:
         with pytest.raises(BadInputError, match="half-written"):
             open_store(store.path)

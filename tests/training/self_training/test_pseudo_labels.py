@@ -1,26 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""A teacher's targets: made from scans alone, kept for one run, and what a run makes of them."""
+"""A teacher's targets: made from scans alone."""
 
 import itertools
-import json
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
-from safetensors.torch import load_file
-from tests.cars import drive_by, poses_of
+from tests.cars import poses_of
 from tests.strategies import rotation_about
 from tests.training.self_training.taught import TAUGHT, sampler_of
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.store.store import StoreWriter, open_store
-from wildshape.method.checkpoint import load_checkpoint
 from wildshape.training.batches.views import ViewSampler
-from wildshape.training.loop import StopRequested, fit, setup
 from wildshape.training.self_training import pseudo_labels
 from wildshape.training.self_training.fused_shape import FusionConfig
 from wildshape.training.self_training.headings import PosedTrack
@@ -37,25 +33,6 @@ from wildshape.training.self_training.pseudo_labels import (
     view_tops,
     with_roof,
 )
-from wildshape.training.self_training.targets import (
-    TARGETS,
-    load_targets,
-    save_targets,
-    true_targets,
-)
-from wildshape.training.state import STATE, save_state
-
-IDENTITY = {"data": "abc", "teacher": "def"}
-
-
-def counts(store):
-    """Of scans, and of tracks to train on."""
-    return store.scan_count, len(sampler_of(store).scans_of)
-
-
-@pytest.fixture(scope="module")
-def targets(car_store, teacher):
-    return fused_targets(teacher, sampler_of(car_store))
 
 
 def test_every_scan_gets_a_pose_and_every_track_a_shape(car_store, targets):
@@ -123,109 +100,10 @@ def test_targets_do_not_depend_on_truth(cars, car_store, teacher, targets, tmp_p
         assert torch.equal(torch.as_tensor(one), torch.as_tensor(two))
 
 
-@pytest.mark.parametrize("complete", [False, True])
-def test_saved_and_loaded_are_equal(car_store, targets, tmp_path, complete):
-    kept = targets._replace(complete=complete)
-    save_targets(tmp_path, kept, IDENTITY)
-    found = load_targets(tmp_path, IDENTITY, *counts(car_store))
-    assert found is not None
-    assert found.complete is complete
-    for one, two in zip(found[:4], kept[:4]):
-        assert torch.equal(torch.as_tensor(one), torch.as_tensor(two))
-
-
-def test_targets_of_another_run_or_damaged_ones_are_made_anew(car_store, targets, tmp_path):
-    known = counts(car_store)
-    assert load_targets(tmp_path, IDENTITY, *known) is None
-    save_targets(tmp_path, targets, IDENTITY)
-    for key in IDENTITY:
-        assert load_targets(tmp_path, IDENTITY | {key: "other"}, *known) is None
-    save_targets(tmp_path, targets, IDENTITY | {"headings": "ghi"})
-    assert load_targets(tmp_path, IDENTITY, *known) is None
-    path = tmp_path / TARGETS
-    path.write_bytes(path.read_bytes()[:-100])
-    assert load_targets(tmp_path, IDENTITY, *known) is None
-    for name in ("rotation", "translation", "shapes", "sensors"):
-        for bad in (getattr(targets, name) * torch.nan, getattr(targets, name)[1:]):
-            save_targets(tmp_path, targets._replace(**{name: bad}), IDENTITY)
-            assert load_targets(tmp_path, IDENTITY, *known) is None
-
-
-def test_true_targets_are_the_truth(car_store, cars):
-    found = true_targets(sampler_of(car_store))
-    assert found.complete
-    start = int(car_store.track_starts[3])
-    pose = cars[3].T_sensor_object
-    torch.testing.assert_close(found.rotation[start + 5], pose.rotation[5].float())
-    torch.testing.assert_close(found.translation[start + 5], pose.translation[5].float())
-    rows = {tuple(point) for point in found.shapes[3].tolist()}
-    assert rows == {tuple(point) for point in cars[3].shape.tolist()}
-
-
-@pytest.mark.parametrize("missing", ["T_sensor_object", "shape"])
-def test_true_targets_refuse_data_without_truth_in_one_sentence(tmp_path, missing):
-    with StoreWriter(tmp_path / "store", {}) as writer:
-        writer.add(drive_by(name="known", scans=3))
-        writer.add(replace(drive_by(name="unknown", scans=3), **{missing: None}))
-    with pytest.raises(BadInputError) as refused:
-        true_targets(sampler_of(open_store(tmp_path / "store")))
-    sentence = str(refused.value)
-    assert "unknown" in sentence
-    assert str(tmp_path) in sentence
-    assert sentence.count(".\n") == 0
-    assert sentence.endswith("the oracle needs both.")
-
-
-@pytest.mark.parametrize("who", ["teacher", "truth"])
-def test_taught_stopped_and_resumed_is_the_undisturbed_run(car_store, teacher, tmp_path, who):
-    taught = teacher if who == "teacher" else "truth"
-
-    def train(folder, *, resume=False, progress=None):
-        run = setup(TAUGHT, car_store, folder, seed=3, resume=resume, teacher=taught)
-        return load_file(fit(run, progress)), load_file(folder / STATE)
-
-    def stop(step, _):
-        if step >= 10:
-            raise StopRequested
-
-    expected = train(tmp_path / "whole")
-    with pytest.raises(StopRequested):
-        train(tmp_path / "parts", progress=stop)
-    assert (tmp_path / "parts" / TARGETS).exists() == (who == "teacher")
-    for found, twin in zip(train(tmp_path / "parts", resume=True), expected):
-        assert set(found) == set(twin)
-        assert all(torch.equal(found[key], twin[key]) for key in twin)
-
-
-def test_another_teacher_is_another_run(car_store, teacher, tmp_path):
-    run = setup(TAUGHT, car_store, tmp_path, seed=3, teacher=teacher)
-    save_state(tmp_path, run.state, run.identity)
-    with pytest.raises(BadInputError, match="teacher"):
-        setup(TAUGHT, car_store, tmp_path, seed=3, teacher="truth", resume=True)
-
-
-def test_a_run_with_headings_is_another_run_without(car_store, tmp_path):
-    run = setup(TAUGHT, car_store, tmp_path, seed=3, teacher="truth")
-    save_state(tmp_path, run.state, run.identity | {"headings": "abc"})
-    with pytest.raises(BadInputError, match="other headings;"):
-        setup(TAUGHT, car_store, tmp_path, seed=3, teacher="truth", resume=True)
-
-
 def test_a_teacher_of_another_kind_of_sensor_is_refused(car_store, teacher):
     camera = ViewSampler(car_store, np.arange(2), replace(TAUGHT.views, sensor="camera"))
     with pytest.raises(BadInputError, match="lidar scans and cannot teach camera scans"):
         fused_targets(teacher, camera)
-
-
-def test_what_is_taught_is_learned(car_store, tmp_path):
-    """The oracle's loss on its own cars falls."""
-    recipe = replace(TAUGHT, optim=replace(TAUGHT.optim, steps=120, lr=3e-3), validate_every=1000)
-    losses = []
-    fit(
-        setup(recipe, car_store, tmp_path, seed=3, teacher="truth"),
-        lambda _, values: losses.append(values["loss"]),
-    )
-    assert losses[-1] < 0.85 * losses[0]
 
 
 @pytest.fixture(scope="module")
@@ -327,38 +205,3 @@ def test_a_camera_s_view_ends_above_no_track(car_store):
         car_store, np.arange(len(car_store)), replace(TAUGHT.views, sensor="camera")
     )
     assert view_tops(camera) == [math.inf] * len(car_store)
-
-
-def test_targets_of_other_rules_are_made_anew(car_store, teacher, tmp_path):
-    """A run with other numbers does not take the targets that lie in its folder."""
-    for points in (64, 128):
-        rules = replace(TAUGHT.self_training, fusion=FusionConfig(points=points))
-        recipe = replace(TAUGHT, self_training=rules)
-        run = setup(recipe, car_store, tmp_path, seed=3, teacher=teacher)
-        assert run.targets is not None
-        assert run.targets.shapes.shape[1] == points
-
-
-def test_targets_of_fewer_scans_are_made_anew(cars, teacher, tmp_path):
-    """A run that also reads smaller scans does not take targets in which these have no pose."""
-    with StoreWriter(tmp_path / "store", {}) as writer:
-        for car in cars[:2]:
-            writer.add(car.part(range(3)))
-    store = open_store(tmp_path / "store")
-    smallest = int(np.argmin(store.scan_sizes))
-    for least in (int(store.scan_sizes[smallest]) + 1, TAUGHT.views.min_points):
-        recipe = replace(TAUGHT, views=replace(TAUGHT.views, min_points=least))
-        run = setup(recipe, store, tmp_path, seed=3, teacher=teacher)
-        assert run.targets is not None
-    rotation = run.targets.rotation[smallest]
-    torch.testing.assert_close(rotation @ rotation.T, torch.eye(3), atol=1e-4, rtol=0)
-
-
-def test_the_rules_numbers_are_saved_with_the_run_and_its_model(car_store, tmp_path):
-    rules = replace(TAUGHT.self_training, fusion=FusionConfig(points=64))
-    recipe = replace(TAUGHT, self_training=rules, optim=replace(TAUGHT.optim, steps=1))
-    model = fit(setup(recipe, car_store, tmp_path, seed=3, teacher="truth"))
-    described = json.loads((tmp_path / "run.json").read_text("utf-8"))
-    for provenance in (described, load_checkpoint(model)[1].provenance):
-        assert provenance["recipe"]["self_training"]["fusion"]["points"] == 64
-        assert provenance["recipe"]["self_training"]["draw"]["occlusion"]["rings"] == 0.2

@@ -15,6 +15,7 @@ from wildshape.io.output import command_line, provenance
 from wildshape.io.progress import SILENT, Progress
 from wildshape.method.checkpoint import MODEL
 from wildshape.ops.device import choose_device
+from wildshape.training.config import stretched
 from wildshape.training.loop import StopRequested
 from wildshape.training.options import TrainingOptions
 from wildshape.training.run_folder import begun_run, finish_run, open_training_data
@@ -72,7 +73,7 @@ def dpc_recipe(options: TrainingOptions) -> DpcRecipe:
     recipe = PRESETS[options.preset]
     if options.steps is None:
         return recipe
-    return replace(recipe, optim=replace(recipe.optim, steps=options.steps))
+    return replace(recipe, optim=stretched(recipe.optim, options.steps))
 
 
 def _fit(run: DpcRun, progress: Progress, stopping: Stopping) -> None:

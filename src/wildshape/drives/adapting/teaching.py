@@ -17,8 +17,7 @@ from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.adapting.examples import Example
 from wildshape.inference.predictor import Predictor
 from wildshape.io.output import command_line, provenance
-from wildshape.io.store.layout import INDEX_JSON
-from wildshape.io.store.store import Store, open_store
+from wildshape.io.store.store import Store, is_finished_store, open_store
 from wildshape.io.write_tracks import write_tracks
 from wildshape.method.checkpoint import MODEL, ModelSettings, load_checkpoint, save_checkpoint
 from wildshape.training.config import OptimConfig, Recipe, ValidationConfig
@@ -96,7 +95,7 @@ def recipe_of(settings: ModelSettings, config: AdaptConfig) -> Recipe:
 
 
 def _packed(examples: Sequence[Example], path: Path, config: AdaptConfig) -> Store:
-    if not (path / INDEX_JSON).is_file():
+    if not is_finished_store(path):
         settings = {"scans": config.scans, "seed": config.seed}
         tracks = (one.track for one in examples)
         write_tracks(tracks, path, "packed", command="drive --adapt", settings=settings)

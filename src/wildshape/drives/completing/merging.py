@@ -7,6 +7,7 @@ its way leads.
 """
 
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import combinations, product
 
 import numpy as np
@@ -44,6 +45,7 @@ class Places:
         each other.
         """
 
+        @cache
         def share(i: int, j: int) -> float:
             return self.overlap(objects[i], objects[j])
 

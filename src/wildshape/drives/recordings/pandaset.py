@@ -29,7 +29,7 @@ def find_pandaset(root: Path) -> list[Path]:
     """Scenes at, or one or two levels below a folder."""
     for level in ("", "*/", "*/*/"):
         scenes = sorted(path.parents[1] for path in root.glob(f"{level}{SWEEPS}/poses.json"))
-        found = [scene for scene in scenes if any((scene / SWEEPS).glob(f"*{FILE}"))]
+        found = [scene for scene in scenes if any((scene / SWEEPS).glob(f"[!.]*{FILE}"))]
         if found:
             return found
     return []

@@ -51,7 +51,7 @@ def check_turn(box: Box) -> Box:
         ValueError: its quaternion is next to 0.
     """
     if math.hypot(*box.quaternion_wxyz) < _SHORTEST:
-        raise ValueError(f"a box turned by {box.quaternion_wxyz}, no unit quaternion")
+        raise ValueError(f"a box turned by {box.quaternion_wxyz}, which is next to 0")
     return box
 
 

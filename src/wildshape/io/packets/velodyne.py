@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Velodyne's packets, decoded by velodyne-decoder.
 
-A turn ends where the beam looks back: what is ahead is seen at one time. It ends as well where
-nothing came for a while, and turns that lack packets are left out.
+A turn ends where the beam looks back: what is ahead is seen at one time. Turns that lack packets,
+or amid which nothing came for a while, are left out.
 """
 
 import json
@@ -16,7 +16,7 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from wildshape.errors import load_library
+from wildshape.errors import BadInputError, load_library
 from wildshape.io.guard import first_line, reading
 from wildshape.records import Turn
 
@@ -24,8 +24,9 @@ _INSTALL = "pip install 'wildshape[pcap]'"
 _AZIMUTH = slice(2, 4)  # of a packet's first block, hundredths of a degree, clockwise from ahead
 _BACK, _ROUND = 18000, 36000
 _UDP_HEADER = 8  # bytes
-_WHOLE = 0.9  # of the usual turn's packets that a turn must have
-_PAUSE_S = 0.05  # a turn at the highest speed: after a longer one the angle tells no turns apart
+_WHOLE = 0.9  # of the packets of the turns around it that a turn must have
+_AROUND = 10  # turns before and after: returns and speed may be changed amid a recording
+_LONGEST = 1.5  # times the usual time from turn to turn: longer are pieces of several
 _LATE = 2000  # hundredths of a degree that a late packet may be behind: two at the highest speed
 _FIRST = 100  # packets that tell an HDL-64E; the others' ends change at most where damaged
 _LASERS = 64
@@ -55,12 +56,14 @@ class _Turn:
     """Where a turn is: its first packet, and how many there are.
 
     Attributes:
-        stamp: when the last was recorded, seconds.
+        began: when the first packet was recorded, seconds.
+        stamp: when the last was.
         turned: how far from behind the beam has come, hundredths of a degree.
     """
 
     begin: int
     packets: int = 0
+    began: float = 0.0
     stamp: float = 0.0
     turned: int = 0
 
@@ -108,11 +111,13 @@ def open_velodyne(path: Path) -> VelodyneTurns:
     """
     _decoder()
     turns: dict[_Source, list[_Turn]] = {}
+    models: dict[_Source, Counter[int]] = {}
     warnings = []
     try:
         with path.open("rb") as file:
             for packet in _packets(file):
                 _count(packet, turns.setdefault(packet.source, []))
+                models.setdefault(packet.source, Counter())[packet.data[-1]] += 1
     except Exception as error:  # noqa: BLE001 - whatever it is, the packets before it are good
         warnings.append(f"{path.name} is cut off or damaged ({first_line(error)})")
     source = max(turns, key=lambda one: sum(turn.packets for turn in turns[one]), default=None)
@@ -123,12 +128,16 @@ def open_velodyne(path: Path) -> VelodyneTurns:
             f" taken, which are most, and those of {others} left out"
         )
     found = turns[source] if source is not None else []
-    least = _WHOLE * float(np.median([turn.packets for turn in found] or [0]))
-    whole = tuple(turn for turn in found if turn.packets >= least)
+    sound = _are_whole(found)
+    whole = tuple(turn for turn, is_whole in zip(found, sound) if is_whole)
     # A recording begins and ends amid a turn, which is no loss.
-    if lacking := sum(turn.packets < least for turn in found[1:-1]):
+    if lacking := sound[1:-1].count(False):
         warnings.append(f"{lacking} turns with missing packets are left out")
-    described = _described(path, source, found) if whole else None
+    described = _described(path, source, found) if source is not None and whole else None
+    if source is not None and described is None:
+        damaged = models[source].total() - max(models[source].values())
+        if damaged:
+            warnings.append(f"{damaged} packets end in another model than most and are left out")
     times = tuple(turn.stamp for turn in whole)
     return VelodyneTurns(path, times, tuple(warnings), source, whole, described)
 
@@ -136,17 +145,24 @@ def open_velodyne(path: Path) -> VelodyneTurns:
 def _count(packet: _Packet, turns: list[_Turn]) -> None:
     """Add a sensor's next packet to its turns; a late one goes where the one before it went."""
     turned = (int.from_bytes(packet.data[_AZIMUTH], "little") - _BACK) % _ROUND
-    if not turns or _begins(turns[-1], turned, packet.stamp):
-        turns.append(_Turn(packet.begin, turned=turned))
+    if not turns or (turned < turns[-1].turned and not _is_late(turns[-1], turned)):
+        turns.append(_Turn(packet.begin, began=packet.stamp, turned=turned))
     turn = turns[-1]
     turn.packets, turn.stamp = turn.packets + 1, packet.stamp
     turn.turned = turn.turned if _is_late(turn, turned) else turned
 
 
-def _begins(turn: _Turn, turned: int, stamp: float) -> bool:
-    """Whether a packet begins the turn after this one."""
-    passed = turned < turn.turned and not _is_late(turn, turned)
-    return passed or abs(stamp - turn.stamp) > _PAUSE_S
+def _are_whole(turns: list[_Turn]) -> list[bool]:
+    """Which turns have as many packets as those around them, and are not pieces of several."""
+    packets = np.array([turn.packets for turn in turns])
+    periods = np.diff([turn.stamp for turn in turns])
+    found = []
+    for i, turn in enumerate(turns):
+        usual = np.median(packets[max(i - _AROUND, 0) : i + _AROUND + 1])
+        period = np.median(periods[max(i - _AROUND, 0) : i + _AROUND]) if len(periods) else np.inf
+        lasts = abs(turn.stamp - turn.began)
+        found.append(bool(turn.packets >= _WHOLE * usual and lasts <= _LONGEST * period))
+    return found
 
 
 def _is_late(turn: _Turn, turned: int) -> bool:
@@ -199,20 +215,25 @@ def _datagram(record: bytes) -> tuple[Any, bytes]:
     return (None if isinstance(found, bytes) else found), sender
 
 
-def _described(path: Path, source: _Source | None, turns: list[_Turn]) -> _Sensor:
+def _described(path: Path, source: _Source, turns: list[_Turn]) -> _Sensor:
     """An HDL-64E, which sends its own calibration; all others tell their model in each packet.
 
     Raises:
         BadInputError: it sent too little of it.
     """
     count = sum(turn.packets for turn in turns)
-    told = "an HDL-64E's calibration, which it sends piece by piece, over seconds"
-    with reading(path, told), path.open("rb") as file:
+    with reading(path, "packets of a Velodyne"), path.open("rb") as file:
         if not _is_hdl64e(_packets_of(file, source, turns[0].begin, min(count, _FIRST))):
             return None
         file.seek(0)
         sent = _packets_of(file, source, turns[0].begin, count)
-        return _calibrated(one.data for one in sent)
+        try:
+            return _calibrated(one.data for one in sent)
+        except (ValueError, KeyError) as error:
+            raise BadInputError(
+                f"{path}: an HDL-64E's calibration, which it sends over seconds, is not whole"
+                f" ({first_line(error)}); record longer."
+            ) from error
 
 
 def _is_hdl64e(packets: Iterator[_Packet]) -> bool:
@@ -239,8 +260,8 @@ def _calibrated(sent: Iterator[bytes]) -> _Sensor:
 
 def _of_one_model(packets: list[_Packet]) -> list[_Packet]:
     """Those that end in the model that most end in: the decoder refuses a turn with others."""
-    models = Counter(one.data[-1] for one in packets)
-    return [one for one in packets if one.data[-1] == models.most_common(1)[0][0]]
+    ((model, _),) = Counter(one.data[-1] for one in packets).most_common(1)
+    return [one for one in packets if one.data[-1] == model]
 
 
 def _config(sensor: _Sensor) -> Any:

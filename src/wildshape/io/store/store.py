@@ -47,6 +47,11 @@ def is_store(path: Path | str) -> bool:
     return any((Path(path) / name).is_file() for name in (INDEX_JSON, WRITING_JSON))
 
 
+def is_finished_store(path: Path | str) -> bool:
+    """Whether a packed store lies at `path`, and not a half-written one."""
+    return (Path(path) / INDEX_JSON).is_file()
+
+
 def open_store(path: Path | str, named: Path | None = None) -> "Store":
     """Open a finished packed store for reading; costs milliseconds however large it is.
 
