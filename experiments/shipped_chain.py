@@ -34,6 +34,7 @@ from wildshape.io.store.store import Store, is_finished_store, open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import MODEL, load_checkpoint, save_checkpoint, weights_file
 from wildshape.method.ray_encoder import RayConfig
+from wildshape.ops.device import choose_device
 from wildshape.ops.threads import exact_on
 from wildshape.parallel.team import cores
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
@@ -128,6 +129,7 @@ class Settings:
         start: checkpoint, or the name of weights shipped, that teach the last round and that it
             goes on from; the rounds before are left out.
         only: weights that are made; `car` asks `default` of RUN/weights.
+        device: of the trainings. On a GPU sums come in any order: two runs differ.
     """
 
     out: Path
@@ -135,6 +137,7 @@ class Settings:
     share: float = 1.0
     start: Path | None = None
     only: tuple[Literal["default", "airplane", "chair", "car"], ...] = NAMES
+    device: Literal["cpu", "cuda"] = "cpu"
 
     @property
     def rounds(self) -> tuple[str, ...]:
@@ -147,7 +150,8 @@ class Settings:
         """That makes such weights."""
         share = "" if self.share == 1 else f" --share {self.share:g}"
         start = "" if self.start is None else f" --start {self.start.name}"
-        return f"{_COMMAND}{share}{start}"
+        device = "" if self.device == "cpu" else f" --device {self.device}"
+        return f"{_COMMAND}{share}{start}{device}"
 
     def part(self, count: int, least: int = 1) -> int:
         """So many tracks or steps of `count`."""
@@ -193,6 +197,7 @@ def trained(name: str, settings: Settings) -> None:
             _data(of.data, settings),
             folder,
             seed=of.data,
+            device=choose_device(settings.device),
             resume=True,
             teacher=settings.checkpoint(of.teacher),
             start=settings.checkpoint(of.start),
@@ -251,6 +256,7 @@ def _views(category: Literal["airplane", "chair", "car"], settings: Settings) ->
             steps=settings.part(VIEW_STEPS[category]),
             taught_steps=settings.part(TAUGHT_STEPS[category]),
             headings=headings,
+            device=settings.device,
         )
     )
     _shipped(folder / f"{category}.safetensors", settings, category)

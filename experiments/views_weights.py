@@ -25,6 +25,7 @@ from wildshape.io.output import provenance
 from wildshape.io.store.store import is_finished_store, open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import load_checkpoint, save_checkpoint
+from wildshape.ops.device import choose_device
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.config import Recipe
 from wildshape.training.loop import MODEL, fit, setup
@@ -47,6 +48,7 @@ class Settings:
         taught_lr: learning rate that the second falls from.
         headings: checkpoint of LiDAR scans that the second stage asks which way the views look.
         seed: of data and training.
+        device: of the trainings.
     """
 
     out: Path
@@ -58,6 +60,7 @@ class Settings:
     taught_lr: float = 7e-4
     headings: Path | None = None
     seed: int = 0
+    device: Literal["cpu", "cuda"] = "cpu"
 
 
 def make_data(settings: Settings, path: Path) -> None:
@@ -101,6 +104,7 @@ def train(settings: Settings, recipe: Recipe, name: str, teacher: Path | None = 
         open_store(settings.out / "data"),
         settings.out / name,
         seed=settings.seed,
+        device=choose_device(settings.device),
         resume=True,
         start=teacher,
         teacher=teacher,
@@ -118,6 +122,7 @@ def ship(model: Path, settings: Settings) -> None:
     stages = f"--steps {settings.steps} --taught-steps {settings.taught_steps}"
     stages += f" --rounds {settings.rounds}" if settings.rounds > 1 else ""
     stages += " --headings DEFAULT" if settings.headings else ""
+    stages += "" if settings.device == "cpu" else f" --device {settings.device}"
     what = f"--category {settings.category} --cad CAD --out RUN {stages} --seed {settings.seed}"
     command = {"command": f"python -m experiments.views_weights {what}"}
     described = replace(found, provenance=found.provenance | command)

@@ -64,7 +64,10 @@ def fit(
             save=partial(checkpoint, run),
             halt=partial(_save_state, run),
         )
-        run_to_end(loop, meter, log, progress, partial(_stop_asked, run, stopped))
+        try:
+            run_to_end(loop, meter, log, progress, partial(_stop_asked, run, stopped))
+        finally:
+            run.views.close()
     run.processes.leave()
     return run.folder / MODEL
 

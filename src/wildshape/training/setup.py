@@ -20,6 +20,7 @@ from wildshape.io.store.store import Store
 from wildshape.method.checkpoint import load_checkpoint
 from wildshape.method.network import Encoding, ShapePoseNet
 from wildshape.ops.device import keep_memory, multiplies_bf16
+from wildshape.parallel.team import cores
 from wildshape.training.batches.fused import FusedSampler, FusedTargets
 from wildshape.training.batches.host import HostViews
 from wildshape.training.batches.resident import ResidentViews, TooLargeError
@@ -238,13 +239,14 @@ def _views(
     recipe: Recipe,
     say: Say,
 ) -> Views:
-    """On a GPU the scans lie there, if they fit; on a CPU they stay in the mapped store."""
+    """On a GPU the scans lie there, if they fit; else every core draws for it."""
     device = processes.device
+    workers = 1 if device.type == "cpu" else max(1, cores() // processes.count)
     if targets is not None:
         draw = recipe.self_training.draw
         net = recipe.network
         single = FusedSampler(sampler, targets, draw, mirror=net.mirror, rays=net.rays)
-        return HostViews(single, seed, processes.rank, device)
+        return HostViews(single, seed, processes.rank, device, workers)
     if device.type != "cuda":
         return HostViews(sampler, seed, processes.rank, device)
     most = int(_RESIDENT_SHARE * torch.cuda.mem_get_info(device)[1])
@@ -252,7 +254,7 @@ def _views(
         return ResidentViews(sampler, seed, processes.rank, device, most)
     except TooLargeError as error:
         say(f"{error} Batches are drawn on the CPU instead, which is slower.")
-        return HostViews(sampler, seed, processes.rank, device)
+        return HostViews(sampler, seed, processes.rank, device, workers)
 
 
 def step_of(run: Run, meter: Meter) -> tuple[Step, Callable[[], None]]:

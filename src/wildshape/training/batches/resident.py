@@ -89,6 +89,9 @@ class ResidentViews:
     def ahead(self) -> None:
         """Nothing, as before."""
 
+    def close(self) -> None:
+        """Nothing, for nobody draws."""
+
     def hold(self, anchors: Float[Tensor, "S 3 3"]) -> None:
         """From now on scans are held to these headings."""
         self._anchors.copy_(anchors)
