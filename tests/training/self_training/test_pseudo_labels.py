@@ -30,7 +30,7 @@ from wildshape.training.self_training.pseudo_labels import (
     levelled,
     refined,
     shape_of,
-    view_tops,
+    whole_shape,
     with_roof,
 )
 
@@ -169,7 +169,8 @@ def test_poses_by_which_a_scan_would_jump_are_not_taken(cars, monkeypatch):
 def test_tracks_turned_as_wholes_look_one_way_again(who, cars):
     turned = torch.tensor((1.0, -1.0, 1.0, -1.0, 1.0, 1.0))
     tracks = [true_track(cars, i, sign.expand(12)) for i, sign in enumerate(turned)]
-    found = agreed_tracks(who, tracks, [sign.expand(12) for sign in turned])
+    shapes = [shape_of(who, track) for track in tracks]
+    found = agreed_tracks(shapes, tracks, [sign.expand(12) for sign in turned])
     assert max(float(off(track, cars, i).max()) for i, track in enumerate(found)) < 1e-4
 
 
@@ -200,8 +201,8 @@ def test_a_roof_above_all_sensors_takes_no_points_away(who):
     assert np.abs(closed[:, 1]).min() < 0.5
 
 
-def test_a_camera_s_view_ends_above_no_track(car_store):
-    camera = ViewSampler(
-        car_store, np.arange(len(car_store)), replace(TAUGHT.views, sensor="camera")
-    )
-    assert view_tops(camera) == [math.inf] * len(car_store)
+def test_a_camera_s_view_ends_above_no_track(who, cars):
+    camera = replace(who, settings=replace(who.settings, sensor="camera"))
+    shape, top = whole_shape(camera, true_track(cars, 0))
+    assert top == math.inf
+    assert np.array_equal(shape, shape_of(camera, true_track(cars, 0)))

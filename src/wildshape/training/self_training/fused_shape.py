@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Float32
 from torch import Tensor
 
 from wildshape.geometry.ground import skirt
+from wildshape.geometry.sampling import voxel_thin
 from wildshape.records import SensorKind
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.self_training.headings import PosedTrack
@@ -72,7 +73,7 @@ def fused_shape(
     fused = np.concatenate(clouds)
     if mirror:
         fused = np.concatenate((fused, fused * np.asarray((1, -1, 1), np.float32)))
-    thinned = _voxel_means(fused, voxel_m)
+    thinned = voxel_thin(fused, voxel_m)
     kept = thinned[_near_others(thinned, config)]
     kept = kept[~skirt(kept)] if sampler.config.sensor == "lidar" else kept
     return exactly(kept, config.points)
@@ -110,13 +111,3 @@ def _near_others(points: Float32[np.ndarray, "n 3"], config: FusionConfig) -> Bo
 
     apart = KDTree(points).query(points, k=config.neighbours + 1)[0][:, 1:].mean(axis=1)
     return apart <= config.stray * np.median(apart)
-
-
-def _voxel_means(points: Float32[np.ndarray, "n 3"], edge_m: float) -> Float32[np.ndarray, "m 3"]:
-    """The mean of the points in each cube: even density, and less noise than its points."""
-    cell = np.floor(points / np.float32(edge_m)).astype(np.int64)
-    _, place = np.unique(cell, axis=0, return_inverse=True)
-    place = place.reshape(-1)
-    count = np.bincount(place)
-    sums = [np.bincount(place, points[:, axis], len(count)) for axis in range(3)]
-    return (np.stack(sums, axis=1) / count[:, None]).astype(np.float32)

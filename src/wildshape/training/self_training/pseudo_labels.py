@@ -218,15 +218,13 @@ def fused_targets(
             tracks.append(track)
             votes.append(signs)
             progress(done, len(sampler.scans_of))
-    if who.headings is None and fronts is None:
-        tracks = agreed_tracks(who, tracks, votes)
-    if who.is_lidar:
-        tracks = [levelled(track) for track in tracks]
-    shapes = [shape_of(who, track) for track in tracks]
-    tops = view_tops(sampler)
-    if who.is_lidar:
-        shapes = [with_roof(who, *known) for known in zip(shapes, tracks, tops)]
-    return targets_of(sampler, tracks, shapes, tops, config.fusion, complete=False)
+        if who.headings is None and fronts is None:
+            shapes = list(helpers.in_order(partial(shape_of, who), tracks))
+            tracks = agreed_tracks(shapes, tracks, votes, config)
+        if who.is_lidar:
+            tracks = [levelled(track) for track in tracks]
+        shapes, tops = zip(*helpers.in_order(partial(whole_shape, who), tracks))
+    return targets_of(sampler, tracks, list(shapes), list(tops), config.fusion, complete=False)
 
 
 def posed_together(
@@ -278,14 +276,16 @@ def chained(scans: list[Points], T_sensor_can: SE3, config: SelfTrainingConfig =
 
 
 def agreed_tracks(
-    teacher: Teacher, tracks: Sequence[PosedTrack], votes: Sequence[Float[Tensor, "_"]]
+    shapes: Sequence[Float32[np.ndarray, "G 3"]],
+    tracks: Sequence[PosedTrack],
+    votes: Sequence[Float[Tensor, "_"]],
+    config: SelfTrainingConfig = _DEFAULT,
 ) -> list[PosedTrack]:
     """The tracks turned so that all look one way, as profiles and the teacher itself say."""
-    config = teacher.config.headings
-    clouds = [torch.from_numpy(shape_of(teacher, track)) for track in tracks]
-    profiles = together([profile(cloud, config.profile) for cloud in clouds])
-    signs = signs_across(profiles, votes, config.profile)
-    signs = settled_signs(tracks, votes, profiles, signs, config)
+    rules = config.headings
+    profiles = together([profile(torch.from_numpy(shape), rules.profile) for shape in shapes])
+    signs = signs_across(profiles, votes, rules.profile)
+    signs = settled_signs(tracks, votes, profiles, signs, rules)
     return turned_as_wholes(tracks, signs)
 
 
@@ -303,6 +303,15 @@ def shape_of(teacher: Teacher, track: PosedTrack) -> Float32[np.ndarray, "G 3"]:
     return fused_shape(teacher.views, track, config, mirror=teacher.mirror, voxel_m=voxel)
 
 
+def whole_shape(teacher: Teacher, track: PosedTrack) -> tuple[Float32[np.ndarray, "G 3"], float]:
+    """What a track shows, with a vehicle's roof, and where its view ended above."""
+    shape = shape_of(teacher, track)
+    if not teacher.is_lidar:
+        return shape, math.inf  # a camera's view ends where its image does: not on objects
+    top = view_top_of(teacher.views, track.scans)
+    return with_roof(teacher, shape, track, top), top
+
+
 def with_roof(
     teacher: Teacher, shape: Float32[np.ndarray, "G 3"], track: PosedTrack, top: float
 ) -> Float32[np.ndarray, "G 3"]:
@@ -312,15 +321,10 @@ def with_roof(
     return with_unseen_roof(shape, sensors, top, config.roof, mirror=teacher.mirror)
 
 
-def view_tops(sampler: ViewSampler) -> list[float]:
-    """Where each track's view ended above; a camera's ends where its image does: not on objects."""
-    if sampler.config.sensor != "lidar":
-        return [math.inf] * len(sampler.scans_of)
-
-    def highest(scan: int) -> float:
-        return float(slope(torch.from_numpy(sampler.store.scan_points(scan))).max())
-
-    return [view_top([highest(int(scan)) for scan in scans]) for scans in sampler.scans_of]
+def view_top_of(views: ViewSampler, scans: Int64[np.ndarray, "V"]) -> float:
+    """Where a LiDAR's view of a track ended above."""
+    clouds = (torch.from_numpy(views.store.scan_points(int(scan))) for scan in scans)
+    return view_top([float(slope(cloud).max()) for cloud in clouds])
 
 
 def _scaled(T_a_b: SE3, factor: float) -> SE3:
