@@ -7,9 +7,8 @@
 CAD holds `manifest.csv` (columns category, file, split, tier, licence, source, name) and the meshes
 it names. Simulated scans alone are trained on, of procedural shapes and of meshes of split `train`
 that an Apache-2.0 file may be made from. RUN/weights holds what is shipped, and its NOTICE.
-On a GPU with 16 cores (`--device cuda`) the vehicles take a quarter of an hour, on two cores most
-of a day. With `--start WEIGHTS` the last round alone is trained: they teach it, and it goes on from
-them. A trial (`--share 0.01`) has a folder of its own in RUN.
+`--device cuda` trains on a GPU. With `--start WEIGHTS` the last round alone is trained: they teach
+it, and it goes on from them. A trial (`--share 0.01`) has a folder of its own in RUN.
 The same command goes on with a run that was stopped; what is finished is not made again. RUN holds
 the weights of each finished round, `<round>.safetensors`: copied to another machine's RUN, they are
 not trained again there.
@@ -92,8 +91,8 @@ class Round:
 ROUNDS = {
     "first": Round(data=1, steps=6_000, preset="small"),
     "taught": Round(data=1, steps=8_000, teacher="first"),
-    "main": Round(data=2, steps=80_000, teacher="taught", start="taught"),
-    "last": Round(data=3, steps=40_000, lr=4e-4, teacher="main", start="main", rays=True),
+    "main": Round(data=2, steps=30_000, teacher="taught", start="taught"),
+    "last": Round(data=3, steps=12_000, lr=4e-4, teacher="main", start="main", rays=True),
 }
 """In their order; the last one is shipped."""
 
