@@ -264,15 +264,23 @@ def main() -> None:
     recipes = [PRESETS[name]() for name in ("paper-lidar", "paper-views", "default")]
     if arguments.smoke:
         recipes = [smallest()]
-    outcome, device = Outcome("gpu"), arguments.device
+    outcome, device, began = Outcome("gpu"), arguments.device, time.perf_counter()
+
+    def at(what: str) -> None:
+        outcome.note(f"{what} after {time.perf_counter() - began:.0f} s")
+
     with TemporaryDirectory() as folder:
         write_cars(Path(folder) / "cars", tracks=2 if arguments.smoke else 64)
         store = open_store(Path(folder) / "cars")
         for recipe in recipes:
             steps(outcome, recipe, store, size, device)
+            at(recipe.name)
         agreement(outcome, recipes[0], store, min(size.steps, AGREE), device)
+        at("losses")
         side_by_side(outcome, recipes[0], store, size, device)
+        at("side by side")
     search(outcome, size.nearest, device)
+    at("searches")
     for preset in ("tiny",) if arguments.smoke else ("paper-lidar", "default"):
         completion(outcome, preset, size, device)
     outcome.publish(arguments.out, small=arguments.small)

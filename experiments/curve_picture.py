@@ -59,6 +59,7 @@ def draw(out: Path, entries: list[dict[str, Any]]) -> None:
     mpl.use("agg")
     mpl.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "wildshape", "font.size": 8})
     from matplotlib import pyplot as plt
+    from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
     figure, panels = plt.subplots(1, 5, figsize=(13, 2.8), layout="constrained")
     for key, name in _LOSSES.items():
@@ -74,6 +75,9 @@ def draw(out: Path, entries: list[dict[str, Any]]) -> None:
     for panel in panels:
         panel.set_xlabel("step")
         panel.set_xscale("log")
+        panel.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        panel.xaxis.set_major_formatter(EngFormatter(sep=""))
+        panel.xaxis.set_minor_formatter(NullFormatter())
         panel.spines[["top", "right"]].set_visible(False)
     with atomic_write(out) as file:
         figure.savefig(file, format="svg", metadata={"Date": None})
