@@ -15,6 +15,7 @@ import numpy as np
 import tyro
 from PIL import Image
 
+from wildshape.cli.main import in_a_sentence
 from wildshape.evaluation.metrics import box_score, true_box
 from wildshape.inference.boxes import carried
 from wildshape.inference.predictor import load
@@ -86,4 +87,5 @@ def draw(out: Path, clouds: list[np.ndarray], boxes: list[tuple[str, np.ndarray,
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Settings))
+    with in_a_sentence():
+        main(tyro.cli(Settings))

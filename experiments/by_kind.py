@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import tyro
 
+from wildshape.cli.main import in_a_sentence
 from wildshape.evaluation.tables import pipe_table
 from wildshape.io.store.store import open_store
 
@@ -73,5 +74,6 @@ def _by_kind(methods: list[Any], kinds: dict[str, str], what: str) -> dict[str, 
 
 
 if __name__ == "__main__":
-    settings = tyro.cli(Settings)
-    print(table(settings.data, settings.evaluation, settings.method))
+    with in_a_sentence():
+        settings = tyro.cli(Settings)
+        print(table(settings.data, settings.evaluation, settings.method))

@@ -23,6 +23,7 @@ from experiments.confidence import rewrite
 from experiments.trust_data import Both, Known
 from experiments.trust_parts import STREETS, Parts
 
+from wildshape.cli.main import in_a_sentence
 from wildshape.evaluation.calibration import auroc, calibration
 from wildshape.io.atomic import write_json
 from wildshape.io.output import provenance
@@ -174,4 +175,5 @@ def _figures(name: str, parts: list[tuple[Known, np.ndarray]]) -> dict[str, dict
 
 if __name__ == "__main__":
     torch.set_num_threads(1)
-    main(tyro.cli(Settings))
+    with in_a_sentence():
+        main(tyro.cli(Settings))

@@ -24,6 +24,7 @@ import tyro
 from experiments.mesh_credits import rows_of
 from safetensors import safe_open
 
+from wildshape.cli.main import in_a_sentence
 from wildshape.evaluation.cases import turn_track
 from wildshape.evaluation.metrics import completion_error
 from wildshape.evaluation.risk_coverage import RiskCoverage, rank_correlation, risk_coverage
@@ -264,4 +265,5 @@ def main(settings: Settings) -> None:
 
 if __name__ == "__main__":
     torch.set_num_threads(1)
-    main(tyro.cli(Settings))
+    with in_a_sentence():
+        main(tyro.cli(Settings))

@@ -13,6 +13,7 @@ import matplotlib as mpl
 import numpy as np
 import tyro
 
+from wildshape.cli.main import in_a_sentence
 from wildshape.io.atomic import atomic_write
 from wildshape.report.page.curves import whole_entries
 
@@ -85,4 +86,5 @@ def draw(out: Path, entries: list[dict[str, Any]]) -> None:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Settings, description=__doc__))
+    with in_a_sentence():
+        main(tyro.cli(Settings, description=__doc__))

@@ -25,6 +25,7 @@ from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from wildshape.cli.main import in_a_sentence
 from wildshape.datasets.sources import open_source
 from wildshape.datasets.tracks.source import all_tracks
 from wildshape.datasets.tracks.truth import fuse_by_truth
@@ -139,4 +140,5 @@ def save_webp(pixels: Image.Image, out: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Settings))
+    with in_a_sentence():
+        main(tyro.cli(Settings))

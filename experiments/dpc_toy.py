@@ -43,6 +43,7 @@ from wildshape.baselines.dpc.viewing_volume import (
     scan_image,
     to_volume,
 )
+from wildshape.cli.main import in_a_sentence
 from wildshape.geometry.transforms.rotation import rotation_angle
 from wildshape.io.atomic import write_json
 from wildshape.io.output import provenance
@@ -234,4 +235,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_a_sentence():
+        main()

@@ -13,6 +13,7 @@ from typing import Annotated
 import tyro
 
 import wildshape
+from wildshape.cli.main import in_a_sentence
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle, read_finished
 from wildshape.report.drive.picture import write_drive_picture
@@ -62,4 +63,5 @@ def nearest(found: FinishedDrive) -> list[FoundVehicle]:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Settings))
+    with in_a_sentence():
+        main(tyro.cli(Settings))

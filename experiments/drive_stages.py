@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 import torch
 
 import wildshape
+from wildshape.cli.main import in_a_sentence
 from wildshape.drives.config import INFERENCE
 from wildshape.drives.result import DriveResult
 
@@ -58,4 +59,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_a_sentence():
+        main()

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import tyro
 
+from wildshape.cli.main import in_a_sentence
 from wildshape.io.atomic import write_text
 from wildshape.io.output import MARKER
 
@@ -143,4 +144,5 @@ def _line(name: str, values: Sequence[float] | np.ndarray) -> str:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Settings))
+    with in_a_sentence():
+        main(tyro.cli(Settings))

@@ -21,6 +21,7 @@ import tyro
 from jaxtyping import Float
 
 import wildshape
+from wildshape.cli.main import in_a_sentence
 from wildshape.evaluation.drives.overlap import UprightBox, overlaps
 from wildshape.evaluation.drives.rectangles import l_shape, smallest_rectangle
 from wildshape.evaluation.metrics import true_box
@@ -173,4 +174,5 @@ def shown(column: str, value: float) -> str:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Settings))
+    with in_a_sentence():
+        main(tyro.cli(Settings))

@@ -18,6 +18,7 @@ import tyro
 from experiments.labelled_boxes import COLUMNS, errors, shown, upright
 
 import wildshape
+from wildshape.cli.main import in_a_sentence
 from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.adapting.examples import Example
 from wildshape.drives.adapting.measures import measure
@@ -92,4 +93,5 @@ def _rows(model: Predictor, track: Track) -> tuple[np.ndarray, np.ndarray]:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Settings))
+    with in_a_sentence():
+        main(tyro.cli(Settings))

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import tyro
 
+from wildshape.cli.main import in_a_sentence
 from wildshape.errors import BadInputError
 
 TIERS = ("A", "A?")
@@ -118,4 +119,5 @@ def _main(cad: tyro.conf.Positional[Path], copyleft: tuple[str, ...] = ()) -> No
 
 
 if __name__ == "__main__":
-    tyro.cli(_main)
+    with in_a_sentence():
+        tyro.cli(_main)

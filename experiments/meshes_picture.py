@@ -17,6 +17,7 @@ import trimesh
 import tyro
 from PIL import Image
 
+from wildshape.cli.main import in_a_sentence
 from wildshape.errors import BadInputError
 from wildshape.io.boxes.detections import pose_of
 from wildshape.report.results import OBJECTS, box_of, find, read_object
@@ -89,4 +90,5 @@ def shaded(mesh: trimesh.Trimesh, width: int) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Settings))
+    with in_a_sentence():
+        main(tyro.cli(Settings))

@@ -11,6 +11,7 @@ from typing import Annotated
 
 import tyro
 
+from wildshape.cli.main import in_a_sentence
 from wildshape.inference.predictor import load
 from wildshape.report.content import track_object
 from wildshape.report.picture import write_picture
@@ -47,4 +48,5 @@ def main(settings: Settings) -> None:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Settings))
+    with in_a_sentence():
+        main(tyro.cli(Settings))

@@ -24,6 +24,7 @@ from wildshape.baselines.global_icp import GlobalIcp
 from wildshape.baselines.icp import Gicp, LocalIcp, MultiStartIcp
 from wildshape.baselines.kiss_matcher import KissMatcher
 from wildshape.baselines.pairs import Chained
+from wildshape.cli.main import in_a_sentence
 from wildshape.errors import MissingExtraError
 from wildshape.evaluation.metrics import ACCURATE_DEG
 from wildshape.evaluation.protocol import run
@@ -133,4 +134,5 @@ def _typed() -> str:
 
 
 if __name__ == "__main__":
-    main()
+    with in_a_sentence():
+        main()

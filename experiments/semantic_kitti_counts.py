@@ -13,6 +13,7 @@ Reads labels alone (data_odometry_labels.zip, 179 MB); minutes. What `convert` w
 import sys
 from pathlib import Path
 
+from wildshape.cli.main import in_a_sentence
 from wildshape.datasets.semantic_kitti.labels import (
     VEHICLES,
     categories_of,
@@ -53,5 +54,6 @@ def count(objects: list[list[int]], least: int) -> str:
 
 
 if __name__ == "__main__":
-    SemanticKitti(Path(sys.argv[1])).parts()
-    main(Path(sys.argv[1]))
+    with in_a_sentence():
+        SemanticKitti(Path(sys.argv[1])).parts()
+        main(Path(sys.argv[1]))

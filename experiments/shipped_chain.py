@@ -27,6 +27,7 @@ from experiments.mesh_credits import notice
 from experiments.meshes import road_vehicles
 
 from experiments import calibrate_confidence, confidence, views_weights
+from wildshape.cli.main import in_a_sentence
 from wildshape.cli.terminal import TERMINAL, stoppable
 from wildshape.io.atomic import write_text
 from wildshape.io.output import provenance
@@ -305,4 +306,5 @@ def _trusted(model: Path, settings: Settings) -> Path:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Settings))
+    with in_a_sentence():
+        main(tyro.cli(Settings))

@@ -23,6 +23,7 @@ from experiments.mesh_credits import rows_of
 from scipy.spatial import KDTree
 
 import wildshape
+from wildshape.cli.main import in_a_sentence
 from wildshape.evaluation.drives.overlap import UprightBox
 from wildshape.evaluation.metrics import true_box
 from wildshape.inference.predictor import Predictor
@@ -190,4 +191,5 @@ def _webp(figure: Any) -> bytes:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Settings))
+    with in_a_sentence():
+        main(tyro.cli(Settings))

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wildshape.cli.main import in_a_sentence
 from wildshape.geometry.projection.full_scan import MOST_RAYS, thinned
 from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.io.write_tracks import write_tracks
@@ -81,4 +82,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_a_sentence():
+        main()

@@ -21,6 +21,7 @@ from typing import Literal
 import tyro
 from experiments.meshes import stretched
 
+from wildshape.cli.main import in_a_sentence
 from wildshape.io.output import provenance
 from wildshape.io.store.store import is_finished_store, open_store
 from wildshape.io.store.writer import StoreWriter
@@ -131,4 +132,5 @@ def ship(model: Path, settings: Settings) -> None:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Settings))
+    with in_a_sentence():
+        main(tyro.cli(Settings))

@@ -20,6 +20,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from wildshape.cli.main import in_a_sentence
 from wildshape.io.tracks import write_track
 from wildshape.records import Track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
@@ -113,4 +114,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_a_sentence():
+        main()

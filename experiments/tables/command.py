@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import tyro
 
-from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.cli.main import in_a_sentence
 
 SettingsT = TypeVar("SettingsT")
 
@@ -24,11 +24,5 @@ def begin(run: Callable[[SettingsT, str], None], settings: type[SettingsT], modu
     """
     arguments = sys.argv[1:]
     line = shlex.join(["python", "-m", module, *arguments])
-    try:
+    with in_a_sentence():
         run(tyro.cli(settings, args=arguments), line)
-    except (BadInputError, MissingExtraError) as error:
-        print(error, file=sys.stderr)
-        sys.exit(2)
-    except KeyboardInterrupt as stopped:
-        print(stopped, file=sys.stderr)
-        sys.exit(130)

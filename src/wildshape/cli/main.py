@@ -5,7 +5,8 @@
 import errno
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from types import ModuleType
 
 from wildshape.cli.commands import module_of
@@ -100,13 +101,20 @@ def _print_completion(shell: str = "") -> None:
 
 
 def _guarded(command: str, arguments: list[str]) -> None:
-    """Run a command; what a user can cure becomes one sentence and an exit code."""
+    """Run a command."""
+    with in_a_sentence():
+        module = module_of(command)
+        module.run(_parse(module, command, arguments))
+
+
+@contextmanager
+def in_a_sentence() -> Iterator[None]:
+    """What a user can cure, and a signal, end the program with one sentence and an exit code."""
     reserved: list[bytearray] = []
     try:
         reserved.append(bytearray(_RESERVED_BYTES))
         with terminable():
-            module = module_of(command)
-            module.run(_parse(module, command, arguments))
+            yield
     except (BadInputError, MissingExtraError) as error:
         _leave(str(error), _BAD_INPUT)
     except Terminated as stopped:
