@@ -205,9 +205,8 @@ def trained(name: str, settings: Settings) -> None:
             provenance=provenance(settings.command) | {"round": name},
             taught=lambda done, total: bar.at(done, total=total),
         )
-    if run.state.step < steps:  # else it is there; made anew, it would teach others
-        with exact_on(cores()):
-            fit_with_progress(run, TERMINAL, stoppable, resume=settings.command)
+    with exact_on(cores()):
+        fit_with_progress(run, TERMINAL, stoppable, resume=settings.command)
     save_checkpoint(settings.finished(name), *load_checkpoint(folder / MODEL), half=True)
 
 

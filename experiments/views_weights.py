@@ -29,7 +29,7 @@ from wildshape.method.checkpoint import load_checkpoint, save_checkpoint
 from wildshape.ops.device import choose_device
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.config import Recipe
-from wildshape.training.loop import MODEL, fit, setup
+from wildshape.training.loop import fit, setup
 from wildshape.training.recipes import views
 
 _COPIES, _VIEWS, _TRUTH_POINTS = 4, 10, 2048
@@ -112,9 +112,7 @@ def train(settings: Settings, recipe: Recipe, name: str, teacher: Path | None = 
         headings=settings.headings if teacher else None,
         provenance=provenance(f"python -m experiments.views_weights {settings}"),
     )
-    if run.state.step < recipe.optim.steps:  # else it is there; made anew, it would teach others
-        fit(run, lambda step, values: print(name, step, values, flush=True))
-    return settings.out / name / MODEL
+    return fit(run, lambda step, values: print(name, step, values, flush=True))
 
 
 def ship(model: Path, settings: Settings) -> None:

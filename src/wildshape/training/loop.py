@@ -35,6 +35,8 @@ def fit(
 ) -> Path:
     """Train to the last step, validating and saving on the way; returns the checkpoint's path.
 
+    A run that is there already is left as it is: made anew, it would teach others.
+
     Args:
         run: set up.
         progress: called every 25 steps (on a GPU every 250) with the step and the means since the
@@ -45,6 +47,10 @@ def fit(
         StopRequested: `stopped` said so; the state is saved.
         BadInputError: the loss is not finite; the last checkpoint stays.
     """
+    model = run.folder / MODEL
+    if run.state.step >= run.recipe.optim.steps and model.exists():
+        run.processes.leave()
+        return model
     meter = Meter(run.recipe.network.branches, run.state.step, run.processes.device)
     step, advance = step_of(run, meter)
     with (
@@ -69,7 +75,7 @@ def fit(
         finally:
             run.views.close()
     run.processes.leave()
-    return run.folder / MODEL
+    return model
 
 
 @dataclass(frozen=True)
