@@ -194,7 +194,8 @@ def test_metrics_and_log_become_table_and_curves(tmp_path: Path) -> None:
     lines = [
         {"step": i, "loss": 1 / i, "observation": 0.1, "branch_shares": [0.5, 0.5]} for i in (1, 2)
     ]
-    lines.append({"step": 2, "validation/cycle_deg": 4.0})
+    truth = {"validation/truth_cd": 0.3, "validation/truth_rot_median_deg": 2.0}
+    lines.append({"step": 2, "validation/cycle_deg": 4.0, **truth})
     (tmp_path / "run").mkdir()
     log = "".join(json.dumps(line) + "\n" for line in lines) + '{"step": 3, "lo'
     (tmp_path / "run" / "log.jsonl").write_text(log, encoding="utf-8")
@@ -209,6 +210,8 @@ def test_metrics_and_log_become_table_and_curves(tmp_path: Path) -> None:
     series = {c.title: [name for name, _, _ in c.series] for c in report.curves}
     assert series["Loss"] == ["loss", "observation"]
     assert series["Cycle consistency on held-out tracks"] == ["cycle"]
+    against = {title: names for title, names in series.items() if "against truth" in title}
+    assert list(against.values()) == [["truth_cd"], ["truth_rot_median"]]
     assert report.provenance == {"evaluation/metrics.json": {"commit": "abc"}}
     assert "Each scan turned by its own random yaw" in render(report)
 

@@ -12,6 +12,12 @@ from wildshape.report.content import Curve
 
 _VALIDATION = "validation/"
 _NO_TERMS = ("step", "branch_shares", "steps_per_second")
+_TRUTH = {
+    "cd": ("Chamfer distance", "metres"),
+    "acc30": ("registered within 30 degrees", "share"),
+    "rot_median_deg": ("rotation, median", "degrees"),
+    "trans_median_m": ("translation, median", "metres"),
+}
 
 
 def training_curves(log: Path) -> tuple[Curve, ...]:
@@ -25,6 +31,11 @@ def training_curves(log: Path) -> tuple[Curve, ...]:
         Curve("Share of each pose branch", "step", "share", _shares(entries)),
         Curve("Held-out tracks, without truth", "step", "metres", held_out, log_y=True),
         Curve("Cycle consistency on held-out tracks", "step", "degrees", cycle),
+        *(
+            Curve(f"Held-out tracks against truth: {what}", "step", unit, series)
+            for key, (what, unit) in _TRUTH.items()
+            for series in (_series(entries, (f"{_VALIDATION}truth_{key}",)),)
+        ),
     )
     return tuple(curve for curve in curves if curve.series)
 
@@ -54,7 +65,7 @@ def _series(
     for key in keys:
         pairs = [(float(e["step"]), float(e[key])) for e in entries if _is_number(e.get(key))]
         if any(y != 0 for _, y in pairs):
-            name = key.removeprefix(_VALIDATION).removesuffix("_deg")
+            name = key.removeprefix(_VALIDATION).removesuffix("_deg").removesuffix("_m")
             series.append((name, [x for x, _ in pairs], [y for _, y in pairs]))
     return tuple(series)
 
