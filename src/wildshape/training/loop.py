@@ -22,7 +22,8 @@ from wildshape.training.validate import Validation, truth_figures, usual_up, val
 
 __all__ = ["MODEL", "Progress", "Run", "StopRequested", "fit", "setup", "split_tracks"]
 
-_LOG_EVERY, _GPU = 25, 10  # reading figures waits for a GPU, a validation takes 1,000 steps of one
+_LOG_EVERY = 25
+_RARER_ON_A_GPU = 10  # reading figures waits for it, a validation takes as long as 1,000 steps
 Progress = Callable[[int, dict[str, Any]], None]
 
 
@@ -144,7 +145,7 @@ def _report(loop: Loop, progress: Progress | None, values: dict[str, Any]) -> No
 
 def _rarely(run: Run, every: int) -> int:
     """So many steps; on a GPU ten times as many."""
-    return every * _GPU if run.processes.device.type == "cuda" else every
+    return every * _RARER_ON_A_GPU if run.processes.device.type == "cuda" else every
 
 
 def _stop_asked(run: Run, stopped: Callable[[], bool]) -> bool:
