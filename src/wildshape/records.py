@@ -89,6 +89,11 @@ class Turn:
     points: Points
     seconds: Float[np.ndarray, "_"] | None = None
 
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes."""
+        return self.points.nbytes + (0 if self.seconds is None else self.seconds.nbytes)
+
     def carried(self, motion: Twist) -> Points:
         """The points where they would be seen from the sensor's place at the scan's time.
 

@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where drives come from: folders, KITTI's layouts, times and poses beside the scans."""
 
+import pickle
+
 import numpy as np
 import pytest
 from tests.refusal import refused
 
+from wildshape.drives.held import Held
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.source import Drive
 from wildshape.geometry.transforms.se3 import SE3
@@ -19,6 +22,10 @@ NO_POINTS = Turn(np.empty((0, 3), np.float32))
 def folder(tmp_path):
     write_scans(tmp_path / "drive", range(4))
     return tmp_path / "drive"
+
+
+def turn_of(frame):
+    return Turn(np.full((1, 3), frame, np.float32))
 
 
 def write_scans(folder, numbers):
@@ -155,17 +162,39 @@ def test_times_of_points_in_scan_files(tmp_path, suffix):
     assert turn.points[:, 0].tolist() == np.delete(rows["x"], 3).tolist()
 
 
-def test_frames_asked_for_last_are_read_once_and_so_few_are_kept_in_memory():
+def test_frames_asked_for_last_are_read_once_and_as_many_are_kept_as_there_is_room_for():
     read = []
 
     def give(frame):
         read.append(frame)
-        return Turn(np.full((1, 3), frame, np.float32))
+        return turn_of(frame)
 
-    drive = Drive.of("drive", [f"{n:06d}" for n in range(40)], give)
+    held = Held(give, room=32 * turn_of(0).nbytes)
     for frame in (*range(40), *range(8, 40)):
-        assert drive.turn(frame).points[0, 0] == frame
+        assert held(frame).points[0, 0] == frame
     assert read == list(range(40))
-    drive.turn(0)
-    drive.turn(8)  # given up for it
+    held(0)
+    held(8)  # given up for it
     assert read == [*range(40), 0, 8]
+
+
+def test_what_is_kept_does_not_go_along_to_another_process():
+    held = Held(turn_of)
+    held(3)
+    sent = pickle.loads(pickle.dumps(held))
+    assert 3 in held
+    assert 3 not in sent
+    assert sent(3).points.tolist() == held(3).points.tolist()
+
+
+def test_a_drive_reads_frames_that_are_asked_for_again_once():
+    read = []
+
+    def give(frame):
+        read.append(frame)
+        return turn_of(frame)
+
+    drive = Drive.of("drive", ["000000", "000001"], give)
+    for frame in (0, 1, 0, 1):
+        assert drive.turn(frame).points[0, 0] == frame
+    assert read == [0, 1]

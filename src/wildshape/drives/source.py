@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Generic, TypeVar
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from wildshape.drives.held import Held
 from wildshape.errors import BadInputError
 from wildshape.geometry.projection.full_scan import FullScan
 from wildshape.geometry.transforms.se3 import SE3
@@ -22,35 +22,6 @@ from wildshape.records import Points, Turn
 _LONGEST_PAUSE = 1e9  # scans; more are no count
 _MOMENT_S, _LONGEST_TURN_S = 0.01, 2.0
 _NOTHING = Turn(np.empty((0, 3), np.float32))
-_HELD = 32  # scans that are kept in memory
-
-T = TypeVar("T")
-
-
-class Held(Generic[T]):
-    """What a function gives for frames; that of the frames asked for last is kept.
-
-    Stages of short drives, and objects that are neighbours in time, ask for the same frames.
-    """
-
-    def __init__(self, give: Callable[[int], T]) -> None:
-        self.give = give
-        self._held: dict[int, T] = {}
-
-    def __reduce__(self) -> "tuple[type[Held[T]], tuple[Callable[[int], T]]]":
-        """What is kept does not go along to another process."""
-        return Held, (self.give,)
-
-    def __contains__(self, frame: int) -> bool:
-        return frame in self._held
-
-    def __call__(self, frame: int) -> T:
-        """A frame's; the one not asked for longest is given up for it."""
-        found = self._held.pop(frame) if frame in self._held else self.give(frame)
-        self._held[frame] = found
-        if len(self._held) > _HELD:
-            del self._held[next(iter(self._held))]
-        return found
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from wildshape.drives.source import Drive, Held
+from wildshape.drives.held import Held
+from wildshape.drives.source import Drive
 from wildshape.drives.tracking.segmentation import read_cut
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.projection.full_scan import sight_lines

@@ -4,13 +4,14 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from wildshape.drives.config import DriveConfig
+from wildshape.drives.held import Held
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.clusters import find_clusters
 from wildshape.drives.tracking.ground import height_above_ground
@@ -19,8 +20,6 @@ from wildshape.drives.tracking.trajectory import landmarks
 from wildshape.io.atomic import atomic_write
 from wildshape.io.guard import reading
 from wildshape.records import Points, Turn
-
-_HELD = 64  # frames whose clusters are kept in memory
 
 
 @dataclass(frozen=True)
@@ -44,6 +43,16 @@ class CutScan:
     tracks: tuple[str, ...] = ()
     grounds: Float[np.ndarray, "_ 3"] = field(default_factory=lambda: np.empty((0, 3)))
 
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes."""
+        return self.points.nbytes + self.rows.nbytes + self.grounds.nbytes
+
+    @cached_property
+    def ends(self) -> list[int]:
+        """Where each cluster ends."""
+        return np.cumsum(self.counts).tolist()
+
     def clusters(self) -> list[Points]:
         """The points of each cluster."""
         return [self.cluster(row) for row in range(len(self.counts))]
@@ -57,8 +66,7 @@ class CutScan:
         return np.concatenate([self.rows[self._of(row)] for row in clusters])
 
     def _of(self, row: int) -> slice:
-        end = int(self.counts[: row + 1].sum())
-        return slice(end - int(self.counts[row]), end)
+        return slice(self.ends[row - 1] if row else 0, self.ends[row])
 
 
 @dataclass(frozen=True)
@@ -140,9 +148,10 @@ class Cutter:
 
     def _grounds(self, found: CutScan, heights: Float[np.ndarray, "n"]) -> Points:
         """A point of the ground under the middle of each cluster, sensor frame."""
-        ends = np.cumsum(found.counts)[:-1]
         grounds = np.zeros((len(found.counts), 3))
-        clusters = zip(found.clusters(), np.split(heights[found.rows], ends), strict=False)
+        clusters = zip(
+            found.clusters(), np.split(heights[found.rows], found.ends[:-1]), strict=False
+        )
         for row, (points, above) in enumerate(clusters):
             level = self.mounting.level(points)
             middle = level.mean(0)
@@ -164,17 +173,18 @@ def read_cut(folder: Path, frame: int) -> CutScan:
     """
     path = cut_file(folder, frame)
     with reading(path, "the clusters of a scan"):
-        return _read_cut(path, path.stat().st_mtime_ns)
+        return _cuts((path, path.stat().st_mtime_ns))
 
 
-@lru_cache(maxsize=_HELD)
-def _read_cut(path: Path, written_ns: int) -> CutScan:
-    """As it was then: objects that are neighbours in time are in the same frames."""
-    del written_ns
-    with np.load(path, allow_pickle=False) as found:
+def _read_cut(written: tuple[Path, int]) -> CutScan:
+    """A file as it was at a time, nanoseconds."""
+    with np.load(written[0], allow_pickle=False) as found:
         arrays = found["points"], found["rows"], found["counts"]
         tracks = tuple(found["tracks"].tolist())
         return CutScan(*arrays, int(found["scanned"]), tracks, found["grounds"])
+
+
+_cuts = Held(_read_cut)
 
 
 def read_cuts(folder: Path, count: int) -> Iterator[CutScan]:

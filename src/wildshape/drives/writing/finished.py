@@ -8,7 +8,6 @@ The level world is the sensor frame of the first frame with z vertical (`placing
 import csv
 import math
 from collections import defaultdict
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -32,7 +31,7 @@ from wildshape.drives.writing.folder import (
 )
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.boxes.detections import pose_of
+from wildshape.io.boxes.detections import poses_of
 from wildshape.io.boxes.table import BoxRow, read_box_table
 from wildshape.io.guard import read_json, read_record, reading
 from wildshape.io.output import MARKER, file_name
@@ -158,15 +157,13 @@ class FinishedDrive:
         if not vehicle.moving or len(frames) < 2:
             return found
         at = np.array(self.seconds)[frames]
-        places = [place.translation.numpy() for place in self.placed(vehicle)]
-        rates = np.gradient(np.array(places), at, axis=0)
+        rates = np.gradient(self.placed(vehicle).translation.numpy(), at, axis=0)
         turns = self.T_level_sensor.rotation.numpy()[frames]
         return np.einsum("fij,fi->fj", turns, rates)
 
-    def placed(self, vehicle: FoundVehicle) -> Iterator[SE3]:
-        """`T_level_box` in each of a vehicle's frames."""
-        for frame, box in zip(vehicle.frames, vehicle.boxes):
-            yield self.T_level_sensor[frame] @ pose_of(box)
+    def placed(self, vehicle: FoundVehicle) -> SE3:
+        """`(f,)` `T_level_box`, one of each of a vehicle's frames."""
+        return self.T_level_sensor[torch.tensor(vehicle.frames)] @ poses_of(vehicle.boxes)
 
 
 def read_finished(out: Path | str) -> FinishedDrive:

@@ -38,6 +38,12 @@ class FullScan:
     origins: np.ndarray | None = None
     lost: np.ndarray | None = None
 
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes, once it was sorted."""
+        known = (self.points, self.origins, self.lost)
+        return sum(2 * one.nbytes for one in known if one is not None)
+
     @cached_property
     def ends(self) -> Float[np.ndarray, "n 3"]:
         """The returns, then the directions of what was lost."""

@@ -3,6 +3,7 @@
 """Rigid transforms. `T_a_b` takes points of frame b to frame a; frames cancel in a product."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,6 +86,9 @@ class SE3:
 
     def __len__(self) -> int:
         return len(self.translation)
+
+    def __iter__(self) -> Iterator["SE3"]:
+        return (self[i] for i in range(len(self)))
 
     def __getitem__(self, index: int | slice | Tensor) -> "SE3":
         return type(self)(self.rotation[index], self.translation[index])

@@ -69,13 +69,20 @@ class Detection:
 
 def pose_of(box: Box) -> SE3:
     """`T_sensor_box`, float64; origin at the box's centre."""
-    wxyz = torch.tensor(box.quaternion_wxyz, dtype=torch.float64)
-    return SE3(rotation_from_quaternion(wxyz), torch.tensor(box.centre, dtype=torch.float64))
+    return poses_of([box])[0]
+
+
+def poses_of(boxes: Sequence[Box]) -> SE3:
+    """The same of several boxes, one batch."""
+    wxyz = torch.tensor([box.quaternion_wxyz for box in boxes], dtype=torch.float64).view(-1, 4)
+    centres = torch.tensor([box.centre for box in boxes], dtype=torch.float64).view(-1, 3)
+    return SE3(rotation_from_quaternion(wxyz), centres)
 
 
 def moved(box: Box, T_target_sensor: SE3) -> Box:
     """The same box in another frame."""
-    T = T_target_sensor.to(pose_of(box).rotation.dtype) @ pose_of(box)
+    T_sensor_box = pose_of(box)
+    T = T_target_sensor.to(T_sensor_box.rotation.dtype) @ T_sensor_box
     x, y, z = T.translation.tolist()
     qw, qx, qy, qz = quaternion_from_rotation(T.rotation).tolist()
     return Box((x, y, z), box.size, (qw, qx, qy, qz))

@@ -213,6 +213,6 @@ def _seen(found: FinishedDrive, drive: Drive, one: FoundVehicle) -> np.ndarray:
     number = found.vehicles.index(one)
     scan = drive.scan(frame)
     mine = scan[owners_of(scan, boxes) == number]
-    T_level_box = list(found.placed(one))[one.frames.index(frame)]
+    T_level_box = found.placed(one)[one.frames.index(frame)]
     T_box_sensor = T_level_box.inverse() @ found.T_level_sensor[frame]
     return thin(T_box_sensor.apply_numpy(mine), 2500)

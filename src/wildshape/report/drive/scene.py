@@ -94,9 +94,11 @@ def thinned(
     frame: int, scan: Points, boxes: dict[int, Box], most: int, config: SceneConfig = _DEFAULT
 ) -> DrawnScan:
     """A scan of at most `most` points, and those on vehicles."""
-    near = scan[(scan[:, :2] ** 2).sum(1) < config.range_m**2]
+    x, y, _ = np.ascontiguousarray(scan.T)
+    near = scan[x * x + y * y < config.range_m**2]
     owners = owners_of(near, boxes)
     rest = near[owners == NOBODY]
+    near, owners = near[owners != NOBODY], owners[owners != NOBODY]
     rest = thin(rest[_one_a_cell(rest, config.cell_m)], most)
     rest = rest[np.random.default_rng(0).permutation(len(rest))]
     parts = [thin(near[owners == number], config.points_a_vehicle) for number in boxes]
@@ -133,11 +135,9 @@ def _one_a_cell(points: Points, cell_m: float) -> Int[np.ndarray, "m"]:
 
 def placed(found: FinishedDrive, one: FoundVehicle) -> Float[np.ndarray, "f 4"]:
     """Centre x, y, z and yaw in the drawing frame, of each of its frames."""
-    rows = [
-        (*T.translation.tolist(), float(torch.atan2(T.rotation[1, 0], T.rotation[0, 0])))
-        for T in found.placed(one)
-    ]
-    return np.array(rows)
+    T = found.placed(one)
+    yaw = torch.atan2(T.rotation[:, 1, 0], T.rotation[:, 0, 0])
+    return torch.cat((T.translation, yaw[:, None]), dim=1).numpy()
 
 
 def scene_data(

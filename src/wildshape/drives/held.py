@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What was read lately, kept in memory within a limit of bytes."""
+
+from collections.abc import Callable, Hashable
+from typing import Generic, Protocol, TypeVar, runtime_checkable
+
+_ROOM = 128_000_000  # bytes; some ninety scans of an HDL-64E
+
+
+@runtime_checkable
+class _Sized(Protocol):
+    @property
+    def nbytes(self) -> int: ...
+
+
+K = TypeVar("K", bound=Hashable)
+T = TypeVar("T", bound=_Sized)
+
+
+class Held(Generic[K, T]):
+    """What a function gives for keys; that of the keys asked for last is kept.
+
+    Stages of short drives, and objects that are neighbours in time, ask for the same frames.
+    """
+
+    def __init__(self, give: Callable[[K], T], room: int = _ROOM) -> None:
+        """`room`: bytes of all that is kept."""
+        self.give, self.room = give, room
+        self._held: dict[K, T] = {}
+        self._bytes = 0
+
+    def __reduce__(self) -> "tuple[type[Held[K, T]], tuple[Callable[[K], T], int]]":
+        """What is kept does not go along to another process."""
+        return Held, (self.give, self.room)
+
+    def __contains__(self, key: K) -> bool:
+        return key in self._held
+
+    def __call__(self, key: K) -> T:
+        """A key's; those not asked for longest are given up for it."""
+        if key in self._held:
+            found = self._held.pop(key)
+        else:
+            found = self.give(key)
+            self._bytes += found.nbytes
+        self._held[key] = found
+        while self._bytes > self.room and len(self._held) > 1:
+            self._bytes -= self._held.pop(next(iter(self._held))).nbytes
+        return found
