@@ -184,6 +184,27 @@ class LinkConfig:
 
 
 @dataclass(frozen=True)
+class StandConfig:
+    """Which tracks are one object that stands (`standing.py`).
+
+    Attributes:
+        points: of each frame that tell where a track stood, about.
+        strays: share of them that do not count at each side.
+        longest_m: a track's points together are no longer than a car, or it is not asked.
+        widest_m: nor wider.
+        overlap: share of the smaller rectangle that two of one object have in common.
+        together: frames in which two pieces of one object may be seen.
+    """
+
+    points: int = 50
+    strays: float = 0.02
+    longest_m: float = 6.0
+    widest_m: float = 2.5
+    overlap: float = 0.5
+    together: int = 2
+
+
+@dataclass(frozen=True)
 class DriveConfig:
     """Everything that decides what a drive gives besides the checkpoint.
 
@@ -197,6 +218,7 @@ class DriveConfig:
     clusters: ClusterConfig = field(default_factory=ClusterConfig)
     detections: DetectionConfig = field(default_factory=DetectionConfig)
     tracks: LinkConfig = field(default_factory=LinkConfig)
+    standing: StandConfig = field(default_factory=StandConfig)
     completion: CompletionConfig = field(default_factory=CompletionConfig)
     turns: TurnConfig = field(default_factory=TurnConfig)
     vehicles: VehicleConfig = field(default_factory=VehicleConfig)

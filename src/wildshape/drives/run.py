@@ -43,6 +43,7 @@ from wildshape.drives.tracking.detections import (
 from wildshape.drives.tracking.mounting import Mounting, find_mounting
 from wildshape.drives.tracking.segmentation import Cutter, read_cuts
 from wildshape.drives.tracking.sightings import Sightings, read_sightings, write_sightings
+from wildshape.drives.tracking.standing import joined_where_they_stand
 from wildshape.drives.tracking.tracks import linked_clusters
 from wildshape.drives.tracking.trajectory import Breaks, find_trajectory, jumps
 from wildshape.drives.writing.files import DriveFiles
@@ -260,7 +261,9 @@ class _Run:
         if self.tracked:
             return given_tracks(read_cuts(self.cuts, len(self.drive)))
         ticks = self.breaks.ticks(self.drive.ticks, self.config.tracks)
-        return linked_clusters(self.cuts, T_level_sensor, ticks, self.config.tracks)
+        found = linked_clusters(self.cuts, T_level_sensor, ticks, self.config.tracks)
+        known = self.cuts, T_level_sensor, self.config.standing, self.breaks.frames
+        return joined_where_they_stand(found, *known)
 
     def folder(self, seen: Sightings) -> Path:
         return self.completing / "objects" / seen.name

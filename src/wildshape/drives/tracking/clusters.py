@@ -133,7 +133,7 @@ def _without_overhang(scan: _Above, rows: Rows, config: ClusterConfig) -> Int[np
         return rows
     points = scan.points[rows]
     below = points[low]
-    axes = _axes(below)
+    axes = level_axes(below)
     begins, ends = spans(below, axes)
     x, y = points[~low, :2].T.astype(np.float64)
     above = axes[0][:, None] * x + axes[1][:, None] * y
@@ -159,12 +159,12 @@ def _stands(heights: Float[np.ndarray, "k"], config: ClusterConfig) -> bool:
 
 def extents(points: Points) -> tuple[float, float]:
     """Length and width of the upright rectangle of least area, of 2 degrees' steps, metres."""
-    begins, ends = spans(points, _axes(points))
+    begins, ends = spans(points, level_axes(points))
     width, length = np.sort(ends - begins).tolist()
     return length, width
 
 
-def _axes(points: Points) -> Float[np.ndarray, "2 2"]:
+def level_axes(points: Points) -> Float[np.ndarray, "2 2"]:
     """Of the rectangle of least area seen from above, of 2 degrees' steps; columns."""
     begins, ends = spans(points[:: 1 + len(points) // _SIZED_BY], _AROUND)
     ahead, aside = (ends - begins).reshape(2, -1)
