@@ -201,8 +201,8 @@ class Box:
         along z, its length left out of account; of one that stands upright on its end it means
         nothing. In a camera's frame z looks ahead, and this is no heading.
         """
-        ahead = box_axes(self.quaternion_wxyz)[:, 0]
-        return math.atan2(ahead[1], ahead[0])
+        w, x, y, z = self.quaternion_wxyz
+        return math.atan2(2 * (x * y + w * z), w * w + x * x - y * y - z * z)
 
 
 @dataclass(frozen=True)

@@ -32,9 +32,10 @@ def drive(tmp_path):
     def add(frames, part, at=lambda frame: (8.0, 5.0), yaw=0.4):
         """A track that saw a part, as x and y of a car's own frame, where the car was then."""
         rng, rows = np.random.default_rng(len(tracks)), []
+        low, high = np.array((*part, (0.2, 1.4))).T
         c, s = math.cos(yaw), math.sin(yaw)
         for frame in frames:
-            own = np.column_stack([rng.uniform(*reach, 80) for reach in (*part, (0.2, 1.4))])
+            own = rng.uniform(low, high, (80, 3))
             world = own @ np.array(((c, s, 0), (-s, c, 0), (0, 0, 1))) + (*at(frame), 0.0)
             scan = T_level_sensor[frame].inverse().apply_numpy(world).astype(np.float32)
             rows.append(len(seen[frame]))

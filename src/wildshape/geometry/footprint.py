@@ -6,10 +6,19 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import torch
 from jaxtyping import Float
+
+from wildshape.geometry.transforms.se3 import SE3
 
 Place = Float[np.ndarray, "4"]
 """Centre x, y, z and yaw, metres and radians."""
+
+
+def upright_places(T_level_box: SE3) -> Float[np.ndarray, "n 4"]:
+    """The `Place` of each of `(n,)` boxes, by their poses."""
+    yaw = torch.atan2(T_level_box.rotation[:, 1, 0], T_level_box.rotation[:, 0, 0])
+    return torch.cat((T_level_box.translation, yaw[:, None]), dim=1).numpy()
 
 
 def footprint(box: Place, size: Sequence[float]) -> Float[np.ndarray, "4 2"]:

@@ -58,8 +58,9 @@ def claim(
     counts = []
     for frame, cut in enumerate(read_cuts(cuts, len(turns.ticks))):
         counts.append(cut.counts)
-        clusters = [turns.T_level_sensor[frame].apply_numpy(part) for part in cut.clusters()]
-        for row, i in _claims(clusters, vehicles, ways, frame, config):
+        for row, i in _claims(
+            cut.moved(turns.T_level_sensor[frame]), vehicles, ways, frame, config
+        ):
             owner[frame, row] = min(i, owner.get((frame, row), i))
     return _shared_out(vehicles, own, owner, counts, config)
 

@@ -39,7 +39,7 @@ from wildshape.io.scans.points import write_ply
 from wildshape.records import Completion, Points
 
 RULED_OUT, CATEGORY = "ruled_out.json", "car"
-_GROUP = 16  # objects that are worked on together
+_GROUP = 5  # objects that are worked on together
 
 
 @dataclass

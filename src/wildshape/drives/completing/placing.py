@@ -18,10 +18,11 @@ from wildshape.drives.source import Drive
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.drives.tracking.segmentation import read_cut
 from wildshape.drives.tracking.sightings import Sightings
+from wildshape.geometry.footprint import upright_places
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation, rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import OBJECTS
-from wildshape.io.boxes.detections import Detection, detections_of, pose_of
+from wildshape.io.boxes.detections import detections_of, poses_of
 from wildshape.io.guard import read_json
 from wildshape.records import Box
 
@@ -85,8 +86,8 @@ def read_completed(seen: Sightings, folder: Path, drive: Drive, turns: Turns) ->
     costs = np.array([float(scan["cost_m"]) for scan in said["scans"]])
     points = dict(zip(seen.frames, seen.points))
     weights = np.array([points[frame] for frame in frames], float)
-    shown = [_placed(one, turns.T_level_sensor[frame]) for one, frame in zip(found, frames)]
-    boxes, phases = turns.met(frames, np.stack(shown))
+    T_level_box = turns.T_level_sensor[torch.tensor(frames)] @ poses_of([one.box for one in found])
+    boxes, phases = turns.met(frames, upright_places(T_level_box))
     return Completed(
         seen=seen,
         frames=frames,
@@ -143,13 +144,6 @@ def weighted_median(values: Float[np.ndarray, "k"], weights: Float[np.ndarray, "
     order = np.argsort(values)
     below = np.cumsum(weights[order])
     return float(values[order[np.searchsorted(below, below[-1] / 2)]])
-
-
-def _placed(one: Detection, T_level_sensor: SE3) -> Float[np.ndarray, "4"]:
-    """Centre and yaw in the level world."""
-    T = T_level_sensor @ pose_of(one.box)
-    yaw = torch.atan2(T.rotation[1, 0], T.rotation[0, 0])
-    return torch.cat((T.translation, yaw[None])).numpy()
 
 
 def boxes_in_scans(

@@ -17,6 +17,7 @@ from wildshape.drives.tracking.clusters import find_clusters
 from wildshape.drives.tracking.ground import height_above_ground
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.drives.tracking.trajectory import landmarks
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import atomic_write
 from wildshape.io.guard import reading
 from wildshape.records import Points, Turn
@@ -56,6 +57,11 @@ class CutScan:
     def clusters(self) -> list[Points]:
         """The points of each cluster."""
         return [self.cluster(row) for row in range(len(self.counts))]
+
+    def moved(self, T_target_sensor: SE3) -> list[Points]:
+        """The points of each cluster in another frame."""
+        points = T_target_sensor.apply_numpy(self.points)
+        return [points[self._of(row)] for row in range(len(self.counts))]
 
     def cluster(self, row: int) -> Points:
         """The points of one."""
@@ -149,14 +155,10 @@ class Cutter:
     def _grounds(self, found: CutScan, heights: Float[np.ndarray, "n"]) -> Points:
         """A point of the ground under the middle of each cluster, sensor frame."""
         grounds = np.zeros((len(found.counts), 3))
-        clusters = zip(
-            found.clusters(), np.split(heights[found.rows], found.ends[:-1]), strict=False
-        )
-        for row, (points, above) in enumerate(clusters):
-            level = self.mounting.level(points)
-            middle = level.mean(0)
-            middle[2] = np.median(level[:, 2] - above)
-            grounds[row] = middle
+        above = np.split(heights[found.rows], found.ends[:-1])
+        for row, level in enumerate(found.moved(self.mounting.levelling())):
+            grounds[row] = level.mean(0)
+            grounds[row, 2] = np.median(level[:, 2] - above[row])
         return self.mounting.levelling().inverse().apply_numpy(grounds)
 
 

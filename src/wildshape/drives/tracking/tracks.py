@@ -75,8 +75,7 @@ def linked_clusters(
         for frame, cut in enumerate(read_cuts(cuts, len(ticks))):
             counts.append(cut.counts)
             usable += cut.scanned > 0
-            moved = [T_level_sensor[frame].apply_numpy(part) for part in cut.clusters()]
-            yield Seen.of(ticks[frame], moved)
+            yield Seen.of(ticks[frame], cut.moved(T_level_sensor[frame]))
 
     found = link(seen(), config)
     fewest = min(config.fewest_scans, usable)

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import torch
 from jaxtyping import Float, Int
 
 from wildshape.drives.source import Drive
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
 from wildshape.drives.writing.playback.moments import PALETTE
 from wildshape.geometry.box import box_axes
+from wildshape.geometry.footprint import upright_places
 from wildshape.records import Box, Points
 from wildshape.report.page.html import quantise
 from wildshape.report.results import chances_in
@@ -135,9 +135,7 @@ def _one_a_cell(points: Points, cell_m: float) -> Int[np.ndarray, "m"]:
 
 def placed(found: FinishedDrive, one: FoundVehicle) -> Float[np.ndarray, "f 4"]:
     """Centre x, y, z and yaw in the drawing frame, of each of its frames."""
-    T = found.placed(one)
-    yaw = torch.atan2(T.rotation[:, 1, 0], T.rotation[:, 0, 0])
-    return torch.cat((T.translation, yaw[:, None]), dim=1).numpy()
+    return upright_places(found.placed(one))
 
 
 def scene_data(
