@@ -188,7 +188,8 @@ class StandConfig:
     """Which tracks are one object that stands (`standing.py`).
 
     Attributes:
-        points: of each frame that tell where a track stood, about.
+        frames: of a track that tell where it stood, spread over it, at most.
+        points: of each of them, at most.
         strays: share of them that do not count at each side.
         longest_m: a track's points together are no longer than a car, or it is not asked.
         widest_m: nor wider.
@@ -196,6 +197,7 @@ class StandConfig:
         together: frames in which two pieces of one object may be seen.
     """
 
+    frames: int = 30
     points: int = 50
     strays: float = 0.02
     longest_m: float = 6.0

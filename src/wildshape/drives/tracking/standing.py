@@ -111,9 +111,12 @@ def _as_one(parts: list[Sightings]) -> Sightings:
 
 
 def _some(seen: Sightings, cuts: Path, T_level_sensor: SE3, config: StandConfig) -> Points:
-    """Some points of each frame, level world."""
-    found = []
-    for frame, cloud in zip(seen.frames, seen.clouds(cuts)):
-        some = cloud[:: 1 + len(cloud) // config.points]
-        found.append(T_level_sensor[frame].apply_numpy(some))
-    return np.concatenate(found)
+    """Some points of some frames, the first and the last among them, level world."""
+    spread = np.linspace(0, len(seen.frames) - 1, min(len(seen.frames), config.frames))
+    some = seen.part(spread.round().astype(int).tolist())
+    return np.concatenate(
+        [
+            T_level_sensor[frame].apply_numpy(cloud[:: 1 + len(cloud) // config.points])
+            for frame, cloud in zip(some.frames, some.clouds(cuts))
+        ]
+    )
