@@ -23,6 +23,7 @@ from tests.drives import detector_files
 from tests.fuzz.scans import CLOUD
 from tests.fuzz.target import Arrays, Target, only_file
 from tests.io.bags.write import write_bag
+from tests.io.packets import write as packets
 
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.recordings import waymo as waymo_drives
@@ -83,6 +84,21 @@ def _is_recorded(name: str) -> bool:
 def _read_bags(folder: Path) -> Arrays:
     file = next(folder.glob("*.bag"), None)
     yield from _read(open_drive(file or folder))
+
+
+def _build_packets(folder: Path) -> None:
+    """Two turns of a VLP-16, alone and beside a sensor whose packets end as an HDL-64E's."""
+    rng = np.random.default_rng(0)
+    scans = rng.integers(0, 9000, (2, packets.PACKETS, packets.BLOCKS, packets.LASERS))
+    ranges = scans.astype(np.uint16)
+    for name, others in (("alone.pcap", ()), ("alone.pcapng", ()), ("two.pcap", ranges[:1])):
+        place = folder / name.replace(".", "-")
+        place.mkdir(parents=True)
+        packets.write_velodyne(place / name, ranges, others=others, hdl64e=True)
+
+
+def _read_packets(folder: Path) -> Arrays:
+    yield from _read(open_drive(only_file(folder)))
 
 
 def _build_recordings(folder: Path) -> None:
@@ -216,6 +232,7 @@ def _read_finished(folder: Path) -> Arrays:
 
 TARGETS = (
     Target("bags", _build_bags, _read_bags, 1.5, attacked=_is_recorded),
+    Target("packets", _build_packets, _read_packets, 0.5),
     Target("recordings", _build_recordings, _read_recordings, 0.5),
     Target("detections", _build_detections, _read_detections, 1),
     Target("finished-drive", _build_finished, _read_finished, 0.5, writes=True),
