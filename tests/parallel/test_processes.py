@@ -53,6 +53,30 @@ with team(2) as two:
     print(list(two.in_order(Long(torch.ones(20000)), [1])))
 """
 
+FREEING_SCRIPT = """
+import os, time
+from wildshape.parallel import processes
+from wildshape.parallel.team import team
+processes._WORTH_S = 0.0
+
+class Slow:
+    def __call__(self, number):
+        time.sleep(0.2)
+        return number
+
+    def __reduce__(self):
+        time.sleep(0.5)
+        return Slow, ()
+
+    def __del__(self):
+        time.sleep(0.5)
+        os.write(1, b"freed")
+
+with team(2) as two:
+    print(list(two.in_order(Slow(), [1])), flush=True)
+time.sleep(0.55)  # it is told, and being freed
+"""
+
 LEFT_SCRIPT = """
 from itertools import count
 from wildshape.parallel import processes
@@ -234,6 +258,14 @@ def test_a_script_may_end_while_its_task_is_written_for_a_helper(tmp_path):
     script.write_text(SHORT_SCRIPT)
     run = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
     assert (run.returncode, run.stdout, run.stderr) == (0, "[1]\n", "")
+
+
+def test_a_script_may_end_while_its_task_is_freed_for_a_helper(tmp_path):
+    """The thread that told the helper was the last to hold it."""
+    script = tmp_path / "script.py"
+    script.write_text(FREEING_SCRIPT)
+    run = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "[1]\nfreed", "")
 
 
 def test_a_script_may_end_before_its_work(tmp_path):

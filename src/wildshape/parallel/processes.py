@@ -100,8 +100,9 @@ class _Assistant:
     def assist(self, task: Callable[[Any], Any], handout: Handout[Any, Any]) -> None:
         """Help with this, once the work before is done."""
         if self._thread.ident is None:
-            _AT_WORK.add(self)
+            _STARTED.difference_update([one for one in tuple(_STARTED) if not one.is_alive()])
             self._thread.start()
+            _STARTED.add(self)
         self._jobs.put((task, handout))
 
     def close(self) -> None:
@@ -112,19 +113,21 @@ class _Assistant:
         if (handout := self._handout) is not None:
             handout.wake()
 
+    def is_alive(self) -> bool:
+        """Whether this thread has not ended yet."""
+        return self._thread.is_alive()
+
     def join(self, seconds: float) -> None:
         """Wait so long at most for this thread to end."""
         self._thread.join(seconds)
 
     def _run(self) -> None:
-        try:
-            for task, handout in iter(self._jobs.get, None):
-                self._handout = handout
-                if self._closed:
-                    break
-                self._help(task, handout)
-        finally:
-            _AT_WORK.discard(self)
+        for task, handout in iter(self._jobs.get, None):
+            self._handout = handout
+            if self._closed:
+                break
+            self._help(task, handout)
+        self._handout = None
 
     def _help(self, task: Callable[[Any], Any], handout: Handout[Any, Any]) -> None:
         if not self.ready and handout.ends_within(_WORTH_S):
@@ -144,13 +147,14 @@ class _Assistant:
                 handout.fail(number, error)
 
 
-_AT_WORK: set[_Assistant] = set()
+_STARTED: set[_Assistant] = set()
+"""Not left by a thread of its own accord: the last task that it held is freed after all it does."""
 
 
 @atexit.register
 def _end_all() -> None:
     """Python may not end before these threads: one that is cut off inside of torch aborts it."""
-    assistants, until = tuple(_AT_WORK), time.monotonic() + _PATIENCE_S
+    assistants, until = tuple(_STARTED), time.monotonic() + _PATIENCE_S
     for one in assistants:
         one.close()
     for one in assistants:
