@@ -3,6 +3,7 @@
 """Where drives come from: folders, KITTI's layouts, times and poses beside the scans."""
 
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -176,6 +177,16 @@ def test_frames_asked_for_last_are_read_once_and_as_many_are_kept_as_there_is_ro
     held(0)
     held(8)  # given up for it
     assert read == [*range(40), 0, 8]
+
+
+def test_threads_may_ask_at_once():
+    held = Held(turn_of, room=3 * turn_of(0).nbytes)
+    frames = [frame for frame in range(6) for _ in range(2)] * 2000
+    with ThreadPoolExecutor(8) as threads:
+        for frame, turn in zip(frames, threads.map(held, frames)):
+            assert turn.points[0, 0] == frame
+    kept = [frame for frame in range(6) if frame in held]
+    assert held._bytes == sum(held(frame).nbytes for frame in kept)
 
 
 def test_what_is_kept_does_not_go_along_to_another_process():

@@ -3,6 +3,7 @@
 """What was read lately, kept in memory within a limit of bytes."""
 
 from collections.abc import Callable, Hashable
+from threading import Lock
 from typing import Generic, Protocol, TypeVar, runtime_checkable
 
 _ROOM = 128_000_000  # bytes; some ninety scans of an HDL-64E
@@ -22,6 +23,7 @@ class Held(Generic[K, T]):
     """What a function gives for keys; that of the keys asked for last is kept.
 
     Stages of short drives, and objects that are neighbours in time, ask for the same frames.
+    Threads may ask at once: drives of one process share what was read of their clusters.
     """
 
     def __init__(self, give: Callable[[K], T], room: int = _ROOM) -> None:
@@ -29,6 +31,7 @@ class Held(Generic[K, T]):
         self.give, self.room = give, room
         self._held: dict[K, T] = {}
         self._bytes = 0
+        self._lock = Lock()
 
     def __reduce__(self) -> "tuple[type[Held[K, T]], tuple[Callable[[K], T], int]]":
         """What is kept does not go along to another process."""
@@ -39,12 +42,16 @@ class Held(Generic[K, T]):
 
     def __call__(self, key: K) -> T:
         """A key's; those not asked for longest are given up for it."""
-        if key in self._held:
-            found = self._held.pop(key)
-        else:
-            found = self.give(key)
-            self._bytes += found.nbytes
-        self._held[key] = found
-        while self._bytes > self.room and len(self._held) > 1:
-            self._bytes -= self._held.pop(next(iter(self._held))).nbytes
-        return found
+        with self._lock:
+            found = self._held.pop(key, None)
+            if found is not None:
+                self._held[key] = found
+                return found
+        given = self.give(key)
+        with self._lock:
+            if key not in self._held:
+                self._held[key] = given
+                self._bytes += given.nbytes
+            while self._bytes > self.room and len(self._held) > 1:
+                self._bytes -= self._held.pop(next(iter(self._held))).nbytes
+        return given

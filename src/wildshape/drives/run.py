@@ -261,9 +261,9 @@ class _Run:
         if self.tracked:
             return given_tracks(read_cuts(self.cuts, len(self.drive)))
         ticks = self.breaks.ticks(self.drive.ticks, self.config.tracks)
-        found = linked_clusters(self.cuts, T_level_sensor, ticks, self.config.tracks)
-        known = self.cuts, T_level_sensor, self.config.standing, self.breaks.frames
-        return joined_where_they_stand(found, *known)
+        known = self.cuts, T_level_sensor
+        found = linked_clusters(*known, ticks, self.config.tracks)
+        return joined_where_they_stand(found, *known, self.config.standing, self.breaks.frames)
 
     def folder(self, seen: Sightings) -> Path:
         return self.completing / "objects" / seen.name
