@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable
 from threading import Lock
 from typing import Generic, Protocol, TypeVar, runtime_checkable
 
-_ROOM = 128_000_000  # bytes; some ninety scans of an HDL-64E
+_ROOM = 256_000_000  # bytes; some 180 scans of an HDL-64E
 
 
 @runtime_checkable

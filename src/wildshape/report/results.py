@@ -142,15 +142,16 @@ def read_object(path: Path) -> dict[str, Any]:
     )
 
 
-def read_result(folder: Path, inputs: Inputs) -> TrackResult:
-    """A track's result, with its scans where they can be read.
+def read_result(folder: Path, inputs: Inputs | None = None) -> TrackResult:
+    """A track's result, with its scans where they can be read; without `inputs` none are.
 
     Raises:
         BadInputError: objects.json is damaged.
     """
     with reading(folder / OBJECTS, "what complete or register writes"):
         record = read_object(folder / OBJECTS)
-        found = TrackResult(folder, record, inputs.track(folder, record))
+        track = None if inputs is None else inputs.track(folder, record)
+        found = TrackResult(folder, record, track)
         for scan in found.scans:
             box_of(found.entry(scan))
             doubt_of(found.entry(scan))

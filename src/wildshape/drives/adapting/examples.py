@@ -14,6 +14,7 @@ from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.completing.completion import CATEGORY
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle, read_finished
+from wildshape.drives.writing.folder import TRACKS
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detections import pose_of
 from wildshape.io.guard import read_record
@@ -84,7 +85,7 @@ def split(examples: Sequence[Example], config: AdaptConfig) -> tuple[list[Exampl
 def _example(
     drive: FinishedDrive, one: FoundVehicle, T_level_sensor: SE3, config: AdaptConfig
 ) -> Example:
-    track = read_track(drive.out / "tracks" / one.name)
+    track = read_track(drive.out / TRACKS / one.name)
     place = {name: frame for frame, name in enumerate(drive.scan_names)}
     boxes = dict(zip(one.frames, one.boxes))
     full = [

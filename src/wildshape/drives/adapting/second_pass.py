@@ -12,7 +12,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from wildshape.drives.result import REPORT, DriveResult
-from wildshape.drives.writing.folder import BOXES, MCAP, MESHES, RRD, SHAPES
+from wildshape.drives.writing.folder import BOXES, MCAP, MESHES, RRD, SHAPES, TRACKS
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import lock_folder, write_json, write_text
 from wildshape.io.guard import read_json
@@ -22,7 +22,7 @@ from wildshape.method.checkpoint import fingerprint
 FIRST = "first"
 _MODEL = "model.txt"
 _FINISHED, _SAYS = "finished.json", "what `wildshape drive` says of itself"
-_FOUND = (BOXES, "tracks", "objects", SHAPES)  # the first of them is moved first
+_FOUND = (BOXES, TRACKS, "objects", SHAPES)  # the first of them is moved first
 _MADE_OF_IT = (MESHES, "boxes", MCAP, RRD, REPORT)
 
 

@@ -25,6 +25,7 @@ from wildshape.drives.writing.folder import (
     BOXES,
     FRAMES,
     SHAPES,
+    TRACKS,
     TRAJECTORY,
     TUM,
     is_drive,
@@ -149,6 +150,18 @@ class FinishedDrive:
             BadInputError: the file is damaged.
         """
         return read_points(self.out / SHAPES / f"{vehicle.name}.ply")
+
+    def scan(self, vehicle: FoundVehicle, name: str) -> Points:
+        """`(n, 3)` one of a vehicle's scans as measured, sensor frame, metres; none if it is lost.
+
+        Args:
+            vehicle: whose.
+            name: of the frame.
+        """
+        try:
+            return read_points(self.out / TRACKS / vehicle.name / "scans" / f"{name}.ply")
+        except BadInputError:
+            return np.empty((0, 3), np.float32)
 
     def velocities(self, vehicle: FoundVehicle) -> Float[np.ndarray, "f 3"]:
         """Over the ground, in each frame's sensor axes, m/s; 0 for what stands."""

@@ -4,15 +4,13 @@
 
 from pathlib import Path
 
-import numpy as np
-
 from wildshape.drives.result import REPORT
 from wildshape.drives.source import Drive
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle, read_finished
 from wildshape.drives.writing.playback.moments import readable_source
 from wildshape.inference.registration import fuse_scans, to_middle
 from wildshape.io.progress import counted, duration
-from wildshape.records import as_text
+from wildshape.records import Points, as_text
 from wildshape.report.content import Cell, Cloud, Report, ReportObject, SceneView, Table
 from wildshape.report.drive.picture import picture_from_above
 from wildshape.report.drive.scene import drawn_scans, scene_data
@@ -20,7 +18,6 @@ from wildshape.report.page.html import write_report
 from wildshape.report.results import (
     MEANING,
     PROBABILITIES,
-    Inputs,
     TrackResult,
     box_of,
     chances_in,
@@ -79,13 +76,12 @@ def drive_report(found: FinishedDrive, drive: Drive | None) -> Report:
     gone = () if drive is not None else (f"{found.source} cannot be read: no scans are drawn.",)
     shown = found.vehicles[:MOST_OBJECTS]
     scans = drawn_scans(found, drive)
-    where = Inputs(found.out / "tracks")
     return Report(
         title=f"Wildshape drive: {as_text(found.name)}",
         facts=tuple(_facts(found)),
         scene=SceneView(scene_data(found, scans), picture_from_above(found, scans)),
         index=(_index(found),) if found.vehicles else (),
-        objects=tuple(_object(found, one, where) for one in shown),
+        objects=tuple(_object(found, one) for one in shown),
         cost=tuple(_cost(said.get("seconds") or {})),
         notes=(*gone, *map(str, said.get("warnings") or ()), *_NOTES),
         provenance=found.record.get("provenance") or {},
@@ -146,12 +142,13 @@ def _chances(found: FinishedDrive, one: FoundVehicle) -> dict[str, str]:
     return {words: f"{chance:.2f}" for words, chance in chances.items()}
 
 
-def _object(found: FinishedDrive, one: FoundVehicle, where: Inputs) -> ReportObject:
+def _object(found: FinishedDrive, one: FoundVehicle) -> ReportObject:
     """Panels in the sensor frame of its fullest completed scan."""
-    result = read_result(found.out / "objects" / one.name, where)
-    scan = _fullest(result)
+    result = read_result(found.out / "objects" / one.name)
+    scans = {name: found.scan(one, name) for name in result.scans}
+    scan = max(scans, key=lambda name: len(scans[name]))
     entry = result.entry(scan)
-    clouds = [Cloud("input scan", _scan(result, scan), size=2.6), *_fused(result, scan)]
+    clouds = [Cloud("input scan", scans[scan], size=2.6), *_fused(result, scans, scan)]
     completed = result.completed(scan)
     if completed is not None:
         clouds.append(Cloud("completed", thin(completed, _POINTS)))
@@ -172,24 +169,12 @@ def _object(found: FinishedDrive, one: FoundVehicle, where: Inputs) -> ReportObj
     )
 
 
-def _fullest(result: TrackResult) -> str:
-    """The completed scan of most points."""
-    return max(result.scans, key=lambda name: len(_scan(result, name)))
-
-
-def _scan(result: TrackResult, name: str) -> np.ndarray:
-    track = result.track
-    if track is None or name not in track.scan_names:
-        return np.empty((0, 3), np.float32)
-    return track.scans[track.scan_names.index(name)]
-
-
-def _fused(result: TrackResult, scan: str) -> list[Cloud]:
+def _fused(result: TrackResult, scans: dict[str, Points], scan: str) -> list[Cloud]:
     """All its completed scans, by their poses, in the frame of one."""
     poses = result.poses()
-    if poses is None or len(result.scans) < 2 or len(poses) != len(result.scans):
+    if poses is None or len(scans) < 2 or len(poses) != len(scans):
         return []
     T_middle_scan = to_middle(poses)
-    T_scan_middle = T_middle_scan[result.scans.index(scan)].inverse()
-    fused = fuse_scans([_scan(result, name) for name in result.scans], T_middle_scan)
+    T_scan_middle = T_middle_scan[list(scans).index(scan)].inverse()
+    fused = fuse_scans(list(scans.values()), T_middle_scan)
     return [Cloud("fused by us", thin(T_scan_middle.apply_numpy(fused), _POINTS))]

@@ -15,7 +15,7 @@ from wildshape.drives.writing.playback.moments import colour_of, readable_source
 from wildshape.io.boxes.detections import pose_of
 from wildshape.records import Box, Points
 from wildshape.report.drive.scene import NOBODY, SceneConfig, boxes_by_frame, thinned
-from wildshape.report.results import Inputs, box_of, chances_in, read_result
+from wildshape.report.results import box_of, chances_in, read_result
 from wildshape.report.scene import box_segments, thin
 from wildshape.report.viewer.details import row
 from wildshape.report.viewer.page import HOST, hosting
@@ -269,11 +269,10 @@ class DrivePage:
 
 def measured(found: FinishedDrive, one: FoundVehicle) -> Points:
     """What a vehicle's completed scans measured, laid over each other in the frame of its box."""
-    result = read_result(found.out / "objects" / one.name, Inputs(found.out / "tracks"))
+    result = read_result(found.out / "objects" / one.name)
     clouds = [np.empty((0, 3), np.float32)]
     for name in result.scans:
         box = box_of(result.entry(name))
-        if result.track is not None and box is not None and name in result.track.scan_names:
-            scan = result.track.scans[result.track.scan_names.index(name)]
-            clouds.append(pose_of(box).inverse().apply_numpy(scan))
+        if box is not None:
+            clouds.append(pose_of(box).inverse().apply_numpy(found.scan(one, name)))
     return thin(np.concatenate(clouds), _MEASURED)
