@@ -24,7 +24,7 @@ from tests.drives.detector_files import (
 from tests.refusal import refused
 
 import wildshape
-from wildshape.drives import run
+from wildshape.drives import pipeline
 from wildshape.drives.config import DetectionConfig, DriveConfig, GroundConfig
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.tracking.detections import (
@@ -179,7 +179,7 @@ def stopped_after_tracks(street, out, detections, monkeypatch):
         raise Killed
 
     with monkeypatch.context() as patched:
-        patched.setattr(run, "Completer", killed)
+        patched.setattr(pipeline, "Completer", killed)
         with pytest.raises(Killed):
             wildshape.drive(street.recording, out, detections=detections)
     return read_sightings(out / "stages" / "tracks.json")

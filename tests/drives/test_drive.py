@@ -17,8 +17,8 @@ from tests.drives.street import HEIGHT
 from tests.refusal import refused
 
 import wildshape
-from wildshape.drives import run
 from wildshape.drives.config import DriveConfig
+from wildshape.drives.pipeline import Pipeline
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.drives.tracking.segmentation import Cutter, read_cut
@@ -159,7 +159,7 @@ def test_a_finished_drive_gets_other_files_and_is_not_found_again(found, recordi
     def never(*_):
         raise AssertionError("the drive was gone through again")
 
-    monkeypatch.setattr(run._Run, "perform", never)
+    monkeypatch.setattr(Pipeline, "perform", never)
     boxes = (found.out / "boxes.csv").stat().st_mtime_ns
     files = DriveFiles(BoxFiles(("json", "kitti", "nuscenes", "argoverse2")), mesh="glb")
     assert wildshape.drive(recording, found.out, files=files) == found

@@ -13,12 +13,13 @@ from tests.refusal import refused
 
 import wildshape
 from wildshape.cli.main import main
-from wildshape.drives import run
+from wildshape.drives import pipeline
 from wildshape.drives.adapting import second_pass
 from wildshape.drives.adapting.adapt import Adaptation
 from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.completing.completion import Completer
 from wildshape.drives.config import INFERENCE, ClusterConfig, DriveConfig
+from wildshape.drives.pipeline import Pipeline
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.tracking.sightings import read_sightings
 from wildshape.drives.writing import outputs
@@ -44,11 +45,11 @@ def test_a_run_killed_at_any_stage_goes_on_to_the_same_boxes(
         raise Killed
 
     for place, stage in (
-        (run, "find_trajectory"),
-        (run, "Cutter"),
-        (run, "linked_clusters"),
-        (run, "write_sightings"),
-        (run, "judge"),
+        (pipeline, "find_trajectory"),
+        (pipeline, "Cutter"),
+        (pipeline, "linked_clusters"),
+        (pipeline, "write_sightings"),
+        (pipeline, "judge"),
         (outputs, "rays_bytes"),
         (outputs, "rows_of"),
     ):
@@ -96,7 +97,7 @@ def test_adapted_weights_complete_a_drive_again(found, recording, tmp_path, monk
         assert said["model"]["steps"] == 7
     assert (out / "first" / "boxes.csv").read_bytes() == before
     assert not (out / "report.html").exists()
-    monkeypatch.setattr(run._Run, "perform", killed)
+    monkeypatch.setattr(Pipeline, "perform", killed)
     assert wildshape.drive(recording, out, adapt=adapted) == again
 
 

@@ -14,7 +14,7 @@ from wildshape.drives.completing import merging
 from wildshape.drives.completing.claims import claim
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.config import BoxConfig, DriveConfig, MergeConfig
-from wildshape.drives.run import _Run
+from wildshape.drives.pipeline import Pipeline
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.segmentation import cut_file
 from wildshape.drives.tracking.sightings import Sightings
@@ -67,7 +67,7 @@ def test_a_drive_tells_its_breaks_to_what_follows(tmp_path):
     drive = Drive.of("drive", names, lambda _: seen, [0.0, 0.1, 0.2, 0.3])
     write_json(tmp_path / "stages" / "breaks.json", asdict(Breaks((2,))))
     predictor = Predictor(ShapePoseNet(CONFIG).eval(), SETTINGS)
-    running = _Run(drive, tmp_path, DriveConfig(), predictor, ALONE, None, Clock(silent))
+    running = Pipeline(drive, tmp_path, DriveConfig(), predictor, ALONE, None, Clock(silent))
     assert running.turns([], still(4).T_level_sensor).unbroken(2, 2) == range(2, 4)
 
 

@@ -9,8 +9,9 @@ import pytest
 import torch
 
 import wildshape
-from wildshape.drives import run
+from wildshape.drives.clock import Clock, silent
 from wildshape.drives.config import DriveConfig
+from wildshape.drives.pipeline import Pipeline
 from wildshape.drives.result import DriveResult
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.rays import RayCutter
@@ -96,11 +97,11 @@ def test_each_object_gets_the_rays_of_its_own_frame_and_a_scan_is_read_once(movi
 def test_all_that_follows_the_trajectory_sees_scans_corrected_by_it(moving, tmp_path, monkeypatch):
     drive, T_world_sensor, *_ = moving
     followed = []
-    monkeypatch.setattr(run._Run, "mounting", lambda _: None)
-    monkeypatch.setattr(run._Run, "trajectory", lambda *_: T_world_sensor)
-    monkeypatch.setattr(run._Run, "find", lambda one, *_: followed.append(one.drive) or NOTHING)
-    clock = run.Clock(run.silent)
-    run._Run(drive, tmp_path, DriveConfig(), wildshape.load(), ALONE, None, clock).perform()
+    monkeypatch.setattr(Pipeline, "mounting", lambda _: None)
+    monkeypatch.setattr(Pipeline, "trajectory", lambda *_: T_world_sensor)
+    monkeypatch.setattr(Pipeline, "find", lambda one, *_: followed.append(one.drive) or NOTHING)
+    clock = Clock(silent)
+    Pipeline(drive, tmp_path, DriveConfig(), wildshape.load(), ALONE, None, clock).perform()
     (found,) = followed
     assert not np.array_equal(found.scan(1), drive.scan(1))
     assert np.array_equal(found.scan(1), drive.moved_by(T_world_sensor).scan(1))

@@ -1,68 +1,24 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""A raw drive in, every vehicle out: the stages one after the other.
+"""A raw drive in, every vehicle out."""
 
-A stage whose files are in the output folder is not run again: a killed run goes on.
-"""
-
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from wildshape.drives.adapting import second_pass
 from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.clock import Clock, Watch, silent
-from wildshape.drives.completing.boxes import faced, smooth
-from wildshape.drives.completing.claims import claim
-from wildshape.drives.completing.completion import Completer
-from wildshape.drives.completing.merging import Places
-from wildshape.drives.completing.placing import Completed, level_poses, on_ground, read_completed
-from wildshape.drives.completing.turns import Turns, with_sense
-from wildshape.drives.completing.vehicles import (
-    judge,
-    likely,
-    refused,
-    stated,
-    surer_if_driving,
-    write_judged,
-)
-from wildshape.drives.completing.whole_scans import held_against
 from wildshape.drives.config import INFERENCE, DriveConfig
+from wildshape.drives.pipeline import Pipeline
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.result import FILES, DriveResult, earlier_result, line_of, settings_of
-from wildshape.drives.source import Drive
-from wildshape.drives.tracking.detections import (
-    BoxCutter,
-    DetectionFile,
-    Detections,
-    check_cut,
-    find_detections,
-    given_tracks,
-)
-from wildshape.drives.tracking.mounting import Mounting, find_mounting
-from wildshape.drives.tracking.segmentation import Cutter, read_cuts
-from wildshape.drives.tracking.sightings import Sightings, read_sightings, write_sightings
-from wildshape.drives.tracking.standing import joined_where_they_stand
-from wildshape.drives.tracking.tracks import linked_clusters
-from wildshape.drives.tracking.trajectory import Breaks, find_trajectory, jumps
+from wildshape.drives.tracking.detections import DetectionFile, find_detections
 from wildshape.drives.writing.files import DriveFiles
-from wildshape.drives.writing.folder import BOXES, FRAMES, TRAJECTORY
-from wildshape.drives.writing.outputs import (
-    RayWriter,
-    Vehicle,
-    write_frames,
-    write_trajectories,
-    write_vehicles,
-)
-from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.folders.complete_folder import OBJECTS
+from wildshape.drives.writing.folder import BOXES, FRAMES
 from wildshape.inference.predictor import Predictor, load
-from wildshape.io.atomic import write_json
-from wildshape.io.guard import read_record
 from wildshape.io.output import begin, finished, keep_apart
-from wildshape.io.poses import read_poses
-from wildshape.parallel.team import ALONE, Team, team
+from wildshape.parallel.team import ALONE, team
 
 if TYPE_CHECKING:
     from wildshape.drives.adapting.adapt import Adaptation
@@ -120,7 +76,7 @@ def drive(
     settings = settings_of(source, recording, topic, config, predictor, detections)
     line = line_of(source, out, topic, config, detections)
     second_pass.put_in_place(out)
-    run = _Run(recording, out, config, predictor, ALONE, given, Clock(watch))
+    run = Pipeline(recording, out, config, predictor, ALONE, given, Clock(watch))
     done = None if overwrite else finished(out, "drive", settings, parts=(BOXES, FRAMES))
     if done is None:
         output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
@@ -138,216 +94,3 @@ def drive(
             found = replace(run, helpers=helpers).again(adapt.model, found)
     files.write(out)
     return found
-
-
-@dataclass(frozen=True)
-class _Run:
-    """One drive on its way through the stages."""
-
-    drive: Drive
-    out: Path
-    config: DriveConfig
-    predictor: Predictor
-    helpers: Team
-    detections: Detections | None
-    clock: Clock
-    second: bool = False
-
-    @property
-    def stages(self) -> Path:
-        return self.out / "stages"
-
-    @property
-    def completing(self) -> Path:
-        return second_pass.stages_of(self.out) if self.second else self.stages
-
-    @property
-    def results(self) -> Path:
-        return second_pass.results_of(self.out) if self.second else self.out
-
-    @property
-    def cuts(self) -> Path:
-        return self.stages / "clusters"
-
-    def again(self, model: str, first: DriveResult) -> DriveResult:
-        """A second pass with an adapted model; its results take the place of the first's."""
-        second_pass.begin_second(self.out, model)
-        adapted = second_pass.like(self.predictor, Path(model))
-        clock = Clock(self.clock.watch, "second ", dict(first.seconds))
-        found = replace(self, predictor=adapted, clock=clock, second=True).perform()
-        return second_pass.conclude(self.out, found, model)
-
-    def perform(self) -> DriveResult:
-        mounting = self.mounting()
-        T_world_sensor = self.trajectory(mounting)
-        moved = replace(self, drive=self.drive.moved_by(T_world_sensor))
-        return moved.find(mounting, T_world_sensor)
-
-    def find(self, mounting: Mounting, T_world_sensor: SE3) -> DriveResult:
-        """All that follows from the sensor's way: scans are corrected by it."""
-        self.cut(mounting)
-        T_level_sensor = level_poses(T_world_sensor, mounting)
-        objects = self.tracks(T_level_sensor)
-        self.complete("completion", objects, mounting)
-        turns = self.turns(objects, T_level_sensor)
-        parts = self.merged(objects, turns)
-        self.complete("merging", parts, mounting)
-        vehicles = self.vehicles([*objects, *parts], turns)
-        return DriveResult(
-            out=self.out,
-            frames=len(self.drive),
-            candidates=len(objects),
-            vehicles=tuple(one.name for one in vehicles),
-            boxes=self.write(vehicles, turns),
-            moving=sum(one.way.moving for one in vehicles),
-            warnings=self.warnings(T_world_sensor, mounting),
-            seconds=self.clock.seconds,
-            workers=self.helpers.worked,
-        )
-
-    def mounting(self) -> Mounting:
-        path = self.stages / "mounting.json"
-        with self.clock.stage("mounting", 1) as at:
-            if not path.is_file():
-                write_json(path, asdict(find_mounting(self.drive, self.config.mounting)))
-            at(1)
-            return read_record(path, "the sensor's mounting", Mounting)
-
-    def trajectory(self, mounting: Mounting) -> SE3:
-        path = self.out / TRAJECTORY
-        with self.clock.stage("trajectory", len(self.drive)) as at:
-            if not path.is_file():
-                cutter = self.cutter(mounting)
-                turns = self.helpers.in_order(cutter.landmarks, range(len(self.drive)))
-                found = find_trajectory(self.drive, mounting, self.config, at, turns)
-                write_json(self.stages / "breaks.json", asdict(found.breaks))
-                write_trajectories(self.out, self.drive, found.T_world_sensor)
-            return read_poses(path, len(self.drive))
-
-    @property
-    def breaks(self) -> Breaks:
-        return Breaks.read(self.stages / "breaks.json")
-
-    def cut(self, mounting: Mounting) -> None:
-        cutter = self.cutter(mounting)
-        self.spread("clusters", cutter, cutter.missing(), len(self.drive))
-        if self.detections is not None:
-            check_cut(self.detections, read_cuts(self.cuts, len(self.drive)))
-
-    def cutter(self, mounting: Mounting) -> Cutter:
-        known = self.drive, mounting, self.cuts, self.config
-        return Cutter(*known) if self.detections is None else BoxCutter(*known, self.detections)
-
-    @property
-    def tracked(self) -> bool:
-        """Whether the detections bring their own tracks."""
-        return self.detections is not None and self.detections.tracked
-
-    def spread(self, stage: str, task: Callable[[Any], None], items: list[Any], total: int) -> None:
-        """Do what is missing of a stage, by several processes where that is worth it."""
-        with self.clock.stage(stage, total) as at:
-            for number, _ in enumerate(self.helpers.as_done(task, items), total - len(items) + 1):
-                at(number)
-
-    def tracks(self, T_level_sensor: SE3) -> list[Sightings]:
-        path = self.stages / "tracks.json"
-        with self.clock.stage("tracks", 1) as at:
-            if not path.is_file():
-                write_sightings(path, self.linked(T_level_sensor))
-            at(1)
-            return read_sightings(path)
-
-    def linked(self, T_level_sensor: SE3) -> list[Sightings]:
-        if self.tracked:
-            return given_tracks(read_cuts(self.cuts, len(self.drive)))
-        ticks = self.breaks.ticks(self.drive.ticks, self.config.tracks)
-        known = self.cuts, T_level_sensor
-        found = linked_clusters(*known, ticks, self.config.tracks)
-        return joined_where_they_stand(found, *known, self.config.standing, self.breaks.frames)
-
-    def folder(self, seen: Sightings) -> Path:
-        return self.completing / "objects" / seen.name
-
-    def complete(self, stage: str, objects: list[Sightings], mounting: Mounting) -> None:
-        level = mounting.levelling() if mounting.is_tilted else None
-        config = self.config.completion, self.config.vehicles
-        folder = self.completing / "objects"
-        completer = Completer(self.predictor, self.drive, self.cuts, folder, level, *config)
-        self.spread(stage, completer, completer.missing(objects), len(completer.groups(objects)))
-
-    def turns(self, objects: list[Sightings], T_level_sensor: SE3) -> Turns:
-        """The sensor's turns, in their sense where points have no times."""
-        found = Turns(self.drive.ticks, T_level_sensor, breaks=self.breaks.frames)
-        if self.drive.turn(0).seconds is not None:
-            return found
-        shown = ((one.frames, one.boxes) for one in self.completed(objects, found))
-        return with_sense(found, shown, self.config.turns)
-
-    def completed(self, objects: list[Sightings], turns: Turns) -> list[Completed]:
-        """Those that were not ruled out."""
-        return [
-            faced(
-                read_completed(seen, self.folder(seen), self.drive, turns), turns, self.config.boxes
-            )
-            for seen in objects
-            if (self.folder(seen) / OBJECTS).is_file()
-        ]
-
-    def merged(self, objects: list[Sightings], turns: Turns) -> list[Sightings]:
-        """Tracks that are one object by their shapes, put together."""
-        path = self.completing / "merged.json"
-        if not path.is_file():
-            write_sightings(path, [] if self.tracked else self.fragments(objects, turns))
-        return read_sightings(path)
-
-    def fragments(self, objects: list[Sightings], turns: Turns) -> list[Sightings]:
-        merging, vehicles = self.config.merging, self.config.vehicles
-        found = likely(self.completed(objects, turns), merging.least_confidence, vehicles)
-        return Places(turns, merging, self.config.boxes).fragments(found)
-
-    def vehicles(self, objects: list[Sightings], turns: Turns) -> list[Vehicle]:
-        places = Places(turns, self.config.merging, self.config.boxes)
-        with self.clock.stage("vehicles", 1) as at:
-            completed = [
-                surer_if_driving(one, turns, self.config.boxes, self.config.vehicles)
-                for one in self.completed(objects, turns)
-            ]
-            said = judge(completed, places, self.config.vehicles)
-            kept = {one.name: one.confidence for one in said if not one.reasons}
-            found = [one for one in completed if one.seen.name in kept]
-            parts, doubtful = {}, []
-            if not self.tracked:
-                found.sort(key=lambda one: -kept[one.seen.name])
-                claimed = claim(found, self.cuts, turns, self.config)
-                found, parts = claimed.vehicles, claimed.parts
-                sure = self.config.surroundings.sure
-                doubtful = [one for one in found if stated(one, kept) < sure]
-            found, crowd = held_against(self.drive.scan, found, doubtful, turns, self.config)
-            said = refused(said, parts | dict.fromkeys(crowd, "crowded"))
-            write_judged(self.completing / "vehicles.json", objects, said)
-            found = [on_ground(one, self.cuts, turns, self.config.boxes) for one in found]
-            at(1)
-            return [
-                Vehicle(one, smooth(one, turns, self.config.boxes), stated(one, kept))
-                for one in sorted(found, key=lambda one: one.seen.name)
-            ]
-
-    def write(self, vehicles: list[Vehicle], turns: Turns) -> int:
-        if self.config.rays:
-            writer = RayWriter.of(self.results, vehicles, self.drive, self.cuts)
-            self.spread("rays", writer, sorted(writer.files), len(writer.files))
-        with self.clock.stage("outputs", len(vehicles)) as at:
-            folders = self.completing / "objects"
-            return write_vehicles(self.results, vehicles, folders, self.cuts, self.drive, turns, at)
-
-    def warnings(self, T_world_sensor: SE3, mounting: Mounting) -> tuple[str, ...]:
-        """What is odd about the drive; writes `frames.csv` on the way."""
-        points = [cut.scanned for cut in read_cuts(self.cuts, len(self.drive))]
-        write_frames(self.out / FRAMES, self.drive, points)
-        found = [*self.drive.warnings, *mounting.told()]
-        if empty := points.count(0):
-            found.append(f"{empty} of {len(points)} scans are empty or cannot be read")
-        found += self.breaks.told()
-        if leaps := list(jumps(T_world_sensor, self.drive.ticks, self.config.trajectory)):
-            found.append(f"jumps of the sensor: {len(leaps)}, the first at frame {leaps[0]}")
-        return tuple(found)
