@@ -201,6 +201,18 @@ def test_the_weights_own_probability_goes_before_what_was_added_up():
     assert stated(other, sure) == sure["other"] != 0.5
 
 
+def test_what_is_as_high_as_a_house_is_a_vehicle_only_if_that_is_sure():
+    config, at = VehicleConfig(), [(0.0, 0.0, 0.0, 0.0)]
+
+    def reasons(height, p_kind):
+        one = replace(completed(at, size=(8.0, 2.5, height)), p_kind=p_kind)
+        (said,) = judge([one], places(), config)
+        return said.reasons
+
+    assert reasons(3.5, 0.5) == reasons(3.9, 0.8) == ()
+    assert reasons(3.7, 0.6) == reasons(4.1, 0.99) == ("height",)
+
+
 def test_tracks_of_one_shape_in_one_place_are_put_together():
     here, there = [(0.0, 0.0, 0.0, 0.0)], [(0.4, 0.1, 0.0, 0.0)]
     objects = [

@@ -76,6 +76,9 @@ class VehicleConfig:
         length_m: from and to.
         width_m: from and to.
         height_m: from and to.
+        tall_m: what is higher, up to this, is a vehicle only if that is sure enough: walls of
+            houses are as high.
+        tall_kind: so sure.
         fewest_points: that the fullest scan must have.
     """
 
@@ -101,6 +104,8 @@ class VehicleConfig:
     length_m: tuple[float, float] = (2.5, 12.0)
     width_m: tuple[float, float] = (1.4, 3.2)
     height_m: tuple[float, float] = (1.05, 3.6)
+    tall_m: float = 4.0
+    tall_kind: float = 0.7
     fewest_points: int = 60
 
 

@@ -168,7 +168,10 @@ def write_judged(path: Path, objects: list[Sightings], said: list[Judged]) -> No
 
 
 def _reasons(one: Completed, confidence: float, config: VehicleConfig) -> tuple[str, ...]:
-    limits = zip(("length", "width", "height"), one.size, _sizes(config))
+    length, width, (lowest, highest) = _sizes(config)
+    if confidence >= config.tall_kind:
+        highest = config.tall_m
+    limits = zip(("length", "width", "height"), one.size, (length, width, (lowest, highest)))
     wrong = [name for name, value, (low, high) in limits if not low <= value <= high]
     least = config.least_confidence if one.p_kind is None else config.least_kind
     unlikely = ["unlikely"] if confidence < least else []
