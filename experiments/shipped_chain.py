@@ -92,8 +92,9 @@ class Round:
 ROUNDS = {
     "first": Round(data=1, steps=6_000, preset="small"),
     "taught": Round(data=1, steps=8_000, teacher="first"),
-    "main": Round(data=2, steps=30_000, teacher="taught", start="taught"),
-    "last": Round(data=3, steps=12_000, lr=4e-4, teacher="main", start="main", rays=True),
+    "second": Round(data=2, steps=12_000, teacher="taught", start="taught"),
+    "main": Round(data=3, steps=50_000, teacher="second", start="second"),
+    "last": Round(data=4, steps=20_000, lr=4e-4, teacher="main", start="main", rays=True),
 }
 """In their order; the last one is shipped."""
 
@@ -112,10 +113,10 @@ class Tracks:
     count: int = 2400
     occlusion: float = 0.3
     rays: int = 0
-    varied: tuple[bool, ...] = (True, False, False)
+    varied: tuple[bool, ...] = (True, False, False, False)
 
 
-DATA = {1: Tracks(), 2: Tracks(count=4800), 3: Tracks(occlusion=0.5, rays=512)}
+DATA = {1: Tracks(), 2: Tracks(), 3: Tracks(count=4800), 4: Tracks(occlusion=0.5, rays=512)}
 """By their seeds. What is learned carries over to unseen objects the better the more there were."""
 
 
