@@ -81,6 +81,16 @@ def test_without_the_recording_the_vehicles_are_drawn_alone(found, tmp_path):
     refused(report_from_drive, out, tmp_path / "few", match="1 scans")
 
 
+def test_a_page_says_which_vehicle_s_scans_are_lost(found, tmp_path):
+    out = shutil.copytree(found.out, tmp_path / "found")
+    lost, whole = CARS
+    scan = out / "tracks" / lost / "scans" / "000003.ply"
+    scan.write_bytes(scan.read_bytes()[:40])
+    said = {shown.name: shown.subtitle for shown in report_from_drive(out).objects}
+    assert said[lost].endswith("; 1 of them cannot be read any more")
+    assert said[whole].endswith("completed together")
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason="did not run: no chromium on PATH")
 def test_the_scene_plays_and_a_click_on_a_vehicle_opens_it(found, tmp_path):
     write_drive_report(found.out)

@@ -155,7 +155,7 @@ def _object(found: FinishedDrive, one: FoundVehicle) -> ReportObject:
     size = " x ".join(f"{side:.2f}" for side in one.size)
     return ReportObject(
         name=one.name,
-        subtitle=f"scan {scan}, {counted(len(result.scans), 'scan')} completed together",
+        subtitle=f"scan {scan}, {counted(len(scans), 'scan')} completed together{_lost(scans)}",
         clouds=tuple(cloud for cloud in clouds if len(cloud.points)),
         box=box_of(entry),
         details=(
@@ -167,6 +167,12 @@ def _object(found: FinishedDrive, one: FoundVehicle) -> ReportObject:
         ),
         paper=False,
     )
+
+
+def _lost(scans: dict[str, Points]) -> str:
+    """Those whose files are gone or damaged since; a scan has points."""
+    count = sum(not len(scan) for scan in scans.values())
+    return f"; {count} of them cannot be read any more" if count else ""
 
 
 def _fused(result: TrackResult, scans: dict[str, Points], scan: str) -> list[Cloud]:
