@@ -28,7 +28,7 @@ from wildshape.inference.compiled import compiled
 from wildshape.inference.confidence import glance_of, judged
 from wildshape.inference.config import InferenceConfig
 from wildshape.inference.free_space import Rays, Sights, without_free_space
-from wildshape.inference.refine import Refined, denser, refine, with_scan
+from wildshape.inference.refine import Refined, denser, partners, refine, with_scan
 from wildshape.inference.registration import fuse_scans, registered, to_middle
 from wildshape.inference.tracks.complete_track import Gathered, complete_together
 from wildshape.inference.tracks.joint_icp import key_scans
@@ -172,12 +172,13 @@ class Predictor:
         return self._together(scans, sensor, rays) if track else self._each(scans, sensor, rays)
 
     def _each(
-        self, scans: Sequence[Points], sensor: Sensor | None, rays: Rays = ()
+        self, scans: Sequence[Points], sensor: Sensor | None, rays: Rays = (), dense: bool = True
     ) -> Iterator[Completion]:
         for start in range(0, len(scans), BATCH):
             began = time.perf_counter()
             batch = list(scans[start : start + BATCH])
-            done = self.complete_looked(self.look(batch, rays[start : start + BATCH]), sensor)
+            looked = self.look(batch, rays[start : start + BATCH])
+            done = self.complete_looked(looked, sensor, dense=dense)
             seconds = (time.perf_counter() - began) / len(batch)
             yield from (replace(item, seconds=seconds) for item in done)
 
@@ -188,7 +189,7 @@ class Predictor:
         if len(scans) > self.config.track.key_scans:
             done = complete_together(self._gathered(scans, sensor, rays), self.config, rays)
         else:
-            done = self.put_together(self._each(scans, sensor, rays), scans, rays)
+            done = self.put_together(self._each(scans, sensor, rays, len(scans) < 2), scans, rays)
         seconds = (time.perf_counter() - began) / max(len(scans), 1)
         return (replace(item, seconds=seconds) for item in done)
 
@@ -200,7 +201,8 @@ class Predictor:
             part = slice(start, start + BATCH)
             for i, looked in enumerate(self.look(list(scans[part]), rays[part]).each(), start):
                 if i in keys:
-                    self._add(gathered, scans[i], self.complete_looked(looked, sensor)[0])
+                    done = self.complete_looked(looked, sensor, dense=False)
+                    self._add(gathered, scans[i], *done)
                 else:
                     gathered.pass_by(looked, sensor, self.config.reasons)
         return gathered
@@ -272,10 +274,12 @@ class Predictor:
         return Looked(scans, seen, found, sights)
 
     @torch.inference_mode()
-    def complete_looked(self, looked: Looked, sensor: Sensor | None = None) -> list[Completion]:
-        """Completions of scans that were looked at, each on its own."""
+    def complete_looked(
+        self, looked: Looked, sensor: Sensor | None = None, *, dense: bool = True
+    ) -> list[Completion]:
+        """Each scan that was looked at on its own; `dense`: of twice as many points."""
         found, seen = looked.found, [sorted_points(one) for one in looked.seen]
-        posed = self._refined(seen, found) if self.refines else Posed.of(found)
+        posed = self._refined(seen, found, dense) if self.refines else Posed.of(found)
         return [self._completion(looked, i, posed, sensor) for i in range(len(looked.scans))]
 
     def _found(self, scans: Sequence[Points], sights: Sights | None) -> Found:
@@ -296,8 +300,8 @@ class Predictor:
             for scan, shape, rotation, translation in zip(scans, *found[:3])
         ]
 
-    def _refined(self, seen: list[Points], found: Found) -> Posed:
-        """Shapes and poses fitted to the scans (`refine.py`), and twice as many points of each."""
+    def _refined(self, seen: list[Points], found: Found, dense: bool) -> Posed:
+        """Shapes and poses fitted to the scans (`refine.py`)."""
         on_device = (part.to(self.device) for part in found[:3])
         up = None if self.up is None else torch.tensor(self.up, dtype=torch.float64).to(self.device)
         mirror, config = self.settings.network.mirror, self.config.refine
@@ -306,7 +310,8 @@ class Predictor:
         T_sensor_canonical = SE3(done.rotation, done.translation)
         posed = T_sensor_canonical.to(torch.float32).apply(done.shapes)
         looks = surfaces(seen, done.rotation) if self.settings.sensor == "lidar" else ()
-        return Posed(done.shapes, T_sensor_canonical, denser(posed, done.partner), looks)
+        points = denser(posed, partners(found.shapes, config.partner)) if dense else posed
+        return Posed(done.shapes, T_sensor_canonical, points, looks)
 
     def _completion(
         self, looked: Looked, i: int, posed: Posed, sensor: Sensor | None

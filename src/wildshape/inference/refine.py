@@ -59,13 +59,11 @@ class Refined(NamedTuple):
         shapes: canonical frame, metres.
         rotation: of `T_scan_canonical`.
         translation: of the same, metres.
-        partner: of each point, the one between which and it another is put (`denser`).
     """
 
     shapes: Float[Tensor, "B P 3"]
     rotation: Float[Tensor, "B 3 3"]
     translation: Float[Tensor, "B 3"]
-    partner: Int64[Tensor, "B P"]
 
 
 def refine(
@@ -101,8 +99,7 @@ def refine(
     drawn = drawn_to(own * fit.stretch[:, None], seen, config)
     whole = drawn if own is exact else mirrored(drawn)
     moved = fit.translation * unit[:, 0]
-    partner = _partners(own, exact, config.partner)
-    return Refined((whole * unit).to(shapes.dtype), fit.rotation, moved, partner)
+    return Refined((whole * unit).to(shapes.dtype), fit.rotation, moved)
 
 
 def _units(shapes: Float[Tensor, "B P 3"]) -> Float[Tensor, "B 1 1"]:
@@ -156,17 +153,10 @@ def drawn_to(
 
 def partners(points: Float[Tensor, "B P 3"], count: int = _DEFAULT.partner) -> Tensor:
     """`(B, P)`: the place of each point's `count`th neighbour."""
-    return _partners(points, points, count)
-
-
-def _partners(
-    own: Float[Tensor, "B n 3"], whole: Float[Tensor, "B P 3"], count: int
-) -> Int64[Tensor, "B P"]:
-    """The same, where `own` may be the half of the points that the others are reflections of."""
-    found = nearest_k(own.float(), whole.float(), count + 1).index[..., count]
-    size = whole.shape[1]
-    if own.shape[1] == size:
-        return found
+    whole, size = points.float(), points.shape[1]
+    if not is_mirrored(points):
+        return nearest_k(whole, whole, count + 1).index[..., count]
+    found = nearest_k(whole[:, : size // 2], whole, count + 1).index[..., count]
     return torch.cat((found, (found + size // 2) % size), dim=1)
 
 

@@ -174,9 +174,9 @@ def test_of_a_long_track_the_key_scans_alone_are_completed_each_on_its_own(monke
     predictor = Predictor(ShapePoseNet(CONFIG).eval(), SETTINGS, config=config)
     completed_alone = []
 
-    def complete_looked(looked, sensor=None):
+    def complete_looked(looked, sensor=None, *, dense=True):
         completed_alone.extend(looked.scans)
-        return Predictor.complete_looked(predictor, looked, sensor)
+        return Predictor.complete_looked(predictor, looked, sensor, dense=dense)
 
     monkeypatch.setattr(predictor, "complete_looked", complete_looked)
     scans = [scan.astype(np.float32) for scan in TRACK.scans]

@@ -65,6 +65,11 @@ class _Candidate:
     nats: list[float] = field(default_factory=list)
 
     @property
+    def single(self) -> bool:
+        """Whether one scan alone is completed."""
+        return len(self.looks) < 2
+
+    @property
     def looked_at(self) -> Sightings:
         """The object in the frames that were looked at."""
         return self.chosen.part(self.places)
@@ -147,8 +152,8 @@ class Completer:
         self._look([one for one in every if one.said >= of.doubtful_nats], None)
         if self.config.rays:
             self._cut_rays([one for one in every if len(one.looks) > 1])
-        alone = completed([look for one in every for look in one.in_time], self.predictor)
-        together = [self._together(alone, one) for one in every]
+        alone = {single: self._completed(every, single) for single in (False, True)}
+        together = [self._together(alone[one.single], one) for one in every]
         seconds = (time.perf_counter() - began) / max(sum(map(len, together)), 1)
         for one, done in zip(every, together):
             self._write(one.looked_at, [replace(scan, seconds=seconds) for scan in done])
@@ -157,6 +162,11 @@ class Completer:
         chosen = keyframes(seen, self.config)
         order = order_of_looks(chosen, self.config.looks)
         return _Candidate(len(seen.frames), chosen, self._clouds(chosen), order)
+
+    def _completed(self, every: list[_Candidate], single: bool) -> Iterator[Completion]:
+        """Each scan on its own, of objects with one alone or with several."""
+        looks = [look for one in every if one.single is single for look in one.in_time]
+        return completed(looks, self.predictor, dense=single)
 
     def _together(self, alone: Iterator[Completion], one: _Candidate) -> list[Completion]:
         """The next of those completed alone are of this object."""

@@ -17,10 +17,13 @@ def looks_at(scans: Sequence[Points], predictor: Predictor) -> list[Looked]:
     return [one for part in parts for one in predictor.look(part).each()]
 
 
-def completed(looks: Sequence[Looked], predictor: Predictor) -> Iterator[Completion]:
-    """Each scan that was looked at, completed on its own."""
+def completed(
+    looks: Sequence[Looked], predictor: Predictor, *, dense: bool
+) -> Iterator[Completion]:
+    """Each scan that was looked at, completed on its own; `dense` as in `complete_looked`."""
     for start in range(0, len(looks), BATCH):
-        yield from predictor.complete_looked(Looked.joined(looks[start : start + BATCH]))
+        some = Looked.joined(looks[start : start + BATCH])
+        yield from predictor.complete_looked(some, dense=dense)
 
 
 def box_of(look: Looked, predictor: Predictor) -> Box:
