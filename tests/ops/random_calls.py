@@ -23,6 +23,8 @@ from wildshape.ops.column_argmax import column_argmax_native, column_argmax_torc
 from wildshape.ops.nearest import Neighbours, nearest, nearest_distance
 from wildshape.ops.nearest.nearest_native import NativeDistance, nearest_both_native, nearest_native
 from wildshape.ops.nearest.nearest_torch import nearest_blocked, nearest_reference
+from wildshape.ops.planes import planes_native
+from wildshape.ops.point_to_plane import point_to_plane_native
 from wildshape.ops.zbuffer.zbuffer_native import visible_native
 from wildshape.ops.zbuffer.zbuffer_torch import visible_reference
 
@@ -126,6 +128,24 @@ def call_visible(random: Random) -> None:
         assert torch.equal(seen, visible_reference(bins, depth, n_bins))
 
 
+def call_planes(random: Random) -> None:
+    """Values are for `test_planes.py`."""
+    clouds = random.choice((0, 1, 3))
+    points = laid_out(random, strewn(random, torch.rand(clouds, 1 + most(random), 3)))
+    shape = clouds, most(random), random.choice((1, 2, 6))
+    middle, _ = planes_native(points, torch.randint(0, points.shape[1], shape))
+    assert middle.shape == (*shape[:2], 3)
+
+
+def call_point_to_plane(random: Random) -> None:
+    """Values are for `test_planes.py`."""
+    points = laid_out(random, strewn(random, torch.rand(random.choice((0, 1, 9)), most(random), 3)))
+    onto = strewn(random, torch.rand(1 + most(random), 3))
+    counterpart = torch.randint(0, len(onto), points.shape[:2])
+    found = point_to_plane_native(points, points[:, :1].sum(1), onto, onto, counterpart, 0.5, 0.1)
+    assert found.A.shape == (len(points), 6, 6)
+
+
 def call_wrongly(random: Random) -> None:
     """Shapes and types that the kernels would read past the end of: refused in one sentence."""
     a, b = torch.rand(2, 1 + most(random), 3), torch.rand(2, 1 + most(random), 3)
@@ -164,7 +184,16 @@ def call_wrongly(random: Random) -> None:
     raise AssertionError(f"wrong call {number} was not refused")
 
 
-KINDS = (call_nearest, call_nearest, call_gradient, call_column_argmax, call_visible, call_wrongly)
+KINDS = (
+    call_nearest,
+    call_nearest,
+    call_gradient,
+    call_column_argmax,
+    call_visible,
+    call_planes,
+    call_point_to_plane,
+    call_wrongly,
+)
 
 
 def main() -> None:

@@ -57,7 +57,15 @@ def watched_run(sanitized, *arguments):
 def test_random_calls_stay_in_bounds_and_agree_with_torch(sanitized):
     done = watched_run(sanitized, str(CALLS))
     assert done.returncode == 0, done.stderr[-4000:]
-    for kind in ("nearest", "gradient", "column_argmax", "visible", "wrongly"):
+    for kind in (
+        "nearest",
+        "gradient",
+        "column_argmax",
+        "visible",
+        "planes",
+        "point_to",
+        "wrongly",
+    ):
         assert f"call_{kind}" in done.stdout
 
 

@@ -8,6 +8,9 @@ import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
+from wildshape.ops.library import planes_kernel
+from wildshape.ops.planes import planes_native
+
 _TINY = 1e-30
 
 
@@ -42,6 +45,15 @@ def planes(
         points: clouds.
         around: places in the cloud of the k points of each neighbourhood.
     """
+    if points.device.type == "cpu" and not points.requires_grad and planes_kernel():
+        return planes_native(points, around)
+    return planes_torch(points, around)
+
+
+def planes_torch(
+    points: Float[Tensor, "B P 3"], around: Int64[Tensor, "B n k"]
+) -> tuple[Float[Tensor, "B n 3"], Float[Tensor, "B n 3"]]:
+    """The same on any device."""
     middle, spread = moments(points, around)
     return middle, thinnest_axis(spread.double()).to(points.dtype)
 

@@ -15,7 +15,8 @@ from wildshape.errors import BadInputError, lacks_memory
 _ABI = 2
 _PATH = Path(__file__).parent / "native" / "libwildshape_ops.so"
 
-_P, _I64, _INT, _F32 = ctypes.c_void_p, ctypes.c_int64, ctypes.c_int, ctypes.c_float
+_P, _I64, _INT = ctypes.c_void_p, ctypes.c_int64, ctypes.c_int
+_F32, _F64 = ctypes.c_float, ctypes.c_double
 _SIGNATURES = {
     "wildshape_abi": ([], _INT),
     "wildshape_level": ([], _INT),
@@ -36,6 +37,8 @@ _NEAREST_K = (_P, _P, _P, _P, _P, _P, _I64, _I64, _I64, _I64, _F32, _P, _P, _INT
 _PARTS = (_P, _I64, _F32, _F32, _P, _I64, _P)
 _CELLS = (_P, _I64, _F32, _P)
 _SPANS = (_P, _I64, _P, _I64, _P, _P)
+_PLANES = (_P, _P, _I64, _I64, _P, _P)
+_POINT_TO_PLANE = (_P, _P, _I64, _I64, _P, _P, _P, _F64, _F64, _P, _P, _P)
 
 
 @cache
@@ -75,6 +78,16 @@ def cells_kernel() -> Callable[..., int] | None:
 def spans_kernel() -> Callable[..., int] | None:
     """How far points reach along directions; None as above."""
     return _added("wildshape_spans", _SPANS)
+
+
+def planes_kernel() -> Callable[..., int] | None:
+    """Planes of neighbourhoods; None as above."""
+    return _added("wildshape_planes", _PLANES)
+
+
+def point_to_plane_kernel() -> Callable[..., int] | None:
+    """The equations of points moved onto planes; None as above."""
+    return _added("wildshape_point_to_plane", _POINT_TO_PLANE)
 
 
 @cache

@@ -17,10 +17,11 @@ from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
 from wildshape.geometry.surface import mirrored, planes
-from wildshape.geometry.transforms.rotation import cross_matrix, rotation_from_vector
+from wildshape.geometry.transforms.rotation import rotation_from_vector
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import JointIcpConfig, TrackConfig
 from wildshape.ops.nearest import nearest, nearest_k
+from wildshape.ops.point_to_plane import point_to_plane
 from wildshape.records import Points
 
 _TRACK = TrackConfig()
@@ -148,7 +149,7 @@ def refine_jointly(
         if step % 3 == 0 or step >= rounds - 2:
             normals = surface_normals(moved[onto].flatten(0, 1), config).view_as(normals)
         found = _counterparts(moved, Surface(moved[onto], normals), onto, mirror)
-        T_object_sensor = _moved(T_object_sensor, moved, found, _width(step, config), config)
+        T_object_sensor = _moved(T_object_sensor, moved, *found, _width(step, config), config)
     back = _as_a_whole(start[onto], T_object_sensor[onto], points[onto], mirror)
     return (back @ T_object_sensor).inverse().to(T_sensor_object.rotation.dtype)
 
@@ -187,8 +188,8 @@ def refine_onto(
         moved = T_object_sensor.apply(points)
         nearest = nearest_k(moved.flatten(0, 1)[None], surface.points[None], 1).index
         nearest = nearest.view(moved.shape[:2])
-        onto = Surface(surface.points[nearest], surface.normals[nearest])
-        T_object_sensor = _moved(T_object_sensor, moved, onto, _width(step, config), config)
+        width = _width(step, config)
+        T_object_sensor = _moved(T_object_sensor, moved, surface, nearest, width, config)
     return T_object_sensor.inverse().to(T_sensor_object.rotation.dtype)
 
 
@@ -226,51 +227,24 @@ def _moved(
     T_object_sensor: SE3,
     points: Float[Tensor, "V n 3"],
     onto: Surface,
+    counterpart: Int64[Tensor, "V n"],
     width: float,
     config: JointIcpConfig,
 ) -> SE3:
     """One Gauss-Newton step of every scan, its points posed, onto the points' counterparts."""
-    at, normal = onto
-    off = points - at
-    kernel = (1 + off.square().sum(-1) / width**2) ** -2  # Geman-McClure
-    centre = points.mean(1, keepdim=True)
-    arm = points - centre
-    rows = torch.cat((torch.linalg.cross(arm, normal), normal), dim=-1)
-    weighted = rows * kernel[..., None]
-    residual = (off * normal).sum(-1, keepdim=True)
-    A, b = weighted.mT @ rows, (weighted.mT @ residual)[..., 0]
-    held, pulled = _held(arm, off, kernel)
-    A, b = A + config.holding * held, b + config.holding * pulled
-    damping = config.ridge * kernel.sum(1)[:, None, None] + 1e-6
+    centre = points.mean(1)
+    A, b, weight = point_to_plane(points, centre, *onto, counterpart, width, config.holding)
+    damping = config.ridge * weight[:, None, None] + 1e-6
     motion = -config.step * torch.linalg.solve(A + damping * torch.eye(6), b)
     turn = rotation_from_vector(motion[:, :3])
-    about = SE3(turn, centre[:, 0] + motion[:, 3:] - (turn @ centre[:, 0, :, None])[..., 0])
+    about = SE3(turn, centre + motion[:, 3:] - (turn @ centre[..., None])[..., 0])
     return about @ T_object_sensor
-
-
-def _held(
-    arm: Float[Tensor, "V n 3"], off: Float[Tensor, "V n 3"], kernel: Float[Tensor, "V n"]
-) -> tuple[Float[Tensor, "V 6 6"], Float[Tensor, "V 6"]]:
-    """What points that are held along all three axes add, against sliding.
-
-    With rows `(a x e, e)` for each axis e, the sum of the axes is in closed form: `|a|^2 - a a^T`,
-    the cross matrix of a, and the identity.
-    """
-    weighted = arm * kernel[..., None]
-    spread = weighted.mT @ arm
-    eye = torch.eye(3)
-    turning = spread.diagonal(dim1=-2, dim2=-1).sum(-1)[:, None, None] * eye - spread
-    across = cross_matrix(weighted.sum(1))
-    moving = kernel.sum(1)[:, None, None] * eye
-    A = torch.cat((torch.cat((turning, across), 2), torch.cat((across.mT, moving), 2)), 1)
-    pull = torch.linalg.cross(weighted, off).sum(1), (kernel[..., None] * off).sum(1)
-    return A, torch.cat(pull, dim=-1)
 
 
 def _counterparts(
     points: Float[Tensor, "V n 3"], surface: Surface, scans: Int64[Tensor, "U"], mirror: bool
-) -> Surface:
-    """The nearest point of the other scans to each point, and its normal.
+) -> tuple[Surface, Int64[Tensor, "V n"]]:
+    """The surface, reflected if objects are, and where on it another scan is nearest to each point.
 
     `surface`: of some scans, `(U, n, 3)`; `scans`: which they are.
     """
@@ -283,8 +257,7 @@ def _counterparts(
         groups = torch.cat((groups, groups))
     query = points.flatten(0, 1)[None]
     found = nearest_k(query, target[None], 1, groups=(own[None], groups[None]))
-    index = found.index.view(count, size)
-    return Surface(target[index], normals[index])
+    return Surface(target, normals), found.index.view(count, size)
 
 
 def _as_a_whole(start: SE3, end: SE3, points: Tensor, mirror: bool) -> SE3:
