@@ -80,6 +80,11 @@ def ordered_bits(values: Float32[np.ndarray, "n"]) -> Int64[np.ndarray, "n"]:
     return (bits ^ ((bits >> 31) & 0x7FFFFFFF)).astype(np.int64)
 
 
+def value_of_bits(bits: Int64[np.ndarray, "n"]) -> Float32[np.ndarray, "n"]:
+    """The values of which `ordered_bits` makes these."""
+    return (bits ^ ((bits >> 31) & 0x7FFFFFFF)).astype(np.int32).view(np.float32)
+
+
 def drawn(size: int, count: int) -> Int64[np.ndarray, "count"]:
     """Which of `size` ordered points a network sees: some of them, or all over and over."""
     if size > count:

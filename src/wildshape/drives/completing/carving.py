@@ -60,12 +60,12 @@ class Carving:
 
     def see(self, frame: int, scan: Points) -> None:
         """Count the rays of a scan, level world."""
-        exact = scan.astype(np.float64)
         sensor = self.turns.T_level_sensor[frame].translation.numpy()
-        off = np.ascontiguousarray((exact[:, :2] - sensor[:2]).T)
+        off = np.stack([scan[:, axis] - sensor[axis] for axis in (0, 1)])
         for i, box in self._present.get(frame, ()):
             size = self.vehicles[i].size
-            towards = exact[_towards(off, box[:2] - sensor[:2], size)]
+            chosen = _towards(off, box[:2] - sensor[:2], size)
+            towards = scan.compress(chosen, axis=0).astype(np.float64)
             _count(self._slabs[i], towards, sensor, box, size, self.config)
 
     def carved(self) -> list[Completed]:

@@ -47,8 +47,8 @@ def _inside_and_around(
 ) -> tuple[int, int]:
     """Points in a box, and beside its sides and ends: of what is neither ground nor above it."""
     floor, top = box[2] - size[2] / 2, box[2] + size[2] / 2
-    points = scan[(scan[:, 2] > floor + config.low_m) & (scan[:, 2] < top)]
-    near = points[np.hypot(*(points[:, :2] - box[:2]).T) < size[0] / 2 + size[1]]
+    points = scan.compress((scan[:, 2] > floor + config.low_m) & (scan[:, 2] < top), axis=0)
+    near = points.compress(np.hypot(*(points[:, :2] - box[:2]).T) < size[0] / 2 + size[1], axis=0)
 
     def within(ahead_m: float, aside_m: float) -> Bool[np.ndarray, "n"]:
         wide = size[0] + 2 * ahead_m, size[1] + 2 * aside_m, size[2]

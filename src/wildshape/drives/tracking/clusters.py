@@ -58,7 +58,7 @@ class _Above:
         beside = np.sign(off[shared])
         off = np.concatenate((off, off[shared] - beside * _SECTOR))
         number = np.concatenate((sector, sector[shared] + beside)) % _SECTORS
-        scaled = _scaled(np.concatenate((points, points[shared])), off, config)
+        scaled = _scaled(np.concatenate((points, points.take(shared, axis=0))), off, config)
         scaled[:, 0] += number * _FAR  # sectors are joined by rows alone
         twin = np.full(len(points), -1)
         twin[shared] = len(points) + np.arange(len(shared))
@@ -81,7 +81,7 @@ def find_clusters(
     rows = np.flatnonzero(above & (away < config.range_m))
     if len(rows) < config.fewest_points:
         return []
-    scan = _Above.of(points[rows], heights[rows], config)
+    scan = _Above.of(points.take(rows, axis=0), heights[rows], config)
     everything = np.arange(len(rows))
     found = [rows[part] for part in _vehicle_sized(scan, everything, (1.0, *config.finer), config)]
     return sorted(found, key=lambda part: float(away[part].min()))
@@ -93,7 +93,7 @@ def _hanging_together(
     """Some rows of a scan by parts, the larger first; `reach`: as a multiple of the usual one."""
     twins = scan.twin[rows]
     doubled = np.flatnonzero(twins >= 0)
-    points = scan.scaled[np.concatenate((rows, twins[doubled]))]
+    points = scan.scaled.take(np.concatenate((rows, twins[doubled])), axis=0)
     pairs = np.stack((doubled, len(rows) + np.arange(len(doubled))), axis=1)
     label = connected_parts(points, reach, config.thin * reach, pairs)[: len(rows)]
     return [rows[part] for part in _parts(label, config.fewest_points)]
@@ -118,7 +118,7 @@ def _vehicle_sized(
         members = _without_overhang(scan, part, config)
         if len(members) < config.fewest_points or not _stands(scan.heights[members], config):
             continue
-        length, width = extents(scan.points[members])
+        length, width = extents(scan.points.take(members, axis=0))
         if length <= config.longest_m and width <= config.widest_m:
             if length >= config.shortest_m:
                 yield members
@@ -131,8 +131,8 @@ def _without_overhang(scan: _Above, rows: Rows, config: ClusterConfig) -> Int[np
     low = scan.heights[rows] < config.overhang_m
     if low.all() or low.sum() < config.fewest_points:
         return rows
-    points = scan.points[rows]
-    below = points[low]
+    points = scan.points.take(rows, axis=0)
+    below = points.compress(low, axis=0)
     axes = level_axes(below)
     begins, ends = spans(below, axes)
     x, y = points[~low, :2].T.astype(np.float64)

@@ -127,7 +127,7 @@ class Cutter:
         parts = find_clusters(self.mounting.level(scan), heights, self.config.clusters)
         rows = np.concatenate(parts) if parts else np.empty(0, np.int64)
         counts = np.array([len(part) for part in parts], np.int64)
-        return CutScan(scan[rows], rows.astype(np.int32), counts, len(scan))
+        return CutScan(scan.take(rows, axis=0), rows.astype(np.int32), counts, len(scan))
 
     def _heights(self, scan: Points) -> Float[np.ndarray, "n"]:
         level = self.mounting.level(scan)

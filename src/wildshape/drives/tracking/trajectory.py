@@ -225,8 +225,10 @@ def landmarks(
     level = mounting.level(turn.points)
     near = np.hypot(level[:, 0], level[:, 1]) < config.trajectory.ground_m
     kept = np.flatnonzero(near | (heights > config.trajectory.standing_m))
-    kept = kept[first_of_cells(turn.points[kept], config.trajectory.voxel_m / 2)]
-    return Turn(turn.points[kept], None if turn.seconds is None else turn.seconds[kept])
+    some = turn.points.take(kept, axis=0)
+    first = first_of_cells(some, config.trajectory.voxel_m / 2)
+    kept = kept[first]
+    return Turn(some.take(first, axis=0), None if turn.seconds is None else turn.seconds[kept])
 
 
 def _landmarks_of(turn: Turn, mounting: Mounting, config: DriveConfig) -> Turn:

@@ -69,7 +69,7 @@ class FullScan:
         span = frustum.azimuths()
         some = np.arange(len(self.ends)) if span is None else self._sorted.between(*span)
         beside = np.zeros(len(self.ends), bool)
-        beside[some[frustum.rows_within(self.ends[some])]] = True
+        beside[some[frustum.rows_within(self.ends.take(some, axis=0))]] = True
         beside[rows] = False
         return thinned(np.flatnonzero(beside), most)
 
