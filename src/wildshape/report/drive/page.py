@@ -153,9 +153,10 @@ def _object(found: FinishedDrive, one: FoundVehicle) -> ReportObject:
     if completed is not None:
         clouds.append(Cloud("completed", thin(completed, _POINTS)))
     size = " x ".join(f"{side:.2f}" for side in one.size)
+    together = f"{counted(len(scans), 'scan')} completed together"
     return ReportObject(
         name=one.name,
-        subtitle=f"scan {scan}, {counted(len(scans), 'scan')} completed together{_lost(scans)}",
+        subtitle=f"scan {scan}, {together}{_lost(found, one, scans)}",
         clouds=tuple(cloud for cloud in clouds if len(cloud.points)),
         box=box_of(entry),
         details=(
@@ -169,9 +170,10 @@ def _object(found: FinishedDrive, one: FoundVehicle) -> ReportObject:
     )
 
 
-def _lost(scans: dict[str, Points]) -> str:
-    """Those whose files are gone or damaged since; a scan has points."""
-    count = sum(not len(scan) for scan in scans.values())
+def _lost(found: FinishedDrive, one: FoundVehicle, scans: dict[str, Points]) -> str:
+    """Those whose files are gone or damaged since; what another vehicle took has no points."""
+    had = {found.scan_names[frame]: points for frame, points in zip(one.frames, one.points)}
+    count = sum(not len(scan) and had.get(name, 0) > 0 for name, scan in scans.items())
     return f"; {count} of them cannot be read any more" if count else ""
 
 

@@ -17,6 +17,7 @@ from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
 from wildshape.drives.writing.playback.moments import PALETTE
 from wildshape.geometry.box import box_axes
 from wildshape.geometry.footprint import upright_places
+from wildshape.ops.connected import first_of_cells
 from wildshape.records import Box, Points
 from wildshape.report.page.html import quantise
 from wildshape.report.results import chances_in
@@ -95,11 +96,11 @@ def thinned(
 ) -> DrawnScan:
     """A scan of at most `most` points, and those on vehicles."""
     x, y, _ = np.ascontiguousarray(scan.T)
-    near = scan[x * x + y * y < config.range_m**2]
+    near = scan.compress(x * x + y * y < config.range_m**2, axis=0)
     owners = owners_of(near, boxes)
-    rest = near[owners == NOBODY]
+    rest = near.compress(owners == NOBODY, axis=0)
     near, owners = near[owners != NOBODY], owners[owners != NOBODY]
-    rest = thin(rest[_one_a_cell(rest, config.cell_m)], most)
+    rest = thin(rest.take(first_of_cells(rest, config.cell_m), axis=0), most)
     rest = rest[np.random.default_rng(0).permutation(len(rest))]
     parts = [thin(near[owners == number], config.points_a_vehicle) for number in boxes]
     counts = [len(part) for part in parts]
@@ -124,13 +125,6 @@ def owners_of(points: Points, boxes: dict[int, Box]) -> Int[np.ndarray, "n"]:
         inside = (np.abs(own) < half + _AROUND_M).all(1) & (own[:, 2] > _FOOT_M - half[2])
         owners[close[inside]] = number
     return owners
-
-
-def _one_a_cell(points: Points, cell_m: float) -> Int[np.ndarray, "m"]:
-    """Rows of one point a cell, the first of each."""
-    cells = np.floor(points / cell_m).astype(np.int64) + 2**20
-    keys = (cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2]
-    return np.sort(np.unique(keys, return_index=True)[1])
 
 
 def placed(found: FinishedDrive, one: FoundVehicle) -> Float[np.ndarray, "f 4"]:
