@@ -263,7 +263,8 @@ class Pipeline:
                 found, parts = claimed.vehicles, claimed.parts
                 sure = self.config.surroundings.sure
                 doubtful = [one for one in found if stated(one, kept) < sure]
-            found, crowd = held_against(self.drive.scan, found, doubtful, turns, self.config)
+            known = found, doubtful, turns, self.config
+            found, crowd = held_against(self.drive.scan, *known, self.helpers.in_order)
             said = refused(said, parts | dict.fromkeys(crowd, "crowded"))
             write_judged(self.completing / "vehicles.json", objects, said)
             found = [on_ground(one, self.cuts, turns, self.config.boxes) for one in found]

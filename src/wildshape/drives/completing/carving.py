@@ -39,6 +39,13 @@ class _Slabs:
     faced: Float[np.ndarray, "2"]
     points: int = 0
 
+    def add(self, other: "_Slabs") -> None:
+        """What another scan says."""
+        for mine, its in ((self.passed, other.passed), (self.own, other.own)):
+            mine += its
+        self.faced += other.faced
+        self.points += other.points
+
     @classmethod
     def empty(cls, config: CarveConfig) -> "_Slabs":
         bins = round(config.reach_m / config.slab_m)
@@ -58,30 +65,33 @@ class Carving:
                 self._present.setdefault(frame, []).append((i, box))
         self.frames = frozenset(self._present)
 
-    def see(self, frame: int, scan: Points) -> None:
-        """Count the rays of a scan, level world."""
+    def counted(self, frame: int, scan: Points) -> dict[int, _Slabs]:
+        """What the rays of a scan, level world, say of each vehicle's box."""
+        found = {}
         sensor = self.turns.T_level_sensor[frame].translation.numpy()
         off = np.stack([scan[:, axis] - sensor[axis] for axis in (0, 1)])
         for i, box in self._present.get(frame, ()):
             size = self.vehicles[i].size
             chosen = _towards(off, box[:2] - sensor[:2], size)
             towards = scan.compress(chosen, axis=0).astype(np.float64)
-            _count(self._slabs[i], towards, sensor, box, size, self.config)
+            found[i] = _counted(towards, sensor, box, size, self.config)
+        return found
+
+    def add(self, counted: dict[int, _Slabs]) -> None:
+        """Keep what one scan says."""
+        for i, slabs in counted.items():
+            self._slabs[i].add(slabs)
 
     def carved(self) -> list[Completed]:
         """The same vehicles in boxes no longer than rays leave room for."""
         return [_cut(one, slabs, self.config) for one, slabs in zip(self.vehicles, self._slabs)]
 
 
-def _count(
-    slabs: _Slabs,
-    scan: Points,
-    sensor: Float[np.ndarray, "3"],
-    box: Box,
-    size: Size,
-    config: CarveConfig,
-) -> None:
-    """Add what the rays of one scan that go towards a box say of it; all in the level world."""
+def _counted(
+    scan: Points, sensor: Float[np.ndarray, "3"], box: Box, size: Size, config: CarveConfig
+) -> _Slabs:
+    """What the rays of one scan that go towards a box say of it; all in the level world."""
+    slabs = _Slabs.empty(config)
     points = _in_box(scan, box)
     origin = _in_box(sensor[None], box)[0]
     floor = -size[2] / 2 + config.low_m
@@ -97,6 +107,7 @@ def _count(
         middles = np.arange(bins) + 0.5
         within = (through.min(0) < middles[:, None]) & (middles[:, None] < through.max(0))
         slabs.passed[end] += within.sum(1)
+    return slabs
 
 
 def _towards(

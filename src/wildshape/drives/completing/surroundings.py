@@ -27,14 +27,20 @@ class Surroundings:
         self.frames = frozenset(frame for one in vehicles for frame in one.frames)
         self._counts = {one.seen.name: np.zeros(2) for one in vehicles}
 
-    def see(self, frame: int, scan: Points) -> None:
-        """Count what a scan shows, level world."""
+    def counted(self, frame: int, scan: Points) -> dict[str, tuple[int, int]]:
+        """Points of a scan, level world, in the boxes of vehicles and around them."""
+        found = {}
         for one in self.vehicles:
             if frame in one.frames:
                 place = one.frames.index(frame)
                 (box,) = self.turns.shown([frame], one.boxes[place : place + 1])
-                inside_and_around = _inside_and_around(scan, box, one.size, self.config)
-                self._counts[one.seen.name] += inside_and_around
+                found[one.seen.name] = _inside_and_around(scan, box, one.size, self.config)
+        return found
+
+    def add(self, counted: dict[str, tuple[int, int]]) -> None:
+        """Keep what one scan shows."""
+        for name, inside_and_around in counted.items():
+            self._counts[name] += inside_and_around
 
     def crowded(self) -> set[str]:
         """Names of those whose completed scans show much close around them."""
