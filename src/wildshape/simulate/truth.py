@@ -55,8 +55,9 @@ def on_surface(solid: Solid, count: int, rng: np.random.Generator) -> tuple[np.n
     a, b, c = (solid.vertices[solid.faces[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)
     cumulative = np.cumsum(np.linalg.norm(normal, axis=1))
-    at = rng.permutation(np.arange(count) + rng.random(count)) / count * cumulative[-1]
+    at = (np.arange(count) + rng.random(count)) / count * cumulative[-1]  # rising: found fast
     face = np.minimum(np.searchsorted(cumulative, at), len(normal) - 1)
+    face = face[rng.permutation(count)]
     u, v = rng.random((2, count, 1))
     fold = u + v > 1
     u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
