@@ -17,6 +17,7 @@ from wildshape.drives.tracking.mounting import Mounting, find_mounting
 from wildshape.drives.tracking.trajectory import Breaks, find_trajectory
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Turn
+from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
 
 pytest.importorskip("kiss_icp")
 pytest.importorskip("pypatchworkpp")
@@ -103,3 +104,27 @@ def test_scans_in_the_frame_of_a_vehicle_are_said(scans):
     (told,) = find_mounting(drive_of(of_vehicle), MountingConfig()).told()
     assert "give scans as the sensor saw them" in told
     assert find_mounting(drive_of(scans), MountingConfig()).told() == []
+
+
+@pytest.mark.parametrize("pause", [600.0, 86_400.0, 1.7e9])
+def test_a_sensor_that_stands_stays_over_a_pause_and_when_its_clock_is_set(pause):
+    """However long: the noise of the speed is not taken times the pause."""
+    street = WholeDrive(StreetConfig(scans=6, sensor="hdl32", speed=0.0, compensated=True), 3)
+    seen = [street.scan(frame).points for frame in range(6)]
+    times = [0.1 * frame + pause * (frame > 2) for frame in range(6)]
+    names = [f"{frame:06d}" for frame in range(6)]
+    drive = Drive.of("street", names, lambda frame: Turn(seen[frame]), times)
+    way = find_trajectory(drive, find_mounting(drive, MountingConfig()), DriveConfig())
+    assert way.breaks.frames == ()
+    assert way.T_world_sensor.translation.abs().max() < 0.05
+
+
+def test_the_scans_beside_a_pause_are_corrected_by_the_motion_on_their_own_side():
+    names = [f"{frame:06d}" for frame in range(6)]
+    times = [0.0, 0.1, 0.2, 100.0, 100.1, 100.2]
+    places = torch.tensor([0.0, 1.0, 2.0, 3.0, 4.0, 5.0]).double()
+    path = SE3(torch.eye(3).double().expand(6, 3, 3), places[:, None] * torch.eye(3).double()[0])
+    drive = Drive.of("street", names, lambda _: Turn(np.zeros((1, 3), np.float32)), times)
+    motion = drive.moved_by(path).motion
+    assert motion is not None
+    assert [twist.linear[0] for twist in motion] == pytest.approx([10.0] * 6)

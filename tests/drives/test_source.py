@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where drives come from: folders, KITTI's layouts, times and poses beside the scans."""
 
+import os
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 
@@ -209,3 +210,23 @@ def test_a_drive_reads_frames_that_are_asked_for_again_once():
     for frame in (0, 1, 0, 1):
         assert drive.turn(frame).points[0, 0] == frame
     assert read == [0, 1]
+
+
+def test_text_beside_binary_scans_is_no_scan(folder):
+    (folder / "gps.csv").write_text("49.0,8.4,110.0\n" * 60)
+    (folder / "README.txt").write_text("49.0 8.4 110.0\n" * 60)
+    assert open_drive(folder).scan_names == ("000000", "000001", "000002", "000003")
+
+
+def test_scans_written_anew_in_as_many_bytes_are_another_recording(folder):
+    before = open_drive(folder).fingerprint
+    assert open_drive(folder).fingerprint == before
+    for path in folder.glob("*.bin"):
+        (-np.fromfile(path, np.float32) - 1).tofile(path)
+    assert open_drive(folder).fingerprint != before
+
+
+def test_names_that_are_no_utf8_are_spelt_out(tmp_path):
+    for number in range(2):
+        np.ones((50, 4), np.float32).tofile(os.fsencode(tmp_path) + b"/caf\xe9_%d.bin" % number)
+    assert open_drive(tmp_path).scan_names == (r"caf\xe9_0", r"caf\xe9_1")

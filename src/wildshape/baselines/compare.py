@@ -118,7 +118,7 @@ def compare(
     models = load_models(options.models, options.device, raw=options.raw)
     for told in _other_sensors(source, models):
         progress.say(told)
-    keep_apart(data, out)
+    keep_apart(out, data, *map(weights_file, options.models))
     identity = options.identity(data)
     output = begin(out, "evaluate", identity, FILES, overwrite=options.overwrite, progress=progress)
     pooled = options.as_seeds and len(models) > 1

@@ -74,6 +74,8 @@ class TrajectoryConfig:
         least_fit: a scan of which a smaller share fits the one before was taken elsewhere: the
             odometry begins anew. On real and simulated streets 0.87 and more fit, of scans taken
             elsewhere 0.26 to 0.48.
+        longest_guess: scans over which a motion is believed to go on; a recording that paused for
+            longer may go on anywhere, but mostly where it was.
         jump_m: steps of neighbouring scans that differ by more are counted as a jump. At 10 Hz no
             vehicle changes its speed by 20 m/s in between.
     """
@@ -86,6 +88,7 @@ class TrajectoryConfig:
     settled: float = 1e-3
     fits_m: float = 1.0
     least_fit: float = 0.65
+    longest_guess: int = 20
     jump_m: float = 2.0
 
 

@@ -3,7 +3,7 @@
 """What decides a drive's result, what `drive` gives back, and which files it may write."""
 
 import shlex
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -115,14 +115,26 @@ def line_of(
     topic: str | None,
     config: DriveConfig,
     detections: DetectionFile | None,
+    model: Path | None = None,
 ) -> str:
-    """The command that finds the same; arguments as of `drive`."""
+    """The command that finds the same; arguments as of `drive`, `model`: that was loaded.
+
+    Another config than the commands' is said to come from Python.
+    """
     chosen = [] if topic is None else ["--topic", topic]
+    if model is not None:
+        chosen += ["--model", str(model)]
     if detections is not None:
         chosen += ["--detections", str(detections.path)]
+        if detections.calibration is not None:
+            chosen += ["--calibration", str(detections.calibration)]
+        if detections.least_score is not None:
+            chosen += ["--min-score", f"{detections.least_score:g}"]
     if config.rays:
         chosen.append("--rays")
-    return shlex.join(("wildshape", "drive", str(source), "--out", str(out), *chosen))
+    line = shlex.join(("wildshape", "drive", str(source), "--out", str(out), *chosen))
+    usual = replace(config, rays=False) == DriveConfig()
+    return line if usual else f"{line} # from Python, with the config in settings"
 
 
 def earlier_result(out: Path, record: dict[str, Any]) -> DriveResult:

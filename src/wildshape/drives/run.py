@@ -70,11 +70,11 @@ def drive(
     if detections is not None:
         given = find_detections(detections, recording)
         recording = given.noted(recording)
-        keep_apart(detections.path, out)
+        keep_apart(out, detections.path)
     predictor = load(config=INFERENCE) if predictor is None else predictor
-    keep_apart(source, out)
+    keep_apart(out, source)
     settings = settings_of(source, recording, topic, config, predictor, detections)
-    line = line_of(source, out, topic, config, detections)
+    line = line_of(source, out, topic, config, detections, predictor.named)
     second_pass.put_in_place(out)
     run = Pipeline(recording, out, config, predictor, ALONE, given, Clock(watch))
     done = None if overwrite else finished(out, "drive", settings, parts=(BOXES, FRAMES))

@@ -17,10 +17,11 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.projection.full_scan import FullScan
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import Twist
-from wildshape.records import Points, Turn
+from wildshape.records import Points, Turn, as_text
 
 _LONGEST_PAUSE = 1e9  # scans; more are no count
 _MOMENT_S, _LONGEST_TURN_S = 0.01, 2.0
+_SAMPLED, _SAMPLE_BYTES = 64, 4096  # files, and bytes of each, that tell recordings apart
 _NOTHING = Turn(np.empty((0, 3), np.float32))
 
 
@@ -39,7 +40,7 @@ class Drive:
         warnings: what is odd about it, a sentence each.
         cut_by: how its objects are cut out, for their files.
         motion: of the sensor at each frame, once known: scans are corrected by it.
-        sizes: bytes of the files that scans are read from.
+        contents: of the files that scans are read from: their sizes, and a hash of some bytes.
     """
 
     name: str
@@ -51,7 +52,7 @@ class Drive:
     warnings: tuple[str, ...] = ()
     cut_by: str = "without labels"
     motion: tuple[Twist, ...] | None = None
-    sizes: tuple[int, ...] = ()
+    contents: tuple[int | str, ...] = ()
 
     @classmethod
     def of(
@@ -71,7 +72,7 @@ class Drive:
         Raises:
             BadInputError: times, or names that count, do not rise.
         """
-        names = tuple(scan_names)
+        names = tuple(map(as_text, scan_names))
         for row, (before, after) in enumerate(pairwise(times or ()), 2):
             if not after > before:
                 raise BadInputError(
@@ -87,7 +88,7 @@ class Drive:
             times=None if times is None else tuple(times),
             T_world_sensor=T_world_sensor,
             warnings=(*warnings, *missing),
-            sizes=tuple(file.stat().st_size for file in files),
+            contents=_contents(tuple(files)),
         )
 
     def __len__(self) -> int:
@@ -95,9 +96,9 @@ class Drive:
 
     @property
     def fingerprint(self) -> str:
-        """Of names, times, poses and sizes: another one is another recording, or a mended one."""
+        """Of names, times, poses, contents: another one is another recording, or a mended one."""
         poses = None if self.T_world_sensor is None else self.T_world_sensor.matrix.tolist()
-        known = json.dumps((self.scan_names, self.times, poses, self.sizes))
+        known = json.dumps((self.scan_names, self.times, poses, self.contents))
         return hashlib.sha256(known.encode()).hexdigest()
 
     def turn(self, frame: int) -> Turn:
@@ -142,6 +143,16 @@ class Drive:
         return replace(self, motion=tuple(_motion(T_world_sensor, self.times)))
 
 
+def _contents(files: tuple[Path, ...]) -> tuple[int | str, ...]:
+    """The size of each file, and a hash of what stands in the middle of some of them."""
+    digest = hashlib.sha256()
+    for file in files[:: -(-len(files) // _SAMPLED) or 1]:
+        with file.open("rb") as opened:
+            opened.seek(file.stat().st_size // 2)
+            digest.update(opened.read(_SAMPLE_BYTES))
+    return (*(file.stat().st_size for file in files), digest.hexdigest())
+
+
 def _places(motion: Twist, seconds: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:
     """Where the sensor was at some times, in few steps: rays of one place are looked at together.
 
@@ -154,13 +165,22 @@ def _places(motion: Twist, seconds: Float[np.ndarray, "n"]) -> Float[np.ndarray,
 
 
 def _motion(T_world_sensor: SE3, times: Sequence[float]) -> list[Twist]:
-    """At each frame, from the frame before it to the one after it."""
+    """At each frame, from the frame before it to the one after it, not across a pause."""
     last = len(times) - 1
-    around = [(max(frame - 1, 0), min(frame + 1, last)) for frame in range(last + 1)]
+    around = [_beside(frame, times, last) for frame in range(last + 1)]
     return [
         Twist.between(T_world_sensor[start], T_world_sensor[end], times[end] - times[start])
         for start, end in around
     ]
+
+
+def _beside(frame: int, times: Sequence[float], last: int) -> tuple[int, int]:
+    """A frame's neighbours, or itself in place of one a pause away; both if both are."""
+    start, end = max(frame - 1, 0), min(frame + 1, last)
+    near = tuple(
+        one if abs(times[one] - times[frame]) <= _LONGEST_TURN_S else frame for one in (start, end)
+    )
+    return (near[0], near[1]) if near[0] < near[1] else (start, end)
 
 
 def _ticks(

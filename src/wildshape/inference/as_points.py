@@ -41,7 +41,7 @@ def as_points(scan: object, name: str = "scan") -> Points:
     if isinstance(scan, str | Path):
         return read_scan(scan).points
     try:
-        points = np.asarray(_coordinates(scan))
+        points = _unmasked(_coordinates(scan))
         points = points if points.dtype.kind == "f" else points.astype(np.float64)
     except (TypeError, ValueError) as error:
         raise BadInputError(f"{name}: no array of numbers ({error}); pass (n, 3).") from error
@@ -70,7 +70,7 @@ def all_as_points(scans: Sequence[object], first: int = 0) -> list[Points]:
 def _coordinates(scan: object) -> object:
     """What of an object is its points; the object itself if it is an array of some kind."""
     if isinstance(scan, Tensor):
-        return scan.detach().cpu()
+        return _host(scan)
     for place in _PLACES:  # laspy's `points` are records, hence the order
         try:
             held = attrgetter(place)(scan)
@@ -78,6 +78,18 @@ def _coordinates(scan: object) -> object:
             continue
         return held.cpu().numpy() if place == _OPEN3D_TENSOR else held
     return scan
+
+
+def _host(values: object) -> object:
+    """A tensor in this machine's memory, without its gradient; anything else as it is."""
+    return values.detach().cpu() if isinstance(values, Tensor) else values
+
+
+def _unmasked(points: object) -> np.ndarray:
+    """An array, NaN where it is masked."""
+    if isinstance(points, np.ma.MaskedArray):
+        return np.ma.filled(points.astype(np.float64), np.nan)
+    return np.asarray(points)
 
 
 def as_rays(rays: object, name: str = "rays") -> SightLines | None:
@@ -100,7 +112,7 @@ def as_rays(rays: object, name: str = "rays") -> SightLines | None:
     if not isinstance(rays, tuple | list) or len(rays) not in (2, 3):
         raise BadInputError(f"{name}: expected directions (m, 3), ranges (m,) and perhaps origins.")
     try:
-        return SightLines(*(np.asarray(part, np.float32) for part in rays))
+        return SightLines(*(np.asarray(_host(part), np.float32) for part in rays))
     except (TypeError, ValueError) as error:
         raise BadInputError(f"{name}: {str(error).removeprefix('rays: ')}") from error
 

@@ -70,7 +70,9 @@ def load(
     """
     place = choose_device(device)
     network, settings = load_checkpoint(weights_file(model))
-    return Predictor(network.to(place), settings, raw=raw, level=level, config=config)
+    found = Predictor(network.to(place), settings, raw=raw, level=level, config=config)
+    found.named = None if model is None else Path(model)
+    return found
 
 
 class Predictor:
@@ -82,7 +84,12 @@ class Predictor:
         raw: see `load`.
         level: see `load`.
         config: see `load`.
+
+    Attributes:
+        named: the model that `load` was asked for; None: the weights shipped, or no file.
     """
+
+    named: Path | None = None
 
     def __init__(
         self,

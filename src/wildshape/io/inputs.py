@@ -260,15 +260,28 @@ def with_rays(source: TrackSource, path: Path, coordinates: Coordinates) -> Trac
     Raises:
         BadInputError: there are several tracks or scans, or the file holds no rays.
     """
-    rays = read_rays(path, coordinates)
     track = source.single("--rays")
+    rays = read_rays(path, _in_unit_of(source, coordinates))
     if len(track.scans) != 1:
         raise BadInputError(
             f"{path}: rays of one scan, but {source.path} holds {len(track.scans)}; keep those of a"
             " track in its folder rays/, named as the scans."
         )
-    seen = TrackFile(replace(track, rays=(rays,)), source.skipped_in(track.name))
+    dropped = tuple(
+        (name.removeprefix(f"{track.name}/"), count) for name, count in source.dropped_nonfinite
+    )
+    seen = TrackFile(replace(track, rays=(rays,)), source.skipped_in(track.name), dropped)
     return TrackSource(source.path, source.names, lambda _: seen)
+
+
+def _in_unit_of(source: TrackSource, coordinates: Coordinates) -> Coordinates:
+    """As the one scan of a source was read: a track.json beside it may name its unit."""
+    path = source.path
+    places = path.parent.parent, path, *(path / name for name in source.names)
+    for folder in places[:1] if path.is_file() and path.parent.name == "scans" else places[1:]:
+        if (folder / "scans").is_dir():
+            return coordinates.in_unit(read_info(folder / "track.json")["unit"])
+    return coordinates
 
 
 def _checked(track: Track) -> TrackFile:

@@ -139,15 +139,20 @@ def finished(
     return record if asked == known and whole else None
 
 
-def keep_apart(source: Path, out: Path) -> None:
+def keep_apart(out: Path, *sources: Path | None) -> None:
     """Refuse to read from what is written: `--overwrite` would remove the input.
 
+    Args:
+        out: folder that is written.
+        sources: data and weights that are read; None for those that are not.
+
     Raises:
-        BadInputError: the input is the output folder or lies in it.
+        BadInputError: an input is the output folder or lies in it.
     """
-    source, target = source.resolve(), out.resolve()
-    if target == source or target in source.parents:
-        raise BadInputError(f"{out}: holds the input {source}; choose another place to write.")
+    target = out.resolve()
+    for source in sources:
+        if source is not None and target in (source.resolve(), *source.resolve().parents):
+            raise BadInputError(f"{out}: holds the input {source}; choose another place to write.")
 
 
 def is_begun(path: Path) -> bool:

@@ -21,10 +21,11 @@ class SimulationConfig:
         scans: usable scans a track; None: 24 for a LiDAR, 5 for the depth camera.
         vary_scans: draw each track's number of scans from half to 5/3 of `scans` (12-40 of 24).
         sensor: what scans.
-        category: of our procedural shapes; airplanes and chairs are for the depth camera.
+        category: of our procedural shapes, by default cars; airplanes and chairs are for the depth
+            camera. Of meshes none is known unless it is given.
         meshes: folder of the user's meshes instead (x forward, z up, metres); track i shows the
             mesh i of the sorted list, again from the first after the last.
-        occlusion: probability that something stands in the way in a LiDAR track.
+        occlusion: probability that something stands in the way in a LiDAR track; None: 0.3.
         ground: leave ground returns within 0.3 m of the object in (LiDAR).
         dropout: share of pulses or pixels lost at random; None: 0.05 LiDAR, 0 camera.
         noise_m: sigma of the range noise, metres; None: the sensor's own (camera: 0).
@@ -44,9 +45,9 @@ class SimulationConfig:
     scans: int | None = None
     vary_scans: bool = False
     sensor: SensorName = "hdl64"
-    category: Category = "car"
+    category: Category | None = None
     meshes: Path | None = None
-    occlusion: float = 0.3
+    occlusion: float | None = None
     ground: bool = False
     dropout: float | None = None
     noise_m: float | None = None
@@ -67,15 +68,15 @@ class SimulationConfig:
         """
         if self.sensor not in SENSORS:
             raise BadInputError(f"sensor is {self.sensor!r}, expected one of {', '.join(SENSORS)}.")
-        if self.category not in ("car", "airplane", "chair"):
+        if self.category not in (None, "car", "airplane", "chair"):
             raise BadInputError(f"category is {self.category!r}, expected car, airplane or chair.")
         self._check_numbers()
-        if self.is_lidar and self.category != "car" and self.meshes is None:
+        if self.is_lidar and self.shown != "car" and self.meshes is None:
             raise BadInputError(
                 f"category {self.category} with sensor {self.sensor}: our {self.category}s are of "
                 "unit size, expected a car; use --sensor depth-camera."
             )
-        for name in ("ground", "rays", "varied"):
+        for name in ("occlusion", "ground", "rays", "varied"):
             if getattr(self, name) and not self.is_lidar:
                 raise BadInputError(f"{name} is of LiDARs, sensor is {self.sensor}; leave it out.")
 
@@ -84,7 +85,7 @@ class SimulationConfig:
         for name, count in counts.items():
             if count is not None and count < 1:
                 raise BadInputError(f"{name} is {count}, expected at least 1.")
-        for name, share in {"occlusion": self.occlusion, "dropout": self.loss}.items():
+        for name, share in {"occlusion": self.occluded, "dropout": self.loss}.items():
             if not 0 <= share < 1:
                 raise BadInputError(f"{name} is {share}, expected 0 to below 1.")
         if not self.noise >= 0:
@@ -99,6 +100,16 @@ class SimulationConfig:
     def device(self) -> SpinningLidar | DepthCamera:
         """The sensor itself."""
         return SENSORS[self.sensor]
+
+    @property
+    def shown(self) -> Category:
+        """What our procedural shapes are."""
+        return "car" if self.category is None else self.category
+
+    @property
+    def occluded(self) -> float:
+        """Probability that something stands in the way."""
+        return 0.3 if self.occlusion is None else self.occlusion
 
     @property
     def usual_scans(self) -> int:

@@ -52,7 +52,7 @@ def _record(raw: RawTrack, config: SimulationConfig, index: int) -> Track:
         scans=tuple(raw.scans),
         scan_names=tuple(f"{i:06d}" for i in range(len(raw.scans))),
         sensor=_sensor(config.device),
-        category=config.category,
+        category=config.shown if config.meshes is None else config.category or "",
         source=f"simulated {config.sensor} {raw.kind}",
         T_sensor_object=SE3(torch.from_numpy(rotation), torch.from_numpy(translation)).inverse(),
         shape=raw.shape,

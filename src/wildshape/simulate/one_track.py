@@ -91,7 +91,7 @@ class Job:
             return varied(mesh, rng) if self.config.varied else mesh
         car = varied_vehicle if self.config.varied else random_vehicle
         makers = {"car": car, "airplane": airplane, "chair": chair}
-        return makers[self.config.category](rng).centred(None if lidar else 1.0)
+        return makers[self.config.shown](rng).centred(None if lidar else 1.0)
 
 
 def _lidar_track(
@@ -109,7 +109,7 @@ def _lidar_track(
     sees every wall down to the ground, but no car's underside. `of_rays` is the source of chance
     of the rays that passed by, if they are wanted: the scans stay as they are.
     """
-    occluded = bool(rng.random() < config.occlusion)
+    occluded = bool(rng.random() < config.occluded)
     alone = Scene([target])
     shape = visible_surface(target, alone, config.shape_points, 0.0, rng)
     height = lidar.height_m + rng.normal(0.0, 0.03)

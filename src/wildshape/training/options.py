@@ -48,6 +48,10 @@ class TrainingOptions:
             raise BadInputError(f"--seed {self.seed}: expected 0 or more.")
         if self.steps is not None and self.steps < 1:
             raise BadInputError(f"--steps {self.steps}: expected 1 or more.")
+        if self.resume and self.overwrite:
+            raise BadInputError(
+                "--resume goes on with a run, --overwrite replaces it; pass one of them."
+            )
         if self.headings and self.teacher in (None, "truth"):
             raise BadInputError(
                 "--headings: decides which way a teacher's tracks look; pass --teacher M, too."

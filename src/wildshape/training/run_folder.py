@@ -5,7 +5,7 @@
 import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -35,13 +35,15 @@ _FILES = (
 
 
 @contextmanager
-def begun_run(data: Path, out: Path, options: TrainingOptions) -> Iterator[None]:
+def begun_run(
+    data: Path, out: Path, options: TrainingOptions, weights: Sequence[Path] = ()
+) -> Iterator[None]:
     """The marker of a run; of a new one nothing stays if what is done in here is refused.
 
     Raises:
         BadInputError: another run is there, or something else.
     """
-    output = _begin(data, out, options)
+    output = _begin(data, out, options, weights)
     if output is None:
         yield
         return
@@ -53,7 +55,9 @@ def begun_run(data: Path, out: Path, options: TrainingOptions) -> Iterator[None]
             raise
 
 
-def _begin(data: Path, out: Path, options: TrainingOptions) -> Output | None:
+def _begin(
+    data: Path, out: Path, options: TrainingOptions, weights: Sequence[Path]
+) -> Output | None:
     """None where a run is gone on with, and to processes that do not lead."""
     if int(os.environ.get("RANK", "0")) > 0:
         return None
@@ -66,7 +70,7 @@ def _begin(data: Path, out: Path, options: TrainingOptions) -> Output | None:
             write_json(out / MARKER, {**begun, "settings": settings})
         remove_leftovers(out)
         return None
-    keep_apart(data, out)
+    keep_apart(out, data, *weights)
     if begun is not None and not options.overwrite:
         raise BadInputError(
             f"{out}: a run is there already; pass --resume to go on with it, --overwrite"

@@ -91,7 +91,7 @@ def train(
         StopRequested: `stopping` said so, the state is saved; its text says how to go on.
     """
     device, weights = choose_device(options.device), _Weights.named_in(options)
-    with begun_run(data, out, options):
+    with begun_run(data, out, options, weights.files):
         store = open_training_data(data, out, options, progress)
         recipe = recipe_for(store, options.preset, options.steps)
         recipe = with_encoder(recipe, options.encoder or recipe.network.backbone)
@@ -121,6 +121,11 @@ class _Weights(NamedTuple):
         truth = options.teacher == "truth"
         teacher = "truth" if truth else _checkpoint(options.teacher)
         return cls(_checkpoint(options.start), teacher, _checkpoint(options.headings))
+
+    @property
+    def files(self) -> list[Path]:
+        """Those that are named."""
+        return [named for named in self if isinstance(named, Path)]
 
 
 def _set_up(

@@ -142,7 +142,7 @@ def run(settings: Settings) -> None:
 
     began = time.monotonic()
     _check(settings)
-    keep_apart(settings.root, settings.out)
+    keep_apart(settings.out, settings.root)
     # Machines of a cluster have working folders of their own.
     work = settings.work
     root = settings.root if work.ray is None else settings.root.absolute()
@@ -186,12 +186,31 @@ def _check(settings: Settings) -> None:
         value = getattr(settings, name)
         if value is not None and not value >= bound:
             raise BadInputError(f"--{name.replace('_', '-')} {value}: expected {bound} or more.")
+    _check_truth(settings)
     for name in ("margin", "ground"):
         if not math.isfinite(getattr(settings, name) or 0.0):
             raise BadInputError(f"--{name} {getattr(settings, name)}: expected a number of metres.")
     if settings.range_m is not None and not 0 <= settings.range_m[0] < settings.range_m[1]:
         low, high = settings.range_m
         raise BadInputError(f"--range-m {low:g} {high:g}: expected two distances, nearer first.")
+
+
+def _check_truth(settings: Settings) -> None:
+    given = [name for name in _TRUTH[1:] if getattr(settings, name) != getattr(Settings, name)]
+    if settings.truth == "none":
+        acting, needs = (), "--truth"
+    elif settings.outliers == "radius":
+        acting, needs = _TRUTH, ""
+    else:
+        acting, needs = ("outliers", "ground_strip"), "--outliers radius"
+    for name in given:
+        if name not in acting:
+            raise BadInputError(
+                f"--{name.replace('_', '-')} has no effect without {needs}; pass that, too, or"
+                " leave it out."
+            )
+    if not 0 < settings.outlier_radius < math.inf:
+        raise BadInputError(f"--outlier-radius {settings.outlier_radius}: expected metres above 0.")
 
 
 def _tell(found: "Converted", settings: Settings, seconds: float) -> None:

@@ -96,8 +96,7 @@ def _write(settings: Settings, scores: Any, counting: Any, made: dict[str, Any])
     from wildshape.io.output import begin, keep_apart
 
     assert settings.out is not None
-    keep_apart(settings.folder, settings.out)
-    keep_apart(settings.labels, settings.out)
+    keep_apart(settings.out, settings.folder, settings.labels)
     output = begin(
         settings.out, "evaluate-drive", _identity(settings), FILES, overwrite=settings.overwrite
     )

@@ -49,6 +49,7 @@ def run(settings: Settings) -> None:
     asked = settings.scans
     check_suffix(settings.out)
     refuse_file(settings.out, overwrite=asked.overwrite)
+    _keep_out(settings.track, settings.out)
     source = open_tracks(settings.track, asked.files.coordinates)
     track = source.single("fuse")
     predictor = load(asked.network.model, asked.network.device)
@@ -71,3 +72,19 @@ def run(settings: Settings) -> None:
     data = {"out": str(settings.out), "points": len(fused), "scans": len(track.scans)}
     data |= {**reasons.data, "uses": "track" if asked.together else "scan"}
     answer(text, {**data, "middle_scan": middle}, as_json=asked.json)
+
+
+def _keep_out(track: Path, out: Path) -> None:
+    """Refuse a cloud among the scans: it would be one of them the next time.
+
+    Raises:
+        BadInputError: it would lie there.
+    """
+    from wildshape.errors import BadInputError
+
+    scans = track / "scans" if (track / "scans").is_dir() else track
+    if out.resolve().parent == scans.resolve():
+        raise BadInputError(
+            f"{out}: lies among the scans of {track}, and would be taken for one the next time;"
+            " choose another place to write."
+        )

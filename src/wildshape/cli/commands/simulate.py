@@ -41,8 +41,9 @@ class Settings:
             all, by default 100.
         seed: the same seed gives the same tracks.
         sensor: what scans.
-        category: of our procedural shapes; airplane and chair need the depth camera.
-        occlusion: probability that something stands in the way in a LiDAR track.
+        category: of our shapes, by default car; airplane and chair need the depth camera; of your
+            own meshes: what their tracks are called.
+        occlusion: probability that something stands in the way in a LiDAR track, by default 0.3.
         ground: leave ground returns at the rim of the object in.
         rays: keep the rays around each scan that did not hit the object, too (LiDAR).
         varied: to train for real scans: more sizes and forms, sensors that differ, and scans cut
@@ -60,8 +61,8 @@ class Settings:
     seed: Annotated[int, arg(metavar="S")] = 0
     sensor: SensorName = "hdl64"
     meshes: Meshes = None
-    category: Literal["car", "airplane", "chair"] = "car"
-    occlusion: Annotated[float, arg(metavar="P")] = 0.3
+    category: Literal["car", "airplane", "chair"] | None = None
+    occlusion: Annotated[float | None, option(metavar="P")] = None
     ground: bool = False
     rays: bool = False
     varied: bool = False

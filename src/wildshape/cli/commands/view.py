@@ -114,7 +114,8 @@ def _page(
         from wildshape.report.viewer.drive_page import serving_drive
 
         found = read_finished(settings.input)
-        return serving_drive(found, settings.port, settings.allow_host), len(found.vehicles)
+        page = serving_drive(found, settings.port, settings.allow_host, settings.inputs)
+        return page, len(found.vehicles)
     from wildshape.report.viewer.page import serving
 
     source = source_of(settings)

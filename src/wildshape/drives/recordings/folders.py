@@ -146,6 +146,8 @@ def _files(folder: Path) -> list[Path]:
     """The scan files of a folder, sorted by name."""
     entries = sorted(folder.iterdir(), key=lambda entry: entry.name)
     files = [entry for entry in entries if is_scan_file(entry) and entry.name not in _BESIDE]
+    certain = [file for file in files if file.suffix.lower() not in _TEXT]  # text may be anything
+    files = certain or files
     if not files:
         raise BadInputError(f"{folder}: holds no scan (.bin .pcd .ply .npy .laz ...).")
     for one, other in pairwise(files):

@@ -133,16 +133,25 @@ def _follow(
     motion: Twist,
     at: Callable[[int], None] = lambda _: None,
 ) -> "tuple[list[Float[np.ndarray, '4 4']], _Odometry]":
-    """Poses of the first frames, and the odometry after them; `motion`: before them."""
+    """Poses of the first frames, and the odometry after them; `motion`: before them.
+
+    A turn is followed at its own middle, wherever in it the scan's stamp lies. About its first
+    point, an error of the speed would come back in the next step as large, and turned round.
+    """
     odometry = _Odometry(config.trajectory, motion)
-    poses = []
+    poses, middle = [], 0.0
     for frame, turn in enumerate(turns):
+        before = middle
+        if len(turn.points) >= _FEWEST_POINTS:
+            middle = turn.middle
+        since = _seconds(drive, frame) + middle - before if frame else 0.0
         if frame and _steps_differ(drive, frame):
-            odometry.expect(_seconds(drive, frame))
-        odometry.follow(turn.carried(odometry.motion), frame)
+            odometry.expect(min(since, _longest_guess(drive, config.trajectory)))
+        odometry.follow(turn.since(middle).carried(odometry.motion), frame)
         if frame:
-            odometry.learn(_seconds(drive, frame))
-        poses.append(odometry.kiss.last_pose.copy())
+            odometry.learn(since)
+        pose = odometry.kiss.last_pose.copy()
+        poses.append(pose @ odometry.motion.after(-middle).matrix.numpy() if middle else pose)
         at(frame + 1)
     return poses, odometry
 
@@ -201,6 +210,11 @@ def _seconds(drive: Drive, frame: int) -> float:
     """Since the frame before; scans, where no times are known."""
     at = drive.times or drive.ticks
     return float(at[frame] - at[frame - 1])
+
+
+def _longest_guess(drive: Drive, config: TrajectoryConfig) -> float:
+    """How long a motion is believed to go on: seconds, or scans where no times are known."""
+    return config.longest_guess * float(np.median(np.diff(drive.times or drive.ticks)))
 
 
 def _steps_differ(drive: Drive, frame: int) -> bool:

@@ -44,12 +44,13 @@ class SightLines:
             if value is not None:
                 object.__setattr__(self, name, _as_floats(name, value))
         count = len(self.ranges)
-        found = {"directions": self.directions, "origins": self.origins}
-        for name, value in found.items():
-            if value is not None and value.shape != (count, 3):
+        expected = {"ranges": (count,), "directions": (count, 3), "origins": (count, 3)}
+        for name, shape in expected.items():
+            value = getattr(self, name)
+            if value is not None and value.shape != shape:
                 raise BadInputError(
                     f"rays: {name} {value.shape} do not fit ranges {self.ranges.shape};"
-                    f" expected ({count}, 3)."
+                    f" expected {shape}."
                 )
         lengths = np.linalg.norm(self.directions, axis=1)
         if not (np.abs(lengths - 1) <= _UNIT).all():

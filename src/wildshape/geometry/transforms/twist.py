@@ -51,10 +51,10 @@ class Twist:
 
     def after(self, seconds: float) -> SE3:
         """`T_b_c`: where the frame is after some time, seen from where it was."""
-        corners = np.concatenate((np.zeros((1, 3)), np.eye(3)))
-        origin, *axes = self.carry(corners, np.full(4, seconds))
-        rotation = np.stack([axis - origin for axis in axes], axis=1)
-        return SE3(torch.from_numpy(rotation), torch.from_numpy(origin.copy()))
+        turn, linear = np.asarray(self.angular), np.asarray(self.linear)
+        axes = _turned(turn, np.eye(3), np.full(3, seconds))
+        (origin,) = _carried(turn, linear, np.full(1, seconds))
+        return SE3(torch.from_numpy(axes.T.copy()), torch.from_numpy(origin))
 
     def carry(
         self, points: Float[np.ndarray, "n 3"], seconds: Float[np.ndarray, "n"]

@@ -33,7 +33,7 @@ from wildshape.io.scans.writers import (
     write_cloud,
     write_mesh,
 )
-from wildshape.method.checkpoint import fingerprint
+from wildshape.method.checkpoint import fingerprint, weights_file
 from wildshape.parallel.team import team
 from wildshape.records import Completion, Points, Track
 
@@ -151,7 +151,7 @@ def complete_folder(
     if options.rays is not None:
         tracks = with_rays(tracks, options.rays, options.coordinates)
     predictor = load(options.model, options.device)
-    keep_apart(source, out)
+    keep_apart(out, source, weights_file(options.model), options.rays)
     command, identity = "register" if registers else "complete", options.identity(source)
     output = begin(out, command, identity, FILES, overwrite=options.overwrite, progress=progress)
     with output.abandoned_if_refused():

@@ -41,9 +41,7 @@ def seconds_since(
 
 
 def _first_seconds(first: float, scan_time: float | None) -> float:
-    """When the first point was taken, since the scan's time."""
-    if abs(first) <= _LONGEST_TURN_S:
-        return first
-    if scan_time is not None and abs(first - scan_time) <= _LONGEST_TURN_S:
-        return first - scan_time
-    return 0.0
+    """When the first point was taken, since the scan's time; a clock may have begun just now."""
+    told = (first,) if scan_time is None else (first, first - scan_time)
+    nearest = min(told, key=abs)
+    return nearest if abs(nearest) <= _LONGEST_TURN_S else 0.0

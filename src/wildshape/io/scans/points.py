@@ -194,7 +194,14 @@ def read_turn(path: Path, scan_time: float | None) -> Turn:
         return Turn(drop_nonfinite(points).points)
     kept = _is_finite(points)
     whole = np.ascontiguousarray(points[kept], np.float32)
-    return Turn(whole, seconds_since(clock[kept], scan_time))
+    clock = clock[kept]
+    returned = whole.any(axis=1) | (clock != 0)  # what did not come back may have zeros alone
+    seconds = seconds_since(clock[returned], scan_time)
+    if seconds is None:
+        return Turn(whole)
+    every = np.full(len(whole), float(seconds.mean()))
+    every[returned] = seconds
+    return Turn(whole, every)
 
 
 def read_scan(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> ScanFile:

@@ -6,10 +6,12 @@ import threading
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wildshape.drives.source import Drive
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
 from wildshape.drives.writing.playback.moments import colour_of, readable_source
 from wildshape.io.boxes.detections import pose_of
@@ -39,19 +41,31 @@ _WHITE = (255, 255, 255)
 
 
 def serving_drive(
-    found: FinishedDrive, port: int = 0, allowed: Sequence[str] = ()
+    found: FinishedDrive, port: int = 0, allowed: Sequence[str] = (), moved: Path | None = None
 ) -> AbstractContextManager["DrivePage"]:
-    """The page of a drive for as long as the block runs; arguments and errors as of `serving`."""
-    return hosting(found.name, lambda server: DrivePage(server, found), port, allowed, dark=True)
+    """The page of a drive for as long as the block runs; arguments and errors as of `serving`.
+
+    Args:
+        found: the drive.
+        port: see there.
+        allowed: see there.
+        moved: where the recording is now, if it is no longer where it was.
+
+    Raises:
+        BadInputError: `moved` is another recording.
+    """
+    drive = found.open_source(moved) if moved else readable_source(found)
+    return hosting(
+        found.name, lambda server: DrivePage(server, found, drive), port, allowed, dark=True
+    )
 
 
 class DrivePage:
     """What is on the page now. Controls call it from several threads: a lock keeps the order."""
 
-    def __init__(self, server: "ViserServer", found: FinishedDrive) -> None:
-        """Lay the page out, standing at the first frame."""
-        self.server, self.found = server, found
-        self.drive = readable_source(found)
+    def __init__(self, server: "ViserServer", found: FinishedDrive, drive: Drive | None) -> None:
+        """Lay the page out, standing at the first frame; without a recording it shows no scans."""
+        self.server, self.found, self.drive = server, found, drive
         self.lock = threading.RLock()
         self.boxes = boxes_by_frame(found)
         self.names = tuple(one.name for one in found.vehicles)

@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""When points were taken: counted from their scan's time, whichever clock they are on."""
+
+import numpy as np
+import pytest
+
+from wildshape.io.scans.point_times import seconds_since
+from wildshape.io.scans.points import read_turn
+
+TURN = np.linspace(0.0, 0.1, 200)
+
+
+@pytest.mark.parametrize("stamp", [0.0, 0.3, 0.9, 1.2, 1.7e9])
+def test_values_on_the_scan_s_own_clock_are_counted_from_its_time(stamp):
+    assert seconds_since(TURN + stamp, stamp) == pytest.approx(TURN, abs=1e-6)
+
+
+@pytest.mark.parametrize("stamp", [0.3, 5.0, 1.7e9])
+@pytest.mark.parametrize("first", [-0.05, 0.0])
+def test_values_since_the_scan_s_time_are_taken_as_they_are(stamp, first):
+    assert seconds_since(TURN + first, stamp) == pytest.approx(TURN + first)
+
+
+def test_another_clock_begins_with_the_scan_and_no_turn_has_no_times():
+    assert seconds_since(TURN + 500.0, 100.0) == pytest.approx(TURN)
+    assert seconds_since(TURN * 1000, None) is not None  # milliseconds
+    assert seconds_since(np.zeros(200), 1.0) is None
+
+
+def test_points_that_did_not_come_back_do_not_take_the_times_of_the_others(tmp_path):
+    """Drivers fill their rows with zeros, the time too."""
+    path, stamp = tmp_path / "scan.ply", 1.7e9
+    rows = np.zeros(201, [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("timestamp", "<f8")])
+    rows["x"][1:], rows["timestamp"][1:] = 5.0, stamp + TURN
+    kinds = "".join(
+        f"property {k} {n}\n" for n, k in zip(rows.dtype.names, [*["float"] * 3, "double"])
+    )
+    head = f"ply\nformat binary_little_endian 1.0\nelement vertex 201\n{kinds}end_header\n"
+    path.write_bytes(head.encode() + rows.tobytes())
+    turn = read_turn(path, stamp)
+    assert turn.seconds is not None
+    assert turn.seconds[1:] == pytest.approx(TURN, abs=1e-6)
+    assert TURN[0] <= turn.seconds[0] <= TURN[-1]
