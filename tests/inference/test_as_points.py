@@ -9,7 +9,7 @@ import torch
 import trimesh
 
 from wildshape.errors import BadInputError
-from wildshape.inference.as_points import as_points
+from wildshape.inference.as_points import as_points, as_rays
 
 RNG = np.random.default_rng(0)
 
@@ -82,3 +82,19 @@ def test_points_of_other_libraries_and_paths(tmp_path):
         np.testing.assert_allclose(as_points(scan), points, atol=1e-6, err_msg=name)
     with pytest.raises(BadInputError, match=r"nowhere\.ply"):
         as_points(tmp_path / "nowhere.ply")
+
+
+def test_masked_rows_are_dropped():
+    points = np.ma.masked_array(scan(), mask=False)
+    points[[2, 5]] = np.ma.masked
+    points.data[[2, 5]] = 40.0
+    np.testing.assert_array_equal(as_points(points), np.delete(points.data, [2, 5], axis=0))
+
+
+def test_rays_may_be_learned_of_and_have_one_range_each():
+    directions, ranges = torch.eye(3).requires_grad_(), torch.ones(3).requires_grad_()
+    found = as_rays((directions, ranges))
+    assert found is not None
+    assert found.ranges.tolist() == [1.0] * 3
+    with pytest.raises(BadInputError, match=r"ranges \(3, 1\)"):
+        as_rays((np.eye(3), np.ones((3, 1))))

@@ -98,3 +98,15 @@ def test_a_damaged_marker_is_refused(folders, tmp_path):
     (out / MARKER).write_text('{"command": "train"}')
     with pytest.raises(BadInputError, match=MARKER), begun_run(folders[0], out, AGAIN):
         pass
+
+
+def test_weights_are_not_removed_by_the_run_that_reads_them(folders, tmp_path):
+    run = tmp_path / "run"
+    train(folders[0], run, OPTIONS)
+    before = sorted(path.name for path in run.iterdir())
+    for named in ({"start": str(run)}, {"teacher": str(run / "model.safetensors")}):
+        with pytest.raises(BadInputError, match="holds the input"):
+            train(folders[0], run, replace(OPTIONS, overwrite=True, **named))
+    assert sorted(path.name for path in run.iterdir()) == before
+    with pytest.raises(BadInputError, match="pass one of them"):
+        replace(OPTIONS, resume=True, overwrite=True)

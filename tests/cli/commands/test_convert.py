@@ -236,6 +236,12 @@ def test_zeros_reach_the_reader(tmp_path, option, field):
         (("--range-m", "9,3"), "nearer first"),
         (("--workers", 0), "--workers 0"),
         (("--split", "train"), "--split: kitti-raw has no such option"),
+        (("--ground-strip", 3), "--ground-strip has no effect without --truth"),
+        (("--truth", "partial", "--outlier-radius", 2), "has no effect without --outliers radius"),
+        (
+            ("--truth", "partial", "--outliers", "radius", "--outlier-radius", "nan"),
+            "--outlier-radius nan: expected metres above 0",
+        ),
     ],
 )
 def test_options_that_make_no_sense(refused, drives, tmp_path, options, said):

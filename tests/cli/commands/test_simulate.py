@@ -51,3 +51,17 @@ def test_what_makes_no_drive_is_refused(refused, tmp_path, more, said):
     out = tmp_path / "drive"
     assert said in refused("simulate", out, *more)
     assert not out.exists()
+
+
+def test_meshes_are_called_what_the_user_says(wildshape, refused, tmp_path):
+    """Not cars: nobody said so."""
+    meshes = tmp_path / "meshes"
+    meshes.mkdir()
+    trimesh.creation.box((7.0, 2.5, 3.2)).export(meshes / "lorry.ply")
+    asked = ("--tracks", 1, "--scans", 1, "--workers", 1, "--layout", "folders")
+    for name, given in (("", ()), ("car", ("--category", "car"))):
+        out = tmp_path / f"tracks{name}"
+        assert wildshape("simulate", out, *asked, "--meshes", meshes, *given).code == 0
+        assert json.loads(next(out.glob("*/track.json")).read_text()).get("category", "") == name
+    camera = ("--sensor", "depth-camera", "--occlusion", 0.9)
+    assert "occlusion is of LiDARs" in refused("simulate", tmp_path / "c", *camera)
