@@ -2,15 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """A beam that turns meets what is beside a moving sensor before or after the turn's middle."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
 
 from wildshape.drives.completing.boxes import smooth
-from wildshape.drives.completing.placing import Completed
+from wildshape.drives.completing.placing import Completed, boxes_in_scans
 from wildshape.drives.completing.turns import Turns, with_sense
 from wildshape.drives.config import BoxConfig, TurnConfig
 from wildshape.drives.tracking.sightings import Sightings
+from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 
@@ -81,3 +84,29 @@ def test_one_that_passes_fast_is_where_the_beam_meets_it():
     way = smooth(one, turns(1), BoxConfig())
     found = turns(1).shown(way.frames, way.boxes)
     assert np.abs(found - boxes)[:19, :2].max() < 0.06
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize(("own", "its", "aside", "start"), [(15, -15, 3.5, 45), (15, 5, -3.0, 15)])
+def test_speeds_are_of_when_the_beam_meets_what_moves(sense, own, its, aside, start):
+    """Beside and behind the sensor, too: there a scan shows it half a turn early or late."""
+    count = 31
+    time = 0.1 * np.arange(count)
+    way = torch.from_numpy(np.column_stack((own * time, 0 * time, 0 * time)))
+    T = SE3(torch.eye(3).double().repeat(count, 1, 1), way)
+    turns = Turns(tuple(range(count)), T, sense)
+    phase = np.zeros(count)
+    for _ in range(30):
+        met = time + 0.1 * phase
+        phase = sense * np.arctan2(aside, start + (its - own) * met) / (2 * np.pi)
+    met = time + 0.1 * phase
+    yaw = np.full(count, 0.0 if its > 0 else np.pi)
+    boxes = np.column_stack((start + its * met, np.full(count, aside), np.full(count, -1.0), yaw))
+    size = 4.0, 1.8, 1.5
+    shown = tuple(boxes_in_scans(turns.shown(np.arange(count), boxes), size, T))
+    vehicle = FoundVehicle("a", size, 0.9, True, tuple(range(count)), shown, (100,) * count)
+    names = tuple(f"{frame:06d}" for frame in range(count))
+    known = Path(), names, tuple(time), tuple(10 * time), (1,) * count
+    found = FinishedDrive(*known, T, turns, 1.7, (vehicle,), {"settings": {"source": "x"}})
+    speeds = found.velocities(vehicle)
+    assert np.abs(speeds - (its, 0.0, 0.0)).max() < 0.5

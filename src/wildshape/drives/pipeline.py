@@ -17,7 +17,7 @@ from wildshape.drives.completing.claims import claim
 from wildshape.drives.completing.completion import Completer
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.placing import Completed, level_poses, on_ground, read_completed
-from wildshape.drives.completing.turns import Turns, with_sense
+from wildshape.drives.completing.turns import TURNS, Turns, with_sense
 from wildshape.drives.completing.vehicles import (
     judge,
     likely,
@@ -217,10 +217,11 @@ class Pipeline:
     def turns(self, objects: list[Sightings], T_level_sensor: SE3) -> Turns:
         """The sensor's turns, in their sense where points have no times."""
         found = Turns(self.drive.ticks, T_level_sensor, breaks=self.breaks.frames)
-        if self.drive.turn(0).seconds is not None:
-            return found
-        shown = ((one.frames, one.boxes) for one in self.completed(objects, found))
-        return with_sense(found, shown, self.config.turns)
+        if self.drive.turn(0).seconds is None:
+            shown = ((one.frames, one.boxes) for one in self.completed(objects, found))
+            found = with_sense(found, shown, self.config.turns)
+        write_json(self.stages / TURNS, {"sense": found.sense, "ticks": found.ticks})
+        return found
 
     def completed(self, objects: list[Sightings], turns: Turns) -> list[Completed]:
         """Those that were not ruled out."""

@@ -31,12 +31,13 @@ def test_another_clock_begins_with_the_scan_and_no_turn_has_no_times():
 def test_points_that_did_not_come_back_do_not_take_the_times_of_the_others(tmp_path):
     """Drivers fill their rows with zeros, the time too."""
     path, stamp = tmp_path / "scan.ply", 1.7e9
-    rows = np.zeros(201, [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("timestamp", "<f8")])
-    rows["x"][1:], rows["timestamp"][1:] = 5.0, stamp + TURN
-    kinds = "".join(
-        f"property {k} {n}\n" for n, k in zip(rows.dtype.names, [*["float"] * 3, "double"])
+    kinds = {"x": "float", "y": "float", "z": "float", "timestamp": "double"}
+    rows = np.zeros(
+        201, [(name, "<f8" if kind == "double" else "<f4") for name, kind in kinds.items()]
     )
-    head = f"ply\nformat binary_little_endian 1.0\nelement vertex 201\n{kinds}end_header\n"
+    rows["x"][1:], rows["timestamp"][1:] = 5.0, stamp + TURN
+    listed = "".join(f"property {kind} {name}\n" for name, kind in kinds.items())
+    head = f"ply\nformat binary_little_endian 1.0\nelement vertex 201\n{listed}end_header\n"
     path.write_bytes(head.encode() + rows.tobytes())
     turn = read_turn(path, stamp)
     assert turn.seconds is not None

@@ -9,13 +9,17 @@ sensor is met a quarter of a turn before or after, and the sensor has moved by t
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from wildshape.drives.object_config import TurnConfig
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.guard import read_json, reading
 
+TURNS = "turns.json"
+"""File of a drive's stages: what is known of its turns."""
 _STEPS = 3  # where a box is shown depends on when it is met, and the reverse
 _SENSES = (0, 1, -1)
 
@@ -39,6 +43,22 @@ class Turns:
     T_level_sensor: SE3
     sense: int = 0
     breaks: tuple[int, ...] = ()
+
+    @classmethod
+    def read(cls, path: Path, T_level_sensor: SE3) -> "Turns":
+        """Of a finished drive; of one without the file all is taken for seen at its turn's middle.
+
+        Raises:
+            BadInputError: the file is damaged.
+        """
+        if not path.is_file():
+            return cls(tuple(range(len(T_level_sensor))), T_level_sensor)
+        with reading(path, "the turns of a sensor"):
+            said = read_json(path, "the turns of a sensor")
+            ticks = tuple(map(int, said["ticks"]))
+            if said["sense"] not in _SENSES or len(ticks) != len(T_level_sensor):
+                raise ValueError(f"sense {said['sense']!r}, {len(ticks)} scans")
+            return cls(ticks, T_level_sensor, int(said["sense"]))
 
     def unbroken(self, first: int, last: int) -> range:
         """Two frames and all around them, up to the next breaks."""

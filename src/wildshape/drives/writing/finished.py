@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from wildshape.drives.completing.placing import boxes_in_scans, level_poses
+from wildshape.drives.completing.turns import TURNS, Turns
 from wildshape.drives.recordings.opening import open_drive
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.mounting import Mounting
@@ -31,6 +32,7 @@ from wildshape.drives.writing.folder import (
     is_drive,
 )
 from wildshape.errors import BadInputError
+from wildshape.geometry.footprint import upright_places
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detections import poses_of
 from wildshape.io.boxes.table import BoxRow, read_box_table
@@ -41,6 +43,7 @@ from wildshape.io.scans.points import read_points
 from wildshape.records import Box, Points, as_text
 
 _LATEST_S = 9e9  # nanoseconds of it fit into 64 bits
+_BEHIND = 0.49  # of a turn before or after its middle: it may be the turn's end or its beginning
 _PERIOD_S = 0.1  # of a scan, where no times are known
 
 
@@ -88,6 +91,7 @@ class FinishedDrive:
         ticks: when each scan was taken, counted in scans, if times are not known.
         scanned: points of each scan.
         T_level_sensor: from each frame's sensor frame to the level world.
+        turns: of the sensor.
         ground_m: height of the sensor above the ground.
         vehicles: by name.
         record: what `wildshape.json` holds.
@@ -99,6 +103,7 @@ class FinishedDrive:
     ticks: tuple[float, ...]
     scanned: tuple[int, ...]
     T_level_sensor: SE3
+    turns: Turns
     ground_m: float
     vehicles: tuple[FoundVehicle, ...]
     record: dict[str, Any]
@@ -164,19 +169,45 @@ class FinishedDrive:
             return np.empty((0, 3), np.float32)
 
     def velocities(self, vehicle: FoundVehicle) -> Float[np.ndarray, "f 3"]:
-        """Over the ground, in each frame's sensor axes, m/s; 0 for what stands."""
+        """Over the ground, in each frame's sensor axes, m/s; 0 for what stands.
+
+        Of where the vehicle stood when the beam met it, and when that was.
+        """
         frames = np.array(vehicle.frames)
-        found = np.zeros((len(frames), 3))
         if not vehicle.moving or len(frames) < 2:
-            return found
-        at = np.array(self.seconds)[frames]
-        rates = np.gradient(self.placed(vehicle).translation.numpy(), at, axis=0)
+            return np.zeros((len(frames), 3))
+        met, phase = self.turns.met(frames, upright_places(self.placed(vehicle)))
+        at = np.array(self.seconds)[frames] + phase * self._turn_s
+        rates = _rates(met[:, :3], at, np.abs(phase) < _BEHIND)
         turns = self.T_level_sensor.rotation.numpy()[frames]
         return np.einsum("fij,fi->fj", turns, rates)
+
+    @property
+    def _turn_s(self) -> float:
+        """How long a turn takes, of a drive of several."""
+        return self.seconds[-1] / max(self.turns.ticks[-1] - self.turns.ticks[0], 1)
 
     def placed(self, vehicle: FoundVehicle) -> SE3:
         """`(f,)` `T_level_box`, one of each of a vehicle's frames."""
         return self.T_level_sensor[torch.tensor(vehicle.frames)] @ poses_of(vehicle.boxes)
+
+
+def _rates(
+    places: Float[np.ndarray, "k 3"], at: Float[np.ndarray, "k"], sure: Bool[np.ndarray, "k"]
+) -> Float[np.ndarray, "k 3"]:
+    """Velocity at each time, from the sure places around it.
+
+    A beam may meet a thing at the end of a turn and again at once.
+    """
+    rows = np.flatnonzero(sure) if sure.sum() > 1 else np.arange(len(at))
+    order = rows[np.argsort(at[rows])]
+    rising = at[order]
+    apart = np.median(np.diff(rising)) / 2
+    before = np.maximum(np.searchsorted(rising, at - apart, "right") - 1, 0)
+    after = np.minimum(np.searchsorted(rising, at + apart, "left"), len(rising) - 1)
+    since = (rising[after] - rising[before])[:, None]
+    way = places[order[after]] - places[order[before]]
+    return np.divide(way, since, out=np.zeros_like(way), where=since > 0)
 
 
 def read_finished(out: Path | str) -> FinishedDrive:
@@ -213,6 +244,7 @@ def read_finished(out: Path | str) -> FinishedDrive:
         ticks=tuple(ticks),
         scanned=scanned,
         T_level_sensor=T_level_sensor,
+        turns=Turns.read(out / "stages" / TURNS, T_level_sensor),
         ground_m=mounting.height_m,
         vehicles=tuple(_vehicle(rows[name], T_level_sensor) for name in sorted(rows)),
         record=_read_record(out / MARKER),
