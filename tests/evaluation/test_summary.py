@@ -1,15 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
 import json
+from dataclasses import replace
 
 import pytest
-from tests.evaluation.scores import scores
+from tests.evaluation.scores import completion, scores
 
+from wildshape.evaluation.protocol import ONE_SCAN
 from wildshape.evaluation.results import (
     MethodScores,
     Results,
+    Skipped,
 )
 from wildshape.evaluation.summary import figures_of, summarise, write_metrics, write_scores
+from wildshape.report.page.metrics import metrics_table
 
 FIXED = ["cd", "precision", "coverage", "acc30", "rot_median_deg"]
 FIXED += ["trans_median_m", "acc30_sym", "rot_sym_median_deg"]
@@ -62,3 +66,21 @@ def test_metrics_json_has_the_fixed_names(tmp_path):
     assert content["methods"]["pose only"]["cd"] is None
     every = json.loads(write_scores(tmp_path / "new", runs).read_text())
     assert len(every["runs"]) == 2
+
+
+def test_a_track_s_one_cloud_counts_as_often_as_the_clouds_of_its_scans():
+    """The rows stand in one column: of tracks of 3 and of 1 scan."""
+    near, far = completion("a", 0.1, 0.1), completion("b", 0.5, 0.5)
+    each = MethodScores("one-scan", (near, near, near, far), (), ())
+    whole = MethodScores("identity", (replace(near, scans=3), far), (), ())
+    assert figures_of(whole)["cd"] == pytest.approx(figures_of(each)["cd"])
+    assert figures_of(whole)["cd"] == pytest.approx((3 * 0.2 + 1.0) / 4)
+
+
+def test_the_page_counts_shapes_poses_and_each_scan_left_out_once(tmp_path):
+    short = tuple(Skipped("c", str(i), f"registration: {ONE_SCAN}") for i in range(5))
+    ours = scores()
+    runs = [Results("none", 0, (replace(ours, skipped=(*ours.skipped, *short)), scores(name="b")))]
+    table = metrics_table(json.loads(write_metrics(tmp_path, runs, {}).read_text()))
+    assert [row[-1] for row in table.rows] == ["2 / 3", "2 / 3"]
+    assert "2 scans skipped by some method" in table.caption

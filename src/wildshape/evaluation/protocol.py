@@ -46,6 +46,7 @@ ALL_SCANS = Limits()
 Progress = Callable[[int, str], None]
 REFUSED = "refused by the method"
 NOT_FINITE = "prediction empty or not finite"
+ONE_SCAN = "a track of one scan"
 
 Found = TypeVar("Found")
 
@@ -223,7 +224,8 @@ def _score_whole(method: TrackCompleter, case: Case, ledger: _Ledger) -> None:
         return
     answer = _spoken(method.complete_track, case.inputs(), case)
     T_sensor_object = case.T_sensor_object[case.middle]
-    _score_completion(answer, case, case.truth, T_sensor_object, case.middle, ledger)
+    every = len(case.scans)
+    _score_completion(answer, case, case.truth, T_sensor_object, case.middle, ledger, scans=every)
 
 
 def _score_completion(
@@ -233,6 +235,8 @@ def _score_completion(
     T_sensor_object: SE3,
     i: int,
     ledger: _Ledger,
+    *,
+    scans: int = 1,
 ) -> None:
     if answer is None:
         ledger.skip(case, i, f"completion: {REFUSED}")
@@ -259,6 +263,7 @@ def _score_completion(
             box=None if answer.box is None else box_score(answer.box, truth.box, T_sensor_object),
             p_pose=answer.p_pose,
             p_box=answer.p_box,
+            scans=scans,
         )
     )
 
@@ -266,7 +271,7 @@ def _score_completion(
 def _score_registration(method: Registrar, case: Case, ledger: _Ledger) -> None:
     others = [i for i in range(len(case.scans)) if i != case.middle]
     if case.T_sensor_object is None or not others:
-        reason = "no true poses" if others else "a track of one scan"
+        reason = "no true poses" if others else ONE_SCAN
         for i in range(len(case.scans)):
             ledger.skip(case, i, f"registration: {reason}")
         return

@@ -59,6 +59,7 @@ class CompletionScore:
         box: of the object, if the method draws one.
         p_pose: probability of a heading within 10 degrees, as the method states it.
         p_box: the same of an overlap of 0.7 with the true box in bird's eye view.
+        scans: that it counts for: of a whole track all.
     """
 
     track: str
@@ -74,6 +75,7 @@ class CompletionScore:
     box: BoxScore | None = None
     p_pose: float | None = None
     p_box: float | None = None
+    scans: int = 1
 
 
 @dataclass(frozen=True)

@@ -50,8 +50,13 @@ class Figure:
 
 
 def _scans(statistic: Statistic, path: str) -> Of:
-    """A statistic of a part of each completed scan's record, of those that have it."""
-    return lambda scores: _of(statistic, (_part(row, path) for row in scores.completions))
+    """A statistic of a part of each completed scan's record, of those that have it.
+
+    A track's one cloud counts as often as it has scans, as the clouds beside it do.
+    """
+    return lambda scores: _of(
+        statistic, (_part(row, path) for row in scores.completions for _ in range(row.scans))
+    )
 
 
 def _poses(statistic: Statistic, path: str) -> Of:

@@ -10,6 +10,7 @@ import pytest
 import torch
 
 from wildshape.errors import BadInputError
+from wildshape.evaluation.tables import COUNTED
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.poses import write_poses
@@ -182,7 +183,12 @@ def test_registered_only_and_in_millimetres(tmp_path: Path) -> None:
 
 
 def test_metrics_and_log_become_table_and_curves(tmp_path: Path) -> None:
-    figures = {"cd": 0.312, "acc30": 0.82, "std": {"acc30": 0.013}, "scans_counted": {"pose": 42}}
+    figures = {
+        "cd": 0.312,
+        "acc30": 0.82,
+        "std": {"acc30": 0.013},
+        "scans_counted": {"completion": 40, "registration": 42},
+    }
     metrics = {
         "rotate": "yaw",
         "seeds": [0, 1],
@@ -204,7 +210,7 @@ def test_metrics_and_log_become_table_and_curves(tmp_path: Path) -> None:
     table = report.tables[0]
     row = dict(zip(table.columns, table.rows[1], strict=True))
     assert table.emphasis == (1,)
-    assert (row["method"], row["CD, m"], row["scans"]) == ("wildshape", "0.312", 42)
+    assert (row["method"], row["CD, m"], row[COUNTED]) == ("wildshape", "0.312", "40 / 42")
     assert row["acc 30, %"] == "82.0 ± 1.3"
     assert "rot, deg" not in row
     series = {c.title: [name for name, _, _ in c.series] for c in report.curves}

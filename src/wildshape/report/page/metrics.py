@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from wildshape.baselines.named import NAMES
+from wildshape.evaluation.protocol import ONE_SCAN
 from wildshape.evaluation.summary import FIGURES
-from wildshape.evaluation.tables import ROTATE, cell
+from wildshape.evaluation.tables import COUNTED, ROTATE, cell
 from wildshape.io.progress import counted
 from wildshape.report.content import Table
 
@@ -27,25 +28,32 @@ def metrics_table(metrics: Mapping[str, Any]) -> Table:
         (name, *(cell(row.get(f.name), (row.get("std") or {}).get(f.name), f) for f in columns))
         for name, row in methods.items()
     ]
-    counts = [
-        max((row.get("scans_counted") or {}).values(), default=None) for row in methods.values()
-    ]
+    counts = [_counts(row.get("scans_counted") or {}) for row in methods.values()]
+    skipped = {
+        (one.get("track"), one.get("scan"))
+        for one in metrics.get("skipped") or ()
+        if ONE_SCAN not in str(one.get("reason"))
+    }
     return Table(
         title=ROTATE.get(rotate, rotate or "evaluation").capitalize(),
-        columns=("method", *(figure.heading for figure in columns), "scans"),
+        columns=("method", *(figure.heading for figure in columns), COUNTED),
         rows=tuple((*row, count) for row, count in zip(rows, counts, strict=True)),
-        caption=_caption(methods, len(metrics.get("seeds") or ()) or 1),
+        caption=_caption(len(skipped), len(metrics.get("seeds") or ()) or 1),
         emphasis=tuple(i for i, name in enumerate(methods) if is_ours(name)),
     )
 
 
-def _caption(methods: Mapping[str, Mapping[str, Any]], seeds: int) -> str:
-    skipped = sum(sum((m.get("scans_skipped") or {}).values()) for m in methods.values())
+def _counts(counted: Mapping[str, int]) -> str:
+    """Of shapes and of poses, as in table.md."""
+    return " / ".join(str(counted.get(kind, 0)) for kind in ("completion", "registration"))
+
+
+def _caption(skipped: int, seeds: int) -> str:
     parts = (
         "CD = precision + coverage, Euclidean, metres; rotation and translation are medians against"
         " the middle scan; sym counts a half turn as right; CD floor is what so few points allow.",
         f"Mean ± standard deviation of {seeds} seeds." if seeds > 1 else "",
-        f"{counted(skipped, 'scan')} skipped, all methods together." if skipped else "",
+        f"{counted(skipped, 'scan')} skipped by some method." if skipped else "",
     )
     return " ".join(part for part in parts if part)
 
