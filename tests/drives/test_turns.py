@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tests.refusal import refused
 
 from wildshape.drives.completing.boxes import smooth
 from wildshape.drives.completing.placing import Completed, boxes_in_scans
-from wildshape.drives.completing.turns import Turns, with_sense
+from wildshape.drives.completing.turns import TURNS, Turns, with_sense
 from wildshape.drives.config import BoxConfig, TurnConfig
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
@@ -110,3 +111,14 @@ def test_speeds_are_of_when_the_beam_meets_what_moves(sense, own, its, aside, st
     found = FinishedDrive(*known, T, turns, 1.7, (vehicle,), {"settings": {"source": "x"}})
     speeds = found.velocities(vehicle)
     assert np.abs(speeds - (its, 0.0, 0.0)).max() < 0.5
+
+
+def test_turns_of_a_finished_drive_are_checked(tmp_path):
+    T = SE3(torch.eye(3).double().repeat(3, 1, 1), torch.zeros(3, 3).double())
+    assert Turns.read(tmp_path / TURNS, T).sense == 0  # of drives that were found before
+    (tmp_path / TURNS).write_text('{"sense": -1, "ticks": [0, 1, 4]}')
+    found = Turns.read(tmp_path / TURNS, T)
+    assert (found.sense, found.ticks) == (-1, (0, 1, 4))
+    for wrong in ('{"sense": 2, "ticks": [0, 1, 4]}', '{"sense": 1, "ticks": [0, 4, 1]}', "[]"):
+        (tmp_path / TURNS).write_text(wrong)
+        refused(Turns.read, tmp_path / TURNS, T, match="turns of a sensor")

@@ -213,6 +213,8 @@ def _build_finished(folder: Path) -> None:
     (out / "stages").mkdir()
     mounting = {"height_m": 1.7, "tilt_deg": 0.6, "up": [0.0, 0.01, 0.99995]}
     (out / "stages" / "mounting.json").write_text(json.dumps(mounting))
+    turns = {"sense": 1, "ticks": list(range(_FRAMES))}
+    (out / "stages" / "turns.json").write_text(json.dumps(turns))
     said = {"command": "drive", "settings": {"source": "street", "scans": _FRAMES}}
     (out / "wildshape.json").write_text(json.dumps(said))
 

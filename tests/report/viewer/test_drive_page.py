@@ -3,6 +3,7 @@
 """The viewer of a drive: the scene at a time, and the vehicle that is chosen."""
 
 import json
+import shutil
 from urllib.request import urlopen
 
 import numpy as np
@@ -11,6 +12,7 @@ from tests.drives.finished_drive import CARS, HEIGHT, SIZE, finished_drive
 
 pytest.importorskip("viser", reason="did not run: viser is not installed (extra view)")
 from wildshape.cli.main import main
+from wildshape.drives.writing.finished import read_finished
 from wildshape.report.viewer import page as pages
 from wildshape.report.viewer.drive_page import NOTHING, measured, serving_drive
 
@@ -63,3 +65,15 @@ def test_the_command_serves_a_drive_s_folder(found, monkeypatch, capsys):
     monkeypatch.setattr(pages, "run_until_interrupted", once)
     main(["view", str(found.out), "--no-open", "--port", "0", "--json"])
     assert json.loads(capsys.readouterr().out)["tracks"] == len(CARS)
+
+
+def test_a_recording_that_has_moved_is_shown_from_where_it_is_now(found, tmp_path):
+    moved = shutil.copytree(found.source, tmp_path / "moved")
+    said = json.loads((found.out / "wildshape.json").read_text())
+    said["settings"]["source"] = str(tmp_path / "gone")
+    out = shutil.copytree(found.out, tmp_path / "out")
+    (out / "wildshape.json").write_text(json.dumps(said))
+    with serving_drive(read_finished(out)) as page:
+        assert page.scan is None
+    with serving_drive(read_finished(out), moved=moved) as page:
+        assert len(page.scan.points) > 1000

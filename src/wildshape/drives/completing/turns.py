@@ -9,6 +9,7 @@ sensor is met a quarter of a turn before or after, and the sensor has moved by t
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from wildshape.io.guard import read_json, reading
 
 TURNS = "turns.json"
 """File of a drive's stages: what is known of its turns."""
+_LATEST = 2**53  # scans
 _STEPS = 3  # where a box is shown depends on when it is met, and the reverse
 _SENSES = (0, 1, -1)
 
@@ -56,7 +58,8 @@ class Turns:
         with reading(path, "the turns of a sensor"):
             said = read_json(path, "the turns of a sensor")
             ticks = tuple(map(int, said["ticks"]))
-            if said["sense"] not in _SENSES or len(ticks) != len(T_level_sensor):
+            rising = all(before < after <= _LATEST for before, after in pairwise((-1, *ticks)))
+            if said["sense"] not in _SENSES or len(ticks) != len(T_level_sensor) or not rising:
                 raise ValueError(f"sense {said['sense']!r}, {len(ticks)} scans")
             return cls(ticks, T_level_sensor, int(said["sense"]))
 
