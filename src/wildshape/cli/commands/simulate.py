@@ -61,7 +61,9 @@ class Settings:
     seed: Annotated[int, arg(metavar="S")] = 0
     sensor: SensorName = "hdl64"
     meshes: Meshes = None
-    category: Literal["car", "airplane", "chair"] | None = None
+    category: Annotated[
+        Literal["car", "airplane", "chair"] | None, option(metavar="{car,airplane,chair}")
+    ] = None
     occlusion: Annotated[float | None, option(metavar="P")] = None
     ground: bool = False
     rays: bool = False
