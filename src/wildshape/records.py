@@ -94,17 +94,6 @@ class Turn:
         """Memory that it takes."""
         return self.points.nbytes + (0 if self.seconds is None else self.seconds.nbytes)
 
-    @property
-    def middle(self) -> float:
-        """Between the first and the last point's time; 0 where no times are known."""
-        if self.seconds is None or not len(self.seconds):
-            return 0.0
-        return float(self.seconds.min() + self.seconds.max()) / 2
-
-    def since(self, seconds: float) -> "Turn":
-        """The same turn with its times counted from another moment of it."""
-        return self if self.seconds is None else Turn(self.points, self.seconds - seconds)
-
     def carried(self, motion: Twist) -> Points:
         """The points where they would be seen from the sensor's place at the scan's time.
 

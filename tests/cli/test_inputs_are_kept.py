@@ -30,6 +30,16 @@ def test_overwrite_spares_the_model(refused, store, run, command):
     assert (run / MODEL).is_file()
 
 
+def test_overwrite_of_a_drive_spares_the_model(refused, run, tmp_path):
+    (tmp_path / "scans").mkdir()
+    np.ones((50, 4), np.float32).tofile(tmp_path / "scans" / "000000.bin")
+    source = tmp_path / "scans"
+    assert "holds the input" in refused(
+        "drive", source, "--out", run, "--model", run, "--overwrite"
+    )
+    assert (run / MODEL).is_file()
+
+
 @pytest.mark.parametrize("plain", [True, False])
 def test_a_fused_cloud_is_not_written_among_the_scans(wildshape, refused, tmp_path, plain):
     found = wildshape(

@@ -18,6 +18,7 @@ from wildshape.drives.writing.files import DriveFiles
 from wildshape.drives.writing.folder import BOXES, FRAMES
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.output import begin, finished, keep_apart
+from wildshape.method.checkpoint import weights_file
 from wildshape.parallel.team import ALONE, team
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def drive(
         recording = given.noted(recording)
         keep_apart(out, detections.path)
     predictor = load(config=INFERENCE) if predictor is None else predictor
-    keep_apart(out, source)
+    keep_apart(out, source, predictor.named and weights_file(predictor.named))
     settings = settings_of(source, recording, topic, config, predictor, detections)
     line = line_of(source, out, topic, config, detections, predictor.named)
     second_pass.put_in_place(out)

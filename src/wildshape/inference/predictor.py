@@ -84,12 +84,9 @@ class Predictor:
         raw: see `load`.
         level: see `load`.
         config: see `load`.
-
-    Attributes:
-        named: the model that `load` was asked for; None: the weights shipped, or no file.
     """
 
-    named: Path | None = None
+    named: Path | None = None  # what `load` was asked for; None: the weights shipped, or no file
 
     def __init__(
         self,

@@ -143,11 +143,11 @@ def _follow(
     for frame, turn in enumerate(turns):
         before = middle
         if len(turn.points) >= _FEWEST_POINTS:
-            middle = turn.middle
+            middle = _middle(turn)
         since = _seconds(drive, frame) + middle - before if frame else 0.0
         if frame and _steps_differ(drive, frame):
             odometry.expect(min(since, _longest_guess(drive, config.trajectory)))
-        odometry.follow(turn.since(middle).carried(odometry.motion), frame)
+        odometry.follow(_since(turn, middle).carried(odometry.motion), frame)
         if frame:
             odometry.learn(since)
         pose = odometry.kiss.last_pose.copy()
@@ -210,6 +210,18 @@ def _seconds(drive: Drive, frame: int) -> float:
     """Since the frame before; scans, where no times are known."""
     at = drive.times or drive.ticks
     return float(at[frame] - at[frame - 1])
+
+
+def _middle(turn: Turn) -> float:
+    """Between the first and the last point's time; 0 where no times are known."""
+    if turn.seconds is None:
+        return 0.0
+    return float(turn.seconds.min() + turn.seconds.max()) / 2
+
+
+def _since(turn: Turn, seconds: float) -> Turn:
+    """The same turn with its times counted from another moment of it."""
+    return turn if turn.seconds is None else Turn(turn.points, turn.seconds - seconds)
 
 
 def _longest_guess(drive: Drive, config: TrajectoryConfig) -> float:
