@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 Points = Float[np.ndarray, "_ 3"]
 SensorKind = Literal["lidar", "camera"]
+ShapeKind = Literal["whole", "mirrored", "partial"]
 Unit = Literal["m", "cm", "mm"]
 
 
@@ -118,6 +119,8 @@ class Track:
         rays: of each scan's frame those near the object that did not hit it, None for a scan
             without; empty where no scan has any.
         label_size_m: truth, length, width and height of the labelled box, for evaluation only.
+        shape_kind: `shape` is `whole` if it is known, `partial` if it is all scans put together,
+            `mirrored` if these were reflected besides.
     """
 
     name: str
@@ -130,6 +133,7 @@ class Track:
     shape: Points | None = None
     rays: tuple[SightLines | None, ...] = ()
     label_size_m: tuple[float, float, float] | None = None
+    shape_kind: ShapeKind = "whole"
 
     def __post_init__(self) -> None:
         """Names are text, whatever the file system holds."""

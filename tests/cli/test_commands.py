@@ -143,11 +143,12 @@ def test_evaluate_and_report(wildshape, refused, store, trained, tmp_path):
     assert "--overwrite" in refused("report", out)
 
 
-def test_evaluate_models_as_seeds(wildshape, store, trained, tmp_path):
+def test_evaluate_models_as_seeds(wildshape, refused, store, trained, tmp_path):
     other = tmp_path / "second.safetensors"
     other.write_bytes((trained / "model.safetensors").read_bytes())
     measure = ("evaluate", store, "--out", tmp_path / "e", "--max-scans", 2, "--as-seeds", "--json")
     models = ("--baselines", "none", "--model", trained, other)
+    assert "two models or more" in refused(*measure, *models[:-1])
     found = wildshape(*measure, *models, "--seeds", 3)
     assert "--as-seeds: each model is measured once" in found.err
     methods = json.loads(found.out)["methods"]

@@ -79,3 +79,20 @@ def test_the_way_is_as_true_where_a_scan_is_stamped_at_its_first_or_last_point(s
         return np.abs(way.T_world_sensor.matrix.numpy() - true)[:, :3, 3].max()
 
     assert stamped(stamped_s) < 1.5 * stamped(0.0)
+
+
+def test_scans_whose_times_cannot_be_used_are_told_of(simulated):
+    measured, _ = simulated
+
+    def told(timed_frames):
+        turns = [
+            Turn(s.points, s.times if i in timed_frames else None) for i, s in enumerate(measured)
+        ]
+        names = [f"{frame:06d}" for frame in range(SCANS)]
+        times = [scan.time for scan in measured]
+        drive = Drive.of("street", names, turns.__getitem__, times)
+        return find_trajectory(drive, find_mounting(drive, CONFIG.mounting), CONFIG).breaks.told()
+
+    assert told(range(SCANS)) == told(()) == []
+    (sentence,) = told((0, 1, 3, 5))
+    assert "in 2 scans, first of frame 2" in sentence

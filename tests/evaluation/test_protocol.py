@@ -11,6 +11,7 @@ from tests.cars import drive_by, known, poses_of
 from wildshape.baselines.icp import LocalIcp
 from wildshape.baselines.identity import Identity, OneScan
 from wildshape.baselines.pairs import Chained
+from wildshape.datasets.tracks.truth import TruthBuilder
 from wildshape.errors import BadInputError
 from wildshape.evaluation.cases import turn_track
 from wildshape.evaluation.protocol import Spoken, run
@@ -277,6 +278,21 @@ def test_truth_is_accumulated_where_no_shape_is_given():
     # The far side is not in the scan: more is missing of the mirrored truth.
     assert score.error.coverage > score.error_partial.coverage
     assert run({"scan": OneScan()}, [drive_by(scans=2)])["scan"].completions[0].truth == "shape"
+
+
+@pytest.mark.parametrize("kind", ["partial", "mirrored"])
+def test_a_shape_made_of_scans_counts_as_none_would(kind):
+    bare = replace(drive_by(scans=7), shape=None)
+    made = TruthBuilder(kind).with_shape(bare)
+    assert made is not None
+    found, wanted = (run({"scan": OneScan()}, [one])["scan"] for one in (made, bare))
+    for one, other in zip(found.completions, wanted.completions, strict=True):
+        assert one.truth == "mirrored"
+        # Of the partial shape the reflection is that of its thinned points.
+        assert one.error.cd == pytest.approx(other.error.cd, abs=2e-3)
+        assert one.truth_points == pytest.approx(other.truth_points, rel=0.1)
+        # What was seen is not to be told from its reflection.
+        assert one.error_partial == (other.error_partial if kind == "partial" else None)
 
 
 def test_progress_and_seed_are_told():

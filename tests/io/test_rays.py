@@ -10,6 +10,7 @@ import pytest
 from tests.io.store.stores import make_parts
 from tests.refusal import refused
 
+from wildshape.errors import BadInputError
 from wildshape.io.inputs import open_tracks
 from wildshape.io.rays import read_rays, write_rays
 from wildshape.io.scans.points import Coordinates
@@ -38,7 +39,7 @@ def seen(track: Track) -> Track:
 
 
 def assert_same_rays(found: Track, truth: Track) -> None:
-    assert found.label_size_m == truth.label_size_m
+    assert (found.label_size_m, found.shape_kind) == (truth.label_size_m, truth.shape_kind)
     assert len(found.rays) == len(truth.rays)
     for one, other in zip(found.rays, truth.rays):
         assert (one is None) == (other is None)
@@ -47,6 +48,15 @@ def assert_same_rays(found: Track, truth: Track) -> None:
             assert np.array_equal(one.ranges, other.ranges)
             assert (one.origins is None) == (other.origins is None)
             assert np.array_equal(one.starts, other.starts)
+
+
+def test_shape_kind_is_kept_or_refused(seen: Track, tmp_path: Path) -> None:
+    write_track(tmp_path / "t", replace(seen, shape_kind="partial"))
+    assert read_track(tmp_path / "t").shape_kind == "partial"
+    info = tmp_path / "t" / "track.json"
+    info.write_text(info.read_text().replace('"partial"', '"half"'))
+    with pytest.raises(BadInputError, match="shape_kind 'half' is unknown; use one of whole"):
+        read_track(tmp_path / "t")
 
 
 def test_folders_keep_rays(seen: Track, tmp_path: Path) -> None:
@@ -62,7 +72,8 @@ def test_stores_keep_rays_however_they_are_joined(seen: Track, tmp_path: Path) -
     (tmp_path / "out" / PARTS).mkdir(parents=True)
     (tmp_path / "out" / WRITING_JSON).write_text("{}")
     parts = [tmp_path / "out" / PARTS / name for name in "ab"]
-    bare = replace(seen, rays=(), label_size_m=None)
+    bare = replace(seen, rays=(), label_size_m=None, shape_kind="partial")
+    seen = replace(seen, shape_kind="mirrored")
     for path, order in zip(parts, ((bare, seen), (seen, bare, seen))):
         with StoreWriter(path, {}) as writer:
             for number, one in enumerate(order):
@@ -79,6 +90,7 @@ def test_a_store_without_rays_is_what_it_was(track: Track, tmp_path: Path) -> No
     names = (path / "index.safetensors").read_bytes()[:4000]
     assert b"ray_" not in names
     assert b"label_" not in names
+    assert b"_shapes" not in names
     assert open_store(path).track(0).rays == ()
 
 

@@ -73,6 +73,8 @@ class ComparisonOptions:
             raise BadInputError(f"--seeds {self.seeds}: expected 1 or more.")
         if self.max_scans is not None and self.max_scans < 1:
             raise BadInputError(f"--max-scans {self.max_scans}: expected 1 or more.")
+        if self.as_seeds and len(self.models) < 2:
+            raise BadInputError("--as-seeds: name two models or more by --model.")
 
     def identity(self, data: Path) -> dict[str, Any]:
         """What decides the figures, as JSON values."""

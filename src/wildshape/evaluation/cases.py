@@ -10,10 +10,11 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from wildshape.datasets.tracks.truth import shape_mirrored, shape_partial
+from wildshape.datasets.tracks.truth import VOXEL_M, mirrored, shape_mirrored, shape_partial
 from wildshape.evaluation.metrics import hull_area, labelled_box, true_box
 from wildshape.evaluation.results import Limits, Rotate, Skipped
 from wildshape.geometry.box import FittedBox
+from wildshape.geometry.sampling import voxel_thin
 from wildshape.geometry.transforms.rotation import random_rotation, random_yaw
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor, SightLines, Track
@@ -26,7 +27,7 @@ class Truth:
     Attributes:
         kind: `shape` (known), or `mirrored` (accumulated and reflected).
         shape: `(g, 3)`.
-        partial: `(g, 3)` as accumulated; None where the shape is known.
+        partial: `(g, 3)` as accumulated; None where it is not at hand.
         area: of the surface, square metres, roughly (convex hull).
         box: as labelled, else tight around the shape.
     """
@@ -115,12 +116,15 @@ def _subsample(track: Track, max_scans: int | None) -> Track:
 def _truth(track: Track, count: int) -> Truth | None:
     if track.T_sensor_object is None or not track.scans:
         return None
-    if track.shape is not None:
-        shape = _thin(track.shape, count)
-        return Truth("shape", shape, None, hull_area(shape), _true_box(track, track.shape))
-    whole = shape_mirrored(track)
-    mirrored, partial = _thin(whole, count), _thin(shape_partial(track), count)
-    return Truth("mirrored", mirrored, partial, hull_area(mirrored), _true_box(track, whole))
+    whole, partial = track.shape, None
+    if whole is None:
+        whole, partial = shape_mirrored(track), shape_partial(track)
+    elif track.shape_kind == "partial":
+        whole, partial = voxel_thin(mirrored(whole), VOXEL_M), whole
+    known = track.shape is not None and track.shape_kind == "whole"
+    shape, box = _thin(whole, count), _true_box(track, whole)
+    partial = None if partial is None else _thin(partial, count)
+    return Truth("shape" if known else "mirrored", shape, partial, hull_area(shape), box)
 
 
 def _true_box(track: Track, shape: Points) -> FittedBox:

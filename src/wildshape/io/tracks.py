@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import torch
 from jaxtyping import Float32
@@ -30,7 +30,7 @@ from wildshape.io.scans.points import (
     read_scan,
 )
 from wildshape.io.scans.writers import ply_bytes, write_ply
-from wildshape.records import Intrinsics, Sensor, SightLines, Track, as_text
+from wildshape.records import Intrinsics, Sensor, ShapeKind, SightLines, Track, as_text
 
 __all__ = [
     "NoUsableScanError",
@@ -110,6 +110,7 @@ def read_track_file(folder: Path | str, coordinates: Coordinates = SENSOR_METRES
         shape=_read_shape(folder / "shape.ply", Coordinates(coordinates.unit)),
         rays=tuple(rays_beside(file, coordinates) for file in kept),
         label_size_m=info["label_size_m"],
+        shape_kind=info["shape_kind"],
     )
     return TrackFile(track, skipped, dropped, _out_of_order(files))
 
@@ -201,7 +202,7 @@ def _read_shape(path: Path, coordinates: Coordinates) -> Float32[ndarray, "n 3"]
 
 
 def read_info(path: Path) -> dict[str, Any]:
-    """track.json, its gaps filled: unit, sensor, category and source.
+    """track.json, its gaps filled.
 
     Raises:
         BadInputError: no JSON object, or a value that makes no sense.
@@ -211,12 +212,17 @@ def read_info(path: Path) -> dict[str, Any]:
     unit = raw.get("unit", "m")
     if unit not in tuple(METRES):
         raise BadInputError(f"{path}: unit {unit!r} is unknown; use one of {', '.join(METRES)}.")
+    kind = raw.get("shape_kind", "whole")
+    if kind not in get_args(ShapeKind):
+        names = ", ".join(get_args(ShapeKind))
+        raise BadInputError(f"{path}: shape_kind {kind!r} is unknown; use one of {names}.")
     return {
         "unit": unit,
         "sensor": sensor_from_json(raw, path),
         "category": str(raw.get("category") or ""),
         "source": str(raw.get("source") or ""),
         "label_size_m": _label_size(raw.get("label_size_m"), path),
+        "shape_kind": kind,
     }
 
 
@@ -297,6 +303,8 @@ def write_track(folder: Path | str, track: Track) -> None:
     info: dict[str, Any] = {"category": track.category, "source": track.source, "unit": "m"}
     if track.label_size_m is not None:
         info["label_size_m"] = list(track.label_size_m)
+    if track.shape_kind != "whole":
+        info["shape_kind"] = track.shape_kind
     write_json(folder / _INFO, sensor_to_json(track.sensor) | info)
     for name, rays in zip(file_names(track.scan_names), track.rays):
         if rays is not None:

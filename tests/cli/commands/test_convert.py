@@ -199,6 +199,8 @@ def test_truth(wildshape, drives, tmp_path):
         assert mirrored is not None
         assert len(partial) < len(mirrored) <= 2 * len(partial)
         assert np.abs(mirrored[:, 1].mean()) < 0.02
+        kinds = [store.track(track).shape_kind for store in (half, both)]
+        assert kinds == ["partial", "mirrored"]
 
 
 def test_an_explicit_zero_is_a_wish(wildshape, drives, tmp_path):

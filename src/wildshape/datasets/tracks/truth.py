@@ -51,10 +51,11 @@ def shape_mirrored(track: Track, *, floor: float | None = None, voxel: float = V
     Raises:
         BadInputError: the track has no poses.
     """
-    return voxel_thin(_mirrored(_clean(track, floor)), voxel)
+    return voxel_thin(mirrored(_clean(track, floor)), voxel)
 
 
-def _mirrored(points: Points) -> Points:
+def mirrored(points: Points) -> Points:
+    """Points `(n, 3)` of the object frame with their reflection at its x-z plane added."""
     return np.concatenate((points, points * np.asarray((1, -1, 1), points.dtype)))
 
 
@@ -99,8 +100,10 @@ class TruthBuilder:
             return None
         points = self._clean(fuse_by_truth(track))
         if self.kind == "mirrored":
-            points = _mirrored(points)
-        return replace(track, shape=voxel_thin(points, self.voxel)) if len(points) else None
+            points = mirrored(points)
+        if not len(points):
+            return None
+        return replace(track, shape=voxel_thin(points, self.voxel), shape_kind=self.kind)
 
     def _clean(self, points: Points) -> Points:
         if self.outliers == "statistical":

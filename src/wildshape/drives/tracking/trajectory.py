@@ -44,10 +44,12 @@ class Breaks:
     Attributes:
         frames: whose place could not be told from the frame before.
         misfit: what seems to be wrong with poses that came with the drive.
+        untimed: frames whose points have no times that can be used, where others have some.
     """
 
     frames: tuple[int, ...] = ()
     misfit: str = ""
+    untimed: tuple[int, ...] = ()
 
     @classmethod
     def read(cls, path: Path) -> "Breaks":
@@ -70,6 +72,11 @@ class Breaks:
             told.append(
                 f"the sensor's way breaks off {times}, first at frame {self.frames[0]}: that scan"
                 " does not fit the one before it; no vehicle is followed across"
+            )
+        if self.untimed:
+            told.append(
+                f"times of points that cannot be used in {counted(len(self.untimed), 'scan')},"
+                f" first of frame {self.untimed[0]}: not corrected for the sensor's motion"
             )
         return told
 
@@ -123,7 +130,8 @@ def find_trajectory(
         motion = _follow(drive, first, config, motion)[1].motion
     poses, odometry = _follow(drive, chain(first, rest), config, motion, at)
     T_world_sensor = SE3.from_matrix(np.linalg.inv(poses[0]) @ np.stack(poses))
-    return Way(T_world_sensor, Breaks(tuple(odometry.lost)))
+    untimed = tuple(odometry.untimed) if odometry.timed else ()
+    return Way(T_world_sensor, Breaks(tuple(odometry.lost), untimed=untimed))
 
 
 def _follow(
@@ -144,6 +152,7 @@ def _follow(
         before = middle
         if len(turn.points) >= _FEWEST_POINTS:
             middle = _middle(turn)
+            odometry.count(turn, frame)
         since = _seconds(drive, frame) + middle - before if frame else 0.0
         if frame and _steps_differ(drive, frame):
             odometry.expect(min(since, _longest_guess(drive, config.trajectory)))
@@ -162,13 +171,23 @@ class _Odometry:
     Attributes:
         motion: of the sensor, after the last scan.
         lost: frames that did not fit.
+        timed: how many scans had times of their points.
+        untimed: the other frames.
     """
 
     def __init__(self, config: TrajectoryConfig, motion: Twist) -> None:
         self.config, self.motion = config, motion
         self.kiss = _kiss_icp(config)
         self.lost: list[int] = []
+        self.timed, self.untimed = 0, list[int]()
         self._before: Float[np.ndarray, "n 3"] | None = None
+
+    def count(self, turn: Turn, frame: int) -> None:
+        """Whether its points have times."""
+        if turn.seconds is None:
+            self.untimed.append(frame)
+        else:
+            self.timed += 1
 
     def expect(self, seconds: float) -> None:
         """Guess the next step from the motion."""

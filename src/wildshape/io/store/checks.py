@@ -28,6 +28,7 @@ from wildshape.io.store.layout import (
     INDEX,
     INDEX_JSON,
     INDEX_TENSORS,
+    SHAPE_KINDS,
     FileRecord,
 )
 from wildshape.io.store.manifest import is_sealed
@@ -150,7 +151,7 @@ def _fits(index: dict[str, np.ndarray], shards: int) -> Iterator[bool]:
 def _extras_fit(
     extras: dict[str, np.ndarray], tracks: int, scans: int, points: int
 ) -> Iterator[bool]:
-    """Whether the rays and labelled boxes of a store, if it has any, fit the rest."""
+    """Whether what only some stores have fits the rest."""
     rays = [extras.get(name) for name in EXTRAS if name.startswith("ray_")]
     known = [column for column in rays if column is not None]
     yield len(known) in (0, len(rays)) and len({column.shape for column in known}) <= 1
@@ -161,7 +162,8 @@ def _extras_fit(
         yield _within(extras["ray_starts"], 0, points - extras["ray_rows"])
     labelled, sizes = (extras.get(name, np.zeros(0)) for name in ("label_tracks", "label_sizes"))
     yield sizes.shape == (3 * len(labelled),) and bool((sizes > 0).all())
-    yield _within(labelled, 0, tracks - 1) and _climbs(labelled)
+    some = [labelled, *(extras.get(name, np.zeros(0)) for name in SHAPE_KINDS.values())]
+    yield all(_within(known, 0, tracks - 1) and _climbs(known) for known in some)
 
 
 def _climbs(numbers: np.ndarray) -> bool:

@@ -25,6 +25,7 @@ from wildshape.io.store.layout import (
     INDEX_JSON,
     JOINING_JSON,
     PARTS,
+    SHAPE_KINDS,
     SHARD_NAME,
     WRITING_JSON,
     FileRecord,
@@ -133,7 +134,7 @@ def _append(writer: IndexWriter, part: Store) -> None:
         **dict.fromkeys(_POINTS, points),
         "pose_starts": writer.count("poses") // 12,
         "ray_scans": writer.count("scan_sizes"),
-        "label_tracks": writer.count("track_names"),
+        **dict.fromkeys(("label_tracks", *SHAPE_KINDS.values()), writer.count("track_names")),
     }
     heads = {
         "track_starts": writer.count("scan_sizes"),

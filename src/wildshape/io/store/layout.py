@@ -25,6 +25,7 @@ import numpy as np
 
 from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
+from wildshape.records import ShapeKind
 
 FORMAT = "wildshape-store"
 VERSION = 1
@@ -66,8 +67,13 @@ EXTRAS: dict[str, str] = {
     "ray_crcs": "int64",  # (R) CRC-32 of each one's bytes
     "label_tracks": "int64",  # (L) the tracks with a labelled box, rising
     "label_sizes": "float64",  # (3 L) its length, width and height, metres
+    "partial_shapes": "int64",  # the tracks whose shape is of their scans, rising
+    "mirrored_shapes": "int64",  # the same, of their scans and these reflected
 }
-"""Tensors of the index that stores without rays and labelled boxes do not have."""
+"""Tensors of the index that only stores have that need them."""
+
+SHAPE_KINDS: dict[ShapeKind, str] = {"partial": "partial_shapes", "mirrored": "mirrored_shapes"}
+"""Which of these list the tracks of a kind of shape; those in none have whole shapes."""
 
 CRCS = ("scan_crcs", "shape_crcs")
 """Tensors that stores of older versions lack."""

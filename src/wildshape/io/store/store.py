@@ -29,6 +29,7 @@ from wildshape.io.store.layout import (
     EXTRAS,
     INDEX_JSON,
     INDEX_TENSORS,
+    SHAPE_KINDS,
     WRITING_JSON,
     FileRecord,
     map_tensors,
@@ -37,7 +38,7 @@ from wildshape.io.store.manifest import files_of, read_manifest
 from wildshape.io.store.rays import rays_of_rows
 from wildshape.io.store.writer import StoreWriter
 from wildshape.io.tracks import sensor_from_json
-from wildshape.records import Sensor, SightLines, Track
+from wildshape.records import Sensor, ShapeKind, SightLines, Track
 
 __all__ = ["Store", "StoreWriter", "is_store", "open_store"]
 
@@ -144,6 +145,7 @@ class Store:
             shape=self.shape_of(index),
             rays=tuple(self.rays_of(s) for s in scans) if self._rays else (),
             label_size_m=self._labels.get(index),
+            shape_kind=self._shape_kinds.get(index, "whole"),
         )
 
     def scan_points(self, scan: int) -> Float32[np.ndarray, "n 3"]:
@@ -187,6 +189,10 @@ class Store:
         sizes = self.column("label_sizes").reshape(-1, 3).tolist()
         tracks = self.column("label_tracks").tolist()
         return {track: (x, y, z) for track, (x, y, z) in zip(tracks, sizes)}
+
+    @cached_property
+    def _shape_kinds(self) -> dict[int, ShapeKind]:
+        return {i: kind for kind, name in SHAPE_KINDS.items() for i in self.column(name).tolist()}
 
     def shape_of(self, track: int) -> Float32[np.ndarray, "n 3"] | None:
         """Truth: surface points in the object frame, a view, metres; None if unknown.

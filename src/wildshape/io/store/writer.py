@@ -24,6 +24,7 @@ from wildshape.io.store.layout import (
     JOINING_JSON,
     PARTS,
     POINT_BYTES,
+    SHAPE_KINDS,
     SHARD_NAME,
     VERSION,
     WRITING_JSON,
@@ -121,6 +122,8 @@ class StoreWriter:
         if track.label_size_m is not None:
             index.append("label_tracks", len(self) - 1)
             index.extend("label_sizes", np.array(track.label_size_m))
+        if track.shape_kind in SHAPE_KINDS:
+            index.append(SHAPE_KINDS[track.shape_kind], len(self) - 1)
         if self._shard.points * POINT_BYTES >= self._shard_bytes:
             self._end_shard()
 

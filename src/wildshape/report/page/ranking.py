@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from wildshape.datasets.tracks.truth import mirrored
 from wildshape.evaluation.metrics import completion_error, registration_error
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Track
@@ -198,7 +199,8 @@ def _cd(result: TrackResult, track: Track) -> float | None:
     completed = result.completed(name)
     if completed is None or track.shape is None or poses is None:
         return None
-    truth = poses[track.middle].apply_numpy(thin(track.shape, _TRUTH_POINTS))
+    whole = mirrored(track.shape) if track.shape_kind == "partial" else track.shape
+    truth = poses[track.middle].apply_numpy(thin(whole, _TRUTH_POINTS))
     return completion_error(completed, truth).cd
 
 
