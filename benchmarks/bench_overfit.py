@@ -19,7 +19,7 @@ from turns import begin, options
 from wildshape.evaluation import protocol
 from wildshape.evaluation.summary import summarise
 from wildshape.evaluation.tables import markdown
-from wildshape.inference.evaluated import Learned
+from wildshape.inference.evaluation_adapter import Learned
 from wildshape.inference.predictor import load
 from wildshape.io.output import provenance
 from wildshape.io.store.store import open_store

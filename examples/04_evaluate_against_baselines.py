@@ -12,7 +12,7 @@ from wildshape.baselines.named import baseline
 from wildshape.evaluation.method import Method
 from wildshape.evaluation.protocol import run
 from wildshape.evaluation.tables import markdown
-from wildshape.inference.evaluated import Learned
+from wildshape.inference.evaluation_adapter import Learned
 from wildshape.io.inputs import open_tracks
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 

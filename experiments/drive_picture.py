@@ -14,7 +14,7 @@ import tyro
 
 import wildshape
 from wildshape.cli.main import in_a_sentence
-from wildshape.drives.recordings.opening import open_drive
+from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle, read_finished
 from wildshape.report.drive.picture import write_drive_picture
 from wildshape.simulate.street.drive_folder import write_drive

@@ -21,9 +21,9 @@ import wildshape
 from wildshape.cli.main import in_a_sentence
 from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.adapting.examples import Example
+from wildshape.drives.adapting.fine_tuning import taught
 from wildshape.drives.adapting.measures import measure
 from wildshape.drives.adapting.second_pass import like
-from wildshape.drives.adapting.teaching import taught
 from wildshape.inference.predictor import Predictor
 from wildshape.io.inputs import open_tracks
 from wildshape.method.checkpoint import fingerprint

@@ -16,11 +16,11 @@ import numpy as np
 from experiments.labelled_boxes import upright, upright_labels
 from jaxtyping import Float
 
-from wildshape.drives.completing.claims import in_box
+from wildshape.drives.completing.cluster_association import in_box
 from wildshape.drives.completing.completion import fullest_of_parts
-from wildshape.drives.completing.placing import level_poses
+from wildshape.drives.completing.level_frame import level_poses
 from wildshape.drives.config import DriveConfig
-from wildshape.drives.recordings.opening import open_drive
+from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.tracking.mounting import find_mounting
 from wildshape.drives.tracking.segmentation import Cutter, read_cuts
 from wildshape.drives.tracking.sightings import Sightings

@@ -15,7 +15,7 @@ import torch
 
 import wildshape
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.as_points import as_points
+from wildshape.inference.point_inputs import as_points
 from wildshape.records import Box, Completion, Intrinsics, Registration, Sensor, Track
 
 

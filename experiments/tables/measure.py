@@ -27,7 +27,7 @@ from wildshape.evaluation.results import (
     Rotate,
     Skipped,
 )
-from wildshape.inference.evaluated import CanonicalShapes, Learned
+from wildshape.inference.evaluation_adapter import CanonicalShapes, Learned
 from wildshape.inference.predictor import load
 from wildshape.io.atomic import write_json
 from wildshape.io.inputs import TrackSource, open_tracks

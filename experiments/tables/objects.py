@@ -21,7 +21,7 @@ from wildshape.baselines.icp import LocalIcp
 from wildshape.baselines.pairs import Chained
 from wildshape.evaluation.examples import Example, gather
 from wildshape.evaluation.pictures import draw_examples
-from wildshape.inference.evaluated import Learned
+from wildshape.inference.evaluation_adapter import Learned
 from wildshape.inference.predictor import load
 from wildshape.io.atomic import atomic_write
 from wildshape.io.inputs import open_tracks

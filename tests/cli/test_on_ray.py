@@ -18,7 +18,7 @@ from tests.cli.test_workers import written
 from tests.drives.street import street, write_scans
 
 from wildshape.evaluation.protocol import run
-from wildshape.inference.evaluated import Learned
+from wildshape.inference.evaluation_adapter import Learned
 from wildshape.inference.folders.complete_folder import FILES, FolderOptions, write_results
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.inputs import open_tracks

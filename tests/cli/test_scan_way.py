@@ -52,5 +52,5 @@ def test_a_scan_visits_few_files(visits: dict[str, int]) -> None:
 
 
 def test_a_scan_is_checked_once(visits: dict[str, int]) -> None:
-    checks = ("io/scans/points.py:check_scan", "inference/as_points.py:as_points")
+    checks = ("io/scans/points.py:check_scan", "inference/point_inputs.py:as_points")
     assert sum(visits.get(name, 0) for name in checks) == 1

@@ -5,8 +5,8 @@
 import numpy as np
 import torch
 
-from wildshape.drives.completing.placing import Completed
-from wildshape.drives.completing.turns import Turns
+from wildshape.drives.completing.level_frame import Completed
+from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.se3 import SE3
 

@@ -10,10 +10,10 @@ import pytest
 from tests.drives.objects import completed, still
 
 from wildshape.drives.completing.boxes import moves, smooth
-from wildshape.drives.completing.claims import claim
+from wildshape.drives.completing.cluster_association import associate
 from wildshape.drives.completing.completion import fullest_of_parts, keyframes, order_of_looks
+from wildshape.drives.completing.level_frame import on_ground
 from wildshape.drives.completing.merging import Places
-from wildshape.drives.completing.placing import on_ground
 from wildshape.drives.completing.surroundings import Surroundings
 from wildshape.drives.completing.vehicles import (
     judge,
@@ -291,7 +291,7 @@ def test_clusters_in_the_box_of_a_vehicle_are_its_own(tmp_path):
     at = [(0.0, 0.0, 0.0, 0.0)]
     whole = replace(completed(at, name="whole"), seen=Sightings("whole", (0,), ((1,),), (20,)))
     again = replace(completed(at, name="again"), seen=Sightings("again", (2,), ((2,),), (20,)))
-    found = claim([whole, again], tmp_path, still(3), DriveConfig())
+    found = associate([whole, again], tmp_path, still(3), DriveConfig())
     assert found.parts == {"again": "part_of_whole"}
     (only,) = found.vehicles
     assert only.seen.frames == (0, 1, 2)

@@ -26,7 +26,7 @@ from tests.refusal import refused
 import wildshape
 from wildshape.drives import pipeline
 from wildshape.drives.config import DetectionConfig, DriveConfig, GroundConfig
-from wildshape.drives.recordings.opening import open_drive
+from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.tracking.detections import (
     BoxCutter,
     DetectionFile,

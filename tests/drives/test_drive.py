@@ -19,7 +19,7 @@ from tests.refusal import refused
 import wildshape
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.pipeline import Pipeline
-from wildshape.drives.recordings.opening import open_drive
+from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.drives.tracking.segmentation import Cutter, read_cut
 from wildshape.drives.tracking.trajectory import find_trajectory

@@ -20,7 +20,7 @@ from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.completing.completion import Completer
 from wildshape.drives.config import INFERENCE, ClusterConfig, DriveConfig
 from wildshape.drives.pipeline import Pipeline
-from wildshape.drives.recordings.opening import open_drive
+from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.tracking.sightings import read_sightings
 from wildshape.drives.writing import outputs
 from wildshape.inference.predictor import Predictor

@@ -11,7 +11,7 @@ from tests.models import CONFIG, SETTINGS
 
 from wildshape.drives.clock import Clock, silent
 from wildshape.drives.completing import merging
-from wildshape.drives.completing.claims import claim
+from wildshape.drives.completing.cluster_association import associate
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.config import BoxConfig, DriveConfig, MergeConfig
 from wildshape.drives.pipeline import Pipeline
@@ -57,7 +57,7 @@ def test_no_vehicle_claims_clusters_across_a_break(tmp_path):
             np.savez(file, **known, scanned=20, tracks=np.array([], str), grounds=np.zeros((1, 3)))
     one = replace(completed([HERE]), seen=Sightings("a", (3,), ((0,),), (20,)))
     for breaks, frames in (((), range(6)), ((2, 5), range(2, 5)), ((3,), range(3, 6))):
-        (found,) = claim([one], tmp_path, still(6, breaks), DriveConfig()).vehicles
+        (found,) = associate([one], tmp_path, still(6, breaks), DriveConfig()).vehicles
         assert found.seen.frames == tuple(frames)
 
 

@@ -18,7 +18,7 @@ from tests.datasets.write_waymo import Thing as WaymoThing
 from tests.refusal import refused
 
 from wildshape.cli.main import main
-from wildshape.drives.recordings.opening import find_drives, open_drive
+from wildshape.drives.recordings.recording_kinds import find_drives, open_drive
 from wildshape.io.scans.points import write_ply
 
 SCENE = street(frames=3)

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from tests.refusal import refused
 
-from wildshape.drives.held import Held
-from wildshape.drives.recordings.opening import open_drive
+from wildshape.drives.frame_cache import FrameCache
+from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.source import Drive
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.poses import write_poses
@@ -171,7 +171,7 @@ def test_frames_asked_for_last_are_read_once_and_as_many_are_kept_as_there_is_ro
         read.append(frame)
         return turn_of(frame)
 
-    held = Held(give, room=32 * turn_of(0).nbytes)
+    held = FrameCache(give, room=32 * turn_of(0).nbytes)
     for frame in (*range(40), *range(8, 40)):
         assert held(frame).points[0, 0] == frame
     assert read == list(range(40))
@@ -181,7 +181,7 @@ def test_frames_asked_for_last_are_read_once_and_as_many_are_kept_as_there_is_ro
 
 
 def test_threads_may_ask_at_once():
-    held = Held(turn_of, room=3 * turn_of(0).nbytes)
+    held = FrameCache(turn_of, room=3 * turn_of(0).nbytes)
     frames = [frame for frame in range(6) for _ in range(2)] * 2000
     with ThreadPoolExecutor(8) as threads:
         for frame, turn in zip(frames, threads.map(held, frames)):
@@ -191,7 +191,7 @@ def test_threads_may_ask_at_once():
 
 
 def test_what_is_kept_does_not_go_along_to_another_process():
-    held = Held(turn_of)
+    held = FrameCache(turn_of)
     held(3)
     sent = pickle.loads(pickle.dumps(held))
     assert 3 in held

@@ -22,7 +22,7 @@ from wildshape.evaluation.protocol import run
 from wildshape.evaluation.summary import figures_of
 from wildshape.geometry.transforms.rotation import random_rotation
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.evaluated import Learned
+from wildshape.inference.evaluation_adapter import Learned
 from wildshape.inference.predictor import Predictor
 from wildshape.method.network import ShapePoseNet
 from wildshape.records import Box, Completion

@@ -27,7 +27,7 @@ from tests.io.packets import write as packets
 
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.recordings import waymo as waymo_drives
-from wildshape.drives.recordings.opening import find_drives, open_drive
+from wildshape.drives.recordings.recording_kinds import find_drives, open_drive
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.detections import (
     DetectionFile,

@@ -11,10 +11,10 @@ from tests.refusal import refused
 
 import wildshape
 from wildshape.geometry.transforms.se3 import SE3, stack
-from wildshape.inference.as_points import as_rays
 from wildshape.inference.choose_hypothesis import Looked
 from wildshape.inference.config import FreeSpaceConfig
 from wildshape.inference.free_space import SeenScores, Sights, without_free_space
+from wildshape.inference.point_inputs import as_rays
 from wildshape.io.rays import write_rays
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.records import SightLines, Track

@@ -16,7 +16,7 @@ from wildshape.errors import BadInputError
 from wildshape.evaluation.evaluate import evaluate_once, write_evaluation
 from wildshape.evaluation.method import Method
 from wildshape.evaluation.results import Results, Rotate
-from wildshape.inference.evaluated import Learned
+from wildshape.inference.evaluation_adapter import Learned
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.inputs import TrackSource, open_tracks
 from wildshape.io.output import begin, keep_apart

@@ -9,9 +9,9 @@ They are written into `wildshape.json` of every result and can be set from Pytho
 from dataclasses import dataclass, field
 
 from wildshape.drives.object_config import (
+    AssociationConfig,
     BoxConfig,
     CarveConfig,
-    ClaimConfig,
     CompletionConfig,
     MergeConfig,
     SurroundingsConfig,
@@ -188,7 +188,7 @@ class LinkConfig:
 
 @dataclass(frozen=True)
 class StandConfig:
-    """Which tracks are one object that stands (`standing.py`).
+    """Which tracks are one object that stands (`static_tracks.py`).
 
     Attributes:
         frames: of a track that tell where it stood, spread over it, at most.
@@ -228,7 +228,7 @@ class DriveConfig:
     turns: TurnConfig = field(default_factory=TurnConfig)
     vehicles: VehicleConfig = field(default_factory=VehicleConfig)
     merging: MergeConfig = field(default_factory=MergeConfig)
-    claims: ClaimConfig = field(default_factory=ClaimConfig)
+    association: AssociationConfig = field(default_factory=AssociationConfig)
     surroundings: SurroundingsConfig = field(default_factory=SurroundingsConfig)
     carving: CarveConfig = field(default_factory=CarveConfig)
     boxes: BoxConfig = field(default_factory=BoxConfig)

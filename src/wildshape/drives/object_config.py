@@ -128,8 +128,8 @@ class MergeConfig:
 
 
 @dataclass(frozen=True)
-class ClaimConfig:
-    """Which clusters belong to a vehicle that was found (`claims.py`).
+class AssociationConfig:
+    """Which clusters belong to a vehicle that was found (`cluster_association.py`).
 
     Attributes:
         around_m: of its box; points so near belong to it.
@@ -168,7 +168,7 @@ class SurroundingsConfig:
 
 @dataclass(frozen=True)
 class CarveConfig:
-    """Where rays say that a vehicle ends (`carving.py`).
+    """Where rays say that a vehicle ends (`free_space_length.py`).
 
     Attributes:
         slab_m: a box is looked at in slabs of this thickness, from each end inwards.
@@ -200,7 +200,7 @@ class CarveConfig:
 
 @dataclass(frozen=True)
 class TurnConfig:
-    """Which way the beam turns (`turns.py`).
+    """Which way the beam turns (`rolling_shutter.py`).
 
     Attributes:
         fewest_scans: completed, of an object that is asked.

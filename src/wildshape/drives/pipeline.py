@@ -13,11 +13,16 @@ from typing import Any
 from wildshape.drives.adapting import second_pass
 from wildshape.drives.clock import Clock
 from wildshape.drives.completing.boxes import faced, smooth
-from wildshape.drives.completing.claims import claim
+from wildshape.drives.completing.cluster_association import associate
 from wildshape.drives.completing.completion import Completer
+from wildshape.drives.completing.level_frame import (
+    Completed,
+    level_poses,
+    on_ground,
+    read_completed,
+)
 from wildshape.drives.completing.merging import Places
-from wildshape.drives.completing.placing import Completed, level_poses, on_ground, read_completed
-from wildshape.drives.completing.turns import TURNS, Turns, with_sense
+from wildshape.drives.completing.rolling_shutter import TURNS, Turns, with_sense
 from wildshape.drives.completing.vehicles import (
     judge,
     likely,
@@ -34,7 +39,7 @@ from wildshape.drives.tracking.detections import BoxCutter, Detections, check_cu
 from wildshape.drives.tracking.mounting import Mounting, find_mounting
 from wildshape.drives.tracking.segmentation import Cutter, read_cuts
 from wildshape.drives.tracking.sightings import Sightings, read_sightings, write_sightings
-from wildshape.drives.tracking.standing import joined_where_they_stand
+from wildshape.drives.tracking.static_tracks import joined_where_they_stand
 from wildshape.drives.tracking.tracks import linked_clusters
 from wildshape.drives.tracking.trajectory import Breaks, find_trajectory, jumps
 from wildshape.drives.writing.folder import FRAMES, TRAJECTORY
@@ -260,8 +265,8 @@ class Pipeline:
             parts, doubtful = {}, []
             if not self.tracked:
                 found.sort(key=lambda one: -kept[one.seen.name])
-                claimed = claim(found, self.cuts, turns, self.config)
-                found, parts = claimed.vehicles, claimed.parts
+                associated = associate(found, self.cuts, turns, self.config)
+                found, parts = associated.vehicles, associated.parts
                 sure = self.config.surroundings.sure
                 doubtful = [one for one in found if stated(one, kept) < sure]
             known = found, doubtful, turns, self.config

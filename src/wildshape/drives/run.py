@@ -11,7 +11,7 @@ from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.clock import Clock, Watch, silent
 from wildshape.drives.config import INFERENCE, DriveConfig
 from wildshape.drives.pipeline import Pipeline
-from wildshape.drives.recordings.opening import open_drive
+from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.result import FILES, DriveResult, earlier_result, line_of, settings_of
 from wildshape.drives.tracking.detections import DetectionFile, find_detections
 from wildshape.drives.writing.files import DriveFiles

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from wildshape.drives.held import Held
+from wildshape.drives.frame_cache import FrameCache
 from wildshape.errors import BadInputError
 from wildshape.geometry.projection.full_scan import FullScan
 from wildshape.geometry.transforms.se3 import SE3
@@ -84,7 +84,7 @@ class Drive:
             name=name,
             scan_names=names,
             ticks=ticks,
-            read=Held(read),
+            read=FrameCache(read),
             times=None if times is None else tuple(times),
             T_world_sensor=T_world_sensor,
             warnings=(*warnings, *missing),

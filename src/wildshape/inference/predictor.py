@@ -14,7 +14,6 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.ground import without_skirt
 from wildshape.geometry.sampling import sorted_points
 from wildshape.geometry.transforms.se3 import SE3, stack
-from wildshape.inference.as_points import all_as_points, as_points, rays_of_each
 from wildshape.inference.boxes import box_seen
 from wildshape.inference.choose_hypothesis import (
     Found,
@@ -28,6 +27,7 @@ from wildshape.inference.compiled import compiled
 from wildshape.inference.confidence import glance_of, judged
 from wildshape.inference.config import InferenceConfig
 from wildshape.inference.free_space import Rays, Sights, without_free_space
+from wildshape.inference.point_inputs import all_as_points, as_points, rays_of_each
 from wildshape.inference.refine import Refined, denser, partners, refine, with_scan
 from wildshape.inference.registration import fuse_scans, registered, to_middle
 from wildshape.inference.tracks.complete_track import Gathered, complete_together

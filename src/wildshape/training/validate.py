@@ -17,7 +17,7 @@ from wildshape.evaluation.summary import figures_of
 from wildshape.geometry.gravity import mean_up
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.choose_hypothesis import choose_hypothesis
-from wildshape.inference.evaluated import Learned
+from wildshape.inference.evaluation_adapter import Learned
 from wildshape.inference.predictor import Predictor
 from wildshape.io.store.store import Store
 from wildshape.method.checkpoint import ModelSettings

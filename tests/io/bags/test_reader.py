@@ -15,7 +15,7 @@ import pytest
 from tests.refusal import refused
 
 from wildshape.cli.main import main
-from wildshape.drives.recordings.opening import open_drive
+from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.errors import MissingExtraError
 from wildshape.io.bags.clouds import cloud_of, message_types
 from wildshape.io.bags.reader import open_bag

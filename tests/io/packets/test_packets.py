@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial import KDTree
 from tests.refusal import refused
 
-from wildshape.drives.recordings.opening import find_drives, open_drive
+from wildshape.drives.recordings.recording_kinds import find_drives, open_drive
 from wildshape.errors import MissingExtraError
 from wildshape.io.packets.ouster import columns_sent
 from wildshape.io.packets.reader import open_packets

@@ -15,7 +15,7 @@ from wildshape.io.poses import write_poses
 from wildshape.io.scans.points import write_ply
 from wildshape.io.tracks import write_track
 from wildshape.records import Completion, Sensor, Track
-from wildshape.report.viewer.completing import from_model
+from wildshape.report.viewer.live_completion import from_model
 from wildshape.report.viewer.sources import from_results, worst_first
 
 

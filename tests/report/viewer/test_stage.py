@@ -13,7 +13,7 @@ from tests.report.viewer.shown import perfect, track
 
 from wildshape.report.viewer.colours import COLOURINGS, GUESSED, by_distance, by_height
 from wildshape.report.viewer.details import details
-from wildshape.report.viewer.fusing import BEFORE
+from wildshape.report.viewer.registrations import BEFORE
 from wildshape.report.viewer.stage import POINTS_A_CLOUD, Stage, Wish
 
 

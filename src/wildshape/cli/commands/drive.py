@@ -269,7 +269,7 @@ def _detections(settings: Settings, drives: dict[Path, str]) -> "DetectionFile |
 
 def _drives(settings: Settings) -> dict[Path, str]:
     """The drives of all sources; with the first of each, what the source was taken for."""
-    from wildshape.drives.recordings.opening import find_drives
+    from wildshape.drives.recordings.recording_kinds import find_drives
     from wildshape.io.progress import counted
 
     if not settings.source:
@@ -285,7 +285,7 @@ def _drives(settings: Settings) -> dict[Path, str]:
 
 def _folders(settings: Settings, drives: list[Path]) -> dict[Path, Path]:
     """Where each drive goes."""
-    from wildshape.drives.recordings.opening import names_of
+    from wildshape.drives.recordings.recording_kinds import names_of
 
     if len(drives) == 1:
         return {drives[0]: settings.out}

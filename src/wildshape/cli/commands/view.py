@@ -142,7 +142,7 @@ def source_of(settings: Settings) -> "Source":
 def _scans(settings: Settings, path: Path) -> "Source":
     from wildshape.io.inputs import open_tracks
     from wildshape.records import as_text
-    from wildshape.report.viewer.completing import from_model
+    from wildshape.report.viewer.live_completion import from_model
 
     source = open_tracks(path, settings.files.coordinates)
     title = as_text(path.resolve().name)
@@ -157,7 +157,7 @@ def _evaluated(settings: Settings) -> "Source":
     from wildshape.io.scans.points import SENSOR_METRES
     from wildshape.records import as_text
     from wildshape.report.results import METRICS, SCORES, coordinates_of, read_object
-    from wildshape.report.viewer.completing import from_model
+    from wildshape.report.viewer.live_completion import from_model
     from wildshape.report.viewer.sources import worst_first
 
     said = read_object(settings.input / METRICS)

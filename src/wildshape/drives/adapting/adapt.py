@@ -12,9 +12,9 @@ from typing import Any
 
 from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.adapting.examples import Example, examples_of, split
+from wildshape.drives.adapting.fine_tuning import taught
 from wildshape.drives.adapting.measures import Measures, clear_headed, measure
 from wildshape.drives.adapting.second_pass import like
-from wildshape.drives.adapting.teaching import taught
 from wildshape.drives.clock import Watch, silent
 from wildshape.drives.result import identity_of
 from wildshape.inference.predictor import Predictor

@@ -16,8 +16,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float
 
-from wildshape.drives.completing.placing import Completed
-from wildshape.drives.completing.turns import Turns
+from wildshape.drives.completing.level_frame import Completed
+from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.object_config import BoxConfig
 
 _LEAST_APART = 0.5  # ticks

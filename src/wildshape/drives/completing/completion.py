@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wildshape.drives.completing.looking import box_of, completed, looks_at
+from wildshape.drives.completing.batched_inference import box_of, completed, looks_at
 from wildshape.drives.completing.vehicles import shape_nats, vehicle_sized
 from wildshape.drives.object_config import CompletionConfig, VehicleConfig
 from wildshape.drives.source import Drive

@@ -13,8 +13,8 @@ from itertools import combinations, product
 import numpy as np
 
 from wildshape.drives.completing.boxes import Way, expected
-from wildshape.drives.completing.placing import Completed
-from wildshape.drives.completing.turns import Turns
+from wildshape.drives.completing.level_frame import Completed
+from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.object_config import BoxConfig, MergeConfig
 from wildshape.drives.tracking.sightings import Sightings, merged
 from wildshape.geometry.footprint import footprint_overlap

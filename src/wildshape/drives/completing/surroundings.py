@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from wildshape.drives.completing.claims import in_box
-from wildshape.drives.completing.placing import Completed
-from wildshape.drives.completing.turns import Turns
+from wildshape.drives.completing.cluster_association import in_box
+from wildshape.drives.completing.level_frame import Completed
+from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.object_config import SurroundingsConfig
 from wildshape.records import Points
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from wildshape.drives.completing.boxes import moves, velocity_of
+from wildshape.drives.completing.level_frame import Completed
 from wildshape.drives.completing.merging import Places
-from wildshape.drives.completing.placing import Completed
-from wildshape.drives.completing.turns import Turns
+from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.object_config import BoxConfig, VehicleConfig
 from wildshape.drives.tracking.clusters import extents
 from wildshape.drives.tracking.sightings import Sightings

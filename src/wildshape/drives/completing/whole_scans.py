@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
-from wildshape.drives.completing.carving import Carving
-from wildshape.drives.completing.placing import Completed
+from wildshape.drives.completing.free_space_length import Carving
+from wildshape.drives.completing.level_frame import Completed
+from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.completing.surroundings import Surroundings
-from wildshape.drives.completing.turns import Turns
 from wildshape.drives.config import DriveConfig
 from wildshape.records import Points
 

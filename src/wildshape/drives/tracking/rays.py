@@ -5,7 +5,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from wildshape.drives.held import Held
+from wildshape.drives.frame_cache import FrameCache
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.segmentation import read_cut
 from wildshape.drives.tracking.sightings import Sightings
@@ -19,7 +19,7 @@ class RayCutter:
     def __init__(self, drive: Drive, cuts: Path) -> None:
         """`cuts`: folder of the drive's clusters."""
         self.drive, self.cuts = drive, cuts
-        self._scans = Held(drive.full_scan)
+        self._scans = FrameCache(drive.full_scan)
 
     def __reduce__(self) -> tuple[type["RayCutter"], tuple[Drive, Path]]:
         """Scans do not go along to another process."""

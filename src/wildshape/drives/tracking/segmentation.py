@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from wildshape.drives.config import DriveConfig
-from wildshape.drives.held import Held
+from wildshape.drives.frame_cache import FrameCache
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.clusters import find_clusters
 from wildshape.drives.tracking.ground import height_above_ground
@@ -186,7 +186,7 @@ def _read_cut(written: tuple[Path, int]) -> CutScan:
         return CutScan(*arrays, int(found["scanned"]), tracks, found["grounds"])
 
 
-_cuts = Held(_read_cut)
+_cuts = FrameCache(_read_cut)
 
 
 def read_cuts(folder: Path, count: int) -> Iterator[CutScan]:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A finished drive, read back from its folder: what other formats, pages and viewers are made of.
 
-The level world is the sensor frame of the first frame with z vertical (`placing.py`).
+The level world is the sensor frame of the first frame with z vertical (`level_frame.py`).
 """
 
 import csv
@@ -17,9 +17,9 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
-from wildshape.drives.completing.placing import boxes_in_scans, level_poses
-from wildshape.drives.completing.turns import TURNS, Turns
-from wildshape.drives.recordings.opening import open_drive
+from wildshape.drives.completing.level_frame import boxes_in_scans, level_poses
+from wildshape.drives.completing.rolling_shutter import TURNS, Turns
+from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.drives.writing.folder import (

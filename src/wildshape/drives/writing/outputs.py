@@ -14,8 +14,8 @@ import torch
 
 from wildshape.drives.completing.boxes import Way
 from wildshape.drives.completing.completion import CATEGORY
-from wildshape.drives.completing.placing import Completed, boxes_in_scans
-from wildshape.drives.completing.turns import Turns
+from wildshape.drives.completing.level_frame import Completed, boxes_in_scans
+from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.rays import RayCutter
 from wildshape.drives.tracking.sightings import Sightings

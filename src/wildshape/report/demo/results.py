@@ -14,7 +14,7 @@ from wildshape.evaluation.evaluate import evaluate_once, write_evaluation
 from wildshape.evaluation.examples import pick
 from wildshape.evaluation.results import Results
 from wildshape.evaluation.summary import as_json, figures_of
-from wildshape.inference.evaluated import Learned
+from wildshape.inference.evaluation_adapter import Learned
 from wildshape.inference.folders.complete_folder import FILES, write_results
 from wildshape.inference.predictor import Predictor
 from wildshape.inference.registration import fuse_scans

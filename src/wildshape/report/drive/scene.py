@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A drive made ready to be drawn: frames and points thinned, each point with the vehicle it is on.
 
-The drawing frame is the level world (`drives/completing/placing.py`): z up, metres, right-handed.
+The drawing frame is the level world (`drives/completing/level_frame.py`): z up, metres.
 """
 
 from collections.abc import Sequence

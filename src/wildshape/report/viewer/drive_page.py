@@ -20,8 +20,8 @@ from wildshape.report.drive.scene import NOBODY, SceneConfig, boxes_by_frame, th
 from wildshape.report.results import box_of, chances_in, read_result
 from wildshape.report.scene import box_segments, thin
 from wildshape.report.viewer.details import row
+from wildshape.report.viewer.drawing_frame import as_node
 from wildshape.report.viewer.page import HOST, hosting
-from wildshape.report.viewer.placing import as_node
 
 if TYPE_CHECKING:
     from viser import ViserServer

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
 
 from wildshape.errors import BadInputError, MissingExtraError
 from wildshape.io.progress import counted
+from wildshape.report.viewer.allowed_hosts import answering_only, checked_hosts, prove
 from wildshape.report.viewer.details import details
 from wildshape.report.viewer.panel import Panel
 from wildshape.report.viewer.sources import Source
 from wildshape.report.viewer.stage import Stage
-from wildshape.report.viewer.visitors import answering_only, checked_hosts, prove
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -185,7 +185,7 @@ def serving(
     Args:
         source: what it shows.
         port: taken, or the next free one; 0 takes any.
-        allowed: names under which it may be asked for beside this machine's (`visitors.py`).
+        allowed: names under which it may be asked for beside this machine's (`allowed_hosts.py`).
 
     Raises:
         BadInputError: an allowed name is none.

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from wildshape.records import Track
 from wildshape.report.viewer.colours import COLOURINGS, WRONG
-from wildshape.report.viewer.fusing import TRUTH, WAYS
-from wildshape.report.viewer.placing import Hold
+from wildshape.report.viewer.drawing_frame import Hold
+from wildshape.report.viewer.registrations import TRUTH, WAYS
 from wildshape.report.viewer.stage import Wish
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the viewer shows, and results on disk as its source; those of a model: `completing.py`."""
+"""What the viewer shows, and results on disk as its source; of a model: `live_completion.py`."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field

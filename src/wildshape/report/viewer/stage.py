@@ -16,8 +16,7 @@ from wildshape.records import Box, Points, Track
 from wildshape.report.content import BLUE, GREEN, GREY, ORANGE
 from wildshape.report.scene import box_segments, thin
 from wildshape.report.viewer.colours import PLAIN, WRONG, Rgb, by_height, completed_colours, rgb
-from wildshape.report.viewer.fusing import AFTER, BEFORE, Moves, moves
-from wildshape.report.viewer.placing import (
+from wildshape.report.viewer.drawing_frame import (
     Hold,
     as_node,
     draw_from_middle,
@@ -25,6 +24,7 @@ from wildshape.report.viewer.placing import (
     moved_by,
     upright,
 )
+from wildshape.report.viewer.registrations import AFTER, BEFORE, Moves, moves
 from wildshape.report.viewer.sources import CompletedScan, true_shape
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from tests.report.viewer.shown import source
 
 from wildshape.errors import BadInputError, MissingExtraError
 from wildshape.report.viewer import page
-from wildshape.report.viewer.visitors import checked_hosts, is_welcome
+from wildshape.report.viewer.allowed_hosts import checked_hosts, is_welcome
 
 AT = 8080
 OWN = ("127.0.0.1:8080", "localhost:8080", "[::1]:8080", "LocalHost:8080")

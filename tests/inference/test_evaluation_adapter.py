@@ -8,7 +8,7 @@ import torch
 
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.evaluated import Learned
+from wildshape.inference.evaluation_adapter import Learned
 from wildshape.inference.predictor import Predictor
 from wildshape.records import Box, Completion, Sensor
 

@@ -11,8 +11,8 @@ from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.registration import to_middle
 from wildshape.report.scene import upright as upright_points
-from wildshape.report.viewer.fusing import AFTER, BEFORE, TRUTH, WAYS, moves
-from wildshape.report.viewer.placing import draw_from_middle, draw_from_sensor, upright
+from wildshape.report.viewer.drawing_frame import draw_from_middle, draw_from_sensor, upright
+from wildshape.report.viewer.registrations import AFTER, BEFORE, TRUTH, WAYS, moves
 
 
 def test_a_camera_s_frame_is_turned_as_the_report_turns_it() -> None:

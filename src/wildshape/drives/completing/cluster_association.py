@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from wildshape.drives.completing.boxes import Way, expected
-from wildshape.drives.completing.placing import Completed
-from wildshape.drives.completing.turns import Turns
+from wildshape.drives.completing.level_frame import Completed
+from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.tracking.segmentation import read_cuts
 from wildshape.drives.tracking.sightings import Sightings
@@ -23,7 +23,7 @@ from wildshape.records import Points
 
 
 @dataclass(frozen=True)
-class Claimed:
+class Association:
     """Vehicles with all that is theirs.
 
     Attributes:
@@ -35,12 +35,12 @@ class Claimed:
     parts: dict[str, str]
 
 
-def claim(
+def associate(
     vehicles: list[Completed],
     cuts: Path,
     turns: Turns,
     config: DriveConfig,
-) -> Claimed:
+) -> Association:
     """Give every cluster to the first vehicle in whose box it lies.
 
     Args:
@@ -58,7 +58,7 @@ def claim(
     counts = []
     for frame, cut in enumerate(read_cuts(cuts, len(turns.ticks))):
         counts.append(cut.counts)
-        for row, i in _claims(
+        for row, i in _in_boxes(
             cut.moved(turns.T_level_sensor[frame]), vehicles, ways, frame, config
         ):
             owner[frame, row] = min(i, owner.get((frame, row), i))
@@ -67,11 +67,11 @@ def claim(
 
 def _shown(one: Completed, turns: Turns, config: DriveConfig) -> Way:
     """The boxes of one where frames show them."""
-    way = expected(one, turns, config.claims.beyond_ticks, config.boxes)
+    way = expected(one, turns, config.association.beyond_ticks, config.boxes)
     return replace(way, boxes=turns.shown(way.frames, way.boxes))
 
 
-def _claims(
+def _in_boxes(
     clusters: list[Points],
     vehicles: list[Completed],
     ways: list[Way],
@@ -86,8 +86,8 @@ def _claims(
         box = way.boxes[frame - way.frames[0]]
         near = np.hypot(*(centres - box[:2]).T) < one.size[0]
         for row in np.flatnonzero(near).tolist():
-            inside = in_box(clusters[row], box, one.size, config.claims.around_m)
-            if inside.mean() >= config.claims.inside:
+            inside = in_box(clusters[row], box, one.size, config.association.around_m)
+            if inside.mean() >= config.association.inside:
                 yield row, i
 
 
@@ -115,12 +115,12 @@ def _shared_out(
     owner: dict[tuple[int, int], int],
     counts: list[np.ndarray],
     config: DriveConfig,
-) -> Claimed:
+) -> Association:
     """The vehicles with what they own; those that lost too much are parts of others."""
     parts = {}
     for i, one in enumerate(vehicles):
         lost = [owner[key] for key in own[i] if owner[key] != i]
-        if len(lost) >= config.claims.lost * len(own[i]):
+        if len(lost) >= config.association.lost * len(own[i]):
             winner = max(set(lost), key=lost.count)
             parts[one.seen.name] = f"part_of_{vehicles[winner].seen.name}"
     rows: list[dict[int, list[int]]] = [{} for _ in vehicles]
@@ -131,7 +131,7 @@ def _shared_out(
         for i, one in enumerate(vehicles)
         if one.seen.name not in parts
     ]
-    return Claimed(found, parts)
+    return Association(found, parts)
 
 
 def _with(seen: Sightings, rows: dict[int, list[int]], counts: list[np.ndarray]) -> Sightings:

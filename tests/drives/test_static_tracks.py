@@ -11,7 +11,7 @@ import torch
 from wildshape.drives.config import StandConfig
 from wildshape.drives.tracking.segmentation import cut_file
 from wildshape.drives.tracking.sightings import Sightings
-from wildshape.drives.tracking.standing import joined_where_they_stand
+from wildshape.drives.tracking.static_tracks import joined_where_they_stand
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 

@@ -19,7 +19,7 @@ K = TypeVar("K", bound=Hashable)
 T = TypeVar("T", bound=_Sized)
 
 
-class Held(Generic[K, T]):
+class FrameCache(Generic[K, T]):
     """What a function gives for keys; that of the keys asked for last is kept.
 
     Stages of short drives, and objects that are neighbours in time, ask for the same frames.
@@ -33,9 +33,9 @@ class Held(Generic[K, T]):
         self._bytes = 0
         self._lock = Lock()
 
-    def __reduce__(self) -> "tuple[type[Held[K, T]], tuple[Callable[[K], T], int]]":
+    def __reduce__(self) -> "tuple[type[FrameCache[K, T]], tuple[Callable[[K], T], int]]":
         """What is kept does not go along to another process."""
-        return Held, (self.give, self.room)
+        return FrameCache, (self.give, self.room)
 
     def __contains__(self, key: K) -> bool:
         return key in self._held

@@ -9,7 +9,7 @@ import torch
 import trimesh
 
 from wildshape.errors import BadInputError
-from wildshape.inference.as_points import as_points, as_rays
+from wildshape.inference.point_inputs import as_points, as_rays
 
 RNG = np.random.default_rng(0)
 

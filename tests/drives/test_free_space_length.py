@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from wildshape.drives.completing.carving import Carving
-from wildshape.drives.completing.placing import Completed
-from wildshape.drives.completing.turns import Turns
+from wildshape.drives.completing.free_space_length import Carving
+from wildshape.drives.completing.level_frame import Completed
+from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.completing.whole_scans import show_scans
 from wildshape.drives.config import CarveConfig
 from wildshape.drives.tracking.sightings import Sightings

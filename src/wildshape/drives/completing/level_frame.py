@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from wildshape.drives.completing.turns import Turns
+from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.object_config import BoxConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.mounting import Mounting

@@ -10,8 +10,8 @@ import torch
 from tests.refusal import refused
 
 from wildshape.drives.completing.boxes import smooth
-from wildshape.drives.completing.placing import Completed, boxes_in_scans
-from wildshape.drives.completing.turns import TURNS, Turns, with_sense
+from wildshape.drives.completing.level_frame import Completed, boxes_in_scans
+from wildshape.drives.completing.rolling_shutter import TURNS, Turns, with_sense
 from wildshape.drives.config import BoxConfig, TurnConfig
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
