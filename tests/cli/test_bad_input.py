@@ -242,6 +242,7 @@ def test_full_disk(wildshape, dataset, trained, tmp_path, monkeypatch):
         ("convert", "kitti-raw", "{out}/none", "{out}"),
         ("convert", "nuscenes", "{out}/none", "{out}"),
         ("train", "{store}", "--out", "{out}", "--steps", "0"),
+        ("train", "{store}", "--out", "{out}", "--seed", f"{1 << 64}"),
         ("train", "{store}", "--out", "{out}", "--preset", "paper-views"),
         ("evaluate", "{store}", "--out", "{out}", "--seeds", "0"),
         ("evaluate", "{store}", "--out", "{out}", "--max-scans", "0"),

@@ -13,6 +13,7 @@ from safetensors.torch import load_file, save_file
 from tests.training.worker import SMALLEST
 
 from wildshape.errors import BadInputError
+from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.method.checkpoint import MODEL, load_checkpoint
 from wildshape.method.ray_encoder import RayConfig
 from wildshape.training.loop import StopRequested, fit, setup, split_tracks
@@ -194,7 +195,7 @@ def test_a_loss_that_is_not_finite_stops_and_spoils_no_checkpoint(car_store, tmp
     before = (tmp_path / STATE).read_bytes()
     with torch.no_grad():
         run.state.network.shape.layer3.bias[0] = math.inf
-    with pytest.raises(BadInputError, match=r"the loss is not finite; resume from the last"):
+    with pytest.raises(BadInputError, match="the loss is not finite; check the data"):
         fit(run)
     assert (tmp_path / STATE).read_bytes() == before
 
@@ -206,6 +207,32 @@ def test_weights_that_are_not_finite_are_not_saved(car_store, tmp_path):
         trained(car_store, tmp_path, recipe=recipe)
     assert not (tmp_path / STATE).exists()
     assert not (tmp_path / "model.safetensors").exists()
+
+
+def test_a_stop_keeps_the_last_state_that_can_be_resumed(car_store, tmp_path):
+    run = setup(SMALLEST, car_store, tmp_path, seed=3)
+
+    def spoil(step, _):
+        if step > 30:
+            with torch.no_grad():
+                next(run.state.network.parameters()).fill_(math.nan)
+            raise StopRequested
+
+    with pytest.raises(BadInputError, match="not finite"):
+        fit(run, spoil)
+    assert setup(SMALLEST, car_store, tmp_path, seed=3, resume=True).state.step == 30
+
+
+def test_tracks_held_out_without_a_usable_scan_are_those_fitted(cars, tmp_path):
+    held = split_tracks(20)[1]
+    with StoreWriter(tmp_path / "store", {}) as writer:
+        for number in range(20):
+            track = replace(cars[number % len(cars)], name=f"{number}")
+            few = tuple(scan[:20] for scan in track.scans)
+            writer.add(replace(track, scans=few) if number in held else track)
+    recipe = replace(SMALLEST, held_out=20)
+    run = setup(recipe, open_store(tmp_path / "store"), tmp_path / "run")
+    assert sorted(run.held_tracks) == [i for i in range(20) if i not in held]
 
 
 def test_few_tracks_are_both_fitted_and_held_out_many_are_not():

@@ -159,10 +159,14 @@ def _system_sentence(error: OSError) -> str:
     reason = (error.strerror or str(error)).lower()
     if error.errno not in _NO_ROOM:
         return f"{place}{reason}; check the path and its permissions."
-    return f"{place}{reason}; what is finished stays valid, and the same command goes on from it."
+    return (
+        f"{place}{reason}; what is finished stays valid, and the same command, of train with"
+        " --resume, goes on from it."
+    )
 
 
 def _leave(sentence: str, code: int) -> None:
-    if os.environ.get("RANK", "0") == "0":  # of torchrun's processes one talks
-        say(f"wildshape: {' '.join(sentence.split())}")
+    rank = os.environ.get("RANK", "0")  # of torchrun's processes; what is wrong may be so in one
+    who = "wildshape" if rank == "0" else f"wildshape, process {rank}"
+    say(f"{who}: {' '.join(sentence.split())}")
     raise SystemExit(code)

@@ -157,6 +157,8 @@ def _stop_asked(run: Run, stopped: Callable[[], bool]) -> bool:
 
 def _save_state(run: Run) -> None:
     if run.processes.leads:
+        weights = sum(float(p.detach().sum()) for p in run.state.network.parameters())
+        refuse_not_finite(weights, run.state.step)  # the state of before stays
         save_state(run.folder, run.state, run.identity)
 
 

@@ -8,6 +8,8 @@ from wildshape.errors import BadInputError
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates
 from wildshape.method.encoders.named import Backbone
 
+_SEEDS = 1 << 64  # torch takes no more
+
 
 @dataclass(frozen=True)
 class TrainingOptions:
@@ -44,8 +46,8 @@ class TrainingOptions:
     profile: bool = False
 
     def __post_init__(self) -> None:
-        if self.seed < 0:
-            raise BadInputError(f"--seed {self.seed}: expected 0 or more.")
+        if not 0 <= self.seed < _SEEDS:
+            raise BadInputError(f"--seed {self.seed}: expected 0 or more, below 2^64.")
         if self.steps is not None and self.steps < 1:
             raise BadInputError(f"--steps {self.steps}: expected 1 or more.")
         if self.resume and self.overwrite:

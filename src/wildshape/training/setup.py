@@ -5,8 +5,10 @@
 import copy
 import hashlib
 import json
+import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -37,6 +39,7 @@ from wildshape.training.self_training.targets import load_targets, save_targets,
 from wildshape.training.state import STATE, TrainState, load_state
 from wildshape.training.step import Step, Views
 
+_LOOK_AGAIN_S = 1.0
 _RESIDENT_SHARE = 0.5  # of a GPU's memory; the rest is the step's
 Say = Callable[[str], None]
 Taught = Callable[[int, int], None]
@@ -129,8 +132,12 @@ def setup(
     if resume and (folder / STATE).exists():
         load_state(folder, state, identity, store.scan_count)
     sampler = ViewSampler(store, fit_tracks, recipe.views)
+    if not _have_scans(store, held_tracks, recipe.views.min_points):
+        held_tracks = fit_tracks
     held_out = ViewSampler(store, held_tracks, recipe.views)
-    targets = _targets(teacher, headings, fronts, sampler, folder, identity, taught, recipe)
+    targets = _targets(
+        teacher, headings, fronts, sampler, folder, identity, taught, recipe, processes
+    )
     views = _views(sampler, targets, seed, processes, recipe, say)
     if state.anchors is not None:
         views.hold(state.anchors)
@@ -201,8 +208,9 @@ def _targets(
     identity: dict[str, str],
     taught: Taught,
     recipe: Recipe,
+    processes: Processes,
 ) -> FusedTargets | None:
-    """Made once a run, and kept beside it."""
+    """Made once a run by one process a machine, and kept beside it; the others wait."""
     config = recipe.self_training
     if teacher is None:
         return None
@@ -213,7 +221,9 @@ def _targets(
     kept = {key: identity[key] for key in asked if key in identity}
     kept["scans"] = _short_hash(np.concatenate(sampler.scans_of).tobytes())
     kept["rules"] = _short_hash(repr((config, time_ordered)).encode())
-    found = load_targets(folder, kept, sampler.store.scan_count, len(sampler.scans_of))
+    load = partial(load_targets, folder, kept, sampler.store.scan_count, len(sampler.scans_of))
+    while (found := load()) is None and not processes.leads_here:
+        time.sleep(_LOOK_AGAIN_S)  # a barrier gives up before an hour is over
     if found is None:
         parts = PosedParts(folder, kept)
         found = fused_targets(
@@ -315,6 +325,12 @@ def split_tracks(count: int, one_in: int = 20) -> tuple[np.ndarray, np.ndarray]:
     order = np.random.default_rng(0).permutation(count)
     held = count // one_in if count >= one_in else 0
     return (order[held:], order[:held]) if held else (order, order)
+
+
+def _have_scans(store: Store, tracks: np.ndarray, min_points: int) -> bool:
+    """Whether any of the tracks has a scan of so many points."""
+    largest = np.maximum.reduceat(store.scan_sizes, store.track_starts[:-1])
+    return bool((largest[tracks] >= min_points).any())
 
 
 def _short_hash(content: bytes) -> str:

@@ -5,13 +5,15 @@
 `loop.fit` trains what `setup` has made; here data, options and preset come together.
 """
 
+import os
 import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+from wildshape.errors import BadInputError
 from wildshape.io.output import command_line, provenance
 from wildshape.io.progress import SILENT, Progress, duration
 from wildshape.io.store.store import Store
@@ -91,7 +93,7 @@ def train(
         StopRequested: `stopping` said so, the state is saved; its text says how to go on.
     """
     device, weights = choose_device(options.device), _Weights.named_in(options)
-    with begun_run(data, out, options, weights.files):
+    with begun_run(data, out, options, weights.files), _resumable(options):
         store = open_training_data(data, out, options, progress)
         recipe = recipe_for(store, options.preset, options.steps)
         recipe = with_encoder(recipe, options.encoder or recipe.network.backbone)
@@ -99,13 +101,27 @@ def train(
     if options.profile and run.processes.leads:
         run.profile = out / PROFILE
     began, first = time.monotonic(), run.state.step
-    if first >= recipe.optim.steps:
+    if first >= recipe.optim.steps and (out / MODEL).is_file():
         return _finished(run, out, 0.0, f"{out} was finished already")
-    flag = "" if options.resume else " --resume"
-    fit_with_progress(run, progress, stopping, resume=f"{command_line()}{flag}")
+    fit_with_progress(run, progress, stopping, resume=_resuming(options))
     seconds = time.monotonic() - began
     text = f"trained {run.state.step - first} steps in {duration(seconds)}"
     return _finished(run, out, seconds, text)
+
+
+def _resuming(options: TrainingOptions) -> str:
+    """The command that goes on with a run."""
+    return command_line() if options.resume else f"{command_line()} --resume"
+
+
+@contextmanager
+def _resumable(options: TrainingOptions) -> Iterator[None]:
+    """A stop before the first step says how to go on: tracks may have been fused for an hour."""
+    try:
+        yield
+    except KeyboardInterrupt as stopped:
+        sentence = f"stopped before training; go on with `{_resuming(options)}`."
+        raise type(stopped)(sentence) from None
 
 
 class _Weights(NamedTuple):
@@ -117,10 +133,15 @@ class _Weights(NamedTuple):
 
     @classmethod
     def named_in(cls, options: TrainingOptions) -> "_Weights":
-        """Of the options."""
+        """Of the options.
+
+        Raises:
+            BadInputError: a checkpoint that is not there.
+        """
         truth = options.teacher == "truth"
-        teacher = "truth" if truth else _checkpoint(options.teacher)
-        return cls(_checkpoint(options.start), teacher, _checkpoint(options.headings))
+        teacher = "truth" if truth else _checkpoint("teacher", options.teacher)
+        start, headings = options.start, options.headings
+        return cls(_checkpoint("start", start), teacher, _checkpoint("headings", headings))
 
     @property
     def files(self) -> list[Path]:
@@ -139,7 +160,8 @@ def _set_up(
     progress: Progress,
 ) -> Run:
     learns = isinstance(weights.teacher, Path)
-    with (progress if learns else SILENT).bar("fusing tracks", 0) as bar:
+    leads = int(os.environ.get("RANK", "0")) == 0
+    with (progress if learns and leads else SILENT).bar("fusing tracks", 0) as bar:
         return setup(
             recipe,
             store,
@@ -156,11 +178,17 @@ def _set_up(
         )
 
 
-def _checkpoint(model: str | None) -> Path | None:
+def _checkpoint(option: str, model: str | None) -> Path | None:
     """The checkpoint that a user names."""
     if model is None:
         return None
-    return weights_file(None if model == "shipped" else Path(model))
+    file = weights_file(None if model == "shipped" else Path(model))
+    if not file.is_file():
+        raise BadInputError(
+            f"--{option} {model}: {file} is not there; name a .safetensors file, or a run that has"
+            " written its model."
+        )
+    return file
 
 
 def fit_with_progress(

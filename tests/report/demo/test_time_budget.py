@@ -62,6 +62,14 @@ def test_a_machine_far_too_slow_ends_all_the_same(monkeypatch):
     assert done.step <= 27
 
 
+@pytest.mark.parametrize("rate", [4.0, 2.0, 1.2])
+def test_a_slow_machine_agrees_on_headings_later_and_as_often(monkeypatch, rate):
+    """The shares had passed when the number of steps was first known."""
+    done = train(95.0, lambda _: rate, monkeypatch)
+    assert len(done.agreed) == len(small().loss.agree_at)
+    assert done.agreed == sorted(set(done.agreed))
+
+
 def test_the_plan_is_what_the_checkpoint_says(monkeypatch):
     run = bare_run(step=75)
     clock = SimpleNamespace(now=0.0)

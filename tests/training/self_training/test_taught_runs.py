@@ -15,7 +15,9 @@ from tests.training.self_training.taught import TAUGHT, sampler_of
 from wildshape.errors import BadInputError
 from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.method.checkpoint import load_checkpoint
+from wildshape.training import setup as runs
 from wildshape.training.loop import StopRequested, fit, setup
+from wildshape.training.runtime.torchrun import Processes
 from wildshape.training.self_training.fused_shape import FusionConfig
 from wildshape.training.self_training.targets import (
     TARGETS,
@@ -130,6 +132,26 @@ def test_what_is_taught_is_learned(car_store, tmp_path):
         lambda _, values: losses.append(values["loss"]),
     )
     assert losses[-1] < 0.85 * losses[0]
+
+
+def test_of_several_processes_one_makes_the_targets(car_store, teacher, tmp_path, monkeypatch):
+    waited, fused = [], runs.fused_targets
+
+    def leader_is_done(_):
+        waited.append(True)
+        monkeypatch.setattr(runs, "join", lambda _: Processes(0, 2, cpu, 0))
+        monkeypatch.setattr(runs, "fused_targets", fused)
+        setup(TAUGHT, car_store, tmp_path, teacher=teacher)
+
+    def refuse(*_, **__):
+        raise AssertionError("made twice")
+
+    cpu = torch.device("cpu")
+    monkeypatch.setattr(runs.time, "sleep", leader_is_done)
+    monkeypatch.setattr(runs, "fused_targets", refuse)
+    monkeypatch.setattr(runs, "join", lambda _: Processes(1, 2, cpu, 1))
+    assert setup(TAUGHT, car_store, tmp_path, teacher=teacher).targets is not None
+    assert waited == [True]
 
 
 def test_targets_of_other_rules_are_made_anew(car_store, teacher, tmp_path):

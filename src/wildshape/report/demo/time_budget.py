@@ -43,6 +43,8 @@ class TimeBudget:
         if self.planned and not self._worth_a_change(run, steps):
             return False
         validate_every = run.recipe.validate_every if self.planned else steps // _VALIDATIONS
+        if not self.planned:
+            _agree_later(run, step, steps)
         self.planned = steps
         _plan(run, steps, max(1, validate_every))
         return True
@@ -59,6 +61,15 @@ class TimeBudget:
         more, left = steps - self.planned, self.planned - step
         drift = more > max(_MORE * left, _LEAST_DRIFT) or -more > max(_FEWER * left, _LEAST_DRIFT)
         return drift and not jumps
+
+
+def _agree_later(run: Run, step: int, steps: int) -> None:
+    """Shares at which headings are agreed on, put off where the first of them has passed."""
+    shares = run.recipe.loss.agree_at
+    late = (step + 0.5) / steps - min(shares, default=1.0)
+    if late > 0 and int(min(shares) * steps) < step:
+        loss = replace(run.recipe.loss, agree_at=tuple(share + late for share in shares))
+        run.recipe = replace(run.recipe, loss=loss)
 
 
 def _plan(run: Run, steps: int, validate_every: int) -> None:

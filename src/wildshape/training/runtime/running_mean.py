@@ -76,6 +76,6 @@ def refuse_not_finite(loss: float, step: int) -> None:
     """
     if not np.isfinite(loss):
         raise BadInputError(
-            f"training stopped before step {step}: the loss is not finite; resume from the"
-            " last checkpoint with a smaller learning rate, or check the data's units."
+            f"training stopped before step {step}: the loss is not finite; check the data's"
+            " units, or begin a new run from the last checkpoint (--start) or of another --seed."
         )

@@ -17,6 +17,12 @@ class Processes:
     rank: int
     count: int
     device: torch.device
+    local_rank: int = 0
+
+    @property
+    def leads_here(self) -> bool:
+        """Whether this process is the first of its machine."""
+        return self.local_rank == 0
 
     @property
     def leads(self) -> bool:
@@ -59,4 +65,4 @@ def join(device: str) -> Processes:
     if device == "cuda":
         torch.cuda.set_device(place)
     distributed.init_process_group("nccl" if device == "cuda" else "gloo")
-    return Processes(distributed.get_rank(), count, place)
+    return Processes(distributed.get_rank(), count, place, local)
