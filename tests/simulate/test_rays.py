@@ -65,3 +65,14 @@ def test_a_wall_along_the_road_is_met_on_the_far_side_and_below_its_top() -> Non
     toward /= np.linalg.norm(toward, axis=1, keepdims=True)
     assert wall.distance(origin, toward, -0.5).tolist() == [15.0, np.inf, np.inf, np.inf]
     assert wall.distance(-origin, -toward, -0.5)[0] == 15.0
+
+
+def test_ground_that_is_in_a_scan_is_no_ray_beside_it() -> None:
+    config = SimulationConfig(
+        tracks=1, scans=4, sensor="os1-128", occlusion=0.0, far_m=10.0, ground=True, rays=2048
+    )
+    (track,) = simulate_tracks(config, 7, workers=1)
+    for scan, rays in zip(track.scans, track.rays):
+        assert rays is not None
+        toward = scan / np.linalg.norm(scan, axis=1, keepdims=True)
+        assert (rays.directions @ toward.T).max() < 1 - 1e-6  # 0.08 degrees; columns have 0.35

@@ -223,6 +223,8 @@ def passing_rays(
     other = np.minimum(ground, wall)
     reach = np.minimum(hits.distance, other)
     by = (hits.solid != 0) | (other < hits.distance)
+    if returns.ground:  # what lies beside the object is in the scan
+        by &= _ground(hits, toward, origin, half, returns.rim_m) == 0
     back = by & (reach < sensor.max_range_m) & (rng.random(len(reach)) >= returns.dropout)
     noisy = reach[back] + returns.noise_m * rng.standard_normal(int(back.sum()))
     ends = _turned(toward[back] * noisy[:, None], R)

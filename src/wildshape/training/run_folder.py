@@ -141,7 +141,7 @@ def open_training_data(
 
 
 def _packed_before(packed: Path, data: Path, origin: dict[str, Any]) -> Store:
-    """The run's own store, if `origin` says that the same tracks would be packed again."""
+    """The run's own store, if `origin` says that it is of these tracks, as they were then."""
     store = open_store(packed, data)
     if store.provenance.get("settings") != json.loads(json.dumps(origin)):
         raise BadInputError(

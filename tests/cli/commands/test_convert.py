@@ -163,7 +163,7 @@ def test_what_is_left_out_is_told_by_reason_and_part(wildshape, drives, tmp_path
         (("--categories", "Van"), 0, 0),
         (("--categories", "Car,Van"), 4, 16),
         (("--ground", 1.6), 0, 0),
-        (("--ground", 1.6, "--keep-ground"), 4, 16),
+        (("--keep-ground",), 4, 16),
     ],
 )
 def test_filters(wildshape, drives, tmp_path, options, tracks, scans):
@@ -176,6 +176,7 @@ def test_filters(wildshape, drives, tmp_path, options, tracks, scans):
         return
     said = json.loads(found.out)
     assert (said["tracks"], said["scans"]) == (tracks, scans)
+    assert ("no track is of the category 'Van'" in found.err) == ("Car,Van" in options)
 
 
 def test_values_apart_never_swallow_what_follows(wildshape, drives, tmp_path):
@@ -235,6 +236,7 @@ def test_zeros_reach_the_reader(tmp_path, option, field):
         (("--margin", "nan"), "--margin nan: expected a number"),
         (("--categories", ","), "--categories names no category"),
         (("--every", 0), "--every 0: expected 1 or more"),
+        (("--ground", 1.6, "--keep-ground"), "--ground has no effect beside --keep-ground"),
         (("--range-m", "9,3"), "nearer first"),
         (("--workers", 0), "--workers 0"),
         (("--split", "train"), "--split: kitti-raw has no such option"),

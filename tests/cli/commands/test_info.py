@@ -86,3 +86,7 @@ def test_a_damaged_record_does_not_hide_the_tracks(wildshape, dataset, tmp_path)
         (folder / name).write_text("[1, 2")
     (folder / INDEX_JSON).unlink()
     assert wildshape("info", folder).code == 0
+
+
+def test_a_sample_below_nothing_is_refused(refused, store):
+    assert "--sample -3: expected 0 or more" in refused("info", store, "--sample", -3)

@@ -26,6 +26,7 @@ def test_another_clock_begins_with_the_scan_and_no_turn_has_no_times():
     assert seconds_since(TURN + 500.0, 100.0) == pytest.approx(TURN)
     assert seconds_since(TURN * 1000, None) is not None  # milliseconds
     assert seconds_since(np.zeros(200), 1.0) is None
+    assert seconds_since(TURN * 10, 1.0) is None  # a share of the turn
 
 
 def test_points_that_did_not_come_back_do_not_take_the_times_of_the_others(tmp_path):

@@ -31,6 +31,7 @@ def _read(path: Path, text: str, coordinates: Coordinates | None = None) -> list
         "# scanned in x y z order by a program\n1 2 3\n4 5 6\n",
         "time;x_m;y_m;z_m\n9;1;2;3\n9;4;5;6\n",
         "Points:0,Points:1,Points:2,intensity\n1,2,3,9\n4,5,6,9\n",
+        "intensity,Points_m_XYZ:0,Points_m_XYZ:1,Points_m_XYZ:2\n9,1,2,3\n9,4,5,6\n",
         "time,position.x,position_y,POS.Z,orientation_x\n9,1,2,3,9\n9,4,5,6,9\n",
         "stamp,x,y,z\n2020-01-01 00:00:00,1,2,3\n2020-01-01 00:00:00,4,5,6\n",
         'name,x,y,z\n"a, b",1,2,3\n"c",4,5,6\n',

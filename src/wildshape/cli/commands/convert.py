@@ -187,6 +187,8 @@ def _check(settings: Settings) -> None:
         if value is not None and not value >= bound:
             raise BadInputError(f"--{name.replace('_', '-')} {value}: expected {bound} or more.")
     _check_truth(settings)
+    if settings.keep_ground and settings.ground is not None:
+        raise BadInputError("--ground has no effect beside --keep-ground; pass one of them.")
     for name in ("margin", "ground"):
         if not math.isfinite(getattr(settings, name) or 0.0):
             raise BadInputError(f"--{name} {getattr(settings, name)}: expected a number of metres.")
@@ -213,6 +215,13 @@ def _check_truth(settings: Settings) -> None:
         raise BadInputError(f"--outlier-radius {settings.outlier_radius}: expected metres above 0.")
 
 
+def _without_tracks(settings: Settings, found: set[str]) -> list[str]:
+    """Categories asked for that no track has; those of nuScenes are parts of dotted names."""
+    dotted = [f".vehicle.{name.lower()}." for name in found]
+    asked = [word for word in settings.categories or () if not word.isdigit()]  # synsets
+    return [word for word in asked if not any(f".{word.lower()}." in name for name in dotted)]
+
+
 def _tell(found: "Converted", settings: Settings, seconds: float) -> None:
     """The figures on stdout, and what was left out as a table on stderr."""
     from wildshape.cli.terminal import answer, say
@@ -227,6 +236,8 @@ def _tell(found: "Converted", settings: Settings, seconds: float) -> None:
     damaged = [result.damage for result in results if result.damage]
     if damaged:
         say(f"{len(damaged)} of {len(results)} parts are damaged, for example {damaged[0]}")
+    for word in _without_tracks(settings, {name for r in results for name in r.categories}):
+        say(f"no track is of the category '{word}'; is it one of the data set's own words?")
     doubts = [told for result in results for told in result.doubts]
     for told in doubts[:_DOUBTS]:
         say(told)

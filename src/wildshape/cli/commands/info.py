@@ -9,6 +9,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from wildshape.cli.options import DEFAULT_FILES, AsJson, Files, Input, Overwrite, option
+from wildshape.errors import BadInputError
 
 EXAMPLES = (
     "wildshape info cars.store --out cars.html",
@@ -44,12 +45,15 @@ def run(settings: Settings) -> None:
     """Count, print, and draw if asked.
 
     Raises:
-        BadInputError: no tracks there, none that can be read, or an output that exists.
+        BadInputError: no tracks there, none that can be read, an output that exists, or a
+            sample below 0.
     """
     from wildshape.cli.terminal import TERMINAL, answer, say
     from wildshape.report.statistics.describe import describe_input
     from wildshape.report.statistics.text import table_text
 
+    if settings.sample < 0:
+        raise BadInputError(f"--sample {settings.sample}: expected 0 or more.")
     found = describe_input(
         settings.input,
         settings.out,

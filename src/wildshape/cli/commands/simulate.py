@@ -22,7 +22,10 @@ EXAMPLES = (
 Out = Annotated[Path, Positional, arg(metavar="OUT", help="packed store, or folder, to write")]
 Meshes = Annotated[
     Path | None,
-    option(metavar="DIR", help="your own meshes (x forward, z up) instead of our shapes"),
+    option(
+        metavar="DIR",
+        help="your own meshes (x forward, z up; glTF: z forward, y up) instead of our shapes",
+    ),
 ]
 
 OF_TRACKS = ("tracks", "category", "occlusion", "ground", "rays", "varied", "layout", "workers")

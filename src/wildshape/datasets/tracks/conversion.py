@@ -37,6 +37,7 @@ class PartResult:
         names: of the tracks that were written as folders, in order.
         damage: why the part could not be read, in a sentence; it is left out whole then.
         doubts: a sentence each on what was read and may not be meant.
+        categories: of the tracks written, how many each.
     """
 
     part: str
@@ -47,10 +48,12 @@ class PartResult:
     names: list[str] = field(default_factory=list)
     damage: str = ""
     doubts: list[str] = field(default_factory=list)
+    categories: dict[str, int] = field(default_factory=dict)
 
     def count(self, track: Track) -> None:
         """Add a track."""
         self.tracks += 1
+        self.categories[track.category] = self.categories.get(track.category, 0) + 1
         self.scans += len(track.scans)
         self.points += sum(len(scan) for scan in track.scans)
 

@@ -14,7 +14,7 @@ TIME_FIELDS = ("t", "time", "timestamp", "offset_time", "time_offset", "time_sta
 """Names of the fields that hold it, the likeliest first."""
 
 _UNITS = (1.0, 1e-3, 1e-6, 1e-9)
-_SHORTEST_TURN_S, _LONGEST_TURN_S = 0.005, 1.0
+_SHORTEST_TURN_S, _LONGEST_TURN_S = 0.005, 0.5
 _FEWEST = 100
 
 
@@ -23,8 +23,9 @@ def seconds_since(
 ) -> Float[np.ndarray, "n"] | None:
     """Seconds since the scan's time; None where the values tell of no turn.
 
-    The unit is the one in which a turn lasts 5 ms to 1 s. Values near 0 are counted from the scan's
-    time, values near that time are on its clock; of another clock, the first is the scan's time.
+    The unit is the one in which a turn lasts 5 ms to 0.5 s; shares of a turn have none. Values near
+    0 are counted from the scan's time, values near that time are on its clock; of another clock,
+    the first is the scan's time.
 
     Args:
         values: of each point, as recorded.

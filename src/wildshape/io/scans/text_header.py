@@ -20,7 +20,7 @@ _PLACE = r"(?:points?|pos(?:ition)?s?|coord(?:inate)?s?|loc(?:ation)?|field)"
 _COLUMN = re.compile(
     rf"(?:{_PLACE}[ _.:-]?)?(?P<axis>[xyz])(?:[ _.:-]?{_PLACE})?"
     r"(?:\s*[_ ]?[(\[{]\s*(?P<bracket>[^)\]}]*?)\s*[)\]}]|[ _](?P<suffix>[kcmduµ]?m"
-    r"|[a-z]*met(?:er|re)s?|ft|feet|in|inch(?:es)?|deg))?|points?[:_](?P<number>[012])",
+    r"|[a-z]*met(?:er|re)s?|ft|feet|in|inch(?:es)?|deg))?|points?(?:_m_xyz)?[:_](?P<number>[012])",
     re.IGNORECASE,
 )
 

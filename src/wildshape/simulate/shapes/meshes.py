@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The user's own meshes as objects: PLY, OBJ, STL, OFF, GLB; x forward, y left, z up."""
+"""The user's own meshes as objects: PLY, OBJ, STL, OFF; x forward, y left, z up.
+
+glTF says itself what its axes are (2.0, section 3.4): y up, z forward.
+"""
 
 import warnings
 from collections.abc import Callable
@@ -23,6 +26,7 @@ _READERS: dict[str, Callable[[Path], tuple[np.ndarray, np.ndarray]]] = {
     ".glb": read_gltf,
     ".gltf": read_gltf,
 }
+_Y_UP = (".glb", ".gltf")
 _SMALLEST_M, _LARGEST_M = 0.5, 30.0
 
 
@@ -56,6 +60,8 @@ def read_mesh(path: Path, metres: bool) -> Solid:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a damaged file's numbers
             vertices, faces = used(*_READERS[path.suffix.lower()](path))
+        if path.suffix.lower() in _Y_UP:
+            vertices = vertices[:, (2, 0, 1)]
     except BadInputError:
         raise
     except Exception as cause:  # a damaged file raises nearly anything

@@ -4,7 +4,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import count
+from itertools import count, islice
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from wildshape.simulate.street.street import LANE_M, LEAD_M, Actor, Motion, Stre
 _KINDS = {"van": "Van", "truck": "Truck"}
 _LONGEST_M, _WIDEST_PARKED_M = 9.5, 2.45
 _LEAST_ROOM_M = 1.0  # between two of one lane
+_TRIES = 32  # vehicles drawn for a place at the kerb
 Seats = Iterator[Actor]
 
 
@@ -73,7 +74,10 @@ def _parked(
         if rng.random() > taken or not street.is_straight(s + 3.0, 6.0):
             s += float(rng.uniform(4.0, 8.0))
             continue
-        actor = next(one for one in drawn if one.size[1] < _WIDEST_PARKED_M)
+        narrow = (one for one in islice(drawn, _TRIES) if one.size[1] < _WIDEST_PARKED_M)
+        actor = next(narrow, None)
+        if actor is None:
+            return  # the user's own vehicles are all too wide
         length, width, _ = actor.size
         lateral = side * (street.half_m - width / 2 - rng.uniform(0.08, 0.35))
         backward = (side > 0) != (rng.random() < 0.15)
@@ -111,16 +115,23 @@ def _same_lane(stretch: _Stretch, drawn: Seats, rng: np.random.Generator) -> Ite
     for sign in (1.0, -1.0):
         gap, neighbour = 0.0, None
         for number in range(int(rng.integers(0, 4))):
+            vehicle = next(drawn)
             gap += float(rng.uniform(11.0, 26.0)) + (_LONGEST_M / 2 if number else 0.0)
+            gap += _over(vehicle) + (_over(neighbour) if neighbour else 0.0)
             more = sign * 0.05 * (number + 1) * ego.speed * float(rng.uniform(0.0, 1.0))
             motion = replace(ego, start=ego.start + sign * gap, speed=ego.speed + more)
             if ego.speed == 0:
                 motion = replace(motion, speed=0.0)
-            actor = replace(next(drawn), motion=motion, lateral=-LANE_M / 2)
+            actor = replace(vehicle, motion=motion, lateral=-LANE_M / 2)
             if neighbour and _room(neighbour, actor, sign, stretch.seconds) < _LEAST_ROOM_M:
                 actor = replace(actor, motion=replace(motion, speed=neighbour.motion.speed))
             neighbour = actor
             yield actor
+
+
+def _over(actor: Actor) -> float:
+    """How much farther than the longest of ours it reaches to either side, metres."""
+    return max(0.0, actor.size[0] - _LONGEST_M) / 2
 
 
 def _room(one: Actor, other: Actor, sign: float, time: float) -> float:
@@ -133,10 +144,13 @@ def _oncoming(stretch: _Stretch, drawn: Seats, rng: np.random.Generator) -> Iter
     """In the other lane, one speed for all."""
     speed = -float(rng.uniform(5.0, 11.0))
     s = stretch.low + float(rng.uniform(0.0, 40.0))
+    before = 0.0
     while s < stretch.high - speed * stretch.seconds:
-        motion = Motion(s, speed)
-        yield replace(next(drawn), motion=motion, lateral=LANE_M / 2, heading=np.pi)
+        vehicle = next(drawn)
+        s += before + _over(vehicle)
+        yield replace(vehicle, motion=Motion(s, speed), lateral=LANE_M / 2, heading=np.pi)
         s += _LONGEST_M + 3.0 + float(rng.exponential(25.0))
+        before = _over(vehicle)
 
 
 def _walker(stretch: _Stretch, seed: tuple[int, ...], rng: np.random.Generator) -> Actor:
