@@ -5,6 +5,7 @@
 import json
 
 import pytest
+import torch
 
 
 def written(out):
@@ -37,3 +38,21 @@ def test_the_same_is_written_by_any_number_of_workers(
     assert json.loads(spread.out)["workers"] == 2
     assert written(tmp_path / "spread") == written(tmp_path / "alone")
     assert len(written(tmp_path / "alone")) >= files
+
+
+@pytest.mark.parametrize("options", [(), ("--track",)])
+def test_the_same_is_written_on_any_number_of_torchs_threads(
+    wildshape, dataset, tmp_path, options
+):
+    """Sums of torch depend on it, and the nearest neighbours of what was summed."""
+    before = torch.get_num_threads()
+    try:
+        for count in (1, 2, 3):
+            torch.set_num_threads(count)
+            out = tmp_path / str(count)
+            assert wildshape("complete", dataset, "--out", out, "--workers", 1, *options).code == 0
+            assert torch.get_num_threads() == count
+    finally:
+        torch.set_num_threads(before)
+    one, two, three = (written(tmp_path / str(count)) for count in (1, 2, 3))
+    assert one == two == three

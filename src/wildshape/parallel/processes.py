@@ -6,7 +6,7 @@ import atexit
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from queue import SimpleQueue
 from threading import Thread
 from typing import Any, TypeVar
@@ -71,8 +71,7 @@ class Processes:
         try:
             while not handout.is_done():
                 yield from handout.results()
-                if any(one.ready for one in self._assistants):
-                    threads.only_one()
+                threads.settle(alone=not any(one.ready for one in self._assistants))
                 handout.do_one(task)
         finally:
             handout.end()
@@ -162,19 +161,29 @@ def _end_all() -> None:
 
 
 class _Threads:
-    """torch's threads in this process: they and helpers would take each other's cores."""
+    """torch's threads in this process: one, for its sums depend on their number.
+
+    Where no helper works beside it, the work whose result does not (`ops/threads.py`) has as many
+    as torch had.
+    """
 
     def __init__(self) -> None:
         self._before = 0
+        self._exact = ExitStack()
 
-    def only_one(self) -> None:
-        """No more than this one from now on."""
-        torch = sys.modules.get("torch")
+    def settle(self, *, alone: bool) -> None:
+        """Before each item; torch may come with the first."""
+        torch, exact = (sys.modules.get(name) for name in ("torch", "wildshape.ops.threads"))
         if torch is not None and not self._before:
             self._before = torch.get_num_threads()
             torch.set_num_threads(1)
+            if exact is not None and alone:
+                self._exact.enter_context(exact.exact_on(self._before))
+        if not alone:
+            self._exact.close()
 
     def restore(self) -> None:
         """As many as there were."""
+        self._exact.close()
         if self._before:
             sys.modules["torch"].set_num_threads(self._before)
