@@ -7,6 +7,7 @@ import shutil
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from tests.datasets.street import street
 from tests.datasets.write_argoverse2 import T_EGO_UP, pose_columns, write_log, write_table
 from tests.datasets.write_kitti_tracking import EYE, write_sequence
@@ -144,3 +145,20 @@ def test_a_calibration_that_nothing_takes_is_refused_before_work(
         "complete", tracks, "--out", "-", "--model", trained, "--boxes", "json"
     )
     assert not (tmp_path / "out").exists()
+
+
+def test_boxes_of_cameras_have_the_axes_of_lidars_where_a_format_has_these(tmp_path):
+    """2 m ahead, 0.5 m to the right and 0.1 m up: a camera's z, x and -y."""
+    pose = Rotation.from_matrix([[0, -1, 0], [0, 0, -1], [1, 0, 0]])  # its x ahead, its z up
+    x, y, z, w = pose.as_quat().tolist()
+    box = Box((0.5, -0.1, 2.0), (1.0, 2.0, 3.0), (w, x, y, z))
+    one = Detection("c", 0, "7", 7, "chair", "camera", 0.5, box)
+    files = BoxFiles(("nuscenes", "argoverse2", "kitti"))
+    (told,) = files.write_detections(tmp_path, [one])
+    assert "depth cameras" in told
+    results = json.loads((tmp_path / "boxes" / "nuscenes.json").read_text())["results"]
+    ((said,),) = results.values()
+    assert said["translation"] == pytest.approx([2.0, -0.5, 0.1])
+    assert np.abs(said["rotation"]) == pytest.approx([1, 0, 0, 0], abs=1e-6)
+    there = read_argoverse2(tmp_path / "boxes" / "argoverse2").T_ego_object[0].translation
+    assert there.tolist() == pytest.approx([2.0, -0.5, 0.1])

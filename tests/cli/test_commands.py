@@ -110,7 +110,7 @@ def test_register_a_track(wildshape, refused, dataset, trained, tmp_path):
     T_middle_scan = read_poses(out / "000000" / "T_middle_scan.txt")
     expected = T_sensor_can[3] @ T_sensor_can.inverse()
     torch.testing.assert_close(T_middle_scan.matrix, expected.matrix, atol=1e-4, rtol=0)
-    assert not (out / "000000" / "completed").exists()
+    assert len(list((out / "000000" / "completed").glob("*.ply"))) == len(T_sensor_can)
     assert "--out" in refused("register", dataset)
     refused("register", dataset / "000000", dataset / "000001", "--model", trained)
 

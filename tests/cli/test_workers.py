@@ -41,9 +41,7 @@ def test_the_same_is_written_by_any_number_of_workers(
 
 
 @pytest.mark.parametrize("options", [(), ("--track",)])
-def test_the_same_is_written_on_any_number_of_torchs_threads(
-    wildshape, dataset, tmp_path, options
-):
+def test_the_same_is_written_on_any_number_of_torchs_threads(wildshape, dataset, tmp_path, options):
     """Sums of torch depend on it, and the nearest neighbours of what was summed."""
     before = torch.get_num_threads()
     try:

@@ -100,3 +100,19 @@ def test_rays_may_be_handed_in_in_any_form_and_none_change_nothing(track: Track,
     refused(model.complete_track, track.scans, rays=[rays], match="1 sets of rays for 2 scans")
     refused(as_rays, 3, match="expected directions")
     refused(as_rays, (np.eye(3), ["a"]), match="rays: could not convert")
+
+
+def test_rays_count_in_every_way_to_pose_a_track(track: Track) -> None:
+    model = wildshape.load()
+    scans, rays = list(track.scans), list(track.rays)
+    alone = [model.complete(*one, rays=of) for one, of in zip(zip(scans), rays)]
+    posed = model.poses(scans, rays=rays)
+    for i, one in enumerate(alone):
+        torch.testing.assert_close(posed[i].matrix, one.pose.matrix, atol=1e-3, rtol=0)
+    first, second = scans
+    pair = model.register(first, second, rays=rays)
+    assert pair.confidence == pytest.approx(min(one.confidence for one in alone), abs=1e-3)
+    assert pair.confidence != pytest.approx(model.register(first, second).confidence, abs=1e-4)
+    fused = model.fuse(scans, rays=rays)
+    moved = model.register_track(scans, rays=rays)[0].apply_numpy(scans[0])
+    np.testing.assert_allclose(fused[: len(scans[0])], moved, atol=1e-5)

@@ -16,6 +16,7 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.confidence import confidence_of
+from wildshape.inference.point_inputs import check_sensor
 from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.registration import inlier_ratio
 from wildshape.method.checkpoint import save_checkpoint, weights_file
@@ -274,6 +275,13 @@ def test_too_few_points_are_refused_by_name(predictor, count):
         list(predictor.complete_many([scan(), scan(count=40)[:count]]))
     with pytest.raises(BadInputError, match=f"source: {count} finite"):
         predictor.register(scan()[:count], scan())
+
+
+def test_a_speck_and_what_is_no_sensor_are_refused(predictor):
+    with pytest.raises(BadInputError, match=r"at least 0\.01 m"):
+        predictor.complete(scan() * np.float32(1e-4))
+    with pytest.raises(BadInputError, match=r"expected a wildshape.Sensor, found 'lidar'"):
+        check_sensor("lidar")
 
 
 def test_sixteen_points_are_enough(predictor):

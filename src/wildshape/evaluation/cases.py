@@ -10,11 +10,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from wildshape.datasets.tracks.truth import VOXEL_M, mirrored, shape_mirrored, shape_partial
+from wildshape.datasets.tracks.truth import shape_mirrored, shape_partial, whole_shape
 from wildshape.evaluation.metrics import hull_area, labelled_box, true_box
 from wildshape.evaluation.results import Limits, Rotate, Skipped
 from wildshape.geometry.box import FittedBox
-from wildshape.geometry.sampling import voxel_thin
 from wildshape.geometry.transforms.rotation import random_rotation, random_yaw
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor, SightLines, Track
@@ -116,11 +115,11 @@ def _subsample(track: Track, max_scans: int | None) -> Track:
 def _truth(track: Track, count: int) -> Truth | None:
     if track.T_sensor_object is None or not track.scans:
         return None
-    whole, partial = track.shape, None
+    whole, partial = whole_shape(track), None
     if whole is None:
         whole, partial = shape_mirrored(track), shape_partial(track)
     elif track.shape_kind == "partial":
-        whole, partial = voxel_thin(mirrored(whole), VOXEL_M), whole
+        partial = track.shape
     known = track.shape is not None and track.shape_kind == "whole"
     shape, box = _thin(whole, count), _true_box(track, whole)
     partial = None if partial is None else _thin(partial, count)

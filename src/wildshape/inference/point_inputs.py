@@ -19,7 +19,7 @@ from wildshape.io.scans.points import (
     drop_nonfinite,
     read_scan,
 )
-from wildshape.records import Points, SightLines
+from wildshape.records import Points, Sensor, SightLines
 
 _RAYS = ("directions", "ranges", "origins")
 _OPEN3D_TENSOR = "point.positions"
@@ -36,7 +36,7 @@ def as_points(scan: object, name: str = "scan") -> Points:
 
     Raises:
         BadInputError: not `(n, 3)`, fewer than 16 finite points, all points equal, over 100 m
-            across, or farther than 1 km from the origin.
+            or under 1 cm across, or farther than 1 km from the origin.
     """
     if isinstance(scan, str | Path):
         return read_scan(scan).points
@@ -115,6 +115,16 @@ def as_rays(rays: object, name: str = "rays") -> SightLines | None:
         return SightLines(*(np.asarray(_host(part), np.float32) for part in rays))
     except (TypeError, ValueError) as error:
         raise BadInputError(f"{name}: {str(error).removeprefix('rays: ')}") from error
+
+
+def check_sensor(sensor: object) -> None:
+    """Refuse what is handed in as a sensor and is none.
+
+    Raises:
+        BadInputError: neither None nor a `Sensor`.
+    """
+    if sensor is not None and not isinstance(sensor, Sensor):
+        raise BadInputError(f"sensor: expected a wildshape.Sensor, found {sensor!r}.")
 
 
 def rays_of_each(rays: Sequence[object], scans: Sequence[object]) -> list[SightLines | None]:

@@ -27,7 +27,7 @@ from wildshape.inference.compiled import compiled
 from wildshape.inference.confidence import glance_of, judged
 from wildshape.inference.config import InferenceConfig
 from wildshape.inference.free_space import Rays, Sights, without_free_space
-from wildshape.inference.point_inputs import all_as_points, as_points, rays_of_each
+from wildshape.inference.point_inputs import all_as_points, as_points, check_sensor, rays_of_each
 from wildshape.inference.refine import Refined, denser, partners, refine, with_scan
 from wildshape.inference.registration import fuse_scans, registered, to_middle
 from wildshape.inference.tracks.complete_track import Gathered, complete_together
@@ -41,6 +41,8 @@ from wildshape.records import Completion, Points, Registration, Sensor
 
 BATCH = 32
 """Scans that are completed at once."""
+Each = Sequence[object]
+"""What is handed in from Python, one a scan (`point_inputs.py`)."""
 _DEFAULT = InferenceConfig()
 
 
@@ -135,11 +137,7 @@ class Predictor:
         return next(self.complete_many([points], sensor, rays=[rays]))
 
     def complete_many(
-        self,
-        scans: Sequence[object],
-        sensor: Sensor | None = None,
-        *,
-        rays: Sequence[object] = (),
+        self, scans: Each, sensor: Sensor | None = None, *, rays: Each = ()
     ) -> Iterator[Completion]:
         """`complete` for many scans, in batches; each is completed on its own."""
         known = rays_of_each(rays, scans)
@@ -148,11 +146,7 @@ class Predictor:
             yield from self._each(all_as_points(scans[part], start), sensor, known[part])
 
     def complete_track(
-        self,
-        scans: Sequence[object],
-        sensor: Sensor | None = None,
-        *,
-        rays: Sequence[object] = (),
+        self, scans: Each, sensor: Sensor | None = None, *, rays: Each = ()
     ) -> list[Completion]:
         """One shape from all scans of a track, in time order, posed in each of them.
 
@@ -178,6 +172,7 @@ class Predictor:
     def _each(
         self, scans: Sequence[Points], sensor: Sensor | None, rays: Rays = (), dense: bool = True
     ) -> Iterator[Completion]:
+        check_sensor(sensor)
         for start in range(0, len(scans), BATCH):
             began = time.perf_counter()
             batch = list(scans[start : start + BATCH])
@@ -189,6 +184,7 @@ class Predictor:
     def _together(
         self, scans: Sequence[Points], sensor: Sensor | None, rays: Rays = ()
     ) -> Iterator[Completion]:
+        check_sensor(sensor)
         began = time.perf_counter()
         if len(scans) > self.config.track.key_scans:
             done = complete_together(self._gathered(scans, sensor, rays), self.config, rays)
@@ -227,14 +223,15 @@ class Predictor:
         gathered.add(done, self._off_ground(scan, shape, done.pose))
 
     def register(
-        self, source: object, target: object, sensor: Sensor | None = None
+        self, source: object, target: object, sensor: Sensor | None = None, *, rays: Each = ()
     ) -> Registration:
-        """`T_target_source = T_target_can inv(T_source_can)` (METHOD 7)."""
+        """`T_target_source = T_target_can inv(T_source_can)` (METHOD 7); `rays`: of both."""
         pair = (as_points(source, "source"), as_points(target, "target"))
-        return registered(*pair, self._each(pair, sensor), self.config.inliers)
+        done = self._each(pair, sensor, rays_of_each(rays, pair))
+        return registered(*pair, done, self.config.inliers)
 
     def register_track(
-        self, scans: Sequence[object], sensor: Sensor | None = None, *, track: bool = False
+        self, scans: Each, sensor: Sensor | None = None, *, track: bool = False, rays: Each = ()
     ) -> SE3:
         """`T_middle_scan`: every scan to the frame of the track's middle scan.
 
@@ -242,24 +239,27 @@ class Predictor:
             scans: of one object, in time order.
             sensor: how they were taken.
             track: pose the scans together (`complete_track`) and not each on its own.
+            rays: of each, as in `complete`.
         """
-        return to_middle(self.poses(scans, sensor, track=track))
+        return to_middle(self.poses(scans, sensor, track=track, rays=rays))
 
     def poses(
-        self, scans: Sequence[object], sensor: Sensor | None = None, *, track: bool = False
+        self, scans: Each, sensor: Sensor | None = None, *, track: bool = False, rays: Each = ()
     ) -> SE3:
-        """`T_sensor_canonical` of each scan; `track` as in `register_track`."""
+        """`T_sensor_canonical` of each scan, as `register_track`."""
         if not len(scans):
             raise BadInputError("no scans; hand in at least one.")
-        done = self.complete_checked(all_as_points(scans), sensor, track=track)
+        known = rays_of_each(rays, scans)
+        done = self.complete_checked(all_as_points(scans), sensor, track=track, rays=known)
         return stack([item.pose for item in done])
 
     def fuse(
-        self, scans: Sequence[object], sensor: Sensor | None = None, *, track: bool = False
+        self, scans: Each, sensor: Sensor | None = None, *, track: bool = False, rays: Each = ()
     ) -> Points:
-        """All points of a track in its middle scan's frame, metres; `track`: see above."""
+        """All points of a track in its middle scan's frame, metres, as `register_track`."""
         clouds = all_as_points(scans)
-        return fuse_scans(clouds, self.register_track(clouds, sensor, track=track))
+        moved = self.register_track(clouds, sensor, track=track, rays=rays)
+        return fuse_scans(clouds, moved)
 
     @torch.inference_mode()
     def look(self, scans: Sequence[Points], rays: Rays = ()) -> Looked:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from wildshape.datasets.tracks.truth import whole_shape
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.registration import fuse_scans
 from wildshape.io.progress import counted
@@ -193,8 +194,9 @@ def track_object(
     middle = track.middle
     scan = track.scans[middle]
     clouds = [Cloud("input scan", scan, size=2.6)]
-    if track.shape is not None and track.T_sensor_object is not None:
-        clouds.append(Cloud("truth", track.T_sensor_object[middle].apply_numpy(track.shape)))
+    truth = whole_shape(track)
+    if truth is not None and track.T_sensor_object is not None:
+        clouds.append(Cloud("truth", track.T_sensor_object[middle].apply_numpy(truth)))
     for label, T_middle_scan in (fused or {}).items():
         clouds.append(Cloud(label, fuse_scans(track.scans, T_middle_scan)))
     if completed is not None:

@@ -73,6 +73,9 @@ def upright(points: np.ndarray, sensor: SensorKind) -> np.ndarray:
     return np.stack((x, z, -y), axis=-1)
 
 
+TRUTH_POINTS = 8192
+
+
 def thin(points: Points, count: int = MAX_POINTS) -> Float[np.ndarray, "m 3"]:
     """At most `count` points, drawn without replacement, the same ones every time."""
     if len(points) <= count:

@@ -46,6 +46,12 @@ def test_what_cannot_be_shown_is_refused(refused, tmp_path):
     assert "no scans" in refused("view", tmp_path)
 
 
+@pytest.mark.parametrize("said", [{"methods": {}}, {"methods": {"a": {}}, "provenance": [1]}])
+def test_what_evaluate_did_not_write_is_refused(refused, store, tmp_path, said):
+    (tmp_path / "metrics.json").write_text(json.dumps(said))
+    assert "metrics.json" in refused("view", tmp_path, "--inputs", store)
+
+
 def test_without_viser_the_extra_is_named(refused, completed, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
     assert "wildshape[view]" in refused("view", completed)

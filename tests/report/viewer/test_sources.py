@@ -67,7 +67,10 @@ def test_results_come_back_scan_by_scan(tmp_path: Path, moved: bool) -> None:
 class _Model:
     """Completes with the scan itself."""
 
-    def complete_many(self, scans: Sequence[object], sensor: Sensor | None) -> Iterator[Completion]:
+    def complete_many(
+        self, scans: Sequence[object], sensor: Sensor | None, *, rays: Sequence[object] = ()
+    ) -> Iterator[Completion]:
+        assert len(rays) in (0, len(scans))
         shown = track()
         done = perfect(shown, 0)
         for scan in scans:

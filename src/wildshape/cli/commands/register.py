@@ -93,7 +93,8 @@ def _pair(settings: Settings, target: Path) -> None:
         raise BadInputError("register - -: stdin holds one scan; name a file for the other.")
     source, target_track = (_scan(path, settings) for path in (settings.source, target))
     predictor = load(settings.scans.network.model, settings.scans.network.device)
-    found = predictor.register(source.scans[0], target_track.scans[0], source.sensor)
+    rays = [one for track in (source, target_track) for one in track.rays or (None,)]
+    found = predictor.register(source.scans[0], target_track.scans[0], source.sensor, rays=rays)
     matrix = found.T_target_source.matrix.tolist()
     lines = [" ".join(f"{value:12.6f}" for value in row) for row in matrix]
     shares = f"inlier ratio {found.inlier_ratio:.3f}, confidence {found.confidence:.3f}"

@@ -153,6 +153,7 @@ def _evaluated(settings: Settings) -> "Source":
     """The data of an evaluation, the worst object first, completed once more."""
     from wildshape.baselines.compare import OURS
     from wildshape.errors import BadInputError
+    from wildshape.io.guard import reading
     from wildshape.io.inputs import open_tracks
     from wildshape.io.scans.points import SENSOR_METRES
     from wildshape.records import as_text
@@ -161,14 +162,15 @@ def _evaluated(settings: Settings) -> "Source":
     from wildshape.report.viewer.sources import worst_first
 
     said = read_object(settings.input / METRICS)
-    asked = (said.get("provenance") or {}).get("settings") or {}
-    data = settings.inputs or (Path(asked["data"]) if asked.get("data") else None)
+    with reading(settings.input / METRICS, "what evaluate writes"):
+        asked = (said.get("provenance") or {}).get("settings") or {}
+        data = settings.inputs or (Path(asked["data"]) if asked.get("data") else None)
+        methods = list(said.get("methods") or {})
+        ours = OURS if OURS in methods else methods[-1]
     if data is None:
         raise BadInputError(f"{settings.input}: does not say which data it is of; add --inputs.")
     here = settings.files.coordinates
     source = open_tracks(data, coordinates_of(asked) if here == SENSOR_METRES else here)
-    methods = list(said.get("methods") or ())
-    ours = OURS if OURS in methods else methods[-1]
     numbers = source.numbers
     ranked = [
         (numbers[name], f"{name}  (CD {cd:.3f} m)")

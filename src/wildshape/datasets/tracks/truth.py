@@ -66,6 +66,13 @@ def _clean(track: Track, floor: float | None) -> Points:
     return points[statistical_inliers(points)]
 
 
+def whole_shape(track: Track) -> Points | None:
+    """The track's shape, with its reflection where it is `partial`: what errors are against."""
+    if track.shape is None or track.shape_kind != "partial":
+        return track.shape
+    return voxel_thin(mirrored(track.shape), VOXEL_M)
+
+
 @dataclass(frozen=True)
 class TruthBuilder:
     """Makes a track's `shape` from its scans and poses.

@@ -6,7 +6,7 @@ To add a format: a writer in `io/boxes/`, and what is said of it in `_FORMATS`.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from wildshape.io.boxes.kitti import KittiCamera
 
 _FOLDER = "boxes"
+_OF_CAMERAS = (
+    "boxes of depth cameras: KITTI's labels are in the camera's frame; nuScenes' and Argoverse 2's"
+    " have its axes turned to x forward, y left, z up"
+)
 _CURE = "KITTI's calibration brings it"
 _EGO_CURE = "a log of Argoverse 2 brings it as calibration/egovehicle_SE3_sensor.feather"
 
@@ -83,6 +87,8 @@ class BoxFiles:
             made = _FORMATS[kind]
             made.write(out / _FOLDER / made.file, detections, self._calibration(kind))
         bare = [_FORMATS[kind].bare for kind in self.formats if not self._calibrates(kind)]
+        if any(one.sensor == "camera" for one in detections):
+            return [_OF_CAMERAS] if set(self.formats) & {"nuscenes", "argoverse2"} else []
         return [sentence for sentence in bare if sentence]
 
     def _calibrates(self, kind: str) -> bool:
@@ -103,7 +109,17 @@ def _json(path: Path, detections: "Sequence[Detection]", _: None) -> None:
 def _nuscenes(path: Path, detections: "Sequence[Detection]", _: None) -> None:
     from wildshape.io.boxes.nuscenes import write_nuscenes_boxes
 
-    write_nuscenes_boxes(path, detections)
+    write_nuscenes_boxes(path, [_in_lidar_axes(one) for one in detections])
+
+
+def _in_lidar_axes(one: "Detection") -> "Detection":
+    """A camera's box with x forward, y left, z up, as formats of LiDARs expect."""
+    from wildshape.io.boxes.detections import moved
+    from wildshape.io.boxes.kitti import camera_at_the_lidar
+
+    if one.sensor == "lidar":
+        return one
+    return replace(one, box=moved(one.box, camera_at_the_lidar().T_rect_sensor.inverse()))
 
 
 def _kitti(path: Path, detections: "Sequence[Detection]", camera: "KittiCamera | None") -> None:
@@ -115,7 +131,7 @@ def _kitti(path: Path, detections: "Sequence[Detection]", camera: "KittiCamera |
 def _argoverse2(path: Path, detections: "Sequence[Detection]", T_ego_sensor: "SE3 | None") -> None:
     from wildshape.io.boxes.argoverse2 import write_argoverse2_boxes
 
-    write_argoverse2_boxes(path, detections, T_ego_sensor)
+    write_argoverse2_boxes(path, [_in_lidar_axes(one) for one in detections], T_ego_sensor)
 
 
 def _check_arrow() -> None:

@@ -138,7 +138,7 @@ def complete_folder(
         out: folder to write.
         options: how.
         progress: is told what goes on.
-        registers: write the scans' poses to the middle scan instead of the completed shapes.
+        registers: also write the scans' poses to the middle scan, and trajectories.
 
     Raises:
         BadInputError: input, model or output cannot be used.
@@ -203,7 +203,7 @@ def write_results(
         predictor,
         output.path.absolute(),
         together=options.track,
-        clouds=None if registers else options.clouds,
+        clouds=options.clouds,
         mesh=options.mesh,
     )
     parts = source.parts(None if options.track else BATCH, done)
@@ -240,14 +240,14 @@ class _PartCompleter:
         predictor: does the work.
         out: a folder of each track is written there.
         together: use all scans of a track together.
-        clouds: format of the shapes; None: write none.
+        clouds: format of the shapes.
         mesh: also write a closed mesh of each shape, in this way.
     """
 
     predictor: Predictor
     out: Path
     together: bool
-    clouds: CloudFormat | None
+    clouds: CloudFormat
     mesh: MeshFiles | None
 
     def __call__(self, part: Part) -> tuple[Part, list[Completion]]:
@@ -263,8 +263,7 @@ class _PartCompleter:
         return replace(part, track=replace(track, scans=(), rays=())), bare
 
     def _write(self, folder: Path, name: str, scan: Points, done: Completion) -> None:
-        if self.clouds is not None:
-            write_cloud(folder / COMPLETED / f"{name}.{self.clouds}", done.points)
+        write_cloud(folder / COMPLETED / f"{name}.{self.clouds}", done.points)
         if self.mesh is not None:
             seen = scan if self.mesh.coloured else None
             write_mesh(folder / MESH / f"{name}.{self.mesh.kind}", done.mesh(seen))

@@ -266,13 +266,6 @@ def check_scan(points: Float[np.ndarray, "n 3"], name: str) -> None:
             "is no scan."
         )
     check_one_object(points, name)
-    if extent < _SMALLEST_EXTENT:
-        raise BadInputError(
-            f"{name}: {extent:.4g} m across, but a scan of one object is at least "
-            f"{_SMALLEST_EXTENT:g} m: "
-            "normalised coordinates (write them in metres), or a unit that does not fit "
-            "(drop --unit mm if the file is in metres)."
-        )
     check_near(points, name)
 
 
@@ -284,9 +277,16 @@ def check_one_object(points: Float[np.ndarray, "n 3"], name: str) -> None:
         name: the file, for the error.
 
     Raises:
-        BadInputError: they are over 100 m across.
+        BadInputError: they are over 100 m or under 1 cm across.
     """
     extent = _extent(points)
+    if extent < _SMALLEST_EXTENT:
+        raise BadInputError(
+            f"{name}: {extent:.4g} m across, but a scan of one object is at least "
+            f"{_SMALLEST_EXTENT:g} m: "
+            "normalised coordinates (write them in metres), or a unit that does not fit "
+            "(drop --unit mm if the file is in metres)."
+        )
     if extent > _LARGEST_EXTENT:
         raise BadInputError(
             f"{name}: {extent:.4g} m across, but a scan of one object is at most "

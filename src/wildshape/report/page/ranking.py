@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from wildshape.datasets.tracks.truth import mirrored
+from wildshape.datasets.tracks.truth import whole_shape
 from wildshape.evaluation.metrics import completion_error, registration_error
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Track
@@ -24,9 +24,7 @@ from wildshape.report.results import (
     doubt_of,
     errors_of_scores,
 )
-from wildshape.report.scene import thin
-
-_TRUTH_POINTS = 4096
+from wildshape.report.scene import TRUTH_POINTS, thin
 
 
 @dataclass(frozen=True)
@@ -197,10 +195,10 @@ def _digits(value: float | None, digits: int) -> str | None:
 def _cd(result: TrackResult, track: Track) -> float | None:
     poses, name = track.T_sensor_object, track.scan_names[track.middle]
     completed = result.completed(name)
-    if completed is None or track.shape is None or poses is None:
+    whole = whole_shape(track)
+    if completed is None or whole is None or poses is None:
         return None
-    whole = mirrored(track.shape) if track.shape_kind == "partial" else track.shape
-    truth = poses[track.middle].apply_numpy(thin(whole, _TRUTH_POINTS))
+    truth = poses[track.middle].apply_numpy(thin(whole, TRUTH_POINTS))
     return completion_error(completed, truth).cd
 
 

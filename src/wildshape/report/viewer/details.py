@@ -7,10 +7,10 @@ from html import escape
 import numpy as np
 
 from wildshape.evaluation.metrics import completion_error
-from wildshape.report.scene import thin
+from wildshape.report.scene import TRUTH_POINTS, thin
 from wildshape.report.viewer.colours import LEGENDS, css
 from wildshape.report.viewer.sources import CompletedScan
-from wildshape.report.viewer.stage import POINTS_A_CLOUD, Stage, Wish
+from wildshape.report.viewer.stage import Stage, Wish
 
 _ROW = "<div style='display:flex;gap:.8em;justify-content:space-between'><span style='opacity:.65'>"
 
@@ -62,7 +62,7 @@ def _true_rows(stage: Stage, wish: Wish) -> list[tuple[str, str]]:
     rows, done = [], stage.completions.get(wish.scan)
     truth = stage.truth_in(wish.scan) if stage.track.shape is not None else None
     if truth is not None and done is not None and done.points is not None:
-        error = completion_error(done.points, thin(truth, 2 * POINTS_A_CLOUD))
+        error = completion_error(done.points, thin(truth, TRUTH_POINTS))
         rows.append(("Chamfer distance to truth", f"{error.cd:.3f} m"))
     way = stage.moves(wish.way)
     if way is not None and way.error is not None and len(stage.track.scans) > 1:

@@ -15,7 +15,9 @@ from wildshape.report.viewer.sources import CompletedScan, Source
 class Completes(Protocol):
     """What is asked of a model."""
 
-    def complete_many(self, scans: Sequence[object], sensor: Sensor | None) -> Iterator[Completion]:
+    def complete_many(
+        self, scans: Sequence[object], sensor: Sensor | None, *, rays: Sequence[object] = ()
+    ) -> Iterator[Completion]:
         """Each scan completed on its own, in order."""
         ...
 
@@ -50,7 +52,8 @@ def _complete(model: Completes, track: Track, first: int) -> Iterator[tuple[int,
     """The scan that is looked at, then all others."""
     order = [first, *(i for i in range(len(track.scans)) if i != first)]
     for part in (order[:1], order[1:]):
-        done = model.complete_many([track.scans[i] for i in part], track.sensor)
+        rays = [track.rays[i] for i in part] if track.rays else ()
+        done = model.complete_many([track.scans[i] for i in part], track.sensor, rays=rays)
         for number, completion in zip(part, done):
             yield number, _completed(completion)
 

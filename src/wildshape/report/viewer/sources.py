@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wildshape.datasets.tracks.truth import shape_partial
+from wildshape.datasets.tracks.truth import shape_partial, whole_shape
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Box, Points, Track, as_text
@@ -70,7 +70,7 @@ class Source:
 def true_shape(track: Track) -> Points | None:
     """`(g, 3)` in the object's frame: the track's shape, or what its true poses accumulate to."""
     if track.shape is not None or track.T_sensor_object is None:
-        return track.shape
+        return whole_shape(track)
     return shape_partial(track)
 
 

@@ -14,7 +14,7 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.registration import fuse_scans
 from wildshape.records import Box, Points, Track
 from wildshape.report.content import BLUE, GREEN, GREY, ORANGE
-from wildshape.report.scene import box_segments, thin
+from wildshape.report.scene import TRUTH_POINTS, box_segments, thin
 from wildshape.report.viewer.colours import PLAIN, WRONG, Rgb, by_height, completed_colours, rgb
 from wildshape.report.viewer.drawing_frame import (
     Hold,
@@ -216,7 +216,7 @@ class Stage:
         shape = self.truth if visible or ("truth", 0) in self.nodes else None
         if poses is None or shape is None:
             return
-        node = self._cloud("truth", 0, thin(shape, 2 * POINTS_A_CLOUD), GREY)
+        node = self._cloud("truth", 0, thin(shape, TRUTH_POINTS), GREY)
         node.place(T_draw_sensor @ poses[wish.scan])
         node.show(visible=visible)
 
