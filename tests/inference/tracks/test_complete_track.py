@@ -284,6 +284,20 @@ def test_the_predictor_uses_tracks():
     assert len(predictor.fuse(scans, track=True)) == sum(map(len, scans))
 
 
+@pytest.mark.parametrize("key_scans", [3, 40])
+def test_the_order_of_points_does_not_matter(key_scans):
+    torch.manual_seed(0)
+    config = InferenceConfig(track=TrackConfig(key_scans=key_scans))
+    predictor = Predictor(ShapePoseNet(CONFIG).eval(), SETTINGS, config=config)
+    scans = [scan.astype(np.float32) for scan in TRACK.scans]
+    rng = np.random.default_rng(3)
+    shuffled = [rng.permutation(scan) for scan in scans]
+    for one, other in zip(*map(predictor.complete_track, (scans, shuffled)), strict=True):
+        np.testing.assert_array_equal(one.points, other.points)
+        assert one.box == other.box
+        assert one.confidence == other.confidence
+
+
 def test_a_sensor_is_near_where_it_was_before():
     """Said of each pair of neighbours, whatever the sensor's own turns; a leap says little."""
     sensors = poses_of(TRACK).inverse().translation

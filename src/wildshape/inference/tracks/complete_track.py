@@ -15,7 +15,7 @@ from jaxtyping import Float, Int64
 from torch import Tensor
 
 from wildshape.geometry.box import FittedBox, unit_of
-from wildshape.geometry.sampling import voxel_thin
+from wildshape.geometry.sampling import sorted_points, voxel_thin
 from wildshape.geometry.surface import mirrored
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
@@ -53,7 +53,7 @@ class Gathered:
 
     Attributes:
         said: of each scan, in time order; completions are without points.
-        scans: of one rigid object, sensor frames.
+        scans: of one rigid object, sensor frames, sorted: points are drawn from them.
         rows: of the scans that were completed; the others were looked at alone.
         weights: what each counts, the odds that it is right; 0 of those looked at alone.
     """
@@ -72,14 +72,14 @@ class Gathered:
         self._odds.append(odds_of(done))
         self._sum += self._odds[-1] * done.pose.inverse().apply(own)
         self.said.append(replace(done, points=done.points[:0].copy()))
-        self.scans.append(scan)
+        self.scans.append(sorted_points(scan))
 
     def pass_by(self, looked: Looked, sensor: Sensor | None, rule: ReasonRule) -> None:
         """The next scan, looked at alone."""
         self._odds.append(0.0)
         said = looked.found.said(0)
         self.said.append(glance_of(looked.scans[0], sensor, *said, self.settings, rule))
-        self.scans.append(looked.seen[0])
+        self.scans.append(sorted_points(looked.seen[0]))
 
     @property
     def done(self) -> list[Completion]:
