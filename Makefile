@@ -14,10 +14,12 @@
 # No GPU in a Linux machine? PyPI's torch may bring 2 GB of CUDA along; this takes the CPU build:
 #   make demo PIP_ARGS="--extra-index-url https://download.pytorch.org/whl/cpu"
 
-CANDIDATES := python3 python3.14 python3.13 python3.12 python3.11
+# 3.14 comes last: two libraries have no wheels for it yet and are compiled, if they can be.
+CANDIDATES := python3 python3.13 python3.12 python3.11 python3.14
 NEW_ENOUGH := import sys; sys.exit(sys.version_info < (3, 11))
-PYTHON ?= $(shell for p in $(CANDIDATES); do \
-	$$p -c '$(NEW_ENOUGH)' 2>/dev/null && { echo $$p; break; }; done)
+WITH_WHEELS := import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))
+PYTHON ?= $(shell for check in '$(WITH_WHEELS)' '$(NEW_ENOUGH)'; do for p in $(CANDIDATES); do \
+	$$p -c "$$check" 2>/dev/null && { echo $$p; exit; }; done; done)
 PIP_ARGS ?=
 DATA ?=
 OUT ?= demo

@@ -58,6 +58,8 @@ def compile_library(folder: Path) -> str:
     """Compile the C files of a folder into one library there; the reason where it failed."""
     compiler = shlex.split(os.environ.get("CC") or "cc")
     sources = sorted(str(path) for path in folder.glob("*.c"))
+    if not os.access(folder, os.W_OK):
+        return f"{folder} cannot be written"
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         made = Path(scratch) / LIBRARY
         command = [*compiler, *FLAGS, "-o", str(made), *sources, "-lm"]

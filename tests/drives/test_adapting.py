@@ -21,8 +21,9 @@ from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.adapting.examples import examples_of
 from wildshape.drives.adapting.measures import Measures
 from wildshape.drives.result import DriveResult
+from wildshape.errors import BadInputError
 from wildshape.inference.predictor import Predictor, load
-from wildshape.method.checkpoint import load_checkpoint
+from wildshape.method.checkpoint import MODEL, load_checkpoint
 from wildshape.method.network import ShapePoseNet
 from wildshape.training import loop
 
@@ -101,6 +102,31 @@ def test_a_better_model_is_kept_and_says_what_the_first_one_knew(
     weights = (one.network.state_dict() for one in (predictor, adapted))
     assert any(not torch.equal(was, now) for was, now in zip(*map(dict.values, weights)))
     assert adapt_to([out], tmp_path, predictor, FEW) == found
+    moved = tmp_path.rename(tmp_path.with_name("moved"))
+    assert adapt_to([out], moved, predictor, FEW).model == str(moved / "adapted" / MODEL)
+
+
+def test_an_adaptation_of_other_drives_weights_or_steps_is_not_gone_on_with(
+    out, predictor, tmp_path, monkeypatch
+):
+    """The first pass may have been made anew, the weights trained anew under the same words."""
+    measured(monkeypatch, replace(GOOD, cost_m=0.09))
+    adapt_to([out], tmp_path, predictor, FEW)
+    for way in (
+        ([out], tmp_path, Predictor(ShapePoseNet(CONFIG).eval(), SETTINGS), FEW),
+        ([out], tmp_path, predictor, replace(FEW, steps=4)),
+    ):
+        with pytest.raises(BadInputError, match="remove this folder to adapt anew"):
+            adapt_to(*way)
+    record = out / "wildshape.json"
+    before = record.read_text()
+    record.write_text(before.replace('"settings": {', '"settings": {"recording": "another",'))
+    assert record.read_text() != before
+    try:
+        with pytest.raises(BadInputError, match="remove this folder to adapt anew"):
+            adapt_to([out], tmp_path, predictor, FEW)
+    finally:
+        record.write_text(before)
 
 
 def test_a_killed_adaptation_goes_on_to_the_same_weights(out, predictor, tmp_path, monkeypatch):

@@ -226,6 +226,15 @@ def test_scans_written_anew_in_as_many_bytes_are_another_recording(folder):
     assert open_drive(folder).fingerprint != before
 
 
+def test_a_scan_mended_in_its_first_third_is_another_recording(folder):
+    before = open_drive(folder).fingerprint
+    path = next(folder.glob("*.bin"))
+    values = np.fromfile(path, np.float32)
+    values[: len(values) // 3] += 1.0
+    values.tofile(path)
+    assert open_drive(folder).fingerprint != before
+
+
 def test_names_that_are_no_utf8_are_spelt_out(tmp_path):
     for number in range(2):
         np.ones((50, 4), np.float32).tofile(os.fsencode(tmp_path) + b"/caf\xe9_%d.bin" % number)

@@ -167,3 +167,10 @@ def test_one_scan_of_a_track_has_its_unit_and_sensor(dataset: Path) -> None:
 def test_hidden_folders_are_no_tracks(dataset: Path) -> None:
     (dataset / "a").rename(dataset / ".a")
     assert open_tracks(dataset).names == ("b",)
+
+
+def test_what_drive_found_is_no_scan(tmp_path):
+    (tmp_path / "boxes.csv").write_text("frame,time\n")
+    (tmp_path / "tracks").mkdir()
+    with pytest.raises(BadInputError, match=r"holds what `drive` found; name .*tracks"):
+        open_tracks(tmp_path)

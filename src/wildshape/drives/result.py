@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What decides a drive's result, what `drive` gives back, and which files it may write."""
 
+import hashlib
 import shlex
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.source import Drive
@@ -103,10 +106,19 @@ def identity_of(predictor: Predictor) -> dict[str, Any]:
     raw = predictor.refines != predictor.settings.facing
     return {
         "model": predictor.settings.provenance,
+        "weights": _hash_of(predictor),
         "inference": asdict(predictor.config),
         **({} if level else {"level": False}),
         **({"raw": True} if raw else {}),
     }
+
+
+def _hash_of(predictor: Predictor) -> str:
+    """Of its weights and settings: what two models are told apart by."""
+    digest = hashlib.sha256(repr(predictor.settings).encode())
+    for name, values in sorted(predictor.network.state_dict().items()):
+        digest.update(name.encode() + np.ascontiguousarray(values.cpu().numpy()).tobytes())
+    return digest.hexdigest()[:16]
 
 
 def line_of(

@@ -21,7 +21,8 @@ from wildshape.records import Points, Turn, as_text
 
 _LONGEST_PAUSE = 1e9  # scans; more are no count
 _MOMENT_S, _LONGEST_TURN_S = 0.01, 2.0
-_SAMPLED, _SAMPLE_BYTES = 64, 4096  # files, and bytes of each, that tell recordings apart
+# Places that tell recordings apart: of all files about, of each at least and at most; bytes.
+_PLACES, _FEWEST_PLACES, _MOST_PLACES, _SAMPLE_BYTES = 1024, 2, 64, 4096
 _NOTHING = Turn(np.empty((0, 3), np.float32))
 
 
@@ -144,13 +145,15 @@ class Drive:
 
 
 def _contents(files: tuple[Path, ...]) -> tuple[int | str, ...]:
-    """The size of each file, and a hash of what stands in the middle of some of them."""
-    digest = hashlib.sha256()
-    for file in files[:: -(-len(files) // _SAMPLED) or 1]:
+    """The size of each file, and a hash of what stands in some places of each."""
+    digest, sizes = hashlib.sha256(), [file.stat().st_size for file in files]
+    places = min(max(_PLACES // max(len(files), 1), _FEWEST_PLACES), _MOST_PLACES)
+    for file, size in zip(files, sizes):
         with file.open("rb") as opened:
-            opened.seek(file.stat().st_size // 2)
-            digest.update(opened.read(_SAMPLE_BYTES))
-    return (*(file.stat().st_size for file in files), digest.hexdigest())
+            for place in range(places):
+                opened.seek(size * place // places)
+                digest.update(opened.read(_SAMPLE_BYTES))
+    return (*sizes, digest.hexdigest())
 
 
 def _places(motion: Twist, seconds: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:

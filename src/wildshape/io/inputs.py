@@ -327,6 +327,8 @@ def _folder(path: Path, coordinates: Coordinates) -> TrackSource:
     entries = sorted(path.iterdir(), key=lambda entry: entry.name)
     shown = [entry for entry in entries if not entry.name.startswith(".")]
     folders = [entry for entry in shown if (entry / "scans").is_dir()]
+    if (path / "boxes.csv").is_file() and (path / "tracks").is_dir():
+        raise BadInputError(f"{path}: holds what `drive` found; name {path / 'tracks'}.")
     if folders:
         names = tuple(as_text(folder.name) for folder in folders)
         return TrackSource(path, names, lambda index: read_track_file(folders[index], coordinates))

@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """`wildshape drive`: what is refused before any work is done, and where each drive goes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from wildshape.cli.commands.drive import Settings, _folders
+from wildshape.errors import BadInputError
 
 CALIBRATION = "R0_rect: 1 0 0 0 1 0 0 0 1\nTr_velo_to_cam: 0 -1 0 0 0 0 -1 0 1 0 0 0\n"
 
@@ -61,3 +64,20 @@ def test_drives_of_one_name_are_told_apart_by_the_folders_above(tmp_path):
 def test_a_drive_given_twice_is_refused(recording, tmp_path, refused):
     other = recording.parent / "." / "recording" / ".." / "recording"
     assert "given twice" in refused("drive", recording, other, "--out", tmp_path / "out")
+
+
+def test_a_drive_where_the_adaptation_goes_is_refused(tmp_path):
+    settings = Settings(source=(tmp_path,), out=tmp_path / "out", adapt=True)
+    with pytest.raises(BadInputError, match="where the adaptation goes; rename it"):
+        _folders(settings, [tmp_path / "adapted", tmp_path / "monday"])
+    assert (
+        len(_folders(replace(settings, adapt=False), [tmp_path / "adapted", tmp_path / "b"])) == 2
+    )
+
+
+def test_several_drives_do_not_go_beside_what_was_found_in_one(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "wildshape.json").write_text("{}")
+    settings = Settings(source=(tmp_path,), out=tmp_path / "out")
+    with pytest.raises(BadInputError, match="holds one drive"):
+        _folders(settings, [tmp_path / "a", tmp_path / "b"])

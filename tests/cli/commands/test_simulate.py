@@ -65,3 +65,8 @@ def test_meshes_are_called_what_the_user_says(wildshape, refused, tmp_path):
         assert json.loads(next(out.glob("*/track.json")).read_text()).get("category", "") == name
     camera = ("--sensor", "depth-camera", "--occlusion", 0.9)
     assert "occlusion is of LiDARs" in refused("simulate", tmp_path / "c", *camera)
+
+
+def test_scans_are_not_corrected_twice(refused, tmp_path):
+    said = refused("simulate", tmp_path / "s", "--drive", "--compensated", "--point-times")
+    assert "corrected twice" in said

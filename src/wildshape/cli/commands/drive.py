@@ -163,6 +163,8 @@ def run(settings: Settings) -> None:
     change: Adaptation | None = None
     if adapt is not None:
         first = find(replace(task, files=DriveFiles(), report=False), folders, drives, settings)
+        if first.refused:  # an adaptation of the others would stand in the way of all
+            _answer(first, None, settings, several=several)
         outs = [found.out for found in first.found]
         with _bars("") as watch:
             change = adapt_to(
@@ -285,11 +287,24 @@ def _drives(settings: Settings) -> dict[Path, str]:
 
 def _folders(settings: Settings, drives: list[Path]) -> dict[Path, Path]:
     """Where each drive goes."""
+    from wildshape.drives.adapting.adapt import ADAPTED
     from wildshape.drives.recordings.recording_kinds import names_of
+    from wildshape.io.output import is_begun
 
     if len(drives) == 1:
         return {drives[0]: settings.out}
-    return {drive: settings.out / name for drive, name in zip(drives, names_of(drives))}
+    if is_begun(settings.out):
+        raise BadInputError(
+            f"{settings.out}: holds one drive; several go into folders of their own, so choose"
+            " another --out."
+        )
+    found = {drive: settings.out / name for drive, name in zip(drives, names_of(drives))}
+    for drive, folder in found.items():
+        if settings.adapt and folder.name == ADAPTED:
+            raise BadInputError(
+                f"{drive}: its folder would be {folder}, where the adaptation goes; rename it."
+            )
+    return found
 
 
 @contextmanager

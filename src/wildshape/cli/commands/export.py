@@ -23,14 +23,16 @@ class Settings:
     The file takes raw scans (B, N, 3), sensor frame, metres, any B and N, and which of their points
     the network sees (B, M), see examples/06_onnx_inference.py. It gives completed points, poses
     (rotation, translation), confidence, cost and branch, all in the sensor frame: centring and the
-    choice among poses are inside. The largest difference to torch is said.
+    choice among poses are inside, refinement is not (as `load(raw=True)`). The largest difference
+    to torch is said.
     """
 
     model: Annotated[
         Path | None,
         Positional,
         option(
-            metavar="MODEL", help="checkpoint, or folder of a training run; else the shipped one"
+            metavar="MODEL",
+            help="checkpoint, folder of a run, or name of shipped weights; else the default ones",
         ),
     ] = None
     out: Annotated[Path, arg(metavar="FILE", help="to write: .onnx or .pt2")] = Path("model.onnx")

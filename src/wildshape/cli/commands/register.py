@@ -41,7 +41,8 @@ class Settings:
     Two scans: prints T_target_source, which takes the source's points to the target's sensor
     frame, and the share of them that then lie near the target. A TRACK: writes
     DIR/TRACK/poses.txt (T_sensor_canonical, KITTI's format), trajectory.tum (the same in TUM's),
-    trajectory.json (the same with smoothness figures), T_middle_scan.txt and objects.json.
+    trajectory.json (the same with smoothness figures), T_middle_scan.txt, objects.json and the
+    completed shapes.
     """
 
     source: Source

@@ -93,6 +93,10 @@ def run(settings: Settings) -> None:
     if settings.seed < 0:
         raise BadInputError(f"--seed {settings.seed}: expected 0 or more.")
     _refuse(settings, OF_TRACKS if settings.drive else OF_DRIVES)
+    if settings.compensated and settings.point_times:
+        raise BadInputError(
+            "--compensated scans with --point-times would be corrected twice; pass one."
+        )
     if settings.drive:
         _drive(settings)
     else:

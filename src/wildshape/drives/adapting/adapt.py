@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """From finished drives to weights that suit them better, or to the reason why there are none."""
 
+import hashlib
+import json
 import shutil
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,16 +19,17 @@ from wildshape.drives.adapting.measures import Measures, clear_headed, measure
 from wildshape.drives.adapting.second_pass import like
 from wildshape.drives.clock import Watch, silent
 from wildshape.drives.result import identity_of
+from wildshape.errors import BadInputError
 from wildshape.inference.predictor import Predictor
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import read_json, read_record, reading, record_of
-from wildshape.io.output import MARKER, begin, finished
+from wildshape.io.output import MARKER, begin, finished, is_begun
 from wildshape.io.progress import counted, duration
 from wildshape.method.checkpoint import MODEL
 
 ADAPTED, SAID = "adapted", "adapted.json"
 FILES = (SAID, f"{ADAPTED}/**/*")
-_COMMAND = "drive --adapt"
+_COMMAND, _SAYS = "drive --adapt", "what `wildshape drive` says of itself"
 
 
 @dataclass(frozen=True)
@@ -118,19 +121,44 @@ def adapt_to(
     """
     place = folder / ADAPTED
     settings = {
-        "drives": [str(out.resolve()) for out in outs],
+        "drives": {str(out.resolve()): _hash_of(out) for out in outs},
         **identity_of(predictor),
         "adapt": asdict(config),
     }
     done = None if overwrite else finished(place, _COMMAND, settings, parts=())
     if done is not None:
         with reading(place / MARKER, "what an adaptation says of itself"):
-            return record_of(Adaptation, done["result"], {})
+            found = record_of(Adaptation, done["result"], {})
+        return replace(found, model=found.model and _weights_in(place))
+    if (
+        not overwrite
+        and is_begun(place)
+        and _settings_of(place) != json.loads(json.dumps(settings))
+    ):
+        raise BadInputError(
+            f"{place}: an adaptation of other drives or settings is there; remove this folder to"
+            " adapt anew, what was found in the drives stays."
+        )
     output = begin(place, _COMMAND, settings, ("**/*",), overwrite=overwrite)
     found = _Adapting(outs, place, predictor, config, watch).perform()
     write_json(folder / SAID, found.data)
     output.finish(result=asdict(found))
     return found
+
+
+def _weights_in(folder: Path) -> str:
+    """Of an adaptation; absolute, for other machines work elsewhere."""
+    return str((folder / MODEL).resolve())
+
+
+def _settings_of(folder: Path) -> Any:
+    with reading(folder / MARKER, _SAYS):
+        return read_json(folder / MARKER, _SAYS, dict)["settings"]
+
+
+def _hash_of(out: Path) -> str:
+    """Of what decided a drive's result."""
+    return hashlib.sha256(json.dumps(_settings_of(out), sort_keys=True).encode()).hexdigest()[:16]
 
 
 @dataclass(frozen=True)
@@ -161,7 +189,7 @@ class _Adapting:
         if model is not None:
             shutil.copyfile(candidate, model)
         return Adaptation(
-            None if model is None else str(model),
+            None if model is None else _weights_in(self.folder),
             len(trained),
             len(held),
             unclear,

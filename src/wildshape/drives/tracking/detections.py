@@ -52,6 +52,12 @@ class DetectionFile:
     calibration: Path | None = None
     least_score: float | None = None
 
+    def __post_init__(self) -> None:
+        """Paths may be given as text."""
+        for name in ("path", "calibration"):
+            if isinstance(given := getattr(self, name), str):
+                object.__setattr__(self, name, Path(given))
+
     def identity(self) -> dict[str, Any]:
         """What decides what is found with them.
 

@@ -101,7 +101,8 @@ def _cell(points: Points, side: int, cell_m: float) -> Int[np.ndarray, "n"]:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Patchwork++ greets on stdout, where a command's result belongs."""
-    sys.stdout.flush()
+    if sys.stdout is not None:
+        sys.stdout.flush()
     kept, nowhere = os.dup(_STDOUT), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, _STDOUT)
     try:

@@ -79,6 +79,7 @@ class Mounting:
         return self.levelling().apply_numpy(scan) if self.is_tilted else scan
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of what is no scan; a sentence says so
 def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
     """Height and tilt of a drive's sensor.
 

@@ -79,8 +79,8 @@ def nearest_triton(
     _search[(triton.cdiv(N, QUERIES), B)](
         query.contiguous(),
         target.contiguous(),
-        query_sizes.to(query.device).contiguous(),
-        target_sizes.to(query.device).contiguous(),
+        query_sizes.to(query.device).clamp(max=N).contiguous(),
+        target_sizes.to(query.device).clamp(max=M).contiguous(),
         squared,
         index,
         N,
