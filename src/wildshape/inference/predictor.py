@@ -41,8 +41,7 @@ from wildshape.records import Completion, Points, Registration, Sensor
 
 BATCH = 32
 """Scans that are completed at once."""
-Each = Sequence[object]
-"""What is handed in from Python, one a scan (`point_inputs.py`)."""
+Each = Sequence[object]  # handed in from Python, one a scan
 _DEFAULT = InferenceConfig()
 
 
@@ -140,6 +139,7 @@ class Predictor:
         self, scans: Each, sensor: Sensor | None = None, *, rays: Each = ()
     ) -> Iterator[Completion]:
         """`complete` for many scans, in batches; each is completed on its own."""
+        check_sensor(sensor)
         known = rays_of_each(rays, scans)
         for start in range(0, len(scans), BATCH):
             part = slice(start, start + BATCH)
@@ -156,6 +156,7 @@ class Predictor:
         Raises:
             BadInputError: a scan is not `(n, 3)`, or has fewer than 16 finite points.
         """
+        check_sensor(sensor)
         return list(self._together(all_as_points(scans), sensor, rays_of_each(rays, scans)))
 
     def complete_checked(
@@ -172,7 +173,6 @@ class Predictor:
     def _each(
         self, scans: Sequence[Points], sensor: Sensor | None, rays: Rays = (), dense: bool = True
     ) -> Iterator[Completion]:
-        check_sensor(sensor)
         for start in range(0, len(scans), BATCH):
             began = time.perf_counter()
             batch = list(scans[start : start + BATCH])
@@ -184,7 +184,6 @@ class Predictor:
     def _together(
         self, scans: Sequence[Points], sensor: Sensor | None, rays: Rays = ()
     ) -> Iterator[Completion]:
-        check_sensor(sensor)
         began = time.perf_counter()
         if len(scans) > self.config.track.key_scans:
             done = complete_together(self._gathered(scans, sensor, rays), self.config, rays)
@@ -226,6 +225,7 @@ class Predictor:
         self, source: object, target: object, sensor: Sensor | None = None, *, rays: Each = ()
     ) -> Registration:
         """`T_target_source = T_target_can inv(T_source_can)` (METHOD 7); `rays`: of both."""
+        check_sensor(sensor)
         pair = (as_points(source, "source"), as_points(target, "target"))
         done = self._each(pair, sensor, rays_of_each(rays, pair))
         return registered(*pair, done, self.config.inliers)
@@ -249,6 +249,7 @@ class Predictor:
         """`T_sensor_canonical` of each scan, as `register_track`."""
         if not len(scans):
             raise BadInputError("no scans; hand in at least one.")
+        check_sensor(sensor)
         known = rays_of_each(rays, scans)
         done = self.complete_checked(all_as_points(scans), sensor, track=track, rays=known)
         return stack([item.pose for item in done])
@@ -258,8 +259,7 @@ class Predictor:
     ) -> Points:
         """All points of a track in its middle scan's frame, metres, as `register_track`."""
         clouds = all_as_points(scans)
-        moved = self.register_track(clouds, sensor, track=track, rays=rays)
-        return fuse_scans(clouds, moved)
+        return fuse_scans(clouds, self.register_track(clouds, sensor, track=track, rays=rays))
 
     @torch.inference_mode()
     def look(self, scans: Sequence[Points], rays: Rays = ()) -> Looked:
