@@ -79,5 +79,5 @@ def test_several_drives_do_not_go_beside_what_was_found_in_one(tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "wildshape.json").write_text("{}")
     settings = Settings(source=(tmp_path,), out=tmp_path / "out")
-    with pytest.raises(BadInputError, match="holds one drive"):
+    with pytest.raises(BadInputError, match="holds an output already; several drives"):
         _folders(settings, [tmp_path / "a", tmp_path / "b"])

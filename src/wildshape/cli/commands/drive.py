@@ -295,8 +295,8 @@ def _folders(settings: Settings, drives: list[Path]) -> dict[Path, Path]:
         return {drives[0]: settings.out}
     if is_begun(settings.out):
         raise BadInputError(
-            f"{settings.out}: holds one drive; several go into folders of their own, so choose"
-            " another --out."
+            f"{settings.out}: holds an output already; several drives go into folders of their"
+            " own, so choose another --out."
         )
     found = {drive: settings.out / name for drive, name in zip(drives, names_of(drives))}
     for drive, folder in found.items():

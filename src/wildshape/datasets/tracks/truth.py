@@ -51,11 +51,10 @@ def shape_mirrored(track: Track, *, floor: float | None = None, voxel: float = V
     Raises:
         BadInputError: the track has no poses.
     """
-    return voxel_thin(mirrored(_clean(track, floor)), voxel)
+    return voxel_thin(_mirrored(_clean(track, floor)), voxel)
 
 
-def mirrored(points: Points) -> Points:
-    """Points `(n, 3)` of the object frame with their reflection at its x-z plane added."""
+def _mirrored(points: Points) -> Points:
     return np.concatenate((points, points * np.asarray((1, -1, 1), points.dtype)))
 
 
@@ -70,7 +69,7 @@ def whole_shape(track: Track) -> Points | None:
     """The track's shape, with its reflection where it is `partial`: what errors are against."""
     if track.shape is None or track.shape_kind != "partial":
         return track.shape
-    return voxel_thin(mirrored(track.shape), VOXEL_M)
+    return voxel_thin(_mirrored(track.shape), VOXEL_M)
 
 
 @dataclass(frozen=True)
@@ -107,7 +106,7 @@ class TruthBuilder:
             return None
         points = self._clean(fuse_by_truth(track))
         if self.kind == "mirrored":
-            points = mirrored(points)
+            points = _mirrored(points)
         if not len(points):
             return None
         return replace(track, shape=voxel_thin(points, self.voxel), shape_kind=self.kind)
