@@ -93,8 +93,8 @@ ROUNDS = {
     "first": Round(data=1, steps=6_000, preset="small"),
     "taught": Round(data=1, steps=8_000, teacher="first"),
     "second": Round(data=2, steps=12_000, teacher="taught", start="taught"),
-    "main": Round(data=3, steps=50_000, teacher="second", start="second"),
-    "last": Round(data=4, steps=20_000, lr=4e-4, teacher="main", start="main", rays=True),
+    "main": Round(data=3, steps=30_000, teacher="second", start="second"),
+    "last": Round(data=4, steps=30_000, lr=4e-4, teacher="main", start="main", rays=True),
 }
 """In their order; the last one is shipped."""
 
