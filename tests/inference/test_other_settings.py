@@ -1,10 +1,68 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Inside a program of somebody else: its settings of torch stay as they were."""
+"""Inside a program that set torch otherwise: the same results, and its settings stay as they were.
 
+Of default types: kernels wrote float32 into memory of that type, and past its end where it was
+smaller.
+"""
+
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
 import torch
+from tests.models import scan
 
 from wildshape.inference.predictor import load
+from wildshape.ops.nearest import nearest_k
+
+SCANS = [scan(seed, 300) for seed in range(3)]
+
+
+@contextmanager
+def default_type(dtype):
+    torch.set_default_dtype(dtype)
+    try:
+        yield
+    finally:
+        torch.set_default_dtype(torch.float32)
+
+
+AROUND = {
+    "float64": lambda: default_type(torch.float64),
+    "float16": lambda: default_type(torch.float16),
+}
+
+
+def everything(model):
+    """Bytes and numbers of all that a model makes of the scans."""
+    moved = model.register(SCANS[0], SCANS[1])
+    done = [model.complete(SCANS[0]), *model.complete_track(SCANS)]
+    found = [(one.points.tobytes(), np.asarray(one.pose).tobytes()) for one in done]
+    trusted = [(one.confidence, one.box, one.evidence) for one in done]
+    return found, trusted, moved.matrix.tobytes(), moved.inlier_ratio, model.fuse(SCANS).tobytes()
+
+
+@pytest.fixture(scope="module")
+def expected():
+    return everything(load())
+
+
+@pytest.mark.parametrize("around", AROUND)
+def test_a_program_that_set_torch_otherwise(expected, around):
+    with AROUND[around]():
+        found = everything(load())
+    assert found == expected
+
+
+@pytest.mark.parametrize("dtype", [torch.float16, torch.float64])
+def test_neighbours_are_float32_whatever_is_the_default(dtype):
+    points = torch.from_numpy(np.stack(SCANS))
+    usual = nearest_k(points, points, 4).distance_squared
+    with default_type(dtype):
+        found = nearest_k(points, points, 4).distance_squared
+    assert found.dtype == torch.float32
+    assert torch.equal(found, usual)
 
 
 def test_loading_draws_no_random_numbers():

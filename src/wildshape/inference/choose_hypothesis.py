@@ -88,12 +88,12 @@ def network_input(
     ordered = [torch.from_numpy(sorted_points(scan)) for scan in scans]
     sampled = torch.stack([scan[torch.from_numpy(drawn(len(scan), count))] for scan in ordered])
     sizes = torch.tensor([min(len(scan), count) for scan in ordered])
-    unseen = torch.zeros(len(scans), 0, 3 + KINDS)
+    unseen = sampled.new_zeros(len(scans), 0, 3 + KINDS)
     if facing:
         turn, centres = face_each(ordered, sensor)
         return NetworkInput(sampled @ turn.mT - centres[:, None], centres, turn, sizes, unseen)
     centres = torch.stack([scan_centre(scan, sensor) for scan in ordered])
-    turn = torch.eye(3).repeat(len(scans), 1, 1)
+    turn = torch.eye(3, dtype=sampled.dtype).repeat(len(scans), 1, 1)
     return NetworkInput(sampled - centres[:, None], centres, turn, sizes, unseen)
 
 
@@ -104,7 +104,7 @@ def _rays_seen(
     config: RayConfig,
 ) -> Float[Tensor, "R 6"]:
     if rays is None:
-        return torch.zeros(config.count, 3 + KINDS)
+        return centre.new_zeros(config.count, 3 + KINDS)
     found = rays.returned
     ends, starts = (torch.from_numpy(part) @ turn.T for part in (found.ends, found.starts))
     return config.seen(ends, starts, centre)

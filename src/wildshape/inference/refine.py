@@ -276,7 +276,7 @@ def _equations(
     off = local - at
     residual = (off * across).sum(-1)
     kernel = (1 + off.square().sum(-1) / config.kernel_m**2) ** -2 * counted  # Geman-McClure
-    share = config.effective_points / counted.sum(1, keepdim=True) / config.error_m**2
+    share = config.effective_points / counted.float().sum(1, keepdim=True) / config.error_m**2
     rows = torch.cat((torch.linalg.cross(local, across), across, -across * at), dim=-1)
     weighted = rows * (kernel * share)[..., None]
     return weighted.mT @ rows, (weighted * residual[..., None]).sum(1)

@@ -59,7 +59,7 @@ def load_network(path: Path, form: Format[Net, Settings]) -> tuple[Net, Settings
         with safe_open(path, framework="pt") as file:
             settings = _settings(path, file.metadata() or {}, form)
             with torch.device("meta"), _Undrawn():
-                expected = form.build(settings).state_dict()
+                expected = form.build(settings).float().state_dict()
             check_shapes(path, file, expected)
             stored = {name: file.get_tensor(name) for name in expected}
             metadata = file.metadata()
@@ -72,7 +72,7 @@ def load_network(path: Path, form: Format[Net, Settings]) -> tuple[Net, Settings
     check_numbers(path, weights)
     _check_sum(path, stored, metadata)
     with torch.random.fork_rng(devices=()), _Undrawn():
-        network = form.build(settings)
+        network = form.build(settings).float()
     network.load_state_dict(weights)
     return network.eval(), settings
 

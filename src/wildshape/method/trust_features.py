@@ -60,7 +60,7 @@ def surfaces(scans: Sequence[Points], R_sensor_canonical: Float[Tensor, "B 3 3"]
         R_sensor_canonical: of their poses.
     """
     some = [scan[drawn(len(scan), min(len(scan), SURFACE_POINTS))] for scan in scans]
-    points = torch.zeros(len(some), SURFACE_POINTS, 3)
+    points = torch.zeros(len(some), SURFACE_POINTS, 3, dtype=torch.float32)
     for row, part in zip(points, some):
         row[: len(part)] = torch.from_numpy(part)
     sizes = torch.tensor([len(part) for part in some])

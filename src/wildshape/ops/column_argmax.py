@@ -46,6 +46,6 @@ def column_argmax_native(values: Float32[Tensor, "n c"], level: int = WIDEST) ->
     if values.ndim != 2 or not 0 < len(values) < 2**31:
         raise BadInputError(f"column_argmax: expected (n, c) with n >= 1, found {values.shape}.")
     values = values.contiguous()
-    row = torch.empty(values.shape[1], dtype=torch.int64)
+    row = values.new_empty(values.shape[1], dtype=torch.int64)
     loaded.wildshape_column_argmax(values.data_ptr(), *values.shape, row.data_ptr(), level)
     return row

@@ -29,9 +29,10 @@ def planes_native(
     if not size:
         raise IndexError("a neighbourhood has no points.")
     check_places(around, most)
-    places = (around + most * torch.arange(clouds)[:, None, None]).contiguous()
+    first = most * torch.arange(clouds, device=around.device)
+    places = (around + first[:, None, None]).contiguous()
     dense = points.detach().double().contiguous()
-    found = torch.empty(2, clouds, count, 3, dtype=torch.float64)
+    found = dense.new_empty(2, clouds, count, 3)
     middle, normal = found
     kernel(
         dense.data_ptr(),

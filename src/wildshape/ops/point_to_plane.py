@@ -78,7 +78,7 @@ def point_to_plane_native(
     for part in (given[0], *given[2:]):
         check_memory("point_to_plane", part, torch.float32)
     places = counterpart.contiguous()
-    A = torch.empty(scans, 6, 6, dtype=torch.float64)
+    A = given[1].new_empty(scans, 6, 6)
     b, weight = A.new_empty(scans, 6), A.new_empty(scans)
     kernel(
         given[0].data_ptr(),

@@ -55,5 +55,5 @@ def highest_seen(
         top: `view_top`.
     """
     if math.isinf(top):
-        return torch.full((len(x_y),), math.inf)
+        return x_y.new_full((len(x_y),), math.inf)
     return (sensors[:, 2] + top * torch.cdist(x_y, sensors[:, :2])).amax(1)

@@ -49,7 +49,8 @@ class TrackFit(NamedTuple):
 
 def key_scans(count: int, config: TrackConfig = _TRACK) -> Int64[Tensor, "U"]:
     """Which of so many scans are fitted to each other: all, or of a long track some."""
-    return torch.linspace(0, count - 1, min(count, config.key_scans)).round().long()
+    places = torch.linspace(0, count - 1, min(count, config.key_scans), dtype=torch.float32)
+    return places.round().long()
 
 
 def refine_checked(
@@ -73,7 +74,7 @@ def refine_checked(
         mirror: the object is symmetric in the plane y = 0 of its frame.
         config: how they are refined.
     """
-    odds = torch.ones(len(scans)) if odds is None else odds
+    odds = torch.ones(len(scans), dtype=torch.float32) if odds is None else odds
     if len(scans) > config.key_scans:
         return _by_key_scans(scans, voted, odds, mirror, config)
     sure = surest(odds, config.believed)
@@ -235,7 +236,7 @@ def _moved(
     centre = points.mean(1)
     A, b, weight = point_to_plane(points, centre, *onto, counterpart, width, config.holding)
     damping = config.ridge * weight[:, None, None] + 1e-6
-    motion = -config.step * torch.linalg.solve(A + damping * torch.eye(6), b)
+    motion = -config.step * torch.linalg.solve(A + damping * torch.eye(6, dtype=A.dtype), b)
     turn = rotation_from_vector(motion[:, :3])
     about = SE3(turn, centre + motion[:, 3:] - (turn @ centre[..., None])[..., 0])
     return about @ T_object_sensor
@@ -265,8 +266,8 @@ def _as_a_whole(start: SE3, end: SE3, points: Tensor, mirror: bool) -> SE3:
 
     A mirror plane has found its place: then only what lies in the plane is taken back.
     """
-    keep = torch.tensor((1.0, 0.0, 1.0)) if mirror else torch.ones(3)
     mean = (start.rotation @ end.rotation.mT).mean(0)
+    keep = mean.new_tensor((1.0, 0.0, 1.0)) if mirror else mean.new_ones(3)
     if mirror:
         angle = torch.atan2(mean[0, 2] - mean[2, 0], mean[0, 0] + mean[2, 2])
         c, s = torch.cos(angle), torch.sin(angle)
@@ -274,7 +275,7 @@ def _as_a_whole(start: SE3, end: SE3, points: Tensor, mirror: bool) -> SE3:
         turn = torch.stack((c, zero, s, zero, one, zero, -s, zero, c)).view(3, 3)
     else:
         u, _, v = torch.linalg.svd(mean)
-        turn = u @ torch.diag(torch.tensor((1.0, 1.0, float(torch.linalg.det(u @ v))))) @ v
+        turn = u @ torch.diag(mean.new_tensor((1.0, 1.0, float(torch.linalg.det(u @ v))))) @ v
     was = start.apply(points).flatten(0, 1).mean(0) * keep
     now = end.apply(points).flatten(0, 1).mean(0) * keep
     return SE3(turn, was - turn @ now)

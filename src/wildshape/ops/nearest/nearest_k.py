@@ -39,7 +39,8 @@ def nearest_k_native(
     if kernel is None:
         raise RuntimeError("the native library is not built; use another backend.")
     shape = (*query.shape[:2], k)
-    found = Neighbourhoods(torch.empty(shape), torch.empty(shape, dtype=torch.int64))
+    squared = torch.empty(shape, dtype=torch.float32, device="cpu")
+    found = Neighbourhoods(squared, torch.empty_like(squared, dtype=torch.int64))
     by_query, by_target = (None, None) if groups is None else groups
     sizes = as_int64(query_sizes), as_int64(target_sizes)
     given = (query, sizes[0], by_query, target, sizes[1], by_target)

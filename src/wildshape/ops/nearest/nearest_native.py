@@ -56,8 +56,8 @@ def nearest_both_native(
 
 def _room(points: Float32[Tensor, "B n 3"]) -> Neighbours:
     return Neighbours(
-        torch.empty(points.shape[:2], dtype=torch.float32),
-        torch.empty(points.shape[:2], dtype=torch.int64),
+        torch.empty(points.shape[:2], dtype=torch.float32, device="cpu"),
+        torch.empty(points.shape[:2], dtype=torch.int64, device="cpu"),
     )
 
 
@@ -125,7 +125,7 @@ class NativeDistance(torch.autograd.Function):
         query, target, index, distance = ctx.saved_tensors
         dense_query, dense_target = _dense_rows(query), _dense_rows(target)
         to_query, to_target = (
-            torch.empty(x.shape, dtype=torch.float32) if wanted else None
+            torch.empty(x.shape, dtype=torch.float32, device="cpu") if wanted else None
             for x, wanted in zip((query, target), ctx.needs_input_grad[:2])
         )
         gradient, index, distance = (x.contiguous() for x in (gradients[0], index, distance))

@@ -27,7 +27,7 @@ def visible_native(
     check_memory("visible", bins, torch.int64)
     check_memory("visible", depth, torch.float32)
     bins, depth = bins.contiguous(), depth.contiguous()
-    seen = torch.empty(bins.shape, dtype=torch.bool)
+    seen = torch.empty_like(bins, dtype=torch.bool)
     failed = loaded.wildshape_visible(
         bins.data_ptr(),
         depth.data_ptr(),
