@@ -28,9 +28,16 @@ def default_type(dtype):
         torch.set_default_dtype(torch.float32)
 
 
+def autocast():
+    return torch.autocast("cpu", dtype=torch.bfloat16)
+
+
 AROUND = {
     "float64": lambda: default_type(torch.float64),
     "float16": lambda: default_type(torch.float16),
+    "autocast": autocast,
+    "device": lambda: torch.device("meta"),  # as `torch.set_default_device` of a GPU
+    "inference": torch.inference_mode,
 }
 
 
@@ -63,6 +70,14 @@ def test_neighbours_are_float32_whatever_is_the_default(dtype):
         found = nearest_k(points, points, 4).distance_squared
     assert found.dtype == torch.float32
     assert torch.equal(found, usual)
+
+
+def test_poses_can_have_gradients():
+    model, points = load(), torch.ones(4, 3, dtype=torch.float64, requires_grad=True)
+    poses = [one.pose for one in (model.complete(SCANS[0]), *model.complete_track(SCANS))]
+    for pose in (*poses, model.register(SCANS[0], SCANS[1]).T_target_source):
+        (gradient,) = torch.autograd.grad(pose.apply(points).sum(), points)
+        torch.testing.assert_close(gradient, pose.rotation.sum(0).expand(4, 3))
 
 
 def test_loading_draws_no_random_numbers():

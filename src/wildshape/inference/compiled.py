@@ -11,6 +11,7 @@ import torch
 from torch import nn
 
 from wildshape.method.network import ShapePoseNet
+from wildshape.ops.device import plain_torch
 
 _BATCHES = (1, 2)  # torch compiles a batch of one by itself, and all others together
 
@@ -44,7 +45,7 @@ def compiled(
     return copied
 
 
-@torch.inference_mode()
+@plain_torch()
 def _rehearse(network: nn.Module, points: int) -> None:
     device = next(network.parameters()).device
     for batch in _BATCHES:

@@ -36,7 +36,7 @@ from wildshape.io.scans.points import LEAST_POINTS
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint, weights_file
 from wildshape.method.network import ShapePoseNet
 from wildshape.method.trust_features import scan_features, surfaces
-from wildshape.ops.device import choose_device
+from wildshape.ops.device import choose_device, plain_torch
 from wildshape.records import Completion, Points, Registration, Sensor
 
 BATCH = 32
@@ -181,6 +181,7 @@ class Predictor:
             seconds = (time.perf_counter() - began) / len(batch)
             yield from (replace(item, seconds=seconds) for item in done)
 
+    @plain_torch()
     def _together(
         self, scans: Sequence[Points], sensor: Sensor | None, rays: Rays = ()
     ) -> Iterator[Completion]:
@@ -261,7 +262,7 @@ class Predictor:
         clouds = all_as_points(scans)
         return fuse_scans(clouds, self.register_track(clouds, sensor, track=track, rays=rays))
 
-    @torch.inference_mode()
+    @plain_torch()
     def look(self, scans: Sequence[Points], rays: Rays = ()) -> Looked:
         """What the network says of scans, in one batch, before they are completed."""
         known = any(one is not None for one in rays)
@@ -277,7 +278,7 @@ class Predictor:
                 seen[i] = kept
         return Looked(scans, seen, found, sights)
 
-    @torch.inference_mode()
+    @plain_torch()
     def complete_looked(
         self, looked: Looked, sensor: Sensor | None = None, *, dense: bool = True
     ) -> list[Completion]:
@@ -322,7 +323,7 @@ class Predictor:
     ) -> Completion:
         """Scan `i` of those looked at."""
         scan, seen, found, sights = looked.scans[i], looked.seen[i], looked.found, looked.sights
-        mirror, config = self.settings.network.mirror, self.config
+        mirror, config, trust = self.settings.network.mirror, self.config, self.settings.trust
         said = glance_of(scan, sensor, *found.said(i), self.settings, config.reasons)
         shape, T_sensor_can, points = posed.shapes[i], posed.T_sensor_canonical[i], posed.points[i]
         exact = self.settings.sensor == "camera"
@@ -349,7 +350,6 @@ class Predictor:
             return judged(done, None, None, self.settings, config.reasons)
         rival = float(found.features[i, -1])
         evidence = scan_features(done, seen, posed.surfaces[i], rival, found.rotation[i], standing)
-        trust = self.settings.trust
         return judged(done, trust and trust.scan, evidence, self.settings, config.reasons)
 
     def _off_ground(self, scan: Points, shape: Points, T_sensor_canonical: SE3) -> Points:

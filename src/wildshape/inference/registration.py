@@ -10,6 +10,7 @@ import torch
 from wildshape.geometry.box import extent
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import InlierRule
+from wildshape.ops.device import plain_torch
 from wildshape.ops.nearest import nearest
 from wildshape.records import Completion, Points, Registration
 
@@ -28,6 +29,7 @@ def fuse_scans(scans: Sequence[Points], T_middle_scan: SE3) -> Points:
     return np.concatenate(moved).astype(np.float32)
 
 
+@plain_torch()
 def registered(
     source: Points,
     target: Points,

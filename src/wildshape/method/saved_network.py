@@ -71,7 +71,7 @@ def load_network(path: Path, form: Format[Net, Settings]) -> tuple[Net, Settings
     weights = {name: values.to(expected[name].dtype) for name, values in stored.items()}
     check_numbers(path, weights)
     _check_sum(path, stored, metadata)
-    with torch.random.fork_rng(devices=()), _Undrawn():
+    with torch.device("cpu"), torch.random.fork_rng(devices=()), _Undrawn():
         network = form.build(settings).float()
     network.load_state_dict(weights)
     return network.eval(), settings

@@ -4,6 +4,8 @@
 
 import ctypes
 import platform
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from mmap import mmap
 
 import torch
@@ -30,6 +32,22 @@ def choose_device(device: str) -> str:
     if device == "cpu":
         _take_workspace()
     return device
+
+
+@contextmanager
+def plain_torch() -> Iterator[None]:
+    """Inside, in this thread: no gradients, no autocast, and new tensors lie on the CPU.
+
+    A result is the same whatever the program around has set. What is made here can have gradients
+    later, unlike in `torch.inference_mode`.
+    """
+    with torch.no_grad(), ExitStack() as held:
+        for kind in ("cpu", "cuda"):
+            if torch.is_autocast_enabled(kind):
+                held.enter_context(torch.autocast(kind, enabled=False))
+        if torch.get_default_device().type != "cpu":
+            held.enter_context(torch.device("cpu"))
+        yield
 
 
 def _take_workspace() -> None:

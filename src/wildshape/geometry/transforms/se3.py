@@ -113,7 +113,7 @@ class SE3:
 
         What this type cannot hold is infinite.
         """
-        moved = self.apply(torch.as_tensor(points, dtype=torch.float64))
+        moved = self.apply(torch.from_numpy(np.array(points, np.float64)))
         with np.errstate(over="ignore"):
             return moved.numpy().astype(points.dtype)
 

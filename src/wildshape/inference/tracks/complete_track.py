@@ -39,6 +39,7 @@ from wildshape.inference.tracks.track_cost import network_inputs, track_cost
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.trust import TrackFeatures
 from wildshape.method.trust_features import track_features
+from wildshape.ops.device import plain_torch
 from wildshape.records import Completion, Points, Sensor
 
 _LEAST_SURE = 1e-3
@@ -108,7 +109,7 @@ class Gathered:
         return self._sum / self.weights.sum()
 
 
-@torch.inference_mode()
+@plain_torch()
 def complete_together(
     gathered: Gathered, config: InferenceConfig = _DEFAULT, rays: Rays = ()
 ) -> Iterator[Completion]:
