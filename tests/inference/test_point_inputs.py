@@ -54,6 +54,7 @@ def test_arrays_lists_and_tensors(given):
         (np.zeros(40), r"found \(40,\)"),
         ([[1.0, 2.0, 3.0], [1.0]], "no array of numbers"),
         (None, "shape"),
+        (torch.ones(40, 3, device="meta"), "no array of numbers"),
     ],
 )
 def test_what_is_no_scan_is_refused(given, said):
@@ -98,3 +99,11 @@ def test_rays_may_be_learned_of_and_have_one_range_each():
     assert found.ranges.tolist() == [1.0] * 3
     with pytest.raises(BadInputError, match=r"ranges \(3, 1\)"):
         as_rays((np.eye(3), np.ones((3, 1))))
+
+
+def test_what_may_not_be_written_is_copied():
+    """Of such an array torch warns, and warnings may be errors."""
+    points = scan()
+    assert as_points(points) is points
+    points.setflags(write=False)
+    assert as_points(points).flags.writeable

@@ -43,7 +43,7 @@ def as_points(scan: object, name: str = "scan") -> Points:
     try:
         points = _unmasked(_coordinates(scan))
         points = points if points.dtype.kind == "f" else points.astype(np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, RuntimeError) as error:
         raise BadInputError(f"{name}: no array of numbers ({error}); pass (n, 3).") from error
     if points.ndim != 2 or points.shape[1] != 3:
         raise BadInputError(
@@ -59,7 +59,7 @@ def as_points(scan: object, name: str = "scan") -> Points:
     if not spans(points).any():
         raise BadInputError(f"{name}: all {len(points)} points are equal; is the file damaged?")
     check_one_object(points, name)
-    return points
+    return np.require(points, requirements="W")  # torch warns of what may not be written
 
 
 def all_as_points(scans: Sequence[object], first: int = 0) -> list[Points]:
