@@ -113,6 +113,24 @@ def test_a_dataset_goes_on_without_bad_scans(wildshape, dataset, trained, tmp_pa
     assert len((tmp_path / "c" / "000000" / "poses.txt").read_text().splitlines()) == 5
 
 
+def test_what_evaluate_cannot_read_is_counted_as_skipped(wildshape, dataset, trained, tmp_path):
+    data = shutil.copytree(dataset, tmp_path / "data")
+    write_ply(data / "000000" / "scans" / "000001.ply", np.zeros((3, 3), np.float32))
+    (data / "000002" / "poses.txt").write_text("1 0 0\n")
+    out = tmp_path / "e"
+    baselines = ("--baselines", "identity", "--rotate", "yaw", "--seeds", "2")
+    found = wildshape("evaluate", data, "--out", out, "--model", trained, *baselines)
+    assert found.code == 0
+    metrics = json.loads((out / "metrics.json").read_text())
+    for row in metrics["methods"].values():
+        assert list(row["scans_skipped"].values()) == [2, 2]  # one of each seed
+    assert [(one["track"], one["scan"], len(one["methods"])) for one in metrics["skipped"]] == [
+        ("000000", "000001.ply", 2),
+        ("000002", "all", 2),
+    ]
+    assert "Left out, identity: 2 x 3 finite points" in (out / "table.md").read_text("utf-8")
+
+
 def test_points_that_are_not_finite_are_dropped_and_said_once(wildshape, scan, trained, tmp_path):
     scan[:7] = np.nan
     np.save(tmp_path / "nan.npy", scan)

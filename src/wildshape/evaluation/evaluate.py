@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Methods measured on the tracks of an input with progress shown, and the files of a result."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from wildshape.evaluation.examples import gather
 from wildshape.evaluation.method import Method
 from wildshape.evaluation.protocol import run as run_protocol
-from wildshape.evaluation.results import Limits, Results, Rotate
+from wildshape.evaluation.results import Limits, Results, Rotate, Skipped
 from wildshape.evaluation.summary import write_metrics, write_scores
 from wildshape.evaluation.tables import markdown, write_table
 from wildshape.io.inputs import TrackSource
@@ -26,7 +27,7 @@ def evaluate_once(
     progress: Progress = SILENT,
     helpers: Team = ALONE,
 ) -> Results:
-    """The protocol under one seed.
+    """The protocol under one seed; what cannot be read is skipped in every row.
 
     Args:
         source: the tracks.
@@ -39,7 +40,21 @@ def evaluate_once(
     """
     limits = Limits(max_scans=max_scans)
     with progress.bar(f"evaluating, seed {seed}", len(source)) as bar:
-        return run_protocol(methods, source, rotate, seed, bar.at, limits=limits, helpers=helpers)
+        found = run_protocol(methods, source, rotate, seed, bar.at, limits=limits, helpers=helpers)
+    unusable = tuple(_unusable(source))
+    rows = tuple(replace(row, skipped=(*row.skipped, *unusable)) for row in found.methods)
+    return replace(found, methods=rows)
+
+
+def _unusable(source: TrackSource) -> Iterator[Skipped]:
+    """Scans that were refused when the tracks were read; of a track refused as a whole one line."""
+    for name in source.names:
+        found = source.skipped_in(name)
+        if name in source.refused and not found:
+            found = (("all", source.refused[name]),)
+        for scan, sentence in found:
+            reason = sentence.partition(": ")[2] or sentence  # without the file
+            yield Skipped(name, scan, reason.rstrip("."))
 
 
 def write_evaluation(
