@@ -53,6 +53,13 @@ def test_numbers_without_leading_zeros_are_refused(tmp_path, before):
     refused(open_drive, tmp_path, match=f"{before}10.npy is sorted before {before}9.npy")
 
 
+@pytest.mark.parametrize("suffix", [".5.npy", ".500000000.npy", ".pcd.bin"])
+def test_seconds_and_numbers_of_nuscenes_without_leading_zeros_are_refused(tmp_path, suffix):
+    for number in (9, 10):
+        (tmp_path / f"{number}{suffix}").write_bytes(b"0")
+    refused(open_drive, tmp_path, match=f"10{suffix} is sorted before 9{suffix}")
+
+
 def test_decimals_in_names_are_no_counts(tmp_path):
     for name in ("1.25", "1.5", "a2", "b1"):
         np.save(tmp_path / f"{name}.npy", np.ones((50, 3)))

@@ -9,11 +9,12 @@ from pathlib import Path
 
 from wildshape.errors import BadInputError
 
-_COUNTED = re.compile(r"(?P<before>|.*[^0-9.-]|.*[^0-9]-)(?P<number>[0-9]+)")  # no dates
+# No dates; seconds are decimals, and nuScenes' files end in `.pcd.bin`.
+_COUNTED = re.compile(r"(?P<before>|.*[^0-9.-]|.*[^0-9]-)(?P<number>[0-9]+(?:\.[0-9]+)?)(?:\.pcd)?")
 
 
 def out_of_order(stems: Sequence[str]) -> int | None:
-    """Where names that only count go back: `scan_10` is before `scan_9`.
+    """Where names that only count go back: `scan_10` is before `scan_9`, `10.0` before `9.5`.
 
     Args:
         stems: of files, sorted as text.
@@ -25,7 +26,7 @@ def out_of_order(stems: Sequence[str]) -> int | None:
     counts = [_COUNTED.fullmatch(stem) for stem in stems]
     if None in counts or len({count["before"] for count in counts if count}) > 1:
         return None
-    numbers = [int(count["number"]) for count in counts if count]
+    numbers = [float(count["number"]) for count in counts if count]
     return next((i for i, (one, other) in enumerate(pairwise(numbers)) if one > other), None)
 
 
