@@ -114,6 +114,15 @@ def test_poses_beside_the_scans_are_used(folder):
     assert len(found) == 4
 
 
+def test_byte_order_marks_are_no_part_of_times_and_poses(folder):
+    write_poses(folder / "poses.txt", SE3.identity(4))
+    (folder / "times.txt").write_text("5.0\n5.1\n5.2\n5.3\n")
+    plain = open_drive(folder)
+    for name in ("times.txt", "poses.txt"):
+        (folder / name).write_text("\ufeff" + (folder / name).read_text(), "utf-8")
+    assert open_drive(folder).fingerprint == plain.fingerprint
+
+
 def test_kitti_raw_and_odometry(tmp_path):
     raw = tmp_path / "2011_09_26_drive_0048_sync"
     write_scans(raw / "velodyne_points" / "data", range(3))

@@ -153,7 +153,7 @@ def read_json(path: Path, expected: str, kind: type = object) -> Any:
             take far more memory than they take room in a file.
     """
     with reading(path, expected):
-        found = parse_json(path.read_text("utf-8"), path, expected)
+        found = parse_json(path.read_text("utf-8-sig"), path, expected)
     if not isinstance(found, kind):
         raise BadInputError(
             f"{path}: expected {expected}, found {type(found).__name__}; write or copy it again."

@@ -43,7 +43,7 @@ def read_poses(path: Path | str, expected: int | None = None) -> SE3:
     """
     path = Path(path)
     with reading(path, "12 numbers a line"):
-        lines = path.read_text("utf-8").splitlines()
+        lines = path.read_text("utf-8-sig").splitlines()
         rows = [_parse(line, i, path) for i, line in enumerate(lines, 1) if line.strip()]
     if expected is not None and len(rows) != expected:
         raise BadInputError(
@@ -119,7 +119,7 @@ def read_tum(path: Path) -> tuple[list[float], SE3]:
         BadInputError: a line is not of 8 finite numbers with a unit quaternion.
     """
     with reading(path, "8 numbers a line: time x y z qx qy qz qw"):
-        lines = path.read_text("utf-8").splitlines()
+        lines = path.read_text("utf-8-sig").splitlines()
         rows = np.array([line.split() for line in lines if line[:1] not in ("", "#")], np.float64)
     numbers = torch.from_numpy(rows)
     good = rows.ndim == 2 and rows.shape[1] == 8 and bool(numbers.isfinite().all())

@@ -61,10 +61,13 @@ FILES = {
 }
 
 
+@pytest.mark.parametrize("mark", ["", "\ufeff"], ids=["", "byte_order_mark"])
 @pytest.mark.parametrize("name", FILES)
-def test_every_format_says_the_same_box(name, tmp_path):
+def test_every_format_says_the_same_box(name, mark, tmp_path):
     content, scan, track = FILES[name]
-    (found,) = read(written(tmp_path / name, content))
+    path = written(tmp_path / name, content)
+    path.write_text(mark + path.read_text(), "utf-8")
+    (found,) = read(path)
     assert (found.scan, found.track) == (scan, track)
     assert found.category.lower() in ("car", "")
     assert found.box.centre == pytest.approx(CENTRE, abs=1e-6)

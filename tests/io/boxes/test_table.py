@@ -17,6 +17,8 @@ def test_what_is_written_is_read_by_frame_and_track(tmp_path):
     write_box_table(tmp_path / "boxes.csv", reversed(ROWS))
     assert read_box_table(tmp_path / "boxes.csv") == ROWS
     lines = (tmp_path / "boxes.csv").read_text().splitlines()
+    (tmp_path / "boxes.csv").write_text("\ufeff" + "\n".join(lines), "utf-8")  # as of Excel
+    assert read_box_table(tmp_path / "boxes.csv") == ROWS
     assert lines[2] == "2,,0001,-4.0,3.0,-1.0,4.6,1.9,1.4,-3.0,0.5,0,1"
 
 

@@ -162,7 +162,7 @@ def _seconds(path: Path) -> list[float] | None:
     if not path.is_file():
         return None
     with reading(path, "a time a line, seconds"):
-        times = [float(line) for line in path.read_text("utf-8").split()]
+        times = [float(line) for line in path.read_text("utf-8-sig").split()]
         if not np.isfinite(times).all():
             raise ValueError("a time that is not finite")
         return times
@@ -173,7 +173,7 @@ def _timestamps(path: Path) -> list[float] | None:
     if not path.is_file():
         return None
     with reading(path, "a date and time a line"):
-        lines = [line.strip() for line in path.read_text("utf-8").splitlines() if line.strip()]
+        lines = [line.strip() for line in path.read_text("utf-8-sig").splitlines() if line.strip()]
         return [datetime.fromisoformat(line[:26]).replace(tzinfo=UTC).timestamp() for line in lines]
 
 

@@ -37,7 +37,7 @@ def read_kitti_file(path: Path, T_rect_sensor: SE3) -> list[DetectorBox]:
     """
     T_sensor_rect = T_rect_sensor.inverse()
     with reading(path, "labels of KITTI, with 15 to 18 fields a line"):
-        lines = path.read_text("utf-8").splitlines()
+        lines = path.read_text("utf-8-sig").splitlines()
         return list(_boxes(lines, path.stem, T_sensor_rect))
 
 

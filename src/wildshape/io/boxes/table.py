@@ -79,7 +79,7 @@ def read_box_table(path: Path | str) -> list[BoxRow]:
         BadInputError: another header, or a line that is no box.
     """
     path = Path(path)
-    with reading(path, "boxes of a drive"), path.open(encoding="utf-8", newline="") as file:
+    with reading(path, "boxes of a drive"), path.open(encoding="utf-8-sig", newline="") as file:
         table = csv.reader(file)
         if tuple(next(table, ())) != HEADER:
             raise BadInputError(f"{path}: expected the header {','.join(HEADER)}.")
