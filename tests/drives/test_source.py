@@ -234,6 +234,13 @@ def test_text_beside_binary_scans_is_no_scan(folder):
     assert open_drive(folder).scan_names == ("000000", "000001", "000002", "000003")
 
 
+@pytest.mark.parametrize("name", ["README.txt", "README.TXT"])
+def test_text_above_a_data_sets_scans_is_no_scan(tmp_path, name):
+    write_scans(tmp_path / "velodyne", range(2))
+    (tmp_path / name).write_text("recorded on a Monday")
+    assert len(open_drive(tmp_path)) == 2
+
+
 def test_scans_written_anew_in_as_many_bytes_are_another_recording(folder):
     before = open_drive(folder).fingerprint
     assert open_drive(folder).fingerprint == before

@@ -38,7 +38,7 @@ class _Files:
 def holds_scans(path: Path) -> bool:
     """Whether scans lie in a folder itself; text may be anything."""
     return path.is_dir() and any(
-        is_scan_file(entry) and entry.suffix not in _TEXT for entry in path.iterdir()
+        is_scan_file(entry) and entry.suffix.lower() not in _TEXT for entry in path.iterdir()
     )
 
 
