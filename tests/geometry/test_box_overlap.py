@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wildshape.geometry.box import FittedBox, box_iou, shared_volume
-from wildshape.geometry.footprint import footprint_iou
+from wildshape.geometry.footprint import footprint_iou, footprint_overlap, upright_places
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
+from wildshape.geometry.transforms.se3 import SE3
 
 
 def box(centre=(0.0, 0.0, 0.0), size=(1.0, 1.0, 1.0), rotation=None):
@@ -109,3 +110,18 @@ def test_the_footprint_of_upright_boxes_overlaps_as_the_boxes_do(angle, x, y):
     a, b = box(size=size), box((x, y, 0.0), other, yaw(math.degrees(angle)))
     found = footprint_iou(np.zeros(4), size, np.array((x, y, 0.0, angle)), other)
     assert found == pytest.approx(box_iou(a, b), abs=1e-6)
+
+
+@given(st.floats(-3.1, 3.1), st.floats(-2, 2), st.floats(-2, 2))
+def test_what_a_smaller_box_shares_is_a_part_of_it(angle, x, y):
+    size, other = (4.0, 1.8, 1.0), (3.0, 1.5, 1.0)
+    pose = SE3(yaw(math.degrees(angle))[None], torch.tensor(((x, y, 0.5),), dtype=torch.float64))
+    (place,) = upright_places(pose)
+    np.testing.assert_allclose(place, (x, y, 0.5, angle), atol=1e-9)
+    shared = shared_volume(box(size=size), box((x, y, 0.0), other, yaw(math.degrees(angle))))
+    for found in (
+        footprint_overlap(np.zeros(4), size, place, other),
+        footprint_overlap(place, other, np.zeros(4), size),
+    ):
+        assert found == pytest.approx(shared / (3.0 * 1.5), abs=1e-6)
+    assert footprint_overlap(place, (0.0, 0.0), place, other) == 0.0
