@@ -110,6 +110,7 @@ _ROTATED = np.asarray(
         (_with(0, 0, np.nan), "NaN"),
         (_with(1, 3, np.inf), "infinite"),
         (_ROTATED.T, "last row"),
+        (_with(3, 0, -0.5), "last row"),
         (np.stack([np.eye(4), np.diag([1.0, -1.0, 1.0, 1.0])]), "determinant -1"),
     ],
 )
