@@ -74,10 +74,22 @@ def test_rays_move_with_what_they_are_held_against() -> None:
         assert (here.hidden == there.hidden).mean() > 0.98
 
 
+def test_rays_of_several_sensors_start_and_end_where_a_move_takes_them() -> None:
+    starts = np.random.default_rng(3).uniform(-2, 2, (50, 3))
+    rays = some_rays(50, origins=starts)
+    turn = rotation_z(torch.tensor(2.0)).double().numpy()
+    for shift in (np.zeros(3), np.array((3.0, -4.0, 1.0))):
+        moved = rays.moved(turn, shift)
+        np.testing.assert_allclose(moved.starts, starts @ turn.T + shift, atol=1e-5)
+        ends, before = moved.returned.ends, rays.returned.ends
+        np.testing.assert_allclose(ends, before @ turn.T + shift, atol=1e-4)
+
+
 def test_what_are_no_rays_is_refused() -> None:
     unit = np.eye(3)
     refused(SightLines, 2 * unit, np.ones(3), match="no unit vector")
     refused(SightLines, unit, np.ones(2), match=r"\(3, 3\) do not fit ranges \(2,\)")
-    refused(SightLines, unit, np.array((1.0, 0.0, np.nan)), match="not above 0")
+    for bad in (0.0, -1.0, np.nan):
+        refused(SightLines, unit, np.array((1.0, 2.0, bad)), match="not above 0")
     refused(SightLines, unit, np.ones(3), np.full((3, 3), np.inf), match="origin is not finite")
     refused(SightLines, np.array([["a"]]), np.ones(1), match="no array of numbers")

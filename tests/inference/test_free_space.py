@@ -10,6 +10,8 @@ import torch
 from tests.refusal import refused
 
 import wildshape
+from wildshape.geometry.projection.visibility import PolarBins
+from wildshape.geometry.transforms.rotation import rotation_from_vector
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.choose_hypothesis import Looked
 from wildshape.inference.config import FreeSpaceConfig
@@ -63,6 +65,28 @@ def test_shape_in_free_space_costs_and_what_is_hidden_does_not(track: Track) -> 
     # The nearer half, y > 0, was nearer to the scan: without it the mean is larger.
     assert float(seen.projection) > float(plain.projection) + 0.5
     assert float(plain.cost(0.25)) == float(plain.observation + 0.25 * plain.projection)
+
+
+def test_free_space_costs_each_hypothesis_its_own_however_the_scan_is_turned() -> None:
+    """Of a wall over half of the view, as above: one shape is half behind it, one is all."""
+    y, z = np.meshgrid(np.linspace(-2, 2, 41), np.linspace(-1, 1, 21))
+    plane = np.stack((np.full(y.size, 10.0), y.ravel(), z.ravel()), -1).astype(np.float32)
+    ends = plane * np.where(plane[:, 1:2] > 0, 0.5, 2.0).astype(np.float32)
+    behind = np.abs(plane) + np.float32((0.0, 0.05, 0.0))
+    scan = np.array([[10.0, 9.0, 0.0]] * 16, np.float32)
+    centre = torch.tensor((10.0, 0.0, 0.0))
+    sights = Sights([scan], [SightLines.of_returns(ends)], CONFIG)
+    vector = torch.tensor((0.3, -0.2, 0.5))
+    for turn in (torch.eye(3), rotation_from_vector(vector)):
+        posed = torch.stack([torch.from_numpy(one) - centre for one in (plane, behind)]) @ turn.mT
+        centred = (torch.from_numpy(scan) - centre) @ turn.mT
+        inputs = (centred[None], (turn @ centre)[None], posed[None], PolarBins())
+        seen = SeenScores(sights, turn[None])(*inputs)
+        assert seen.free_space is not None
+        expected = (CONFIG.free_m * 0.5, 0.0)
+        assert seen.free_space[0].tolist() == pytest.approx(expected, abs=0.05 * CONFIG.free_m)
+        paid = seen.cost(0.25) - (seen.observation + 0.25 * seen.projection)
+        torch.testing.assert_close(paid, seen.free_space)
 
 
 def test_looks_one_by_one_keep_their_rays(track: Track) -> None:
