@@ -334,7 +334,7 @@ class Predictor:
             standing = alone.of(whole, 0)
         done = Completion(
             points=with_scan(whole, len(shape), scan) if exact and self.refines else whole,
-            pose=T_sensor_can.to(torch.float64),
+            pose=T_sensor_can.to(torch.float64).owned(),
             box=box_seen(
                 solid, T_sensor_can, seen, mirror=mirror, body=not exact, config=config.box
             ),

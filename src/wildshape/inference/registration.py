@@ -43,7 +43,7 @@ def registered(
     confidence = min(done_source.confidence, done_target.confidence)
     warning = done_source.warning or done_target.warning
     reasons = tuple(dict.fromkeys((*done_source.reasons, *done_target.reasons)))
-    return Registration(T_target_source, ratio, confidence, warning, reasons)
+    return Registration(T_target_source.owned(), ratio, confidence, warning, reasons)
 
 
 def inlier_ratio(

@@ -36,12 +36,12 @@ def choose_device(device: str) -> str:
 
 @contextmanager
 def plain_torch() -> Iterator[None]:
-    """Inside, in this thread: no gradients, no autocast, and new tensors lie on the CPU.
+    """Inside, in this thread: `inference_mode`, no autocast, and new tensors lie on the CPU.
 
-    A result is the same whatever the program around has set. What is made here can have gradients
-    later, unlike in `torch.inference_mode`.
+    A result is the same whatever the program around has set. Autograd refuses tensors made here;
+    what a caller gets is copied (`SE3.owned`).
     """
-    with torch.no_grad(), ExitStack() as held:
+    with torch.inference_mode(), ExitStack() as held:
         for kind in ("cpu", "cuda"):
             if torch.is_autocast_enabled(kind):
                 held.enter_context(torch.autocast(kind, enabled=False))

@@ -125,6 +125,11 @@ class SE3:
         """The same transforms in another floating type."""
         return type(self)(self.rotation.to(dtype), self.translation.to(dtype))
 
+    def owned(self) -> "SE3":
+        """A copy that autograd takes, too, wherever it was made (`torch.inference_mode`)."""
+        with torch.inference_mode(mode=False):
+            return type(self)(self.rotation.clone(), self.translation.clone())
+
 
 def _check_layout(m: Tensor) -> None:
     if m.ndim < 2 or m.shape[-2:] not in ((3, 4), (4, 4)):

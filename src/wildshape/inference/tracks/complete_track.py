@@ -149,7 +149,7 @@ def complete_together(
         said, T_sensor_object = gathered.said[i], fit.T_sensor_object[i]
         item = Completion(
             points=T_sensor_object.apply(whole).float().numpy(),
-            pose=T_sensor_object,
+            pose=T_sensor_object.owned(),
             box=carried(fitted, T_sensor_object),
             confidence=0.0 if said.warning else mean,
             branch=said.branch,
