@@ -53,6 +53,7 @@ def test_arrays_lists_and_tensors(given):
         (np.zeros((40, 4)), r"shape \(n, 3\), found \(40, 4\)"),
         (np.zeros(40), r"found \(40,\)"),
         ([[1.0, 2.0, 3.0], [1.0]], "no array of numbers"),
+        (np.eye(40)[:, :3] * 1j, "its numbers are complex"),
         (None, "shape"),
         (torch.ones(40, 3, device="meta"), "no array of numbers"),
     ],

@@ -42,6 +42,8 @@ def as_points(scan: object, name: str = "scan") -> Points:
         return read_scan(scan).points
     try:
         points = _unmasked(_coordinates(scan))
+        if points.dtype.kind == "c":  # numpy would drop the imaginary parts
+            raise TypeError("its numbers are complex")
         points = points if points.dtype.kind == "f" else points.astype(np.float64)
     except (TypeError, ValueError, RuntimeError) as error:
         raise BadInputError(f"{name}: no array of numbers ({error}); pass (n, 3).") from error
