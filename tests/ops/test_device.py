@@ -10,6 +10,7 @@ import sys
 import pytest
 import torch
 
+from wildshape.errors import BadInputError
 from wildshape.ops import device as allocator
 
 PROGRAM = "from wildshape.ops.device import keep_memory; print(keep_memory())"
@@ -47,3 +48,8 @@ def test_takes_effect_on_glibc():
 def test_does_nothing_on_other_libraries(monkeypatch):
     monkeypatch.setattr(platform, "libc_ver", lambda: ("musl", "1.2"))
     assert not allocator.keep_memory()
+
+
+def test_a_device_that_torch_does_not_know_is_refused():
+    with pytest.raises(BadInputError, match="'tpu': there are cpu, cuda and auto"):
+        allocator.choose_device("tpu")

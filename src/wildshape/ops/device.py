@@ -21,7 +21,7 @@ def choose_device(device: str) -> str:
     """What torch calls it, made ready; `auto` is the GPU where there is one.
 
     Raises:
-        BadInputError: a GPU is asked for, and torch finds none.
+        BadInputError: torch knows no such device, or finds no GPU where one is asked for.
         OSError: a processor without memory for its matrix products.
     """
     found = torch.cuda.is_available()
@@ -29,6 +29,10 @@ def choose_device(device: str) -> str:
         raise BadInputError(f"--device {device}: torch finds no GPU here; use --device cpu.")
     if device == "auto":
         device = "cuda" if found else "cpu"
+    try:
+        torch.device(device)
+    except RuntimeError as error:
+        raise BadInputError(f"device {device!r}: there are cpu, cuda and auto.") from error
     if device == "cpu":
         _take_workspace()
     return device
