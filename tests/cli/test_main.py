@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
 import errno
+import json
+import os
 import shlex
 import subprocess
 import sys
@@ -210,3 +212,34 @@ def test_other_errors_of_ours_are_not_hidden(wildshape, monkeypatch):
     monkeypatch.setattr("wildshape.cli.commands.info.run", run)
     with pytest.raises(RuntimeError, match="a mistake"):
         wildshape("info", "anything")
+
+
+def in_a_shell(line):
+    """A line of the shell; `wildshape` is this package's, with Python's usual buffers."""
+    program = f'w() {{ "{sys.executable}" -m wildshape "$@"; }}; {line}'
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONUNBUFFERED"}
+    return subprocess.run(["sh", "-c", program], capture_output=True, text=True, env=environment)
+
+
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_closed_stream_swallows_what_is_said(closed):
+    """Without stderr every command with progress ended at once, and said nothing of it."""
+    scan = shlex.quote(str(ROOT / "examples" / "scan.npy"))
+    found = in_a_shell(f"w info {scan} --json {closed}")
+    assert found.returncode == 0, found
+    assert not found.stdout or json.loads(found.stdout)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+@pytest.mark.parametrize("asked", ["--help", "--version", "info --help"])
+def test_a_full_disk_under_stdout(asked):
+    found = in_a_shell(f"w {asked} > /dev/full")
+    assert found.returncode == 1
+    assert found.stderr.startswith("wildshape: no space left on device; ")
+    assert found.stderr.count("\n") == 1
+
+
+def test_a_reader_that_has_gone_is_left_in_silence(tmp_path):
+    code = tmp_path / "code"
+    found = in_a_shell(f"(w --help; echo $? > {shlex.quote(str(code))}) | true")
+    assert (code.read_text(), found.stderr) in (("1\n", ""), ("0\n", ""))  # 0: it was not gone yet

@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from types import ModuleType
 
 from wildshape.cli.commands import module_of
@@ -48,27 +49,24 @@ def main(argv: Sequence[str] | None = None) -> None:
             disk is full; always with one sentence on stderr.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    if not arguments or arguments[0] in _HELP:
-        print(overview())
-        return
-    if arguments[0] == "--version":
-        from wildshape import __version__
-
-        print(__version__)
-        return
-    if arguments[0] == "--print-completion":
-        _print_completion(*arguments[1:2])
-        return
-    if arguments[0] not in COMMANDS:
-        _leave(f"'{arguments[0]}' is no command; there are {', '.join(COMMANDS)}.", _BAD_INPUT)
+    _open_closed_streams()
     # Threads that wait must sleep: where another program has one of two cores, spinning ones made
     # training twenty times slower. Read when torch is imported, hence here.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     with terminable():  # the way out, too
         try:
-            _guarded(arguments[0], arguments[1:])
+            with in_a_sentence():
+                _obey(arguments)
+                sys.stdout.flush()
         finally:
             release_folders()
+
+
+def _open_closed_streams() -> None:
+    """A closed one is None in Python, and the next file that is opened would take its number."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open(mode))  # noqa: SIM115
 
 
 def overview() -> str:
@@ -100,11 +98,21 @@ def _print_completion(shell: str = "") -> None:
     print(script(shell, COMMANDS), end="")
 
 
-def _guarded(command: str, arguments: list[str]) -> None:
-    """Run a command."""
-    with in_a_sentence():
-        module = module_of(command)
-        module.run(_parse(module, command, arguments))
+def _obey(arguments: list[str]) -> None:
+    """Run a command, or print what is asked for."""
+    if not arguments or arguments[0] in _HELP:
+        print(overview())
+    elif arguments[0] == "--version":
+        from wildshape import __version__
+
+        print(__version__)
+    elif arguments[0] == "--print-completion":
+        _print_completion(*arguments[1:2])
+    elif arguments[0] in COMMANDS:
+        module = module_of(arguments[0])
+        module.run(_parse(module, arguments[0], arguments[1:]))
+    else:
+        _leave(f"'{arguments[0]}' is no command; there are {', '.join(COMMANDS)}.", _BAD_INPUT)
 
 
 @contextmanager
@@ -122,6 +130,7 @@ def in_a_sentence() -> Iterator[None]:
     except KeyboardInterrupt as stopped:
         _leave(str(stopped) or _stopped(), _INTERRUPTED)
     except BrokenPipeError:
+        _drop_output()
         sys.stderr.close()  # the reader of our output has gone; nothing is left to say
         raise SystemExit(_FAILED) from None
     except (MemoryError, RuntimeError, ImportError, OSError, SystemError) as error:
@@ -131,7 +140,16 @@ def in_a_sentence() -> Iterator[None]:
             _leave(_NO_MEMORY, _FAILED)
         if not isinstance(error, OSError):
             raise
+        _drop_output()
         _leave(_system_sentence(error), _FAILED if error.errno in _NO_ROOM else _BAD_INPUT)
+
+
+def _drop_output() -> None:
+    """What stdout cannot take: Python would try once more at its end, and exit with 120."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parse(module: ModuleType, command: str, arguments: list[str]) -> object:
@@ -146,7 +164,8 @@ def _parse(module: ModuleType, command: str, arguments: list[str]) -> object:
         )
     except SystemExit as leaving:
         if leaving.code in (0, None):
-            print("\n".join(("", "examples:", *(f"  {line}" for line in module.EXAMPLES))))
+            lines = ("", "examples:", *(f"  {line}" for line in module.EXAMPLES))
+            print("\n".join(lines), flush=True)
         raise
 
 
