@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scans whose points have times are corrected for the sensor's motion during the turn."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -34,7 +36,8 @@ def seen_from_one_place(scan, street):
 
 
 def drive_of(scans, *, timed):
-    turns = [Turn(scan.points, scan.times if timed else None) for scan in scans]
+    known = [timed and len(scan.points) for scan in scans]  # an empty file tells no times
+    turns = [Turn(scan.points, scan.times if known[i] else None) for i, scan in enumerate(scans)]
     names = [f"{frame:06d}" for frame in range(len(scans))]
     return Drive.of("street", names, turns.__getitem__, [scan.time for scan in scans])
 
@@ -79,6 +82,15 @@ def test_the_way_is_as_true_where_a_scan_is_stamped_at_its_first_or_last_point(s
         return np.abs(way.T_world_sensor.matrix.numpy() - true)[:, :3, 3].max()
 
     assert stamped(stamped_s) < 1.5 * stamped(0.0)
+
+
+def test_the_way_is_as_true_where_the_first_scan_is_empty(simulated):
+    """The motion before the scans after it is found as that before a first one with points."""
+    measured, _ = simulated
+    nothing = replace(measured[0], points=measured[0].points[:0], times=measured[0].times[:0])
+    _, off = followed(measured, timed=True)
+    _, off_behind = followed([nothing, *measured[1:]], timed=True)
+    assert off_behind < 2 * off
 
 
 def test_scans_whose_times_cannot_be_used_are_told_of(simulated):

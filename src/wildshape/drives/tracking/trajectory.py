@@ -126,7 +126,7 @@ def find_trajectory(
     rest = iter(turns)
     first = list(islice(rest, _FIRST_SCANS))
     motion = STANDING
-    if first[0].seconds is not None:
+    if any(turn.seconds is not None for turn in first):  # the first scan may be empty
         motion = _follow(drive, first, config, motion)[1].motion
     poses, odometry = _follow(drive, chain(first, rest), config, motion, at)
     T_world_sensor = SE3.from_matrix(np.linalg.inv(poses[0]) @ np.stack(poses))
