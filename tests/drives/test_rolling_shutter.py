@@ -3,6 +3,8 @@
 """A beam that turns meets what is beside a moving sensor before or after the turn's middle."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,11 +14,15 @@ from tests.refusal import refused
 from wildshape.drives.completing.boxes import smooth
 from wildshape.drives.completing.level_frame import Completed, boxes_in_scans
 from wildshape.drives.completing.rolling_shutter import TURNS, Turns, with_sense
-from wildshape.drives.config import BoxConfig, TurnConfig
+from wildshape.drives.config import BoxConfig, DriveConfig, TurnConfig
+from wildshape.drives.pipeline import Pipeline
+from wildshape.drives.source import Drive
 from wildshape.drives.tracking.sightings import Sightings
+from wildshape.drives.tracking.trajectory import Breaks
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.records import Turn
 
 FRAMES = 20
 STANDING = np.array([(8.0, 4.0, -1.0, 0.1), (14.0, -5.0, -1.0, 3.0), (22.0, 3.5, -1.0, -0.4)])
@@ -71,6 +77,25 @@ def test_what_stands_is_found_in_one_place_and_tells_the_sense(sense):
         assert np.abs(stood - box).max() < 0.03
         assert when == pytest.approx(phases, abs=1e-9)
         assert found.shown(frames, stood) == pytest.approx(boxes, abs=0.01)
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_a_sense_is_looked_for_where_no_scan_has_times_not_where_the_first_is_empty(
+    timed, tmp_path
+):
+    points = np.ones((5, 3), np.float32)
+    read = [Turn(points[:0]), *[Turn(points, np.zeros(5) if timed else None)] * (FRAMES - 1)]
+    names, at = [f"{frame:06d}" for frame in range(FRAMES)], [0.1 * i for i in range(FRAMES)]
+    stands = [shown(lambda _, place=place: place, 1)[0] for place in STANDING]
+    seen = [SimpleNamespace(frames=range(FRAMES), boxes=boxes) for boxes in stands]
+    pipeline: Any = SimpleNamespace(
+        drive=Drive.of("street", names, read.__getitem__, at),
+        breaks=Breaks(),
+        config=DriveConfig(),
+        stages=tmp_path,
+        completed=lambda *_: seen,
+    )
+    assert Pipeline.turns(pipeline, [], sensor(range(FRAMES))).sense == (0 if timed else 1)
 
 
 def test_one_that_passes_fast_is_where_the_beam_meets_it():

@@ -58,6 +58,8 @@ from wildshape.io.guard import read_record
 from wildshape.io.poses import read_poses
 from wildshape.parallel.team import Team
 
+_FIRST_SCANS = 3  # tell whether points have times
+
 
 @dataclass(frozen=True)
 class Pipeline:
@@ -222,7 +224,8 @@ class Pipeline:
     def turns(self, objects: list[Sightings], T_level_sensor: SE3) -> Turns:
         """The sensor's turns, in their sense where points have no times."""
         found = Turns(self.drive.ticks, T_level_sensor, breaks=self.breaks.frames)
-        if self.drive.turn(0).seconds is None:
+        first = range(min(_FIRST_SCANS, len(self.drive)))  # one alone may be empty
+        if all(self.drive.turn(frame).seconds is None for frame in first):
             shown = ((one.frames, one.boxes) for one in self.completed(objects, found))
             found = with_sense(found, shown, self.config.turns)
         write_json(self.stages / TURNS, {"sense": found.sense, "ticks": found.ticks})
