@@ -158,3 +158,11 @@ def test_without_the_recording_there_are_no_scans(found, tmp_path):
     with (found.out / "drive.mcap").open("rb") as file:
         topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}
     assert topics == {"/tf", "/boxes", "/shapes", "/trajectory"}
+
+
+@pytest.mark.parametrize(
+    ("source", "name"),
+    [("day/2026.11.27", "2026.11.27"), ("day/a.b.pcap", "a.b"), ("day/street", "street")],
+)
+def test_a_drive_bears_the_whole_name_of_its_folder(found, source, name):
+    assert replace(found, record={"settings": {"source": source}}).name == name

@@ -44,6 +44,7 @@ from wildshape.records import Box, Points, as_text
 
 _LATEST_S = 9e9  # nanoseconds of it fit into 64 bits
 _BEHIND = 0.49  # of a turn before or after its middle: it may be the turn's end or its beginning
+_FILES = (".bag", ".db3", ".mcap", ".pcap", ".pcapng")  # recordings that are one
 _PERIOD_S = 0.1  # of a scan, where no times are known
 
 
@@ -119,7 +120,8 @@ class FinishedDrive:
     @property
     def name(self) -> str:
         """Of the recording."""
-        return as_text(self.source.stem if self.source.suffix else self.source.name)
+        is_file = self.source.suffix.lower() in _FILES  # it may be gone; folders may have dots
+        return as_text(self.source.stem if is_file else self.source.name)
 
     @property
     def seconds(self) -> tuple[float, ...]:
