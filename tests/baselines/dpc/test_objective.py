@@ -21,6 +21,7 @@ from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.loop import MODEL, StopRequested
+from wildshape.training.options import TrainingOptions
 
 
 def tiny(name, steps=3):
@@ -117,6 +118,17 @@ def test_training_lowers_the_loss_and_can_be_resumed(plane_store, tmp_path):
     fit_dpc(again)
     expected, found = (load_file(tmp_path / name / MODEL) for name in ("whole", "part"))
     assert all(torch.equal(expected[key], found[key]) for key in expected)
+
+
+def test_every_seed_that_is_let_in_trains(plane_store, tmp_path):
+    found = []
+    for seed in (0, 1 << 32, (1 << 64) - 1):
+        assert TrainingOptions(seed=seed).seed == seed
+        fit_dpc(setup_dpc(tiny("dpc-small", 1), plane_store, tmp_path / str(seed), seed=seed))
+        weights = load_file(tmp_path / str(seed) / MODEL)
+        found.append(torch.cat([weights[name].flatten() for name in sorted(weights)]))
+    assert not torch.equal(found[0], found[1])
+    assert not torch.equal(found[1], found[2])
 
 
 def test_a_finished_run_is_left_as_it_is(plane_store, tmp_path):

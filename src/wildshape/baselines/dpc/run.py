@@ -124,7 +124,8 @@ def _take(run: DpcRun, objective: DpcObjective, meter: Meter) -> None:
     state.optimiser.param_groups[0]["lr"] = learning_rate(state.step, optim)
     device = meter.ring.device
     batch = run.sampler.draw(run.seed, state.step).to(device)
-    generator = torch.Generator().manual_seed(run.seed << 32 | state.step)
+    # Torch takes 64 bits; the batch and the weights know those of a seed that are cut off here.
+    generator = torch.Generator().manual_seed((run.seed << 32 | state.step) % (1 << 64))
     result = objective(batch, state.step / optim.steps, generator)
     state.optimiser.zero_grad(set_to_none=True)
     result.loss.backward()
