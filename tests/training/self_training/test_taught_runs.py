@@ -74,6 +74,18 @@ def test_true_targets_are_the_truth(car_store, cars):
     assert rows == {tuple(point) for point in cars[3].shape.tolist()}
 
 
+def test_a_partial_shape_is_taught_with_its_reflection(tmp_path):
+    car = drive_by(scans=3)
+    seen = car.shape[car.shape[:, 1] > 0.2]
+    with StoreWriter(tmp_path / "store", {}) as writer:
+        writer.add(replace(car, shape=seen, shape_kind="partial"))
+    found = true_targets(sampler_of(open_store(tmp_path / "store")))
+    assert found.complete
+    across = found.shapes[0, :, 1]
+    assert across.min() == pytest.approx(-seen[:, 1].max(), abs=0.05)
+    assert across.max() == pytest.approx(seen[:, 1].max(), abs=0.05)
+
+
 @pytest.mark.parametrize("missing", ["T_sensor_object", "shape"])
 def test_true_targets_refuse_data_without_truth_in_one_sentence(tmp_path, missing):
     with StoreWriter(tmp_path / "store", {}) as writer:

@@ -16,6 +16,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor
 
+from wildshape.datasets.tracks.truth import whole_shape
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import atomic_write
 from wildshape.method.saved_network import check_numbers, check_shapes
@@ -57,6 +58,9 @@ def targets_of(
 def true_targets(sampler: ViewSampler, config: FusionConfig = _DEFAULT) -> FusedTargets:
     """The truth as targets: the oracle, the upper bound of METHOD 9.
 
+    Shapes are those that evaluation measures against: partial ones with their reflection, for as
+    whole ones they are taught.
+
     Raises:
         BadInputError: a track has no true poses or no true shape.
     """
@@ -65,10 +69,11 @@ def true_targets(sampler: ViewSampler, config: FusionConfig = _DEFAULT) -> Fused
     tracks, shapes = [], []
     for scans in sampler.scans_of:
         number = int(np.searchsorted(starts, scans[0], side="right")) - 1
-        known, shape = store.poses_of(number), store.shape_of(number)
+        track = store.track(number)
+        known, shape = track.T_sensor_object, whole_shape(track)
         if known is None or shape is None:
             raise BadInputError(
-                f"{store.named}: track {store.names[number]} has no true poses or shape; the oracle"
+                f"{store.named}: track {track.name} has no true poses or shape; the oracle"
                 " needs both."
             )
         own = known[torch.from_numpy(scans - starts[number])].to(torch.float32)
