@@ -140,6 +140,15 @@ def test_a_finished_run_is_left_as_it_is(plane_store, tmp_path):
     assert [file.read_bytes() for file in files] == before
 
 
+def test_a_finished_run_that_lost_its_model_writes_it_again(plane_store, tmp_path):
+    fit_dpc(setup_dpc(tiny("dpc-small", 1), plane_store, tmp_path))
+    before = load_file(tmp_path / MODEL)
+    (tmp_path / MODEL).unlink()
+    fit_dpc(setup_dpc(tiny("dpc-small", 1), plane_store, tmp_path, resume=True))
+    found = load_file(tmp_path / MODEL)
+    assert all(torch.equal(before[key], found[key]) for key in before)
+
+
 def test_two_kinds_of_sensor_are_refused(planes, cars, tmp_path):
     with StoreWriter(tmp_path / "store", {}) as writer:
         writer.add(replace(planes[0], name="plane"))

@@ -106,7 +106,7 @@ def fit_dpc(
         BadInputError: the loss is not finite; the last checkpoint stays.
     """
     state, save = run.state, partial(_save, run)
-    if state.step >= run.recipe.optim.steps:
+    if state.step >= run.recipe.optim.steps and (run.folder / MODEL).is_file():
         return
     device = next(state.network.parameters()).device
     objective = DpcObjective(state.network, run.recipe.loss)
