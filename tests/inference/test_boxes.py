@@ -42,20 +42,27 @@ def test_what_little_sticks_out_is_no_part_of_a_body():
     torch.testing.assert_close(fitted.size, SIZE, atol=0.02, rtol=0)
     whole = fit_to_scans(shape, [scan], mirror=True, body=False)
     assert whole.size.tolist() == pytest.approx((4.0, 2.1, 1.5), abs=0.02)
+    seen_alone = fit_to_scans(surface(), [scan], mirror=True, body=False)
+    assert seen_alone.size.tolist() == pytest.approx((4.0, 2.1, 1.5), abs=0.02)
 
 
 def test_where_a_scan_ends_beyond_the_shape_the_box_ends_with_it_on_both_sides_of_the_mirror():
     wide = surface(300, seed=1) * torch.tensor((1.0, 1.1, 1.0), dtype=torch.float64)
-    left = wide[wide[:, 1] > 0]
-    fitted = fit_to_scans(surface(), [left], mirror=True)
-    assert fitted.size.tolist() == pytest.approx((4.0, 1.98, 1.5), abs=0.02)
-    assert fitted.centre.tolist() == pytest.approx((0, 0, 0), abs=0.02)
+    left, right = wide[wide[:, 1] > 0], wide[wide[:, 1] < 0]
+    for side in (left, right):
+        fitted = fit_to_scans(surface(), [side], mirror=True)
+        assert fitted.size.tolist() == pytest.approx((4.0, 1.98, 1.5), abs=0.02)
+        assert fitted.centre.tolist() == pytest.approx((0, 0, 0), abs=0.02)
     one_sided = fit_to_scans(surface(), [left], mirror=False)
     assert float(one_sided.size[1]) == pytest.approx(1.89, abs=0.05)
 
 
-def test_a_stray_point_far_outside_is_not_believed():
-    scan = torch.cat((surface(200, seed=1), torch.tensor([[0.0, 0.0, 9.0]], dtype=torch.float64)))
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("side", [-9.0, 9.0])
+def test_a_few_strays_far_outside_are_not_believed(axis, side):
+    strays = torch.zeros(10, 3, dtype=torch.float64)
+    strays[:, axis] = side
+    scan = torch.cat((surface(200, seed=1), strays))
     fitted = fit_to_scans(surface(), [scan], mirror=True)
     torch.testing.assert_close(fitted.size, SIZE, atol=0.03, rtol=0)
 

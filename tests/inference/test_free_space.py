@@ -83,10 +83,26 @@ def test_free_space_costs_each_hypothesis_its_own_however_the_scan_is_turned() -
         inputs = (centred[None], (turn @ centre)[None], posed[None], PolarBins())
         seen = SeenScores(sights, turn[None])(*inputs)
         assert seen.free_space is not None
-        expected = (CONFIG.free_m * 0.5, 0.0)
-        assert seen.free_space[0].tolist() == pytest.approx(expected, abs=0.05 * CONFIG.free_m)
+        half, none = seen.free_space[0].tolist()
+        assert half == pytest.approx(CONFIG.free_m * 0.5, abs=0.05 * CONFIG.free_m)
+        assert none == pytest.approx(0.0, abs=0.05 * CONFIG.free_m)
         paid = seen.cost(0.25) - (seen.observation + 0.25 * seen.projection)
         torch.testing.assert_close(paid, seen.free_space)
+
+
+def test_what_a_shape_itself_hides_counts_no_more_with_rays_than_without() -> None:
+    y, z = np.meshgrid(np.linspace(-2, 2, 41), np.linspace(-1, 1, 21))
+    plane = np.stack((np.full(y.size, 10.0), y.ravel(), z.ravel()), -1).astype(np.float32)
+    ends = plane * np.where(plane[:, 1:2] > 0, 0.5, 2.0).astype(np.float32)
+    scan = np.array([[10.0, 9.0, 0.0]] * 16, np.float32)
+    centre = torch.tensor((10.0, 0.0, 0.0))
+    sights = Sights([scan], [SightLines.of_returns(ends)], CONFIG)
+    scored = []
+    for shape in (plane, np.concatenate((plane, plane * np.float32(1.3)))):
+        centred, posed = (torch.from_numpy(one) - centre for one in (scan, shape))
+        inputs = (centred[None], centre[None], posed[None, None], PolarBins())
+        scored.append(float(SeenScores(sights, torch.eye(3)[None])(*inputs).projection))
+    assert scored[1] == pytest.approx(scored[0], rel=1e-5)
 
 
 def test_looks_one_by_one_keep_their_rays(track: Track) -> None:

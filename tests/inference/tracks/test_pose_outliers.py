@@ -47,6 +47,13 @@ def test_quarter_turns_are_found_and_put_back_on_the_way(rows):
     assert torch.equal(without_outliers(given).translation[kept], true.translation[kept])
 
 
+def test_the_nearer_neighbour_that_is_right_gives_its_attitude():
+    true = passing()
+    found = without_outliers(gone_astray(true, [3, 4]))
+    torch.testing.assert_close(found.rotation[3], true.rotation[2])
+    torch.testing.assert_close(found.rotation[4], true.rotation[5])
+
+
 def test_a_steady_track_stays_as_it_is():
     true = passing()
     assert without_outliers(true) is true
