@@ -49,6 +49,15 @@ def test_height_and_tilt_of_a_sensor_come_from_the_ground():
     SE3.from_matrix(turn.matrix)  # a rotation
 
 
+def test_what_is_seen_of_a_cluster_is_the_middle_and_size_of_its_extent():
+    many = np.array(((0, 0, 0), (0.5, 0, 0), (1, 0.2, 0), (4, 2, -1.5)), np.float32)
+    seen = Seen.of(7, [many, many[:1]])
+    assert seen.tick == 7
+    np.testing.assert_allclose(seen.centres, ((2, 1, -0.75), (0, 0, 0)), atol=1e-6)
+    np.testing.assert_allclose(seen.sizes, ((4, 2, 1.5), (0, 0, 0)), atol=1e-6)
+    assert Seen.of(7, []).centres.shape == (0, 3)
+
+
 @pytest.mark.parametrize("up", [(0.0, 0.0, -1.0), (0.0, 0.5, 0.5), (1.0, 0.0, 0.0)])
 def test_what_is_no_vertical_is_refused(up):
     with pytest.raises(ValueError, match="the vertical is"):

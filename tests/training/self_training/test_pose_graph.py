@@ -6,9 +6,12 @@ import pytest
 import torch
 from tests.cars import drive_by, poses_of
 
-from wildshape.geometry.transforms.rotation import rotation_from_quaternion
+from wildshape.geometry.transforms.rotation import (
+    rotation_from_quaternion,
+    rotation_from_vector,
+)
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.training.self_training.pose_graph import Edges, refine_by_graph, solve
+from wildshape.training.self_training.pose_graph import Edges, _twist, refine_by_graph, solve
 
 
 def shaken(poses, degrees=2.0, metres=0.15, seed=0):
@@ -74,3 +77,12 @@ def test_too_little_to_lay_on_each_other_changes_nothing():
     poses = poses_of(track)
     assert refine_by_graph(few, poses) is poses
     assert refine_by_graph(few[:1], poses[:1]) is not None
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-3, 1.0, 3.1])
+def test_a_residual_is_in_radians_and_metres(angle):
+    """So that what is trusted to half a degree and 3 cm weighs as such."""
+    vector = angle * torch.tensor(((0.6, -0.48, 0.64),), dtype=torch.float64)
+    shift = torch.tensor(((1.0, 2.0, 3.0),), dtype=torch.float64)
+    found = _twist(SE3(rotation_from_vector(vector), shift))
+    torch.testing.assert_close(found, torch.cat((vector, shift), -1), atol=1e-10, rtol=1e-9)
