@@ -72,7 +72,7 @@ def test_free_space_costs_each_hypothesis_its_own_however_the_scan_is_turned() -
     y, z = np.meshgrid(np.linspace(-2, 2, 41), np.linspace(-1, 1, 21))
     plane = np.stack((np.full(y.size, 10.0), y.ravel(), z.ravel()), -1).astype(np.float32)
     ends = plane * np.where(plane[:, 1:2] > 0, 0.5, 2.0).astype(np.float32)
-    behind = np.abs(plane) + np.float32((0.0, 0.05, 0.0))
+    behind = np.abs(plane) + np.array((0.0, 0.05, 0.0), np.float32)
     scan = np.array([[10.0, 9.0, 0.0]] * 16, np.float32)
     centre = torch.tensor((10.0, 0.0, 0.0))
     sights = Sights([scan], [SightLines.of_returns(ends)], CONFIG)

@@ -35,7 +35,7 @@ def test_a_share_of_the_way_is_that_share_of_the_turn(angle, share, start):
 
 def test_between_a_pose_and_itself_is_that_pose():
     """Also where a quaternion times itself is rounded to more than 1."""
-    for first in Rotation.random(50, random_state=0):
-        same = pose(first, (1.0, 2.0, 3.0))
+    for vector in np.random.default_rng(0).normal(size=(50, 3)):
+        same = pose(Rotation.from_rotvec(vector), (1.0, 2.0, 3.0))
         middle = between(same, same, 0.5)
         assert middle.matrix.numpy() == pytest.approx(same.matrix.numpy(), abs=1e-9)
