@@ -46,13 +46,16 @@ def test_what_little_sticks_out_is_no_part_of_a_body():
     assert seen_alone.size.tolist() == pytest.approx((4.0, 2.1, 1.5), abs=0.02)
 
 
-def test_where_a_scan_ends_beyond_the_shape_the_box_ends_with_it_on_both_sides_of_the_mirror():
+def test_where_a_scan_ends_beyond_the_shape_a_body_ends_with_it_on_the_side_seen_alone():
     wide = surface(300, seed=1) * torch.tensor((1.0, 1.1, 1.0), dtype=torch.float64)
     left, right = wide[wide[:, 1] > 0], wide[wide[:, 1] < 0]
-    for side in (left, right):
+    for side, towards in ((left, 0.045), (right, -0.045)):
         fitted = fit_to_scans(surface(), [side], mirror=True)
-        assert fitted.size.tolist() == pytest.approx((4.0, 1.98, 1.5), abs=0.02)
-        assert fitted.centre.tolist() == pytest.approx((0, 0, 0), abs=0.02)
+        assert fitted.size.tolist() == pytest.approx((4.0, 1.89, 1.5), abs=0.02)
+        assert fitted.centre.tolist() == pytest.approx((0, towards, 0), abs=0.02)
+        whole = fit_to_scans(surface(), [side], mirror=True, body=False)
+        assert whole.size.tolist() == pytest.approx((4.0, 1.98, 1.5), abs=0.02)
+        assert whole.centre.tolist() == pytest.approx((0, 0, 0), abs=0.02)
     one_sided = fit_to_scans(surface(), [left], mirror=False)
     assert float(one_sided.size[1]) == pytest.approx(1.89, abs=0.05)
 

@@ -4,7 +4,8 @@
 
 Labels are of the body: mirrors, aerials and stray points stick out of it. They are few, on the
 shape and in a scan, and do not count at the ends and sides. A decoder draws towards what is usual:
-where more of a scan than that lies outside of the shape, the box ends where the scan does.
+where more of a scan than that lies outside of the shape, the box ends where the scan does. Of a
+LiDAR this is of the side seen alone: reflected, it would count the mirror plane's error twice.
 """
 
 from collections.abc import Iterable
@@ -58,11 +59,13 @@ def fit_to_scans(
         seen: points `(n, 3)` of each scan in that frame. Those far outside the shape's own box are
             strays. Of every four scans the one that reaches furthest is not believed.
         mirror: the object is symmetric in the plane y = 0.
-        body: what little sticks out does not count, as of a vehicle; of an aeroplane wings do.
+        body: what little sticks out does not count, as of a vehicle; of an aeroplane wings do, and
+            what was seen of one side, by an exact camera, is believed of the other.
         config: what is not believed.
     """
     exact = shape.double()
     axes = _level(exact, config) if mirror else fit_box(exact).rotation
+    reflect = mirror and not body
     config = config if body else replace(config, shape_share=0.0, seen_share=0.0)
     low, high = _ends(_rows(exact, axes), config)
     reach = config.reach * (high - low).norm()
@@ -70,13 +73,13 @@ def fit_to_scans(
     for points in seen:
         scans += 1
         rows = _rows(points.double(), axes)
-        if mirror:
+        if reflect:
             rows[1].abs_()
         near = rows[:, ((rows > (low - reach)[:, None]) & (rows < (high + reach)[:, None])).all(0)]
         if near.shape[1]:
             begins, ends = _seen_ends(near, config)
             highs.append(ends)
-            lows.append(_reflected(begins, ends) if mirror else begins)
+            lows.append(_reflected(begins, ends) if reflect else begins)
     rank = min(scans // config.scans_a_witness, len(lows) - 1)
     low = torch.minimum(low, torch.stack(lows).sort(0).values[rank])
     high = torch.maximum(high, torch.stack(highs).sort(0).values[-1 - rank])

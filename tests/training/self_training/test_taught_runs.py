@@ -76,6 +76,7 @@ def test_true_targets_are_the_truth(car_store, cars):
 
 def test_a_partial_shape_is_taught_with_its_reflection(tmp_path):
     car = drive_by(scans=3)
+    assert car.shape is not None
     seen = car.shape[car.shape[:, 1] > 0.2]
     with StoreWriter(tmp_path / "store", {}) as writer:
         writer.add(replace(car, shape=seen, shape_kind="partial"))
