@@ -112,6 +112,7 @@ def run_to_end(
     state = loop.state
     while state.step < loop.plan()[0]:
         loop.take()
+        state.drop_faded()
         now, (steps, save_every) = state.step, loop.plan()
         due = now < steps and now % save_every == 0
         stop = now < steps and stopped()
