@@ -10,8 +10,8 @@ that an Apache-2.0 file may be made from. RUN/weights holds what is shipped, and
 `--device cuda` trains on a GPU. With `--start WEIGHTS` the last round alone is trained: they teach
 it, and it goes on from them. A trial (`--share 0.01`) has a folder of its own in RUN.
 The same command goes on with a run that was stopped; what is finished is not made again. RUN holds
-the weights of each finished round, `<round>.safetensors`: copied to another machine's RUN, they are
-not trained again there.
+the weights of each finished round, `<round>.safetensors`: copied to another machine's RUN, that
+round and those before it are not trained again there.
 """
 
 from dataclasses import dataclass, replace
@@ -148,6 +148,13 @@ class Settings:
         return names if self.start is None else names[-1:]
 
     @property
+    def unfinished(self) -> tuple[str, ...]:
+        """The rounds after the last one that is finished; each asks for the one before it alone."""
+        names = self.rounds
+        done = [number for number, name in enumerate(names) if self.finished(name).exists()]
+        return names[max(done) + 1 :] if done else names
+
+    @property
     def command(self) -> str:
         """That makes such weights."""
         share = "" if self.share == 1 else f" --share {self.share:g}"
@@ -179,7 +186,7 @@ def main(settings: Settings) -> None:
     weights.mkdir(parents=True, exist_ok=True)
     write_text(weights / "NOTICE", notice(settings.cad))
     if "default" in settings.only:
-        for name in settings.rounds:
+        for name in settings.unfinished:
             trained(name, settings)
         _shipped(settings.finished(settings.rounds[-1]), settings, "vehicle")
     for category in VIEWS:
@@ -188,9 +195,7 @@ def main(settings: Settings) -> None:
 
 
 def trained(name: str, settings: Settings) -> None:
-    """A round's weights, in half precision: made now or resumed, unless they are there."""
-    if settings.finished(name).exists():
-        return
+    """A round's weights, in half precision: made now or resumed."""
     of, folder = ROUNDS[name], settings.out / name
     steps = settings.part(of.steps)
     with TERMINAL.bar(f"round {name}: fusing tracks", 0) as bar:

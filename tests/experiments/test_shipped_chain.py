@@ -57,9 +57,10 @@ def test_a_trial_leaves_nothing_that_a_full_run_takes_for_its_own(cad, tmp_path,
     assert kept[-1] == tmp_path / f"{LAST}.safetensors"
 
 
-def test_a_finished_round_of_another_machine_is_not_trained_again(cad, tmp_path, monkeypatch):
-    weights = Settings(tmp_path, cad).finished("first")
-    weights.write_bytes(b"kept")
-    monkeypatch.setattr(shipped_chain, "setup", None)
-    trained("first", Settings(tmp_path, cad))
-    assert weights.read_bytes() == b"kept"
+def test_a_finished_round_and_those_before_it_are_not_trained_again(cad, tmp_path, monkeypatch):
+    asked, settings = [], Settings(tmp_path, cad, only=("default",))
+    settings.finished("second").write_bytes(b"of another machine")
+    monkeypatch.setattr(shipped_chain, "trained", lambda name, of: asked.append(name))
+    monkeypatch.setattr(shipped_chain, "_shipped", lambda *of: None)
+    shipped_chain.main(settings)
+    assert asked == ["main", LAST]
