@@ -41,7 +41,7 @@ from wildshape.drives.tracking.segmentation import Cutter, read_cuts
 from wildshape.drives.tracking.sightings import Sightings, read_sightings, write_sightings
 from wildshape.drives.tracking.static_tracks import joined_where_they_stand
 from wildshape.drives.tracking.tracks import linked_clusters
-from wildshape.drives.tracking.trajectory import Breaks, find_trajectory, jumps
+from wildshape.drives.tracking.trajectory import FIRST_SCANS, Breaks, find_trajectory, jumps
 from wildshape.drives.writing.folder import FRAMES, TRAJECTORY
 from wildshape.drives.writing.outputs import (
     RayWriter,
@@ -57,8 +57,6 @@ from wildshape.io.atomic import write_json
 from wildshape.io.guard import read_record
 from wildshape.io.poses import read_poses
 from wildshape.parallel.team import Team
-
-_FIRST_SCANS = 3  # tell whether points have times
 
 
 @dataclass(frozen=True)
@@ -224,7 +222,7 @@ class Pipeline:
     def turns(self, objects: list[Sightings], T_level_sensor: SE3) -> Turns:
         """The sensor's turns, in their sense where points have no times."""
         found = Turns(self.drive.ticks, T_level_sensor, breaks=self.breaks.frames)
-        first = range(min(_FIRST_SCANS, len(self.drive)))  # one alone may be empty
+        first = range(min(FIRST_SCANS, len(self.drive)))  # one alone may be empty
         if all(self.drive.turn(frame).seconds is None for frame in first):
             shown = ((one.frames, one.boxes) for one in self.completed(objects, found))
             found = with_sense(found, shown, self.config.turns)

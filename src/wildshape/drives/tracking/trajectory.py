@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from kiss_icp.kiss_icp import KissICP
 
 _FEWEST_POINTS = 100
-_FIRST_SCANS = 3  # tell the motion at the beginning
+FIRST_SCANS = 3  # tell the motion at the beginning, and whether points have times
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def find_trajectory(
     if turns is None:
         turns = (_landmarks_of(drive.turn(frame), mounting, config) for frame in range(len(drive)))
     rest = iter(turns)
-    first = list(islice(rest, _FIRST_SCANS))
+    first = list(islice(rest, FIRST_SCANS))
     motion = STANDING
     if any(turn.seconds is not None for turn in first):  # the first scan may be empty
         motion = _follow(drive, first, config, motion)[1].motion

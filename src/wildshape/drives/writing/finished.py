@@ -34,17 +34,19 @@ from wildshape.drives.writing.folder import (
 from wildshape.errors import BadInputError
 from wildshape.geometry.footprint import upright_places
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.bags.storages import STORAGES
 from wildshape.io.boxes.detections import poses_of
 from wildshape.io.boxes.table import BoxRow, read_box_table
 from wildshape.io.guard import read_json, read_record, reading
 from wildshape.io.output import MARKER, file_name
+from wildshape.io.packets.reader import SUFFIXES
 from wildshape.io.poses import read_poses, read_tum
 from wildshape.io.scans.points import read_points
 from wildshape.records import Box, Points, as_text
 
 _LATEST_S = 9e9  # nanoseconds of it fit into 64 bits
 _BEHIND = 0.49  # of a turn before or after its middle: it may be the turn's end or its beginning
-_FILES = (".bag", ".db3", ".mcap", ".pcap", ".pcapng")  # recordings that are one
+_FILES = (*STORAGES, *SUFFIXES)  # recordings that are one
 _PERIOD_S = 0.1  # of a scan, where no times are known
 
 

@@ -13,7 +13,7 @@ from wildshape.io.packets.ouster import OusterTurns, open_ouster
 from wildshape.io.packets.velodyne import VelodyneTurns, open_velodyne
 from wildshape.records import Turn
 
-_SUFFIXES = (".pcap", ".pcapng")
+SUFFIXES = (".pcap", ".pcapng")
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class PacketFile:
 
 def is_packet_file(path: Path) -> bool:
     """Whether a file is a recording of packets, by its suffix."""
-    return path.suffix.lower() in _SUFFIXES and path.is_file()
+    return path.suffix.lower() in SUFFIXES and path.is_file()
 
 
 def open_packets(path: Path) -> PacketFile:
