@@ -11,9 +11,8 @@ import pytest
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
-from wildshape.inference.folders import complete_folder as results
+from wildshape.io.scans import writers
 from wildshape.io.scans.points import read_points, write_ply
-from wildshape.io.scans.writers import write_cloud
 
 
 @pytest.fixture
@@ -234,14 +233,16 @@ def test_output_of_other_settings_is_not_mixed_in(refused, dataset, trained, tmp
 
 
 def test_full_disk(wildshape, dataset, trained, tmp_path, monkeypatch):
+    write = writers.write_cloud
+
     def full(path, points):
         if path.name == "000002.ply":
             raise OSError(errno.ENOSPC, "No space left on device", str(path))
-        write_cloud(path, points)
+        write(path, points)
 
     command = ("complete", dataset, "--out", tmp_path / "c", "--model", trained)
     with monkeypatch.context() as patch:
-        patch.setattr(results, "write_cloud", full)
+        patch.setattr(writers, "write_cloud", full)
         found = wildshape(*command)
     assert found.code == 1
     assert "no space left" in found.err

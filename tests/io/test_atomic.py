@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
 import json
+import os
 import stat
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -81,3 +84,17 @@ def test_a_folder_in_the_way_is_named(tmp_path: Path) -> None:
 def test_names_that_are_no_utf8_are_spelt_out(tmp_path: Path) -> None:
     write_text(tmp_path / "a.html", "caf\udce9")
     assert (tmp_path / "a.html").read_text("utf-8") == "caf\\udce9"
+
+
+def test_threads_that_write_at_once_leave_the_umask_as_it_was(tmp_path: Path) -> None:
+    before, often = os.umask(0o077), sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)  # else threads hardly ever meet
+    try:
+        with ThreadPoolExecutor(8) as threads:
+            list(threads.map(lambda i: write_text(tmp_path / str(i), ""), range(200)))
+        after = os.umask(0o077)
+    finally:
+        os.umask(before)
+        sys.setswitchinterval(often)
+    assert after == 0o077
+    assert {stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()} == {0o600}

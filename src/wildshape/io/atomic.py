@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from threading import Lock
 from typing import IO
 
 from wildshape.errors import BadInputError
@@ -24,6 +25,7 @@ except ImportError:  # Windows
     fcntl = None
 
 _TAKEN = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES)
+_MASK = Lock()  # between setting and setting back, another thread would read what is set
 _held: dict[tuple[int, int], int] = {}
 
 
@@ -86,8 +88,9 @@ def write_json(path: Path | str, data: object) -> None:
 
 def _umask() -> int:
     """The process's file mode mask, which can only be read by setting it."""
-    mask = os.umask(0o022)
-    os.umask(mask)
+    with _MASK:
+        mask = os.umask(0o022)
+        os.umask(mask)
     return mask
 
 

@@ -35,7 +35,7 @@ from wildshape.io.atomic import write_json
 from wildshape.io.boxes.detections import moved
 from wildshape.io.output import file_name
 from wildshape.io.poses import write_poses
-from wildshape.io.scans.points import write_ply
+from wildshape.io.scans.writers import cloud_writer
 from wildshape.records import Completion, Points
 
 RULED_OUT, CATEGORY = "ruled_out.json", "car"
@@ -224,8 +224,9 @@ class Completer:
             done = [_carried(one, self.T_level_sensor.inverse()) for one in done]
         track = chosen.track(self.cuts, self.drive, CATEGORY)
         folder = self.folder / chosen.name
-        for name, one in zip(track.scan_names, done, strict=True):
-            write_ply(folder / COMPLETED / f"{file_name(name)}.ply", one.points)
+        with cloud_writer() as write:
+            for name, one in zip(track.scan_names, done, strict=True):
+                write(folder / COMPLETED / f"{file_name(name)}.ply", one.points)
         write_poses(folder / POSES, stack([one.pose for one in done]))
         said = objects_of(track, done, self.predictor, self.cuts, together=True)
         write_json(folder / OBJECTS, said)  # last: it says that the object is done

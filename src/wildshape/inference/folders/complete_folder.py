@@ -30,12 +30,12 @@ from wildshape.io.scans.writers import (
     MESH_FORMATS,
     CloudFormat,
     MeshFiles,
-    write_cloud,
+    cloud_writer,
     write_mesh,
 )
 from wildshape.method.checkpoint import fingerprint, weights_file
 from wildshape.parallel.team import team
-from wildshape.records import Completion, Points, Track
+from wildshape.records import Completion, Track
 
 COMPLETED, MESH = "completed", "mesh"
 OBJECTS, POSES = "objects.json", "poses.txt"
@@ -256,17 +256,16 @@ class _PartCompleter:
         done = self.predictor.complete_checked(
             track.scans, track.sensor, track=self.together, rays=track.rays
         )
-        bare = []
-        for name, scan, one in zip(track.scan_names, track.scans, done):
-            self._write(self.out / file_name(track.name), file_name(name), scan, one)
-            bare.append(replace(one, points=one.points[:0].copy()))
+        bare, folder = [], self.out / file_name(track.name)
+        with cloud_writer() as write:
+            for scan_name, scan, one in zip(track.scan_names, track.scans, done):
+                name = file_name(scan_name)
+                write(folder / COMPLETED / f"{name}.{self.clouds}", one.points)
+                if self.mesh is not None:
+                    seen = scan if self.mesh.coloured else None
+                    write_mesh(folder / MESH / f"{name}.{self.mesh.kind}", one.mesh(seen))
+                bare.append(replace(one, points=one.points[:0].copy()))
         return replace(part, track=replace(track, scans=(), rays=())), bare
-
-    def _write(self, folder: Path, name: str, scan: Points, done: Completion) -> None:
-        write_cloud(folder / COMPLETED / f"{name}.{self.clouds}", done.points)
-        if self.mesh is not None:
-            seen = scan if self.mesh.coloured else None
-            write_mesh(folder / MESH / f"{name}.{self.mesh.kind}", done.mesh(seen))
 
 
 def _whole_tracks(
