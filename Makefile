@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
 #   make demo [DATA=folder]   the whole way in five minutes, ending in demo/report.html
-#   make test                 lint, types, import floors, tests
+#   make test                 lint, types, import layers, tests
 #   make check                the first three alone; not repeated where no Python file has changed
 #   make bench                everything timed beside the alternatives, in five minutes; all bars
 #   make smoke                every benchmark at its smallest: whether it runs and agrees, no times

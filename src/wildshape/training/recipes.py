@@ -100,7 +100,7 @@ def views() -> Recipe:
 
 
 def default() -> Recipe:
-    """For a long run: `small` with more shape points and finer bins; the shipped weights' network.
+    """For a long run: `small` with more shape points and finer bins; as wide as the shipped weights'.
 
     Its widths are those of `small`, so that it can be trained without a GPU.
     """

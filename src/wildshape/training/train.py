@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple
 
 from wildshape.errors import BadInputError
 from wildshape.io.output import command_line, provenance
-from wildshape.io.progress import SILENT, Progress, duration
+from wildshape.io.progress import SILENT, Progress, counted, duration
 from wildshape.io.store.store import Store
 from wildshape.method.checkpoint import MODEL, load_checkpoint, weights_file
 from wildshape.ops.device import choose_device
@@ -105,7 +105,7 @@ def train(
         return _finished(run, out, 0.0, f"{out} was finished already")
     fit_with_progress(run, progress, stopping, resume=_resuming(options))
     seconds = time.monotonic() - began
-    text = f"trained {run.state.step - first} steps in {duration(seconds)}"
+    text = f"trained {counted(run.state.step - first, 'step')} in {duration(seconds)}"
     return _finished(run, out, seconds, text)
 
 

@@ -20,7 +20,7 @@ EXAMPLES = (
 )
 
 PRESETS = {
-    "default": "the shipped weights' network, 30,000 steps",
+    "default": "a network as wide as the shipped one, 30,000 steps",
     "small": "fewer points, 12,000 steps: 20 minutes at best",
     "views": "depth views of objects of unit size, 8,000 steps",
     "paper-lidar": "exactly the paper, LiDAR: 400,000 steps",
