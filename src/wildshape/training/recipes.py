@@ -100,9 +100,9 @@ def views() -> Recipe:
 
 
 def default() -> Recipe:
-    """For a long run: `small` with more shape points and finer bins; as wide as the shipped weights'.
+    """For a long run: `small` with more shape points and finer bins.
 
-    Its widths are those of `small`, so that it can be trained without a GPU.
+    Its widths are those of `small` and of the shipped weights: it can be trained without a GPU.
     """
     base = small()
     return replace(
