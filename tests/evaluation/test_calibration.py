@@ -22,6 +22,17 @@ def test_by_hand():
     assert calibration([], []) is None
 
 
+def test_equal_probabilities_give_one_figure_in_any_order():
+    """Bins of two: 0.5 and 0.5 of three equal ones with one right, then the third and 0.9."""
+    expected = (2 * abs(0.5 - 1 / 3) + abs(1.4 - 4 / 3)) / 4
+    for true in ([True, False, False], [False, True, False], [False, False, True]):
+        held = calibration([0.5, 0.5, 0.5, 0.9], [*true, True], bins=2)
+        assert held is not None
+        assert held.error == pytest.approx(expected)
+        backwards = calibration([0.9, 0.5, 0.5, 0.5], [True, *true], bins=2)
+        assert backwards == pytest.approx(held)
+
+
 def test_true_probabilities_hold():
     rng = np.random.default_rng(0)
     p = rng.uniform(size=20_000)

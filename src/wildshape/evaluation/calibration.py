@@ -30,7 +30,7 @@ class Held(NamedTuple):
 
 
 def calibration(stated: Numbers, true: Outcomes, bins: int = BINS) -> Held | None:
-    """Probabilities against what came true; None without any.
+    """Probabilities against what came true; None without any. Their order does not matter.
 
     Args:
         stated: 0 to 1.
@@ -42,7 +42,10 @@ def calibration(stated: Numbers, true: Outcomes, bins: int = BINS) -> Held | Non
     p, y = np.asarray(stated, np.float64), np.asarray(true, np.float64)
     order = np.argsort(p, kind="stable")
     parts = [part for part in np.array_split(order, bins) if len(part)]
-    apart = [len(part) * abs(p[part].mean() - y[part].mean()) for part in parts]
+    # A bin may end among equal ones: each counts as what came true of all of them.
+    _, at, count = np.unique(p, return_inverse=True, return_counts=True)
+    came = (np.bincount(at, y) / count)[at]
+    apart = [len(part) * abs(p[part].mean() - came[part].mean()) for part in parts]
     share = float(y.mean())
     return Held(sum(apart) / len(p), float(np.mean((p - y) ** 2)), share * (1.0 - share))
 
