@@ -53,13 +53,25 @@ def read_boxes(path: Path) -> list[LabelledBox]:
     """The boxes of a sequence in the file's order, regions that nobody cared to label left out.
 
     Raises:
-        BadInputError: the file is missing, or a line is not of KITTI tracking's format.
+        BadInputError: the file is missing, a line is not of KITTI tracking's format, or an object
+            has two boxes in a frame.
     """
     if not path.is_file():
         raise BadInputError(f"{path}: no such file; KITTI tracking's label archive brings it.")
     lines = path.read_text(errors="replace").splitlines()
     rows = [(f"{path}, line {i}", line.split()) for i, line in enumerate(lines, start=1)]
-    return [_box(words, where) for where, words in rows if words and words[2:3] != [_IGNORED]]
+    boxes, seen = [], set[tuple[int, int]]()
+    for where, words in rows:
+        if not words or words[2:3] == [_IGNORED]:
+            continue
+        box = _box(words, where)
+        if (box.frame, box.track) in seen:
+            raise BadInputError(
+                f"{where}: object {box.track} has a box in frame {box.frame} already; {_CURE}."
+            )
+        seen.add((box.frame, box.track))
+        boxes.append(box)
+    return boxes
 
 
 def _box(words: list[str], where: str) -> LabelledBox:
