@@ -162,3 +162,4 @@ def test_hull_area():
         (1, 1, 0), np.float32
     )
     assert 1 < hull_area(flat) < 2
+    assert hull_area(corners[:3]) == 0

@@ -280,6 +280,16 @@ def test_truth_is_accumulated_where_no_shape_is_given():
     assert run({"scan": OneScan()}, [drive_by(scans=2)])["scan"].completions[0].truth == "shape"
 
 
+def test_a_shape_of_few_points_is_measured_and_one_of_none_is_no_truth():
+    track = drive_by(scans=2)
+    assert track.shape is not None
+    three, none = (replace(track, shape=track.shape[:count]) for count in (3, 0))
+    scores = run({"scan": OneScan()}, [three])["scan"].completions
+    assert [(score.truth_points, score.cd_floor) for score in scores] == [(3, 0.0)] * 2
+    skipped = run({"scan": OneScan()}, [none])["scan"].skipped
+    assert {one.reason for one in skipped} == {"completion: no true shape"}
+
+
 @pytest.mark.parametrize("kind", ["partial", "mirrored"])
 def test_a_shape_made_of_scans_counts_as_none_would(kind):
     bare = replace(drive_by(scans=7), shape=None)

@@ -120,6 +120,8 @@ def _truth(track: Track, count: int) -> Truth | None:
         whole, partial = shape_mirrored(track), shape_partial(track)
     elif track.shape_kind == "partial":
         partial = track.shape
+    if not len(whole):
+        return None
     known = track.shape is not None and track.shape_kind == "whole"
     shape, box = _thin(whole, count), _true_box(track, whole)
     partial = None if partial is None else _thin(partial, count)

@@ -104,9 +104,14 @@ def registration_error(
 
 
 def hull_area(points: Points) -> float:
-    """Area of the convex hull, square metres: about a car's own surface (flat clouds: twice it)."""
+    """Area of the convex hull, square metres: about a car's own surface (flat clouds: twice it).
+
+    0 of fewer than four points, which have none.
+    """
     from scipy.spatial import ConvexHull
 
+    if len(points) < 4:
+        return 0.0
     # QJ: joggled input, so that flat clouds have a hull too; its random numbers have a fixed seed.
     return float(ConvexHull(np.asarray(points, dtype=float), qhull_options="QJ").area)
 
