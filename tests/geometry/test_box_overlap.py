@@ -125,3 +125,11 @@ def test_what_a_smaller_box_shares_is_a_part_of_it(angle, x, y):
     ):
         assert found == pytest.approx(shared / (3.0 * 1.5), abs=1e-6)
     assert footprint_overlap(place, (0.0, 0.0), place, other) == 0.0
+
+
+@pytest.mark.parametrize("size", [(0.0, 0.0), (0.0, 1.0), (2.0, 0.0)])
+def test_boxes_without_ground_share_none(size):
+    place, large, whole = np.zeros(4), np.array((0.1, 0.2, 0.0, 0.3)), (4.0, 1.8)
+    assert footprint_iou(place, size, large, whole) == 0.0
+    assert footprint_iou(large, whole, place, size) == 0.0
+    assert footprint_iou(place, size, place, size) == 0.0

@@ -37,6 +37,8 @@ def shared_ground(
     box: Place, size: Sequence[float], other: Place, other_size: Sequence[float]
 ) -> float:
     """Square metres that two boxes share in bird's eye view; see `footprint`."""
+    if not min(*size[:2], *other_size[:2]) > 0:
+        return 0.0  # no point is outside of a polygon that is one point
     return _area(_clipped(footprint(box, size), footprint(other, other_size)))
 
 
