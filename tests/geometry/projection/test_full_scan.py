@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from wildshape.geometry.projection.full_scan import FullScan, sight_lines
+from wildshape.geometry.projection.full_scan import FullScan, _Frustum, sight_lines
 
 
 def in_the_frustum(frame: np.ndarray, own: np.ndarray) -> np.ndarray:
@@ -54,6 +54,16 @@ def test_rays_beside_an_object_are_those_in_its_frustum(middle, half):
     assert len(some) == 50
     assert (np.diff(some) > 0).all()
     assert set(some) <= set(expected)
+
+
+def test_rays_beside_an_object_far_overhead_are_those_in_its_frustum():
+    """Steeper than 64 degrees axes towards an object are rolled against the sensor's."""
+    middle = np.array((12.3, -4.0, 27.4))
+    frame = (middle + np.random.default_rng(0).uniform(-6, 6, (40_000, 3))).astype(np.float32)
+    own = np.flatnonzero((np.abs(frame - frame.mean(0)) < (2.0, 0.5, 0.5)).all(1))
+    expected = np.setdiff1d(_Frustum.around(frame[own]).rows_within(frame), own)
+    assert len(expected) > 50
+    assert FullScan(frame).near(own, most=10**6).tolist() == expected.tolist()
 
 
 def test_rays_that_did_not_come_back_and_where_rays_began_are_kept():

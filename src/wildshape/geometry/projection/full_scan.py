@@ -165,7 +165,9 @@ class _Frustum(NamedTuple):
         `cos e sin a` to the left and `cos e cos a cos p - sin e sin p` ahead. The azimuth grows
         with a and changes one way with e, so corners are its extremes.
         """
-        ahead = self.axes[:, 0]
+        ahead, left = self.axes[:, 0], self.axes[:, 1]
+        if left[2] != 0:  # axes of what lies steeply are rolled, too
+            return None
         level = float(np.hypot(ahead[0], ahead[1]))
         pitch = np.array((self.low[1], self.high[1]))
         lean = np.tan(pitch) * ahead[2]
