@@ -161,6 +161,19 @@ def test_an_argoverse2_table_comes_back_as_the_labels_it_was_read_from(tmp_path)
     assert found.timestamps.max() == STAMPS[2]
 
 
+def test_categories_are_the_inputs_however_they_are_written(tmp_path):
+    box = Box((10.0, 0.0, 0.0), (4.0, 2.0, 1.0), (1.0, 0.0, 0.0, 0.0))
+    kinds = ("Car", "car", "Cyclist", "person_sitting", "Bus", "")
+    given = [Detection("a", 0, "7", 7, kind, "lidar", 0.5, box) for kind in kinds]
+    write_argoverse2_boxes(tmp_path / "a.feather", given)
+    found = feather.read_table(tmp_path / "a.feather").column("category").to_pylist()
+    vehicle = "REGULAR_VEHICLE"
+    assert found == [vehicle, vehicle, "CYCLIST", "PERSON_SITTING", "BUS", vehicle]
+    (file,) = write_kitti_labels(tmp_path, given, camera_at_the_lidar())
+    types = [line.split()[2] for line in file.read_text().splitlines()]
+    assert types == ["Car", "Car", "Cyclist", "Person_sitting", "Misc", "Misc"]
+
+
 @pytest.mark.parametrize("name", ["1700000000123456789", "315966265659927216"])
 def test_argoverse2_has_the_time_that_a_scan_is_named_by(name, tmp_path):
     scan = {"scan": name, "confidence": 0.5, "box": json.loads(_BOX)}

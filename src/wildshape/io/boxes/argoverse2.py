@@ -43,7 +43,7 @@ def write_argoverse2_boxes(
         )
         for i, name in enumerate(names)
     }
-    kinds = [_CATEGORIES.get(c, c.upper()) for c in (one.category for one in detections)]
+    kinds = [_CATEGORIES.get(c.lower(), c.upper()) for c in (one.category for one in detections)]
     table = pyarrow.table(  # every type is said, for a drive may have no vehicle
         {
             "timestamp_ns": pyarrow.array(list(map(_time, detections)), pyarrow.int64()),

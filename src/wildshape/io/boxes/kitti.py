@@ -16,7 +16,8 @@ from wildshape.io.atomic import write_text
 from wildshape.io.boxes.detections import Detection, moved, pose_of
 from wildshape.records import Box
 
-_TYPES = {"car": "Car", "van": "Van", "truck": "Truck"}
+_NAMES = ("Car", "Van", "Truck", "Pedestrian", "Person", "Person_sitting", "Cyclist", "Tram")
+_TYPES = {name.lower(): name for name in _NAMES}
 _UNKNOWN, _NO_IMAGE = "Misc", (-1.0, -1.0, -1.0, -1.0)
 _SIGNS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
 
