@@ -93,6 +93,20 @@ def test_the_way_is_as_true_where_the_first_scan_is_empty(simulated):
     assert off_behind < 2 * off
 
 
+@pytest.mark.parametrize(("stamped_s", "timed_s"), [(0.0999, 0.0), (0.0, 0.1)])
+def test_a_scan_that_is_late_does_not_make_the_sensor_race(simulated, stamped_s, timed_s):
+    """By its stamp, or by the times of its points: the next one seems to come at once."""
+    measured, _ = simulated
+    late = [float(frame == 2) for frame in range(SCANS)]
+    turns = [Turn(scan.points, scan.times + timed_s * late[i]) for i, scan in enumerate(measured)]
+    times = [scan.time + stamped_s * late[i] for i, scan in enumerate(measured)]
+    names = [f"{frame:06d}" for frame in range(SCANS)]
+    drive = Drive.of("street", names, turns.__getitem__, times)
+    way = find_trajectory(drive, find_mounting(drive, CONFIG.mounting), CONFIG)
+    assert way.breaks.frames == ()
+    assert way.T_world_sensor.translation.abs().max() < 1.2 * 15.0 * 0.1 * SCANS
+
+
 def test_scans_whose_times_cannot_be_used_are_told_of(simulated):
     measured, _ = simulated
 

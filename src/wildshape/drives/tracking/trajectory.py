@@ -144,7 +144,8 @@ def _follow(
     """Poses of the first frames, and the odometry after them; `motion`: before them.
 
     A turn is followed at its own middle, wherever in it the scan's stamp lies. About its first
-    point, an error of the speed would come back in the next step as large, and turned round.
+    point, an error of the speed would come back in the next step as large, and turned round. A
+    step takes half of what a turn lasts at least: stamps may be late.
     """
     odometry = _Odometry(config.trajectory, motion)
     poses, middle = [], 0.0
@@ -154,6 +155,7 @@ def _follow(
             middle = _middle(turn)
             odometry.count(turn, frame)
         since = _seconds(drive, frame) + middle - before if frame else 0.0
+        since = max(since, _lasts(turn) / 2)
         if frame and _steps_differ(drive, frame):
             odometry.expect(min(since, _longest_guess(drive, config.trajectory)))
         odometry.follow(_since(turn, middle).carried(odometry.motion), frame)
@@ -236,6 +238,11 @@ def _middle(turn: Turn) -> float:
     if turn.seconds is None:
         return 0.0
     return float(turn.seconds.min() + turn.seconds.max()) / 2
+
+
+def _lasts(turn: Turn) -> float:
+    """From the first point's time to the last one's; 0 where no times are known."""
+    return float(np.ptp(turn.seconds)) if turn.seconds is not None and len(turn.points) else 0.0
 
 
 def _since(turn: Turn, seconds: float) -> Turn:
