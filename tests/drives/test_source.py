@@ -180,6 +180,25 @@ def test_times_of_points_in_scan_files(tmp_path, suffix):
     assert turn.points[:, 0].tolist() == np.delete(rows["x"], 3).tolist()
 
 
+@pytest.mark.parametrize("begun", [0.0, -0.3, 1e9])
+@pytest.mark.parametrize("first", [-0.1, -0.05, 0.0])
+@pytest.mark.parametrize("on_clock", [True, False])
+def test_a_clock_that_began_just_now_counts_all_turns_alike(tmp_path, begun, first, on_clock):
+    """Whether a turn's first point is stamped, its middle or its last."""
+    head = "FIELDS x y z time\nSIZE 4 4 4 8\nTYPE F F F F\nPOINTS 200\nDATA binary\n"
+    times = [begun + 0.1 * frame for frame in range(8)]
+    for frame, time in enumerate(times):
+        rows = np.ones(200, [(name, "<f4") for name in ("x", "y", "z")] + [("time", "<f8")])
+        rows["time"] = np.linspace(0.0, 0.1, 200) + first + on_clock * time
+        (tmp_path / f"{frame}.pcd").write_bytes(head.encode() + rows.tobytes())
+    (tmp_path / "times.txt").write_text("".join(f"{time:.1f}\n" for time in times))
+    drive = open_drive(tmp_path)
+    for frame in range(8):
+        turn = drive.turn(frame)
+        assert turn.seconds is not None
+        assert turn.seconds[0] == pytest.approx(first, abs=1e-6)
+
+
 def test_frames_asked_for_last_are_read_once_and_as_many_are_kept_as_there_is_room_for():
     read = []
 

@@ -23,6 +23,7 @@ _LONGEST_PAUSE = 1e9  # scans; more are no count
 _MOMENT_S, _LONGEST_TURN_S = 0.01, 2.0
 # Places that tell recordings apart: of all files about, of each at least and at most; bytes.
 _PLACES, _FEWEST_PLACES, _MOST_PLACES, _SAMPLE_BYTES = 1024, 2, 64, 4096
+_CLOCK_BEGAN_S = 1.0  # ago; twice the longest turn that has times
 _NOTHING = Turn(np.empty((0, 3), np.float32))
 
 
@@ -111,7 +112,23 @@ class Drive:
             turn = self.read(frame)
         except BadInputError:
             return _NOTHING
-        return turn if self.times is not None else Turn(turn.points)
+        return Turn(turn.points) if self.times is None else self._timed(turn, self.times, frame)
+
+    def _timed(self, turn: Turn, times: tuple[float, ...], frame: int) -> Turn:
+        """A turn that begins as long before or after its scan's time as the others do.
+
+        On a clock that began just now, times of points look like times since their scan's own; the
+        scan that is farthest from then tells which they are.
+        """
+        surest = max(0, len(self) - 1, key=lambda one: abs(times[one]))
+        began = _begins(turn)
+        if began is None or frame == surest or not 0 < abs(times[frame]) < _CLOCK_BEGAN_S:
+            return turn
+        usual = _begins(self.turn(surest))
+        if turn.seconds is None or usual is None:
+            return turn
+        by = min(0.0, -times[frame], times[frame], key=lambda by: abs(began + by - usual))
+        return replace(turn, seconds=turn.seconds + by) if by else turn
 
     def scan(self, frame: int) -> Points:
         """A frame's points where they would be seen from the sensor's place at the scan's time.
@@ -142,6 +159,11 @@ class Drive:
         if self.times is None or len(self) < 2:
             return self  # how long a scan takes is not known
         return replace(self, motion=tuple(_motion(T_world_sensor, self.times)))
+
+
+def _begins(turn: Turn) -> float | None:
+    """When its first point was taken, since the scan's time, if that is known."""
+    return None if turn.seconds is None or not len(turn.seconds) else float(turn.seconds.min())
 
 
 def _contents(files: tuple[Path, ...]) -> tuple[int | str, ...]:
