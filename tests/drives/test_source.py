@@ -74,6 +74,22 @@ def test_a_missing_scan_is_counted_and_leaves_its_time_out(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("names", "ticks"),
+    [
+        (("scan_07", "scan_08", "scan_11"), (0, 1, 4)),
+        (("l-10.pcd", "l-20.pcd", "l-30.pcd", "l-50.pcd"), (0, 1, 2, 4)),
+        (("17.10", "17.20", "17.30", "18.30"), (0, 1, 2, 12)),
+        (("20260131_125958", "20260131_125959", "20260131_130000"), (0, 1, 2)),
+        (("a2", "b3", "b7"), (0, 1, 2)),
+    ],
+)
+def test_names_count_behind_what_they_share_but_not_the_time_of_day(tmp_path, names, ticks):
+    for name in names:
+        np.ones((50, 5), np.float32).tofile(tmp_path / f"{name}.bin")
+    assert open_drive(tmp_path).ticks == ticks
+
+
+@pytest.mark.parametrize(
     "numbers",
     [
         (10, 20, 30, 60),

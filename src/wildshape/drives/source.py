@@ -4,6 +4,7 @@
 
 import hashlib
 import json
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -17,6 +18,7 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.projection.full_scan import FullScan
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import Twist
+from wildshape.io.order import numbers_of
 from wildshape.records import Points, Turn, as_text
 
 _LONGEST_PAUSE = 1e9  # scans; more are no count
@@ -24,6 +26,7 @@ _MOMENT_S, _LONGEST_TURN_S = 0.01, 2.0
 # Places that tell recordings apart: of all files about, of each at least and at most; bytes.
 _PLACES, _FEWEST_PLACES, _MOST_PLACES, _SAMPLE_BYTES = 1024, 2, 64, 4096
 _CLOCK_BEGAN_S = 1.0  # ago; twice the longest turn that has times
+_DATED = re.compile(r".*[0-9]{6}[^0-9.][0-9.]+$")  # 20260131_235959: minutes have 60 seconds
 _NOTHING = Turn(np.empty((0, 3), np.float32))
 
 
@@ -214,8 +217,8 @@ def _ticks(
     """When each scan was taken, in scans since the first, and a sentence if some are missing."""
     if times is not None:
         ticks = _counted(np.diff(times))
-    elif all(name.isascii() and name.isdigit() for name in names):
-        ticks = _numbered(names)
+    elif numbers := _numbers(names):
+        ticks = _numbered(names, numbers)
     else:
         ticks = np.arange(len(names))
     missing = int(ticks[-1]) + 1 - len(names)
@@ -223,16 +226,24 @@ def _ticks(
     return tuple(ticks.tolist()), told
 
 
-def _numbered(names: tuple[str, ...]) -> Int[np.ndarray, "n"]:
+def _numbers(names: tuple[str, ...]) -> Sequence[int | float]:
+    """What names count, alone or behind what they share; none where a date is before the time."""
+    if all(name.isascii() and name.isdigit() for name in names):
+        return [int(name) for name in names]
+    return [] if any(_DATED.match(name) for name in names) else numbers_of(names)
+
+
+def _numbered(names: tuple[str, ...], numbers: Sequence[int | float]) -> Int[np.ndarray, "n"]:
     """Names that count scans one by one, or by tens, or are stamps of a clock.
 
     Raises:
         BadInputError: they do not rise.
     """
-    steps = np.array([int(after) - int(before) for before, after in pairwise(names)], np.float64)
-    if (steps < 1).any():
+    steps = np.array([after - before for before, after in pairwise(numbers)], np.float64)
+    if (steps <= 0).any():
         raise BadInputError(f"{names[0]} to {names[-1]}: scans share a number; rename them.")
-    return _counted(steps, 1.0 if (steps == 1).any() else None)
+    one_by_one = (steps == 1).any() and all(float(number).is_integer() for number in numbers)
+    return _counted(steps, 1.0 if one_by_one else None)
 
 
 def _counted(steps: Float[np.ndarray, "m"], one: float | None = None) -> Int[np.ndarray, "n"]:

@@ -23,11 +23,16 @@ def out_of_order(stems: Sequence[str]) -> int | None:
         The place of the first name whose successor has a smaller number; None where there is none,
         or where the names differ by more than a number at their end.
     """
+    numbers = numbers_of(stems)
+    return next((i for i, (one, other) in enumerate(pairwise(numbers)) if one > other), None)
+
+
+def numbers_of(stems: Sequence[str]) -> list[float]:
+    """The numbers at the end of names that differ by them alone; none of other names."""
     counts = [_COUNTED.fullmatch(stem) for stem in stems]
     if None in counts or len({count["before"] for count in counts if count}) > 1:
-        return None
-    numbers = [float(count["number"]) for count in counts if count]
-    return next((i for i, (one, other) in enumerate(pairwise(numbers)) if one > other), None)
+        return []
+    return [float(count["number"]) for count in counts if count]
 
 
 def check_counted(files: Sequence[Path]) -> None:
