@@ -185,6 +185,33 @@ def test_bad_tracks_and_empty_stores_are_refused(track: Track, tmp_path: Path) -
     assert len(open_store(tmp_path / "store")) == 1
 
 
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"T_sensor_object": SE3.identity(0)}, "0 poses do not fit"),
+        ({"T_sensor_object": SE3.identity()}, "3 poses do not fit"),  # one alone, not a batch
+        ({"T_sensor_object": SE3(torch.zeros(3, 3, 3), torch.zeros(3, 3))}, "no rotation"),
+        ({"T_sensor_object": SE3(torch.eye(3).expand(3, 3, 3), torch.ones(3, 3) / 0)}, "NaN"),
+        ({"label_size_m": (4.0, 0.0, 1.5)}, "label_size_m"),
+        ({"label_size_m": (4.0, np.nan, 1.5)}, "label_size_m"),
+        ({"scans": (np.zeros((5, 4), np.float32),) * 3}, "x, y, z"),
+        ({"scans": (np.full((5, 3), 1e300),) * 3}, "not finite"),
+    ],
+)
+def test_what_no_reader_would_take_is_refused_and_the_rest_is_kept(
+    changes: dict, said: str, track: Track, tmp_path: Path
+) -> None:
+    """A store of which one track has a box without a size was written, and never opened."""
+    bad = Track("bad", track.scans, track.scan_names)
+    vars(bad).update(changes)  # past the types, which are checked under pytest alone
+    with StoreWriter(tmp_path / "store", {}) as writer:
+        with pytest.raises(BadInputError, match=f"^track bad: .*{said}"):
+            writer.add(bad)
+        writer.add(track)
+    assert open_store(tmp_path / "store").names == ("car-1",)
+    open_store(tmp_path / "store").track(0)
+
+
 def _rewrite(path: Path, **changes) -> None:
     data = json.loads((path / "index.json").read_text())
     (path / "index.json").write_text(json.dumps(data | changes))

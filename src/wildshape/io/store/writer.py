@@ -98,7 +98,8 @@ class StoreWriter:
 
         Raises:
             BadInputError: a name that was added before, no scans, poses and names of another
-                length than the scans, or points that are not finite.
+                length than the scans, points that are not finite x, y, z, poses that are not
+                rigid, or a labelled box without a size.
             OSError: the disk is full.
         """
         self._check(track)
@@ -148,9 +149,11 @@ class StoreWriter:
         (self.path / WRITING_JSON).unlink(missing_ok=True)
 
     def _check(self, track: Track) -> None:
+        """Refuse what no reader would take: one such track and the store never opens again."""
         poses = track.T_sensor_object
-        lengths = {len(track.scans), len(track.scan_names), len(poses or track.scans)}
-        lengths.add(len(track.rays or track.scans))
+        lengths = {len(track.scans), len(track.scan_names), len(track.rays or track.scans)}
+        if poses is not None:
+            lengths.add(len(poses) if poses.translation.ndim == 2 else 0)
         if len(lengths) > 1 or not track.scans:
             raise BadInputError(
                 f"track {track.name}: {len(track.scans)} scans, {len(track.scan_names)} names, "
@@ -160,9 +163,26 @@ class StoreWriter:
         if track.name in self._names:
             raise BadInputError(f"two tracks are named '{track.name}'; rename one of them.")
         clouds = track.scans if track.shape is None else (*track.scans, track.shape)
-        if not all(is_finite(cloud) for cloud in clouds):  # a reader goes by the CRC alone
+        if any(cloud.shape != (len(cloud), 3) for cloud in clouds):
+            raise BadInputError(f"track {track.name}: points are x, y, z; leave out what is more.")
+        with np.errstate(over="ignore"):  # what float32 cannot hold is infinite
+            finite = all(is_finite(np.asarray(cloud, np.float32)) for cloud in clouds)
+        if not finite:  # a reader goes by the CRC alone
             raise BadInputError(f"track {track.name}: has points that are not finite; drop these.")
+        self._check_truth(track)
         self._names.add(track.name)
+
+    def _check_truth(self, track: Track) -> None:
+        size = track.label_size_m
+        if size is not None and not (len(size) == 3 and all(side > 0 for side in size)):
+            raise BadInputError(
+                f"track {track.name}: label_size_m is {size}, expected length, width and height."
+            )
+        if track.T_sensor_object is not None:
+            try:
+                SE3.from_matrix(track.T_sensor_object.matrix.detach().cpu())
+            except BadInputError as error:
+                raise BadInputError(f"track {track.name}: {error}") from error
 
     def _add_truth(self, poses: SE3 | None, shape: Float32[np.ndarray, "n 3"] | None) -> None:
         index = self._index
