@@ -212,6 +212,19 @@ def test_what_no_reader_would_take_is_refused_and_the_rest_is_kept(
     open_store(tmp_path / "store").track(0)
 
 
+def test_a_store_is_closed_once(
+    track: Track, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second time its index was written without the columns that lay on the disk."""
+    monkeypatch.setattr("wildshape.io.store.index._BUFFERED", 3)
+    with StoreWriter(tmp_path / "store", {}) as writer:
+        writer.add(track)
+        writer.close()
+        with pytest.raises(ValueError, match="closed"):
+            writer.add(replace(track, name="late"))
+    assert open_store(tmp_path / "store").names == ("car-1",)
+
+
 def _rewrite(path: Path, **changes) -> None:
     data = json.loads((path / "index.json").read_text())
     (path / "index.json").write_text(json.dumps(data | changes))

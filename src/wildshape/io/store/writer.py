@@ -80,6 +80,7 @@ class StoreWriter:
         self._points = 0
         self._shards: list[FileRecord] = []
         self._shard: _Shard | None = None
+        self._closed = False
 
     def __enter__(self) -> "StoreWriter":
         return self
@@ -101,7 +102,10 @@ class StoreWriter:
                 length than the scans, points that are not finite x, y, z, poses that are not
                 rigid, or a labelled box without a size.
             OSError: the disk is full.
+            ValueError: the store is closed.
         """
+        if self._closed:
+            raise ValueError(f"{self.path}: the store is closed.")
         self._check(track)
         index = self._index
         if self._shard is None:
@@ -129,12 +133,14 @@ class StoreWriter:
             self._end_shard()
 
     def close(self) -> None:
-        """Finish the store: last shard, index, and at last `index.json`.
+        """Finish the store: last shard, index, and at last `index.json`; once is enough.
 
         Raises:
             BadInputError: not a single track was added.
             OSError: the disk is full; the store stays half-written and is not opened.
         """
+        if self._closed:
+            return
         if not len(self):
             raise BadInputError(f"{self.path}: no track to store; check the source.")
         if self._shard is not None:
@@ -147,6 +153,7 @@ class StoreWriter:
         manifest = manifest_of(self._index.finish(), self._shards, counts, self._provenance)
         write_json(self.path / INDEX_JSON, manifest)
         (self.path / WRITING_JSON).unlink(missing_ok=True)
+        self._closed = True
 
     def _check(self, track: Track) -> None:
         """Refuse what no reader would take: one such track and the store never opens again."""
