@@ -28,11 +28,14 @@ SHAPES = [
 ]
 
 
-def by_sorting(query, target, k):
+def by_sorting(query, target, k, groups=None):
     """Nothing but the definition."""
     d2 = (query.double()[:, :, None] - target.double()[:, None]).square().sum(-1)
+    if groups is not None:
+        d2 = d2.masked_fill(groups[0][:, :, None] == groups[1][:, None], math.inf)
     order = d2.argsort(stable=True, dim=-1)[..., :k]
-    return d2.gather(-1, order), order
+    squared = d2.gather(-1, order)
+    return squared, order.masked_fill(squared.isinf(), 0)
 
 
 def test_plain_torch_is_a_sort():
@@ -71,6 +74,28 @@ def test_native_is_plain_torch(level, shape, grouped):
         own, plain = (way(query, target, k, *given, most) for way in (search, nearest_k_torch))
         assert torch.equal(own.index, plain.index)
         torch.testing.assert_close(own.distance_squared, plain.distance_squared)
+
+
+@needs_library
+@pytest.mark.parametrize("level", [0, 1, 2])
+def test_groups_that_lie_apart_find_each_other(level):
+    """Whole blocks are of one group, and are left out for its own queries alone."""
+    if level > widest():
+        pytest.skip("instruction set absent")
+    query, target = (torch.cat((part, part + 9.0), 1) for part in clouds(2, 50, 90, grid=True))
+    own, other = ((part[..., 0] > 5).long() for part in (query, target))
+    lone = (torch.arange(180) == 15).long().expand(2, -1)  # the last of its block
+    for some, groups in (
+        (target, (own, other)),
+        (target, (own, 1 - other)),
+        (target, (own * 0, other * 0)),
+        (target * 0, (own * 0, lone)),
+    ):
+        for k in (1, 4, 120):
+            squared, order = by_sorting(query, some, k, groups)
+            found = nearest_k_native(query, some, k, groups=groups, level=level)
+            assert torch.equal(found.distance_squared.double(), squared)
+            assert torch.equal(found.index, order)
 
 
 @needs_library

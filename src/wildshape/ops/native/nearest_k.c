@@ -41,6 +41,24 @@ static inline int apart(const k_search *search, int32_t query, int32_t target)
     return !search->query_group || search->query_group[query] != search->target_group[target];
 }
 
+/* Leave out blocks that hold nothing but the group that all queries of a tile are of: else each
+ * such tile would look into its whole group before it met another. */
+static void leave_out_own(const k_search *search, const cloud *queries, int64_t tile,
+                          const cloud *targets, float *bound)
+{
+    const int32_t *query = queries->order + tile * BLOCK;
+    for (int i = 1; i < BLOCK; i++)
+        if (search->query_group[query[i]] != search->query_group[query[0]])
+            return;
+    for (int64_t b = 0; b < targets->blocks; b++) {
+        int i = 0;
+        while (i < BLOCK && !apart(search, query[0], targets->order[b * BLOCK + i]))
+            i++;
+        if (i == BLOCK)
+            bound[b] = INFINITY;
+    }
+}
+
 /* Put a key among `k` in order; the largest falls out. No branch: it would be guessed wrongly. */
 static inline __attribute__((always_inline)) void insert_among(uint64_t *keys, int k, uint64_t key)
 {

@@ -61,6 +61,8 @@ TARGET static void NAME(search_k)(const cloud *queries, int64_t tile, const clou
     for (int i = 0; i < BLOCK * search->k; i++)
         keys[i] = key_of(search->most, -1);
     NAME(bounds)(queries, tile, targets, bound);
+    if (search->query_group)
+        leave_out_own(search, queries, tile, targets, bound);
     /* Near blocks first, so that the others are mostly out of reach. */
     for (int first = 0; first < FIRST || NAME(farthest)(&q) == FLT_MAX; first++) {
         const int64_t b = NAME(nearest_block)(bound, targets->blocks);
