@@ -14,17 +14,21 @@ from collections.abc import Callable
 from pathlib import Path
 from random import Random
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from wildshape.errors import BadInputError
 from wildshape.ops import library
 from wildshape.ops.column_argmax import column_argmax_native, column_argmax_torch
+from wildshape.ops.connected import connected_parts, first_of_cells, first_sorted
 from wildshape.ops.nearest import Neighbours, nearest, nearest_distance
+from wildshape.ops.nearest.nearest_k import nearest_k_native, nearest_k_torch
 from wildshape.ops.nearest.nearest_native import NativeDistance, nearest_both_native, nearest_native
 from wildshape.ops.nearest.nearest_torch import nearest_blocked, nearest_reference
 from wildshape.ops.planes import planes_native
 from wildshape.ops.point_to_plane import point_to_plane_native
+from wildshape.ops.spans import spans, spans_numpy
 from wildshape.ops.zbuffer.zbuffer_native import visible_native
 from wildshape.ops.zbuffer.zbuffer_torch import visible_reference
 
@@ -91,6 +95,41 @@ def call_nearest(random: Random) -> None:
     twin = random.choice((nearest_reference, nearest_blocked))
     equal(there, twin(a, b, n, m))
     equal(back, twin(b, a, m, n))
+
+
+def call_nearest_k(random: Random) -> None:
+    """In which order plain torch gives equal ones is not known: `test_nearest_k.py` has that."""
+    clouds = random.choice((0, 1, 1, 2))
+    a, b = cloud(random, clouds), cloud(random, clouds)
+    own, other = (torch.randint(random.choice((1, 1, 3)), part.shape[:2]) for part in (a, b))
+    groups = random.choice((None, (own, other)))
+    given = random.choice((1, 6, 8, 16, 17, b.shape[1] + 2)), sizes(random, a), sizes(random, b)
+    far = random.choice((torch.inf, 0.0, 2.0, 1e25))
+    torch.set_num_threads(random.choice((1, 3, 100)))
+    found = nearest_k_native(a, b, *given, groups, far, level=level(random))
+    torch.set_num_threads(1)
+    plain = nearest_k_torch(a, b, *given, groups, far)
+    assert torch.equal(found.distance_squared, plain.distance_squared)
+    assert ((found.index >= 0) & (found.index < max(b.shape[1], 1))).all()
+
+
+def call_connected(random: Random) -> None:
+    """Parts are for `test_connected.py`."""
+    points = (torch.randint(-9, 9, (most(random), 3)) * random.choice((1.0, 0.1, 1e6))).numpy()
+    cell, reach = random.choice((0.1, 1.0, 7.0)), random.choice((0.1, 1.0, 7.0))
+    pairs = np.random.default_rng(0).integers(max(len(points), 1), size=(len(points) // 9, 2))
+    part = connected_parts(points[::-1], reach, cell, pairs)
+    assert len(part) == len(points)
+    assert set(part.tolist()) == set(range(int(part.max(initial=-1)) + 1))
+    if len(points):
+        assert np.array_equal(first_of_cells(points, cell), first_sorted(points, cell))
+
+
+def call_spans(random: Random) -> None:
+    points = torch.randn(1 + most(random), 3).numpy()[:: random.choice((1, 2, -1))]
+    level_axes = torch.randn(2, random.choice((1, 7, 90)), dtype=torch.float64).numpy()
+    for found, expected in zip(spans(points, level_axes), spans_numpy(points, level_axes)):
+        assert np.array_equal(found, expected)
 
 
 def call_gradient(random: Random) -> None:
@@ -187,6 +226,9 @@ def call_wrongly(random: Random) -> None:
 KINDS = (
     call_nearest,
     call_nearest,
+    call_nearest_k,
+    call_connected,
+    call_spans,
     call_gradient,
     call_column_argmax,
     call_visible,

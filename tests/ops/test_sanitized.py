@@ -59,6 +59,9 @@ def test_random_calls_stay_in_bounds_and_agree_with_torch(sanitized):
     assert done.returncode == 0, done.stderr[-4000:]
     for kind in (
         "nearest",
+        "nearest_k",
+        "connected",
+        "spans",
         "gradient",
         "column_argmax",
         "visible",
