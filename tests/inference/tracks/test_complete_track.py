@@ -7,17 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.cars import car_surface, drive_by, poses_of
+from tests.cars import poses_of
+from tests.inference.tracks.known_car import (
+    TRACK,
+    completed,
+    each_turned,
+    together,
+    turned_around,
+)
 from tests.inference.tracks.spoilt import relative, spoilt
 from tests.models import CONFIG, SETTINGS
 
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3, stack
-from wildshape.inference.boxes import carried, fit_to_scans
 from wildshape.inference.config import InferenceConfig, TrackConfig
 from wildshape.inference.predictor import Predictor
 from wildshape.inference.refine import drawn_to, padded
-from wildshape.inference.tracks import complete_track as whole
 from wildshape.inference.tracks import joint_icp
 from wildshape.inference.tracks.heading_vote import (
     continuous_signs,
@@ -29,41 +34,6 @@ from wildshape.inference.tracks.heading_vote import (
     voted_signs,
 )
 from wildshape.method.network import ShapePoseNet
-from wildshape.records import Completion
-
-TRACK = drive_by(scans=7, step=2.0, heading=0.3, side=5.0)
-SHAPE = torch.from_numpy(car_surface(2000)[0])
-BOX = fit_to_scans(SHAPE, [], mirror=True)
-
-
-def completed(poses):
-    """As a network would that knows the car's shape, but not quite its pose."""
-    return [
-        Completion(
-            poses[i].apply(SHAPE).float().numpy(), poses[i], carried(BOX, poses[i]), 0.5, 0, 0.1
-        )
-        for i in range(len(poses))
-    ]
-
-
-def together(done, scans):
-    gathered = whole.Gathered(SETTINGS)
-    for item, scan in zip(done, scans):
-        gathered.add(item, scan)
-    return list(whole.complete_together(gathered))
-
-
-def turned_around(poses, rows):
-    back = poses @ half_turn(0.0)
-    return stack([back[i] if i in rows else poses[i] for i in range(len(poses))])
-
-
-def each_turned(track, generator):
-    """Every scan turned by its own yaw."""
-    yaw = 6.28 * torch.rand(len(track.scans), generator=generator, dtype=torch.float64)
-    turn = SE3(rotation_z(yaw), torch.zeros(len(yaw), 3, dtype=torch.float64))
-    scans = tuple(turn[i].apply_numpy(scan) for i, scan in enumerate(track.scans))
-    return replace(track, scans=scans, T_sensor_object=turn @ poses_of(track))
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -135,6 +105,15 @@ def test_a_scan_that_turned_and_fits_is_not_put_between_its_neighbours():
     true = turn @ poses_of(part)
     scans = [turn[i].apply_numpy(scan) for i, scan in enumerate(part.scans)]
     for i, item in enumerate(together(completed(true), scans)):
+        assert float(torch.rad2deg((true[i].inverse() @ item.pose).angle())) < 5.0
+
+
+def test_a_scan_that_fits_nowhere_as_it_is_is_put_between_its_neighbours():
+    """A quarter turn, which no vote sees and no fit mends."""
+    true = poses_of(TRACK)
+    quarter = SE3(rotation_z(torch.tensor(torch.pi / 2).double()), torch.zeros(3).double())
+    start = stack([true[i] @ quarter if i == 3 else true[i] for i in range(7)])
+    for i, item in enumerate(together(completed(start), TRACK.scans)):
         assert float(torch.rad2deg((true[i].inverse() @ item.pose).angle())) < 5.0
 
 

@@ -11,7 +11,18 @@ from tests.cars import drive_by, poses_of
 from tests.inference.tracks.spoilt import relative, spoilt
 
 from wildshape.inference.config import TrackConfig
-from wildshape.inference.tracks.joint_icp import refine_jointly, surface_normals
+from wildshape.inference.tracks import joint_icp
+from wildshape.inference.tracks.joint_icp import (
+    Surface,
+    _counterparts,
+    _disagreement,
+    fused_surface,
+    key_scans,
+    refine_checked,
+    refine_jointly,
+    surest,
+    surface_normals,
+)
 
 BOXY = drive_by(scans=9, step=2.0, heading=0.3, side=5.0)
 BODY, CABIN, SHIFT = np.array((2.1, 0.9, 0.7)), np.array((1.0, 0.75, 0.6)), (-0.4, 0.0, 0.6)
@@ -129,3 +140,89 @@ def test_the_normals_of_a_plane_and_a_sphere():
     sphere = 2 * torch.nn.functional.normalize(torch.randn(4000, 3, generator=generator), dim=1)
     cosine = (surface_normals(sphere) * sphere / 2).sum(1).abs()
     assert float(cosine.mean()) > 0.99
+
+
+def test_the_surer_half_and_all_that_are_nearly_as_sure():
+    odds = torch.tensor([1.0, 5.0, 3.0, 2.0, 4.0])
+    assert surest(odds, share=0.9).tolist() == [1, 2, 4]
+    assert surest(odds, share=0.3).tolist() == [1, 2, 3, 4]
+    assert surest(torch.tensor([9.0, 0.1]), share=0.9).tolist() == [0, 1]
+    assert surest(torch.ones(3), share=0.9).tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+def test_no_scan_is_laid_on_itself_nor_on_its_own_reflection(mirror):
+    """Near the mirror plane that is the nearest."""
+    x, z = torch.meshgrid(torch.arange(5.0), torch.arange(4.0), indexing="ij")
+    places = (torch.full((20,), y) for y in (0.1, 0.4, 0.8))
+    sheets = torch.stack([torch.stack((x.flatten(), y, z.flatten()), 1) for y in places])
+    onto = torch.tensor([0, 2])
+    surface = Surface(sheets[onto], torch.zeros_like(sheets[onto]))
+    found, at = _counterparts(sheets, surface, onto, mirror)
+    # Scan 0 on scan 2; scan 1, nearer to scan 0, on that; scan 2 on scan 0.
+    assert (at // 20 % 2).tolist() == [[1] * 20, [0] * 20, [0] * 20]
+    assert len(found.points) == (80 if mirror else 40)
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+def test_of_what_key_scans_show_there_is_a_reflection_too(mirror):
+    config = TrackConfig().onto
+    found = fused_surface(SCANS[:2], TRUE[:2], config, mirror=mirror)
+    assert len(found.points) == len(found.normals) == config.most * (2 if mirror else 1)
+    scan = TRUE[0].inverse().apply(torch.from_numpy(SCANS[0]).double()).float()
+    assert float(torch.cdist(found.points[:100], scan).amin(1).max()) < 2e-3
+    if mirror:
+        for part in found:
+            own, other = part.chunk(2)
+            torch.testing.assert_close(other, own * torch.tensor((1.0, -1.0, 1.0)))
+
+
+def test_scans_of_either_side_agree_where_objects_are_symmetric():
+    """The sides of a wall each: its reflection is the other's; else they lie as far as counts."""
+    x, z = np.meshgrid(np.linspace(-2, 2, 21), np.linspace(0, 1, 6))
+    left = np.stack((x.ravel(), np.full(x.size, 0.9), z.ravel()), 1).astype(np.float32)
+    sides = [left, left * np.array((1, -1, 1), np.float32)]
+    poses, config = TRUE[:2], TrackConfig()
+    scans = [poses[i].apply_numpy(side) for i, side in enumerate(sides)]
+    assert _disagreement(scans, poses, True, config) < 1e-4
+    assert _disagreement(scans, poses, False, config) == pytest.approx(config.vote.far_m)
+
+
+FEW = TrackConfig(key_scans=4)
+KEYS = key_scans(len(TRUE), FEW)
+
+
+def test_of_a_long_track_no_scan_leaves_its_vote_far_behind(monkeypatch):
+    """The key scans find the truth; on what they show, one of the others would jump."""
+    start, asked = spoilt(TRUE, seed=1), []
+
+    def onto(_surface, _scans, poses, _config):
+        translation = poses.translation.clone()
+        translation[1] += 9.0
+        translation[2] += 0.1
+        return replace(poses, translation=translation)
+
+    def chosen(odds, share):
+        asked.append(odds.tolist())
+        return surest(odds, share)
+
+    monkeypatch.setattr(joint_icp, "refine_jointly", lambda *_, **__: TRUE[KEYS])
+    monkeypatch.setattr(joint_icp, "refine_onto", onto)
+    monkeypatch.setattr(joint_icp, "surest", chosen)
+    odds = torch.arange(1.0, len(TRUE) + 1)
+    fit = refine_checked(SCANS, start, odds, mirror=False, config=FEW)
+    assert fit.refined
+    assert asked == [odds[KEYS].tolist()]
+    assert torch.equal(fit.T_sensor_object[KEYS].matrix, TRUE[KEYS].matrix)
+    moved = fit.T_sensor_object.translation - start.translation
+    assert torch.equal(moved[1], torch.zeros(3).double())
+    torch.testing.assert_close(moved[2], torch.full((3,), 0.1).double())
+
+
+def test_of_a_long_track_none_moves_where_the_key_scans_do_not(monkeypatch):
+    worse = spoilt(TRUE, seed=5, degrees=10.0, metres=0.4)
+    monkeypatch.setattr(joint_icp, "refine_jointly", lambda *_, **__: worse[KEYS])
+    monkeypatch.setattr(joint_icp, "refine_onto", lambda *_: worse)
+    fit = refine_checked(SCANS, TRUE, mirror=False, config=FEW)
+    assert not fit.refined
+    assert fit.T_sensor_object is TRUE

@@ -78,6 +78,13 @@ def test_few_scans_have_no_majority(count):
     assert without_outliers(given) is given
 
 
+@pytest.mark.parametrize(("degrees", "off"), [(60, []), (70, [2])])
+def test_a_scan_must_differ_from_both_neighbours(degrees, off):
+    """Those about it lie 20 degrees apart: from one of them it differs by 40, and then by 50."""
+    yaw = torch.tensor([0.0, 0.0, degrees, 20.0, 20.0], dtype=torch.float64)
+    assert torch.nonzero(outliers(rotation_z(torch.deg2rad(yaw))))[:, 0].tolist() == off
+
+
 @pytest.mark.parametrize("degrees", [10, 35, 60])
 def test_objects_that_really_turn_are_believed(degrees):
     turning = rotation_z(torch.arange(9) * math.radians(degrees)).double()

@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What each voice in the vote on a heading is worth."""
+
+import math
+
+import torch
+
+from wildshape.geometry.transforms.rotation import rotation_z
+from wildshape.inference.config import HeadingVoteConfig
+from wildshape.inference.tracks.heading_vote import (
+    half_turn,
+    likeness_of_next,
+    nearness_of_next,
+    slow,
+    voted_signs,
+)
+
+
+def test_scans_follow_each_other_if_three_quarters_of_the_neighbours_turn_little():
+    for fast, follows in ((1, True), (3, False)):
+        steps = torch.tensor([40.0] * fast + [5.0] * (8 - fast), dtype=torch.float64)
+        yaw = torch.cat((torch.zeros(1).double(), steps.cumsum(0)))
+        assert slow(rotation_z(torch.deg2rad(yaw))) is follows
+
+
+def test_a_scan_that_is_not_sure_at_all_counts_a_little_and_the_shape_twice():
+    """A shape that speaks against its heading outweighs it from there on."""
+    config = HeadingVoteConfig()
+    least = config.own_m * config.unsure / config.shape_votes
+    for share, sign in ((0.9, 1.0), (1.1, -1.0)):
+        gain = torch.tensor((0.05, -share * least, 0.05))
+        assert voted_signs(gain, torch.zeros(2), torch.zeros(3)).tolist() == [1.0, sign, 1.0]
+
+
+def test_of_a_scan_turned_about_the_middle_the_next_says_the_opposite():
+    """Wherever the middle lies in the object's frame."""
+    middle = 2.5
+    x = torch.linspace(8.0, -8.0, 7, dtype=torch.float64)
+    sensors = torch.stack((x, torch.full_like(x, 4.0), torch.full_like(x, 1.5)), 1)
+    links = nearness_of_next(sensors, middle)
+    sensors[3] = half_turn(middle).apply(sensors[3:4])[0]
+    opposed = nearness_of_next(sensors, middle)
+    torch.testing.assert_close(opposed[2:4], -links[2:4])
+    torch.testing.assert_close(opposed[[0, 1, 4, 5]], links[[0, 1, 4, 5]])
+
+
+def test_views_of_opposite_sides_lie_on_each_other_s_reflection():
+    """Of an object that rises to one end, seen from its left and then from its right."""
+    x = torch.linspace(-2.0, 2.0, 60)
+    left = torch.stack((x, torch.full_like(x, 0.9), 0.4 * x), 1)
+    views = torch.stack((left, left * torch.tensor((1.0, -1.0, 1.0))))
+    far = HeadingVoteConfig().far_m
+    worse = float((0.8 * x.abs() * math.cos(math.atan(0.4))).clamp(max=far).mean())
+    found = likeness_of_next(views, 0.0, mirror=True)
+    assert 0.8 * 2 * worse < float(found) < 2 * far
+    assert abs(float(likeness_of_next(views, 0.0, mirror=False))) < 1e-3

@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""One object of all scans: its shape, box and confidence, whatever its size and its frame."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from tests.cars import poses_of
+from tests.inference.tracks.known_car import (
+    SHAPE,
+    TRACK,
+    completed,
+    each_turned,
+    together,
+    turned_around,
+)
+from tests.inference.tracks.spoilt import spoilt
+from tests.models import CONFIG, SETTINGS
+
+from wildshape.geometry.projection.sight_lines import SightLines
+from wildshape.geometry.projection.visibility import FacingBins
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.confidence import ConfidenceFeatures, Glance
+from wildshape.inference.config import TrackConfig
+from wildshape.inference.tracks import complete_track as whole
+from wildshape.inference.tracks.heading_vote import half_turn
+from wildshape.inference.tracks.track_cost import network_inputs
+
+
+def test_the_mean_shape_counts_scans_by_their_odds():
+    """Of weights without probabilities these are the confidence."""
+    gathered, poses = whole.Gathered(SETTINGS), poses_of(TRACK)
+    for i, (confidence, factor) in enumerate(((0.9, 1.0), (0.3, 1.2))):
+        points = poses[i].apply(factor * SHAPE).float().numpy()
+        done = replace(completed(poses)[i], points=points, confidence=confidence)
+        gathered.add(done, TRACK.scans[i])
+    expected = (0.9 * SHAPE + 0.3 * 1.2 * SHAPE) / 1.2
+    torch.testing.assert_close(gathered.shape, expected[: CONFIG.points], atol=1e-5, rtol=0)
+
+
+def test_a_scan_that_the_network_was_not_made_for_has_no_confidence():
+    done = [replace(item, confidence=0.1 * i) for i, item in enumerate(completed(poses_of(TRACK)))]
+    done[2] = replace(done[2], warning="far too large")
+    stated = [item.confidence for item in together(done, TRACK.scans)]
+    assert stated == pytest.approx([0.3, 0.3, 0.0, 0.3, 0.3, 0.3, 0.3])
+
+
+def test_the_box_is_laid_around_what_no_ray_passed(monkeypatch):
+    laid, box = [], whole._box
+
+    def around(shape, *args, **options):
+        laid.append(len(shape))
+        return box(shape, *args, **options)
+
+    monkeypatch.setattr(whole, "_box", around)
+    monkeypatch.setattr(whole, "Sights", lambda *_: None)
+    monkeypatch.setattr(whole, "without_free_space", lambda shape, *_: shape[:500])
+    done = completed(poses_of(TRACK))[:2]
+    passed = SightLines.of_returns(TRACK.scans[1][:5])
+    for rays in ((), (None, passed)):
+        assert len(together(done, TRACK.scans, rays=rays)[0].points) == CONFIG.points
+    assert laid == [CONFIG.points, 500]
+
+
+def test_shapes_of_scans_turned_towards_their_object_become_denser():
+    done = completed(poses_of(TRACK))[:2]
+    facing = together(done, TRACK.scans, replace(SETTINGS, facing=True))
+    assert len(facing[0].points) == 2 * CONFIG.points
+
+
+@pytest.mark.parametrize("sensor", ["lidar", "camera"])
+def test_of_objects_half_as_large_all_lengths_are_half_as_large(sensor):
+    """One scan of them looks back."""
+    large = replace(SETTINGS, sensor=sensor, extent_m=(2.0, 5.0), projection=FacingBins(0.4))
+    small = replace(large, extent_m=(1.0, 2.5), projection=FacingBins(0.2))
+    track = TRACK if sensor == "lidar" else each_turned(TRACK, torch.Generator().manual_seed(0))
+    start = turned_around(spoilt(poses_of(track), seed=1, degrees=3.0, metres=0.1), {1})
+    done = completed(start)
+    found = together(done, track.scans, large)
+    halved = [SE3(item.pose.rotation, item.pose.translation / 2) for item in done]
+    less = [replace(one, points=one.points / 2, pose=pose) for one, pose in zip(done, halved)]
+    twin = together(less, [scan / np.float32(2) for scan in track.scans], small)
+    for one, other in zip(found, twin):
+        np.testing.assert_allclose(2 * other.points, one.points, atol=2e-3)
+        torch.testing.assert_close(other.pose.rotation, one.pose.rotation, atol=1e-3, rtol=0)
+        assert 2 * other.cost == pytest.approx(one.cost, abs=1e-3)
+        assert 2 * np.asarray(other.box.size) == pytest.approx(one.box.size, abs=5e-3)
+
+
+@pytest.mark.parametrize("sensor", ["lidar", "camera"])
+def test_votes_do_not_depend_on_the_size_of_the_objects(sensor):
+    votes = []
+    for size in (1.0, 0.5):
+        cell, extents = FacingBins(0.4 * size), (2.0 * size, 5.0 * size)
+        settings = replace(SETTINGS, sensor=sensor, extent_m=extents, projection=cell)
+        gathered = whole.Gathered(settings)
+        gathered.scans = [scan * np.float32(size) for scan in TRACK.scans]
+        poses, inputs = poses_of(TRACK), network_inputs(gathered.scans, settings)
+        poses = SE3(poses.rotation, size * poses.translation)
+        votes.append(whole._votes(poses, size * SHAPE, 0.1 * size, gathered, inputs, TrackConfig()))
+    for one, other in zip(*votes):
+        torch.testing.assert_close(other, one, atol=1e-3, rtol=0)
+        assert float(one.abs().max()) > 0.03
+
+
+def test_the_confidence_is_that_of_scans_that_were_completed():
+    """A scan that was only looked at does not count, nor is the mean shape of it."""
+    gathered, done = whole.Gathered(SETTINGS), completed(poses_of(TRACK))
+    for item, scan in zip(done, TRACK.scans):
+        gathered.add(item, scan)
+    said = gathered.said[3]
+    features = ConfidenceFeatures(*[0.1] * len(ConfidenceFeatures._fields))
+    gathered.said[3] = Glance(said.pose, 0.99, 2, "", (), features)
+    gathered._odds[3] = 0.0
+    assert gathered.rows.tolist() == [0, 1, 2, 4, 5, 6]
+    found = list(whole.complete_together(gathered))
+    assert [item.confidence for item in found] == pytest.approx([0.5] * 7)
+    assert [item.branch for item in found] == [0, 0, 0, 2, 0, 0, 0]
+
+
+def test_half_turns_are_about_the_middle_of_the_object_wherever_its_origin_lies():
+    beside = torch.tensor((0.8, 0.0, 0.0), dtype=torch.float64)
+    true = poses_of(TRACK) @ SE3(torch.eye(3).double(), -beside)
+    back = true @ half_turn(0.8)
+    start = back.where(torch.arange(7) % 4 == 1, true)
+    shape = SHAPE + beside
+    done = [
+        replace(item, points=start[i].apply(shape).float().numpy(), pose=start[i])
+        for i, item in enumerate(completed(start))
+    ]
+    for i, item in enumerate(together(done, TRACK.scans)):
+        off = true[i].inverse() @ item.pose
+        assert float(torch.rad2deg(off.angle())) < 5.0
+        assert float((off.apply(beside[None]) - beside).norm()) < 0.2
+
+
+def test_the_surface_seen_is_that_of_both_sides_of_a_symmetric_object():
+    both, one = (
+        whole._seen(list(TRACK.scans), poses_of(TRACK), mirror, TrackConfig())
+        for mirror in (True, False)
+    )
+    walls = [(part[:, 0].abs() < 1.5) & ((part[:, 2] + 0.25).abs() < 0.2) for part in (both, one)]
+    seen = [set(part[wall, 1].sign().tolist()) for part, wall in zip((both, one), walls)]
+    assert seen == [{-1.0, 1.0}, {-1.0}]
+
+
+def test_the_box_is_fitted_to_each_scan_where_it_lies_on_the_object(monkeypatch):
+    handed, fit, true = [], whole.fit_to_scans, poses_of(TRACK)
+
+    def kept(shape, seen, **options):
+        handed.extend(seen)
+        return fit(shape, handed, **options)
+
+    monkeypatch.setattr(whole, "fit_to_scans", kept)
+    whole._box(SHAPE, list(TRACK.scans), true, whole.BoxConfig(), mirror=True, body=True)
+    for cloud, pose, scan in zip(handed, true, TRACK.scans, strict=True):
+        expected = pose.inverse().apply(torch.from_numpy(scan).double())
+        torch.testing.assert_close(cloud, expected)
