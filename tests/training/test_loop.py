@@ -5,6 +5,7 @@
 import json
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 import torch
@@ -16,8 +17,10 @@ from wildshape.errors import BadInputError
 from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.method.checkpoint import MODEL, load_checkpoint
 from wildshape.method.ray_encoder import RayConfig
+from wildshape.training import loop
 from wildshape.training.loop import StopRequested, fit, setup, split_tracks
 from wildshape.training.state import STATE
+from wildshape.training.validate import Validation
 
 
 class KilledError(Exception):
@@ -167,6 +170,36 @@ def test_the_checkpoint_says_what_it_is(undisturbed):
     json.dumps(settings.provenance, allow_nan=False)
 
 
+def test_the_checkpoint_says_how_scans_are_to_be_read_and_what_was_validated(
+    car_store, tmp_path, monkeypatch
+):
+    views, loss = replace(SMALLEST.views, turn="facing"), replace(SMALLEST.loss, belief=0.04)
+    run = setup(replace(SMALLEST, views=views, loss=loss), car_store, tmp_path)
+    asked = []
+
+    def truth(network, _settings, _store, tracks, turn, _config):
+        asked.append((network is run.state.mean, tracks is run.held_tracks, turn))
+        return {"truth_cd": 0.5}
+
+    monkeypatch.setattr(loop, "validate", lambda *_: Validation(0.1, 0.2, 0.3, 0.4, 5.0))
+    monkeypatch.setattr(loop, "usual_up", lambda *_: (0.0, 0.0, 1.0))
+    monkeypatch.setattr(loop, "truth_figures", truth)
+    logged = loop.checkpoint(run)
+    _, settings = load_checkpoint(tmp_path / MODEL)
+    assert (settings.facing, settings.belief, settings.up) == (True, 0.04, (0.0, 0.0, 1.0))
+    assert settings.cost_m == (0.3, 0.4)
+    assert settings.metrics == {
+        "observation": 0.1,
+        "projection": 0.2,
+        "cost_median": 0.3,
+        "cost_p90": 0.4,
+        "cycle_deg": 5.0,
+        "truth_cd": 0.5,
+    }
+    assert logged == {f"validation/{name}": value for name, value in settings.metrics.items()}
+    assert asked == [(True, True, "yaw")]
+
+
 def test_the_kept_weights_are_the_running_mean(car_store, tmp_path):
     """One step: the mean lies between the start and the weights after it."""
     recipe = replace(SMALLEST, optim=replace(SMALLEST.optim, steps=1, average=0.9))
@@ -184,6 +217,32 @@ def test_without_averaging_the_last_weights_are_kept(car_store, tmp_path):
     run = trained(car_store, tmp_path, recipe=recipe)
     for mean, now in zip(run.state.mean.parameters(), run.state.network.parameters()):
         assert torch.equal(mean, now)
+
+
+def test_headings_are_agreed_on_at_their_shares_of_the_run_by_the_mean_weights(
+    car_store, tmp_path, monkeypatch
+):
+    """From then on scans are held to them, also in a run that is resumed."""
+    asked = []
+
+    def agreed(network, sampler, *_):
+        asked.append((run.state.step, network is run.state.mean))
+        return torch.full((len(sampler.store.scan_sizes), 3, 3), float(len(asked)))
+
+    def checkpoint(run):
+        loop.save_state(run.folder, run.state, run.identity)
+        return {}
+
+    monkeypatch.setattr(loop, "agreed_rotations", agreed)
+    monkeypatch.setattr(loop, "checkpoint", checkpoint)
+    optim, loss = replace(SMALLEST.optim, steps=6), replace(SMALLEST.loss, agree_at=(0.34, 0.67))
+    recipe = replace(SMALLEST, optim=optim, loss=loss)
+    run = setup(recipe, car_store, tmp_path, seed=3)
+    fit(run)
+    assert asked == [(2, True), (4, True)]
+    again = setup(recipe, car_store, tmp_path, seed=3, resume=True)
+    for one in (run, again):
+        assert bool((one.sampler.draw(0).anchor == 2.0).all())
 
 
 @pytest.mark.parametrize("every", [10, 30])
@@ -242,6 +301,37 @@ def test_few_tracks_are_both_fitted_and_held_out_many_are_not():
     assert len(held) == 5
     assert sorted([*fitted, *held]) == list(range(100))
     assert list(split_tracks(100)[1]) == list(held)
+
+
+def test_tracks_that_are_held_out_are_not_fitted(car_store, tmp_path):
+    run = setup(replace(SMALLEST, held_out=4), car_store, tmp_path)
+    fitted, held = (
+        {int(scan) for scans in sampler.scans_of for scan in scans}
+        for sampler in (run.sampler, run.held_out)
+    )
+    assert not fitted & held
+    assert len(run.held_out.scans_of) == 2
+    assert fitted | held == set(range(car_store.scan_count))
+
+
+def test_several_processes_are_asked_to_stop_where_all_of_them_ask(
+    car_store, tmp_path, monkeypatch
+):
+    """At the same steps, or one would wait for the others for ever."""
+    run = setup(SMALLEST, car_store, tmp_path)
+    asked = []
+
+    def together(flag):
+        asked.append(run.state.step)
+        return True
+
+    two = SimpleNamespace(count=2, device=torch.device("cpu"), any=together)
+    monkeypatch.setattr(run, "processes", two)
+    stops = []
+    for run.state.step in range(1, 76):
+        stops.append(loop._stop_asked(run, lambda: False))
+    assert asked == [25, 50, 75]
+    assert [step for step, stop in enumerate(stops, start=1) if stop] == asked
 
 
 def test_a_network_that_sees_rays_starts_from_one_that_does_not(car_store, undisturbed, tmp_path):
