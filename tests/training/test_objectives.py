@@ -123,6 +123,20 @@ def test_one_field_leaves_the_selector_out(batch):
     torch.testing.assert_close(*grads)
 
 
+def test_the_selector_is_taught_to_believe_in_the_winner(batch):
+    """The loss is the less, the more the branch that wins is believed in."""
+    torch.manual_seed(0)
+    network = ShapePoseNet(replace(SMALLEST.network, selector=True))
+    drawn = torch.get_rng_state()
+    found = []
+    for belief in (0.0, 0.5):
+        torch.set_rng_state(drawn)
+        found.append(list(objectives_of(batch, network, belief)))
+    for without, taught in zip(*found):
+        nats = (taught - without).detach() / 0.5
+        assert 0.25 < float(nats) < 3.0  # of four alike it is 1.4
+
+
 def test_what_is_taught_does_not_depend_on_the_size_of_the_objects():
     generator = torch.Generator().manual_seed(0)
     scans, shapes, sensors = (torch.randn(4, n, 3, generator=generator) for n in (64, 80, 2))

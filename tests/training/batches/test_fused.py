@@ -91,6 +91,24 @@ def test_the_sensor_stays_where_it_was_seen_from(car_store, cars):
     assert bool((depth > 0).all())
 
 
+@pytest.mark.parametrize("mirror", [False, True])
+def test_sensors_are_stretched_and_reflected_with_their_scans(car_store, cars, mirror):
+    """Seen by the scan that was taken there, a place is the origin: straight before the scan."""
+    sampler = sampler_of(car_store, cars, mirror)
+    firsts = [scans[:1] for scans in sampler.views.scans_of]
+    place = sampler.targets.sensors[:, :1].expand(-1, 5, -1)
+    sampler.views.scans_of = firsts
+    batch = FusedSampler(
+        sampler.views, sampler.targets._replace(sensors=place), mirror=mirror
+    ).draw(1, 2)
+    seen = SE3(batch.rotation, batch.translation).apply(batch.sensors)
+    assert float(seen[..., 1:].abs().max()) < 1e-3
+    # From there to the scan's middle is the range of the middle of its points.
+    away = -seen[:, 0, 0]
+    reach = (batch.scans + torch.stack((away, 0 * away, 0 * away), 1)[:, None]).norm(dim=2)
+    torch.testing.assert_close((reach.amin(1) + reach.amax(1)) / 2, away, atol=1e-3, rtol=0)
+
+
 def test_a_batch_depends_on_its_seeds_alone(car_store, cars):
     first, second = sampler_of(car_store, cars), sampler_of(car_store, cars)
     second.draw(9)

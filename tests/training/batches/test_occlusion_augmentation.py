@@ -93,3 +93,25 @@ def test_a_fifth_show_rings_alone_and_some_no_feet():
     assert 20 <= rings <= 60
     lifted = torch.tensor(highs) > 0.6 * 0.25 * float(elevation.max() - elevation.min())
     assert 4 <= int(lifted.sum()) <= 30
+
+
+def test_what_lies_between_the_beams_is_not_hidden():
+    """Of a scan thinned to rings, something hides points of rings alone."""
+    points, checked = _wall(-0.2), 0
+    config = OcclusionConfig(strip=1.0, side=0.0, top=0.0, feet=0.0, rings=1.0, least=0.001)
+    for seed in range(10):
+        seen, hidden = partly_hidden(points, np.random.default_rng(seed), config)
+        both = torch.cat((seen, hidden))
+        assert _wide_gaps(both) >= 3
+        assert _wide_gaps(both) == _wide_gaps(seen)
+        checked += len(hidden) > 20
+    assert checked >= 5
+
+
+def test_the_side_that_is_said_is_hidden():
+    points = _wall(-0.2)
+    for left, far in ((1.0, 1.0), (0.0, -1.0)):
+        config = OcclusionConfig(strip=0.0, side=1.0, left=left, top=0.0, feet=0.0, rings=0.0)
+        for seed in range(5):
+            seen, hidden = partly_hidden(points, np.random.default_rng(seed), config)
+            assert float((far * hidden[:, 1]).min()) >= float((far * seen[:, 1]).max()) - 0.05
