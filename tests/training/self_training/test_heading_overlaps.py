@@ -5,7 +5,7 @@
 import pytest
 import torch
 
-from wildshape.training.self_training.heading_overlaps import agreeing_signs
+from wildshape.training.self_training.heading_overlaps import _contradiction, agreeing_signs
 
 HALF_TURN = torch.tensor((-1.0, -1.0, 1.0))
 
@@ -53,3 +53,18 @@ def test_objects_are_turned_about_their_middle_wherever_the_origin_lies():
 
 def test_views_that_agree_are_left_alone():
     assert len(set(agreeing_signs(*views_of_a_wedge(1.0), mirror=True).tolist())) == 1
+
+
+def test_what_stands_before_or_beside_a_view_contradicts_it_and_what_it_hides_does_not():
+    """A wall of 2 m before a sensor at the origin, 5 m away."""
+    y, z = torch.meshgrid(torch.arange(-1, 1.01, 0.1), torch.arange(-1, 1.01, 0.1), indexing="ij")
+    wall = torch.stack((torch.full_like(y, 5.0), y, z), -1).view(-1, 3)
+    behind, before = wall * 1.3, wall * 0.99
+    beside = torch.tensor((5.0, 1.2, 0.0)).expand(9, 3)
+    far = torch.tensor((5.0, 4.0, 0.0)).expand(9, 3)
+    found = [
+        float(_contradiction(points[None], wall, torch.zeros(3), 0.5))
+        for points in (wall, behind, before, beside, far, wall * 0.5)
+    ]
+    ahead = 0.01 * float(wall.norm(dim=1).mean())
+    assert found == pytest.approx([0.0, 0.0, ahead, 0.2, 0.5, 0.5], abs=0.02)

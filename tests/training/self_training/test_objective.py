@@ -53,6 +53,15 @@ def test_pose_terms_by_hand():
     assert float(turned.distance) == pytest.approx(math.sqrt(2) * math.hypot(2.0, 1.0), abs=1e-5)
 
 
+def test_strays_are_no_corners():
+    """One point in a hundred flies far beyond the box on every axis."""
+    shape, quarter = box(count=1000), rotation_z(torch.tensor(math.pi / 2))
+    shape[::100] *= 20.0
+    truth = (torch.eye(3)[None], torch.zeros(1, 3), shape[None])
+    turned = pose_terms(*branches((quarter, (0.0, 0.0, 0.0))), *truth)
+    assert float(turned.distance) == pytest.approx(math.sqrt(2) * math.hypot(2.0, 0.9), rel=0.05)
+
+
 def test_the_winner_alone_learns():
     rotation, translation = branches(
         (torch.eye(3), (0.1, 0.0, 0.0)), (torch.eye(3), (0.5, 0.0, 0.0))

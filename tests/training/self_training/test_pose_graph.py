@@ -11,7 +11,13 @@ from wildshape.geometry.transforms.rotation import (
     rotation_from_vector,
 )
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.training.self_training.pose_graph import Edges, _twist, refine_by_graph, solve
+from wildshape.training.self_training.pose_graph import (
+    Edges,
+    PoseGraphConfig,
+    _twist,
+    refine_by_graph,
+    solve,
+)
 
 
 def shaken(poses, degrees=2.0, metres=0.15, seed=0):
@@ -57,6 +63,18 @@ def test_a_registration_that_went_wrong_is_left_out():
     turn, shift = relative_error(solve(shaken(truth), spoilt), truth)
     assert turn < 0.3
     assert shift < 0.03
+
+
+def test_poses_given_hold_against_a_registration_as_much_as_they_are_believed():
+    """Two that are given alike, and said to lie apart, both to half a metre: a third each."""
+    wide = PoseGraphConfig(edge_m=0.5, prior_m=0.5, widest=1e6, narrowest=1e6)
+    apart = SE3.identity(1)
+    apart = SE3(apart.rotation, torch.tensor([[0.3, 0.0, 0.0]], dtype=torch.float64))
+    edges = Edges(torch.tensor([0]), torch.tensor([1]), apart)
+    found = solve(SE3.identity(2), edges, wide)
+    expected = torch.tensor([[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0]], dtype=torch.float64)
+    torch.testing.assert_close(found.translation, expected)
+    torch.testing.assert_close(found.rotation, SE3.identity(2).rotation)
 
 
 @pytest.mark.parametrize("step", [1.0, 0.0])

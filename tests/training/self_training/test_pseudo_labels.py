@@ -15,6 +15,7 @@ from tests.training.self_training.taught import TAUGHT, sampler_of
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.predictor import load
 from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.self_training import pseudo_labels
@@ -159,6 +160,40 @@ def test_refined_scans_lie_nearer_to_each_other(who, cars):
     assert apart(refined(who, shaken).T_sensor_can) < 0.5 * apart(shaken.T_sensor_can)
 
 
+def nothing_moves(monkeypatch, by_graph=0.0):
+    """Fits that leave all poses as they are, or move them all by so much."""
+
+    def moved(_scans, poses, *_):
+        return SE3(poses.rotation, poses.translation + by_graph)
+
+    monkeypatch.setattr(pseudo_labels, "refine_jointly", lambda _, poses, **__: poses)
+    monkeypatch.setattr(pseudo_labels, "refine_by_graph", moved)
+
+
+def test_a_scan_gone_astray_is_put_back_where_scans_follow_each_other(who, cars, monkeypatch):
+    nothing_moves(monkeypatch)
+    track, quarter = true_track(cars, 0), rotation_about((0, 0, 1), math.pi / 2).float()
+    rotation = track.T_sensor_can.rotation.clone()
+    rotation[4] = rotation[4] @ quarter
+    astray = track._replace(T_sensor_can=SE3(rotation, track.T_sensor_can.translation))
+    back = refined(who, astray).T_sensor_can
+    own = track.T_sensor_can.inverse() @ back
+    assert float(torch.rad2deg(own.angle()).max()) < 15
+    unordered = refined(replace(who, time_ordered=False), astray).T_sensor_can
+    torch.testing.assert_close(unordered.matrix, astray.T_sensor_can.matrix)
+
+
+def test_neighbours_are_laid_on_each_other_in_time_order_in_units(who, cars, monkeypatch):
+    """Of objects half as large, a tenth of a unit is half as many metres."""
+    nothing_moves(monkeypatch, by_graph=0.1)
+    half = replace(who, settings=replace(who.settings, extent_m=(1.0, 2.5)))
+    assert half.unit == 0.5
+    track = true_track(cars, 0)
+    for teacher, way in ((half, 0.05), (replace(half, time_ordered=False), 0.0)):
+        found = refined(teacher, track).T_sensor_can.translation - track.T_sensor_can.translation
+        torch.testing.assert_close(found, torch.full((12, 3), way), atol=1e-5, rtol=0)
+
+
 def test_poses_by_which_a_scan_would_jump_are_not_taken(cars, monkeypatch):
     track = true_track(cars, 0)
     away = SE3(track.T_sensor_can.rotation, track.T_sensor_can.translation + 9.0)
@@ -172,6 +207,39 @@ def test_tracks_turned_as_wholes_look_one_way_again(who, cars):
     shapes = [shape_of(who, track) for track in tracks]
     found = agreed_tracks(shapes, tracks, [sign.expand(12) for sign in turned])
     assert max(float(off(track, cars, i).max()) for i, track in enumerate(found)) < 1e-4
+
+
+def test_a_teacher_that_is_clear_about_a_track_is_believed_against_its_profile(who, cars):
+    """The shape of one looks turned; the teacher posed all its scans as they are."""
+    tracks = [true_track(cars, i) for i in range(6)]
+    shapes = [shape_of(who, track) for track in tracks]
+    shapes[0] = shapes[0] * np.array((-1, -1, 1), np.float32)
+    found = agreed_tracks(shapes, tracks, [torch.ones(12)] * 6)
+    assert max(float(off(track, cars, i).max()) for i, track in enumerate(found)) < 1e-4
+
+
+def test_lengths_shrink_with_the_objects(who, cars, monkeypatch):
+    """Of objects half as large: voxels of their shape, and what is asked of other weights."""
+    settings = replace(who.settings, extent_m=(1.0, 2.5))
+    half = replace(who, settings=settings, headings=load(raw=True))
+    voxels, asked = [], []
+
+    def fused(*_, voxel_m, **__):
+        voxels.append(voxel_m)
+        return np.zeros((1, 3), np.float32)
+
+    def signs(_other, scans, poses, _config):
+        asked.append((scans[0], poses.translation))
+        return torch.ones(len(scans))
+
+    monkeypatch.setattr(pseudo_labels, "fused_shape", fused)
+    monkeypatch.setattr(pseudo_labels, "transferred_signs", signs)
+    track = true_track(cars, 0)
+    shape_of(half, track)
+    heading_votes(half, track)
+    assert voxels == [pytest.approx(0.5 * FusionConfig().lidar_voxel_m)]
+    np.testing.assert_allclose(asked[0][0], 2 * cars[0].scans[0], rtol=1e-6)
+    torch.testing.assert_close(asked[0][1], 2 * track.T_sensor_can.translation)
 
 
 def test_a_pitched_frame_is_levelled(cars):
@@ -199,6 +267,27 @@ def test_a_roof_above_all_sensors_takes_no_points_away(who):
     closed = with_roof(who, shape, track, math.inf)
     assert closed.shape == shape.shape
     assert np.abs(closed[:, 1]).min() < 0.5
+
+
+def test_a_lidar_s_view_ends_where_its_scans_tell_and_so_does_the_roof(who, cars, monkeypatch):
+    asked, tops = [], []
+
+    def ends(slopes):
+        asked.extend(slopes)
+        return 0.05
+
+    def closed(shape, _sensors, top, *_, **__):
+        tops.append(top)
+        return 2 * shape
+
+    monkeypatch.setattr(pseudo_labels, "view_top", ends)
+    monkeypatch.setattr(pseudo_labels, "with_unseen_roof", closed)
+    track = true_track(cars, 1)
+    shape, top = whole_shape(who, track)
+    assert (top, tops) == (0.05, [0.05])
+    assert np.array_equal(shape, 2 * shape_of(who, track))
+    steepest = [float((s[:, 2] / np.hypot(s[:, 0], s[:, 1])).max()) for s in cars[1].scans]
+    assert asked == pytest.approx(steepest, abs=1e-5)
 
 
 def test_a_camera_s_view_ends_above_no_track(who, cars):
