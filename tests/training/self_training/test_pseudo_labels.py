@@ -124,9 +124,10 @@ def true_track(cars, index, signs=None):
 
 
 def off(track, cars, index):
-    """How far the object's origin lies from where it should, metres, a scan each."""
-    true = poses_of(cars[index]).translation.float()
-    return (track.T_sensor_can.translation - true).norm(dim=-1)
+    """How far the object's front lies from where it should, metres, a scan each."""
+    front = torch.tensor((2.0, 0.0, 0.0)).expand(len(track.scans), 1, 3)
+    true = poses_of(cars[index]).to(torch.float32).apply(front)
+    return (track.T_sensor_can.apply(front) - true)[:, 0].norm(dim=-1)
 
 
 def test_a_teacher_reads_the_scans_as_it_was_trained(who, car_store):
