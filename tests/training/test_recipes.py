@@ -80,6 +80,16 @@ def test_a_store_of_two_kinds_of_sensor_is_refused(cars, tmp_path):
         recipe_for(open_store(tmp_path), "small", None)
 
 
+def test_a_recipe_is_of_the_data_s_kind_of_sensor_and_the_paper_s_are_of_their_own(cars, tmp_path):
+    with StoreWriter(tmp_path, {}) as writer:
+        writer.add(replace(cars[0], sensor=Sensor("camera")))
+    store = open_store(tmp_path)
+    for name in ("small", "views", "paper-views"):
+        assert recipe_for(store, name, None).views.sensor == "camera"
+    with pytest.raises(BadInputError, match="preset paper-lidar is for lidar scans"):
+        recipe_for(store, "paper-lidar", None)
+
+
 @pytest.mark.parametrize("name", PRESETS)
 def test_every_preset_is_named_and_takes_a_step(name, car_store):
     recipe = PRESETS[name]()

@@ -13,6 +13,7 @@ from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.projection.visibility import FacingBins, facing_bins
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.method.ray_encoder import RayConfig
+from wildshape.training.batches import fused
 from wildshape.training.batches.fused import (
     DrawConfig,
     FusedSampler,
@@ -241,3 +242,40 @@ def test_what_is_hidden_now_ends_rays_before_it():
         assert along[at] == pytest.approx(1.0)
         assert reach < 0.81 * float(hidden[at].norm())
     assert with_hidden(rays, hidden[:0], rng, 5) is rays
+
+
+def test_of_a_camera_s_views_nothing_is_hidden_and_all_are_drawn_alike(
+    car_store, cars, monkeypatch
+):
+    def refuse(*_):
+        raise AssertionError("hidden")
+
+    monkeypatch.setattr(fused, "partly_hidden", refuse)
+    sampler = sampler_of(car_store, cars, sensor="camera")
+    assert sampler.draw(1).scans.shape == (12, 300, 3)
+    assert sampler._shares_in(sampler.views.scans_of[0]) is None
+
+
+def test_scans_are_rolled_about_their_line_of_sight(car_store, cars):
+    """Up, as the turned scan has it: across the sight, little aside or to any side."""
+    still = DrawConfig(larger=0.0, axis=0.0)
+    for roll, least, most in ((0.0, 0.0, 1e-5), (1.0, 0.4, 1.0)):
+        plain = sampler_of(car_store, cars, roll=roll, roll_rad=0.0)
+        upright = torch.eye(3).expand_as(plain.targets.rotation)
+        targets = plain.targets._replace(rotation=upright)
+        up = FusedSampler(plain.views, targets, still).draw(1).rotation[:, :, 2]
+        assert least <= float(up[:, 1].abs().max()) <= most
+
+
+def test_rays_end_where_something_stands_before_a_part_of_the_scan(car_store, cars, monkeypatch):
+    """A frame of one ray: whatever else is seen was put there with what hides."""
+    first = car_store.scan_points(0)[:1]
+    monkeypatch.setattr(car_store, "rays_of", lambda _: SightLines.of_returns(first))
+    plain = sampler_of(car_store, cars)
+    for strip in (0.0, 1.0):
+        hides = OcclusionConfig(strip=strip, side=0.0, top=0.0, feet=0.0, rings=0.0)
+        config = DrawConfig(without_rays=0.0, occlusion=hides)
+        seeing = RayConfig(count=16, depth_m=90.0, within_m=90.0)
+        rays = FusedSampler(plain.views, plain.targets, config, rays=seeing).draw(3).rays
+        several = [len(some.unique(dim=0)) > 2 for some in rays]
+        assert sum(several) == (0 if strip == 0.0 else pytest.approx(12, abs=2))

@@ -115,3 +115,20 @@ def test_the_side_that_is_said_is_hidden():
         for seed in range(5):
             seen, hidden = partly_hidden(points, np.random.default_rng(seed), config)
             assert float((far * hidden[:, 1]).min()) >= float((far * seen[:, 1]).max()) - 0.05
+
+
+def test_low_things_hide_what_is_low():
+    points = _wall(-0.2)
+    config = OcclusionConfig(strip=0.0, side=0.0, top=0.0, feet=1.0, rings=0.0)
+    for seed in range(10):
+        seen, hidden = partly_hidden(points, np.random.default_rng(seed), config)
+        assert float(slope(hidden).max()) < float(slope(seen).min())
+
+
+def test_objects_above_the_horizon_are_cut_low_more_often_than_high():
+    """At the square of a share drawn evenly: on average at a third of what rises."""
+    points = _wall(1.5)
+    config = OcclusionConfig(strip=0.0, side=0.0, top=1.0, feet=0.0, rings=0.0)
+    rngs, whole = map(np.random.default_rng, range(300)), float(slope(points).max())
+    at = [float(slope(partly_hidden(points, rng, config).points).max()) / whole for rng in rngs]
+    assert 0.28 < np.mean(at) < 0.4

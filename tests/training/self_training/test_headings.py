@@ -24,6 +24,7 @@ from wildshape.training.self_training.headings import (
     PosedTrack,
     agreed_rotations,
     by_scan,
+    pose_track,
     settled_signs,
     signs_across,
     signs_within,
@@ -160,11 +161,37 @@ def test_the_scans_of_a_track_are_brought_to_look_one_way(cars, car_store, time_
     assert bool(((signs < 0) == flipped).all()) or bool(((signs > 0) == flipped).all())
 
 
-def test_all_tracks_of_a_network_look_one_way(cars, car_store):
-    """The shipped network's headings, against the truth: right for all, or turned for all."""
+@pytest.fixture(scope="module")
+def shipped(car_store):
+    """The network, and the cars as it reads them."""
     predictor = load(raw=True)
     config = ViewConfig(points=predictor.settings.input_points, turn="facing")
-    sampler = ViewSampler(car_store, np.arange(len(car_store)), config)
+    return predictor, ViewSampler(car_store, np.arange(len(car_store)), config)
+
+
+def test_a_track_is_posed_in_its_sensors_frames_and_its_middle_is_that_of_its_shapes(
+    cars, shipped, monkeypatch
+):
+    """Also of a network whose shapes lie beside their origin."""
+    predictor, sampler = shipped
+    track = pose_track(predictor.network, sampler, predictor.settings, sampler.scans_of[2])
+    assert abs(track.middle_x) < 0.3
+    off = track.T_sensor_can.translation - poses_of(cars[2]).translation
+    assert float(off.norm(dim=-1).median()) < 0.4
+    beside, forward = torch.tensor((1.5, 0.0, 0.0)), predictor.network.forward
+
+    def shifted(*args):
+        shapes, rotation, translation, belief = forward(*args)
+        return shapes + beside, rotation, translation - rotation @ beside, belief
+
+    monkeypatch.setattr(predictor.network, "forward", shifted)
+    again = pose_track(predictor.network, sampler, predictor.settings, sampler.scans_of[2])
+    assert again.middle_x == pytest.approx(track.middle_x + 1.5, abs=1e-3)
+
+
+def test_all_tracks_of_a_network_look_one_way(cars, shipped):
+    """The shipped network's headings, against the truth: right for all, or turned for all."""
+    predictor, sampler = shipped
     loss = LossConfig(beta=0.25, projection=predictor.settings.projection, time_ordered=True)
     rotation = agreed_rotations(predictor.network, sampler, loss)
     true = torch.cat([poses_of(car).rotation for car in cars]).float()
