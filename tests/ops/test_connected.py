@@ -53,6 +53,15 @@ def test_pairs_are_one_part_and_so_are_the_points_of_a_cell():
     assert connected_parts(points, 0.1, 1.0).tolist() == [0, 1, 2, 0]
 
 
+@pytest.mark.usefixtures("either")
+def test_steps_of_the_whole_reach_count_and_longer_ones_across_a_cube_do_not():
+    ends = np.array([[0, 0, 0], [3, 4, 0]], np.float32)
+    assert connected_parts(ends, 5.0, 0.1).tolist() == [0, 0]
+    assert connected_parts(ends, 4.99, 0.1).tolist() == [0, 1]
+    corners = np.array([[0, 0, 0], [0.59, 0.59, 0.59]], np.float32)
+    assert connected_parts(corners, 1.0, 0.3).tolist() == [0, 1]
+
+
 @pytest.mark.skipif(connected_kernel() is None, reason="native library not built")
 @pytest.mark.parametrize("cell", [0.002, 0.1, 0.3])
 def test_many_points_as_trees_have_it(cell):

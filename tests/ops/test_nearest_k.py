@@ -17,6 +17,7 @@ from wildshape.ops.nearest.nearest_k import (
     nearest_k_torch,
     nearest_k_trees,
 )
+from wildshape.ops.threads import exact_on
 
 SHAPES = [
     (1, 1, 1, 1),
@@ -106,6 +107,21 @@ def test_sizes_of_any_whole_type_are_read():
     narrow = nearest_k_native(query, target, 2, sizes[0].int(), sizes[1].int())
     assert torch.equal(wide.index, narrow.index)
     assert torch.equal(wide.distance_squared, narrow.distance_squared)
+
+
+@needs_library
+def test_threads_change_nothing():
+    query, target = clouds(2, 1100, 1000)
+    groups = (torch.arange(2200).view(2, -1) % 3, torch.arange(2000).view(2, -1) % 3)
+    found, sizes = [], (torch.tensor((1100, 700)), torch.tensor((-1, 1000)))
+    for threads in (1, 3, 100):
+        with exact_on(threads):
+            found.append(nearest_k_native(query, target, 4, *sizes, groups))
+    for several in found[1:]:
+        assert torch.equal(several.index, found[0].index)
+        assert torch.equal(several.distance_squared, found[0].distance_squared)
+    plain = nearest_k_torch(query, target, 4, *sizes, groups)
+    assert torch.equal(found[0].index, plain.index)
 
 
 @needs_library
