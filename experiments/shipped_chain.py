@@ -198,10 +198,11 @@ def trained(name: str, settings: Settings) -> None:
     """A round's weights, in half precision: made now or resumed."""
     of, folder = ROUNDS[name], settings.out / name
     steps = settings.part(of.steps)
+    data = _data(of.data, settings)  # before the bar, whose estimate it would spoil
     with TERMINAL.bar(f"round {name}: fusing tracks", 0) as bar:
         run = setup(
             of.recipe(steps),
-            _data(of.data, settings),
+            data,
             folder,
             seed=of.data,
             device=choose_device(settings.device),
