@@ -165,7 +165,7 @@ def remove_leftovers(path: Path) -> None:
     """Remove what a process left that was killed while writing; no other may be at work."""
     for leftover in path.rglob(_LEFTOVER):
         if leftover.is_file():
-            leftover.unlink()
+            leftover.unlink(missing_ok=True)
 
 
 def unfinished(path: Path, command: str) -> bool:

@@ -156,10 +156,9 @@ def test_samples_are_repeatable_and_never_too_large():
     assert sample_of(5, 10) == sample_of(5, 0) == [0, 1, 2, 3, 4]
 
 
-@pytest.mark.parametrize("far", [1e200, float("inf"), float("nan")])
-def test_poses_that_are_none_are_refused(tmp_path, far):
+def test_poses_that_are_far_away_are_refused(tmp_path):
     track = around()
     assert track.T_sensor_object is not None
-    poses = SE3(track.T_sensor_object.rotation, track.T_sensor_object.translation + far)
+    poses = SE3(track.T_sensor_object.rotation, track.T_sensor_object.translation + 1e200)
     with pytest.raises(BadInputError, match="store: a pose is not finite or far away"):
         described(packed(tmp_path, [replace(track, T_sensor_object=poses)]))

@@ -33,7 +33,7 @@ from wildshape.inference.folders.complete_folder import (
 from wildshape.inference.predictor import Predictor
 from wildshape.io.atomic import write_json
 from wildshape.io.boxes.detections import moved
-from wildshape.io.output import file_name
+from wildshape.io.output import file_name, remove_leftovers
 from wildshape.io.poses import write_poses
 from wildshape.io.scans.writers import cloud_writer
 from wildshape.records import Completion, Points
@@ -228,6 +228,7 @@ class Completer:
             for name, one in zip(track.scan_names, done, strict=True):
                 write(folder / COMPLETED / f"{file_name(name)}.ply", one.points)
         write_poses(folder / POSES, stack([one.pose for one in done]))
+        remove_leftovers(folder)  # of a worker that was killed over this object
         said = objects_of(track, done, self.predictor, self.cuts, together=True)
         write_json(folder / OBJECTS, said)  # last: it says that the object is done
 

@@ -21,7 +21,7 @@ from wildshape.inference.registration import to_middle
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import reading
 from wildshape.io.inputs import Part, TrackSource, open_tracks, with_rays
-from wildshape.io.output import Output, begin, file_name, keep_apart
+from wildshape.io.output import Output, begin, file_name, keep_apart, remove_leftovers
 from wildshape.io.poses import times_of, write_poses, write_trajectory, write_tum
 from wildshape.io.progress import SILENT, Bar, Progress
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates
@@ -224,6 +224,7 @@ def write_results(
                 together=options.track,
                 skipped=skipped,
             )
+            remove_leftovers(folder)  # of a worker that was killed, whose part another did
             write_json(folder / OBJECTS, described)
             summary.tracks, summary.scans = summary.tracks + 1, summary.scans + len(scans)
             summary.reasons.of((f"{track.name}/{name}" for name in track.scan_names), scans)
