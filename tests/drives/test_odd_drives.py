@@ -54,7 +54,7 @@ def test_a_sensor_that_stands_stays_where_it_is(scans):
 
 
 def test_poses_that_do_not_fit_the_scans_are_said():
-    """Right ones, their inverse, scans that are in the world already, a camera's axes."""
+    """Right ones, inverse ones, scans in the world already, a camera's axes, cm, none at all."""
     seen = street(frames=8)
     path = path_of(seen.places)
     turn = torch.tensor(((0, -1, 0, 5e5), (1, 0, 0, 5e6), (0, 0, 1, 90), (0, 0, 0, 1.0)))
@@ -66,6 +66,9 @@ def test_poses_that_do_not_fit_the_scans_are_said():
         (seen.scans, T_map_sensor.inverse(), "inverse of the poses fits the scans better"),
         (placed, path, "lie better on each other without them"),
         (seen.scans, camera @ path @ camera.inverse(), "without them"),
+        (seen.scans, SE3(path.rotation, 100 * path.translation), "without them: give T_world_"),
+        (seen.scans, SE3.identity(8), "the sensor hardly moves, but its scans do not"),
+        ([seen.scans[0]] * 8, SE3.identity(8), None),
     ):
         drive = replace(drive_of(scans), T_world_sensor=poses)
         found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
