@@ -23,7 +23,8 @@ from wildshape.training.objectives import (
     turning_handicap,
 )
 from wildshape.training.runtime.running_mean import Meter
-from wildshape.training.self_training.objective import SelfTaught
+from wildshape.training.self_training import objective
+from wildshape.training.self_training.objective import SelfTaught, seen_from, shape_terms
 
 VIEWS = replace(SMALLEST.views, tracks=4, views=3)
 
@@ -135,6 +136,38 @@ def test_the_selector_is_taught_to_believe_in_the_winner(batch):
     for without, taught in zip(*found):
         nats = (taught - without).detach() / 0.5
         assert 0.25 < float(nats) < 3.0  # of four alike it is 1.4
+
+
+@pytest.mark.parametrize("complete", [False, True])
+def test_of_what_sensors_did_not_see_nothing_is_taught_unless_shapes_are_whole(
+    batch, complete, monkeypatch
+):
+    handed = []
+
+    def terms(shapes, targets, known, config):
+        handed.append((shapes, known))
+        return shape_terms(shapes, targets, known, config)
+
+    monkeypatch.setattr(objective, "shape_terms", terms)
+    network = ShapePoseNet(replace(SMALLEST.network, mirror=False))
+    targets, sensors = torch.randn(4, 80, 3), torch.tensor((0.0, 9.0, 0.0)).expand(4, 2, 3)
+    taught = FusedBatch(
+        batch.scans[:4],
+        batch.turn[:4],
+        torch.ones(4, 3),
+        targets,
+        sensors,
+        torch.full((4,), 0.1),
+        torch.zeros(4, 0, 6),
+    )
+    SelfTaught(network, complete)(taught)
+    ((shapes, known),) = handed
+    if complete:
+        assert known is None
+    else:
+        expected = seen_from(shapes.detach(), sensors, taught.view_top, mirror=False)
+        assert torch.equal(known, expected)
+        assert 0 < int(known.sum()) < known.numel()
 
 
 def test_what_is_taught_does_not_depend_on_the_size_of_the_objects():

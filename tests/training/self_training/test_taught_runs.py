@@ -11,6 +11,7 @@ import torch
 from safetensors.torch import load_file
 from tests.cars import drive_by
 from tests.training.self_training.taught import TAUGHT, sampler_of
+from tests.training.worker import FEW_STEPS
 
 from wildshape.errors import BadInputError
 from wildshape.io.store.store import StoreWriter, open_store
@@ -127,6 +128,15 @@ def test_another_teacher_is_another_run(car_store, teacher, tmp_path):
     save_state(tmp_path, run.state, run.identity)
     with pytest.raises(BadInputError, match="teacher"):
         setup(TAUGHT, car_store, tmp_path, seed=3, teacher="truth", resume=True)
+
+
+def test_another_start_is_another_run(car_store, teacher, tmp_path):
+    plain = replace(FEW_STEPS, optim=replace(FEW_STEPS.optim, steps=3))
+    run = setup(plain, car_store, tmp_path, seed=3, start=teacher)
+    save_state(tmp_path, run.state, run.identity)
+    assert setup(plain, car_store, tmp_path, seed=3, start=teacher, resume=True).state.step == 0
+    with pytest.raises(BadInputError, match="other start;"):
+        setup(plain, car_store, tmp_path, seed=3, resume=True)
 
 
 def test_a_run_with_headings_is_another_run_without(car_store, tmp_path):
