@@ -266,7 +266,7 @@ def test_three_scans_an_empty_and_a_damaged_one_are_warnings(recording, tmp_path
     few = wildshape.drive(folder, tmp_path / "out")
     assert few.frames == 5
     assert few.warnings == (
-        "1 scans are missing between the others",
+        "1 scan missing between the others",
         "2 of 5 scans are empty or cannot be read",
     )
     assert few.vehicles

@@ -70,7 +70,7 @@ def test_a_missing_scan_is_counted_and_leaves_its_time_out(tmp_path):
     write_scans(tmp_path, (7, 8, 11))
     drive = open_drive(tmp_path)
     assert drive.ticks == (0, 1, 4)
-    assert drive.warnings == ("2 scans are missing between the others",)
+    assert drive.warnings == ("2 scans missing between the others",)
 
 
 @pytest.mark.parametrize(

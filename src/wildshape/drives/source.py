@@ -19,6 +19,7 @@ from wildshape.geometry.projection.full_scan import FullScan
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import Twist
 from wildshape.io.order import numbers_of
+from wildshape.io.progress import counted
 from wildshape.records import Points, Turn, as_text
 
 _LONGEST_PAUSE = 1e9  # scans; more are no count
@@ -222,7 +223,7 @@ def _ticks(
     else:
         ticks = np.arange(len(names))
     missing = int(ticks[-1]) + 1 - len(names)
-    told = (f"{missing} scans are missing between the others",) if missing else ()
+    told = (f"{counted(missing, 'scan')} missing between the others",) if missing else ()
     return tuple(ticks.tolist()), told
 
 

@@ -107,7 +107,9 @@ def nearest_k(
     groups: tuple[Int64[Tensor, "B N"], Int64[Tensor, "B M"]] | None = None,
     most: float = math.inf,
 ) -> Neighbourhoods:
-    """The k nearest targets of each query, no gradient; of equal ones the smaller index first.
+    """The k nearest targets of each query, no gradient.
+
+    Of equal ones the native kernels give the smaller index first, torch and k-d trees any.
 
     Args:
         query: `(B, N, 3)` points.
