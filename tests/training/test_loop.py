@@ -14,11 +14,10 @@ from safetensors.torch import load_file, save_file
 from tests.training.worker import SMALLEST
 
 from wildshape.errors import BadInputError
-from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.method.checkpoint import MODEL, load_checkpoint
 from wildshape.method.ray_encoder import RayConfig
 from wildshape.training import loop
-from wildshape.training.loop import StopRequested, fit, setup, split_tracks
+from wildshape.training.loop import StopRequested, fit, setup
 from wildshape.training.state import STATE
 from wildshape.training.validate import Validation
 
@@ -280,38 +279,6 @@ def test_a_stop_keeps_the_last_state_that_can_be_resumed(car_store, tmp_path):
     with pytest.raises(BadInputError, match="not finite"):
         fit(run, spoil)
     assert setup(SMALLEST, car_store, tmp_path, seed=3, resume=True).state.step == 30
-
-
-def test_tracks_held_out_without_a_usable_scan_are_those_fitted(cars, tmp_path):
-    held = split_tracks(20)[1]
-    with StoreWriter(tmp_path / "store", {}) as writer:
-        for number in range(20):
-            track = replace(cars[number % len(cars)], name=f"{number}")
-            few = tuple(scan[:20] for scan in track.scans)
-            writer.add(replace(track, scans=few) if number in held else track)
-    recipe = replace(SMALLEST, held_out=20)
-    run = setup(recipe, open_store(tmp_path / "store"), tmp_path / "run")
-    assert sorted(run.held_tracks) == [i for i in range(20) if i not in held]
-
-
-def test_few_tracks_are_both_fitted_and_held_out_many_are_not():
-    fitted, held = split_tracks(8)
-    assert sorted(fitted) == sorted(held) == list(range(8))
-    fitted, held = split_tracks(100)
-    assert len(held) == 5
-    assert sorted([*fitted, *held]) == list(range(100))
-    assert list(split_tracks(100)[1]) == list(held)
-
-
-def test_tracks_that_are_held_out_are_not_fitted(car_store, tmp_path):
-    run = setup(replace(SMALLEST, held_out=4), car_store, tmp_path)
-    fitted, held = (
-        {int(scan) for scans in sampler.scans_of for scan in scans}
-        for sampler in (run.sampler, run.held_out)
-    )
-    assert not fitted & held
-    assert len(run.held_out.scans_of) == 2
-    assert fitted | held == set(range(car_store.scan_count))
 
 
 def test_several_processes_are_asked_to_stop_where_all_of_them_ask(
