@@ -37,7 +37,7 @@ from wildshape.method.checkpoint import MODEL, load_checkpoint, save_checkpoint,
 from wildshape.method.ray_encoder import RayConfig
 from wildshape.ops.device import choose_device
 from wildshape.ops.threads import exact_on
-from wildshape.parallel.team import cores
+from wildshape.parallel.team import Team, cores, team
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.config import Recipe
 from wildshape.training.recipes import PRESETS
@@ -46,7 +46,7 @@ from wildshape.training.train import fit_with_progress
 
 _SENSORS = ("hdl64", "hdl64", "hdl32", "os1-128")
 _GROUND = 1  # of the sensors the one whose scans keep some ground
-_SCANS, _SHAPE_POINTS, _VALIDATE_EVERY = 16, 512, 3000
+_SCANS, _SHAPE_POINTS, _VALIDATE_EVERY = 16, 512, 10_000
 _COMMAND = "python -m experiments.shipped_chain --cad CAD --out RUN"
 VIEWS: tuple[Literal["airplane", "chair", "car"], ...] = ("airplane", "chair", "car")
 NAMES = ("default", *VIEWS)
@@ -94,7 +94,7 @@ ROUNDS = {
     "taught": Round(data=1, steps=8_000, teacher="first"),
     "second": Round(data=2, steps=12_000, teacher="taught", start="taught"),
     "main": Round(data=3, steps=30_000, teacher="second", start="second"),
-    "last": Round(data=4, steps=30_000, lr=4e-4, teacher="main", start="main", rays=True),
+    "last": Round(data=4, steps=100_000, lr=8e-4, teacher="main", start="main", rays=True),
 }
 """In their order; the last one is shipped."""
 
@@ -221,13 +221,18 @@ def _data(seed: int, settings: Settings) -> Store:
     """Drives past procedural and CAD vehicles, simulated once; begun again if half-written."""
     path = settings.out / f"tracks{seed}"
     if not is_finished_store(path):
-        with StoreWriter(path, provenance(settings.command), overwrite=True) as store:
+        with (
+            StoreWriter(path, provenance(settings.command), overwrite=True) as store,
+            team() as helpers,
+        ):
             for number in range(len(_SENSORS)):
-                _add_drives(store, number, seed, settings)
+                _add_drives(store, number, seed, settings, helpers)
     return open_store(path)
 
 
-def _add_drives(store: StoreWriter, number: int, seed: int, settings: Settings) -> None:
+def _add_drives(
+    store: StoreWriter, number: int, seed: int, settings: Settings, helpers: Team
+) -> None:
     """Those of one sensor."""
     tracks = DATA[seed]
     sets = 2 * len(tracks.varied)
@@ -247,7 +252,7 @@ def _add_drives(store: StoreWriter, number: int, seed: int, settings: Settings) 
         sources = product(tracks.varied, (None, Path(folder)))
         for place, (varied, meshes) in enumerate(sources):
             drives = replace(config, meshes=meshes, varied=varied)
-            for track in simulate_tracks(drives, own + place):
+            for track in simulate_tracks(drives, own + place, helpers=helpers):
                 store.add(replace(track, name=f"{config.sensor}-{own + place}-{track.name}"))
 
 

@@ -3,12 +3,13 @@
 """Simulated tracks as records: the same for the same seed, however many workers make them."""
 
 from collections.abc import Iterator
+from contextlib import nullcontext
 
 import numpy as np
 import torch
 
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.parallel.team import team
+from wildshape.parallel.team import Team, team
 from wildshape.records import Intrinsics, Sensor, Track
 from wildshape.simulate.config import SimulationConfig
 from wildshape.simulate.one_track import Job, RawTrack
@@ -19,7 +20,10 @@ __all__ = ["SimulationConfig", "simulate_tracks"]
 
 
 def simulate_tracks(
-    config: SimulationConfig, seed: int, workers: int | None = None
+    config: SimulationConfig,
+    seed: int,
+    workers: int | None = None,
+    helpers: Team | None = None,
 ) -> Iterator[Track]:
     """Yield `config.tracks` tracks with truth, in order.
 
@@ -32,6 +36,7 @@ def simulate_tracks(
         config: what to simulate.
         seed: at least 0.
         workers: processes; None: one a core.
+        helpers: who works instead, for many small calls: none begins processes of its own.
 
     Raises:
         BadInputError: a mesh that cannot be used.
@@ -39,8 +44,8 @@ def simulate_tracks(
     """
     meshes = mesh_files(config.meshes) if config.meshes else ()
     job = Job(config, seed, meshes)
-    with team(workers) as helpers:
-        for index, made in enumerate(helpers.in_order(job.track, range(config.tracks))):
+    with team(workers) if helpers is None else nullcontext(helpers) as workforce:
+        for index, made in enumerate(workforce.in_order(job.track, range(config.tracks))):
             yield _record(made, config, index)
 
 
