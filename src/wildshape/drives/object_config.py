@@ -12,8 +12,8 @@ class CompletionConfig:
     Attributes:
         looks: scans of a track that the network sees first, the fullest of equal parts of those to
             complete.
-        worst_cost_m: tracks whose best look costs more are no vehicles; those of a labelled street
-            cost less than 0.2 m.
+        worst_cost_m: tracks whose best look costs more are no vehicles; those of twenty labelled
+            streets cost less than 0.28 m, but for one that is solid.
         hopeless_cost_m: nor are those whose fullest scan costs more.
         solid_scans: seen in so many scans with points as long, wide and high as a vehicle's, an
             object may cost more.
@@ -33,10 +33,10 @@ class CompletionConfig:
     """
 
     looks: int = 3
-    worst_cost_m: float = 0.2
-    hopeless_cost_m: float = 0.22
+    worst_cost_m: float = 0.28
+    hopeless_cost_m: float = 0.32
     solid_scans: int = 15
-    solid_cost_m: float = 0.3
+    solid_cost_m: float = 0.4
     hopeless_nats: float = -5.0
     least_nats: float = -4.0
     doubtful_nats: float = -2.0
@@ -95,7 +95,7 @@ class VehicleConfig:
     merged_nats: float = 1.0
     usual_confidence: float = 0.1
     least_confidence: float = 0.4
-    least_kind: float = 0.3
+    least_kind: float = 0.5
     least_driving: float = 0.1
     driving_m: float = 3.5
     driving_deg: float = 15.0
