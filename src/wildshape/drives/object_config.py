@@ -12,8 +12,8 @@ class CompletionConfig:
     Attributes:
         looks: scans of a track that the network sees first, the fullest of equal parts of those to
             complete.
-        worst_cost_m: tracks whose best look costs more are no vehicles. Of 353 of labelled streets
-            three cost more, two of them solid; hedges of a real drive cost 0.20 to 0.28 m.
+        worst_cost_m: tracks whose best look costs more are no vehicles. Of twenty labelled
+            streets two vehicles are lost so; hedges of a real drive cost 0.20 to 0.28 m.
         hopeless_cost_m: nor are those whose fullest scan costs more.
         solid_scans: seen in so many scans with points as long, wide and high as a vehicle's, an
             object may cost more.
