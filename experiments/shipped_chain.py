@@ -38,7 +38,7 @@ from wildshape.method.ray_encoder import RayConfig
 from wildshape.ops.device import choose_device
 from wildshape.ops.threads import exact_on
 from wildshape.parallel.team import Team, cores, team
-from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+from wildshape.simulate.generate import SimulationConfig, simulated_by
 from wildshape.training.config import Recipe
 from wildshape.training.recipes import PRESETS
 from wildshape.training.setup import setup
@@ -252,7 +252,7 @@ def _add_drives(
         sources = product(tracks.varied, (None, Path(folder)))
         for place, (varied, meshes) in enumerate(sources):
             drives = replace(config, meshes=meshes, varied=varied)
-            for track in simulate_tracks(drives, own + place, helpers=helpers):
+            for track in simulated_by(helpers, drives, own + place):
                 store.add(replace(track, name=f"{config.sensor}-{own + place}-{track.name}"))
 
 

@@ -23,6 +23,7 @@ from wildshape.inference.refine import (
     refine,
     with_scan,
 )
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
 SHAPE = car_surface(4000, seed=5)[0].astype(np.float32)
 STRETCH = np.array((1.07, 0.96, 1.05), np.float32)
@@ -227,16 +228,17 @@ def test_an_exact_scan_takes_the_place_of_points_put_between():
 
 
 def test_levelling_may_cost_a_trace_of_the_fit():
-    """Alone, the network leans this scan, and lies on it a trace better so."""
+    """Alone, the network leans this scan by two degrees, and lies on it a trace better so."""
     predictor = load()
-    scan = np.load(Path(__file__).parents[2] / "examples" / "scan.npy")
+    *_, drive = simulate_tracks(SimulationConfig(tracks=2, scans=6), 1, workers=1)
+    scan = drive.scans[1]
     assert predictor.up is not None
     leans = [
         float(np.degrees(np.arccos(found.pose.rotation.numpy()[2] @ np.array(predictor.up))))
         for found in (load(raw=True).complete(scan), predictor.complete(scan))
     ]
-    assert leans[0] > 1.5
-    assert leans[1] < 0.7 * leans[0]
+    assert leans[0] > 1.8
+    assert leans[1] < 1.4
 
 
 def test_its_numbers_can_be_set_from_python():

@@ -54,7 +54,7 @@ class VehicleConfig:
     """Which completed tracks are vehicles (`vehicles.py`).
 
     Where the weights state no probability, what speaks for a vehicle is added up as log-odds. The
-    numbers were chosen by looking at two unlabelled drives.
+    numbers were chosen by looking at two unlabelled drives, and at twenty simulated streets.
 
     Attributes:
         kinds: usual length, width, height of cars, vans and lorries, metres.

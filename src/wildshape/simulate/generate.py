@@ -3,7 +3,6 @@
 """Simulated tracks as records: the same for the same seed, however many workers make them."""
 
 from collections.abc import Iterator
-from contextlib import nullcontext
 
 import numpy as np
 import torch
@@ -16,14 +15,11 @@ from wildshape.simulate.one_track import Job, RawTrack
 from wildshape.simulate.sensor import DepthCamera, SpinningLidar
 from wildshape.simulate.shapes.meshes import mesh_files
 
-__all__ = ["SimulationConfig", "simulate_tracks"]
+__all__ = ["SimulationConfig", "simulate_tracks", "simulated_by"]
 
 
 def simulate_tracks(
-    config: SimulationConfig,
-    seed: int,
-    workers: int | None = None,
-    helpers: Team | None = None,
+    config: SimulationConfig, seed: int, workers: int | None = None
 ) -> Iterator[Track]:
     """Yield `config.tracks` tracks with truth, in order.
 
@@ -36,17 +32,21 @@ def simulate_tracks(
         config: what to simulate.
         seed: at least 0.
         workers: processes; None: one a core.
-        helpers: who works instead, for many small calls: none begins processes of its own.
 
     Raises:
         BadInputError: a mesh that cannot be used.
         MissingExtraError: embreex is not installed.
     """
+    with team(workers) as helpers:
+        yield from simulated_by(helpers, config, seed)
+
+
+def simulated_by(helpers: Team, config: SimulationConfig, seed: int) -> Iterator[Track]:
+    """The same by helpers that work on other things too: many small sets need no new processes."""
     meshes = mesh_files(config.meshes) if config.meshes else ()
     job = Job(config, seed, meshes)
-    with team(workers) if helpers is None else nullcontext(helpers) as workforce:
-        for index, made in enumerate(workforce.in_order(job.track, range(config.tracks))):
-            yield _record(made, config, index)
+    for index, made in enumerate(helpers.in_order(job.track, range(config.tracks))):
+        yield _record(made, config, index)
 
 
 def _record(raw: RawTrack, config: SimulationConfig, index: int) -> Track:

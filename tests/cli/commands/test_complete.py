@@ -13,7 +13,7 @@ from wildshape.io.rays import read_rays
 @pytest.fixture
 def hidden(wildshape, tmp_path):
     """A track of two scans, something in front of the car, with rays."""
-    asked = ("--tracks", 1, "--scans", 2, "--seed", 3, "--occlusion", 0.999, "--rays")
+    asked = ("--tracks", 1, "--scans", 2, "--seed", 4, "--occlusion", 0.999, "--rays")
     done = wildshape("simulate", tmp_path / "data", *asked, "--layout", "folders", "--workers", 1)
     assert done.code == 0, done.err
     return next((tmp_path / "data").glob("*/track.json")).parent
@@ -23,11 +23,11 @@ def test_the_rays_of_a_file_are_those_of_the_library(wildshape, refused, hidden,
     scan, rays = (next(iter(sorted(hidden.glob(kind)))) for kind in ("scans/*", "rays/*.npz"))
     alone = library.load().complete(scan)
     under = library.load().complete(scan, rays=read_rays(rays))
-    assert abs(under.cost - alone.cost) > 1e-3
+    assert abs(under.cost - alone.cost) > 0.01
     done = wildshape("complete", scan, "--rays", rays, "--out", tmp_path / "out")
     assert done.code == 0, done.err
     (record,) = json.loads(next((tmp_path / "out").rglob("objects.json")).read_text())["scans"]
-    assert record["cost_m"] == pytest.approx(under.cost, abs=1e-4)
+    assert record["cost_m"] == pytest.approx(under.cost, abs=1e-3)
     assert record["p_pose"] == pytest.approx(under.p_pose, abs=1e-2)
     said = refused("complete", hidden, "--rays", rays, "--out", tmp_path / "all")
     assert "holds 2; keep those of a track in its folder rays/" in said

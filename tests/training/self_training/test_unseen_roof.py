@@ -54,3 +54,13 @@ def test_what_was_seen_of_one_side_is_known_of_the_other_where_objects_are_symme
     assert len(near) > 80
     assert float(near[:, 1].mean()) > 0.2
     assert len(unseen_roof(_walls(3.0), place, mirror=True)) < 40
+
+
+def test_a_roof_is_as_broad_as_the_top_and_has_none_of_the_strays():
+    """Above broad walls the upper part is narrower; a handful of points flies far behind."""
+    upper = _walls(1.0) * torch.tensor((1.0, 0.6, 1.0)) + torch.tensor((0.0, 0.0, 2.1))
+    strays = torch.tensor((-9.0, 0.0, 0.0)) + torch.arange(6)[:, None] * torch.tensor((0, 0.1, 0.4))
+    roof = unseen_roof(torch.cat((_walls(2.0), upper, strays)), _LOW, mirror=True)
+    assert len(roof) > 100
+    assert float(roof[:, 1].abs().max()) < 0.7
+    assert float(roof[:, 0].min()) > -4.2
