@@ -50,8 +50,7 @@ _SCANS, _SHAPE_POINTS, _VALIDATE_EVERY = 16, 512, 10_000
 _COMMAND = "python -m experiments.shipped_chain --cad CAD --out RUN"
 VIEWS: tuple[Literal["airplane", "chair", "car"], ...] = ("airplane", "chair", "car")
 NAMES = ("default", *VIEWS)
-VIEW_STEPS = {"airplane": 5000, "chair": 5000, "car": 2000}
-TAUGHT_STEPS = {"airplane": 5000, "chair": 5000, "car": 3500}
+_VIEW_STEPS = 5000  # of each of the two stages
 _CALIBRATION_TRACKS = 60
 
 
@@ -265,8 +264,8 @@ def _views(category: Literal["airplane", "chair", "car"], settings: Settings) ->
             out=folder,
             cad=settings.cad,
             category=category,
-            steps=settings.part(VIEW_STEPS[category]),
-            taught_steps=settings.part(TAUGHT_STEPS[category]),
+            steps=settings.part(_VIEW_STEPS),
+            taught_steps=settings.part(_VIEW_STEPS),
             headings=headings,
             device=settings.device,
         )
