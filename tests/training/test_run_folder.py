@@ -10,6 +10,7 @@ from wildshape.errors import BadInputError
 from wildshape.io.output import MARKER, begin
 from wildshape.io.scans.points import Coordinates
 from wildshape.io.write_tracks import write_tracks
+from wildshape.method.checkpoint import load_checkpoint, weights_file
 from wildshape.training.options import TrainingOptions
 from wildshape.training.recipes import PRESETS, tiny
 from wildshape.training.run_folder import begun_run, open_training_data
@@ -98,6 +99,18 @@ def test_a_damaged_marker_is_refused(folders, tmp_path):
     (out / MARKER).write_text('{"command": "train"}')
     with pytest.raises(BadInputError, match=MARKER), begun_run(folders[0], out, AGAIN):
         pass
+
+
+@pytest.mark.parametrize("taught", [{}, {"teacher": "shipped"}])
+def test_the_shipped_weights_are_fine_tuned_with_all_that_they_see(folders, tmp_path, taught):
+    options = TrainingOptions(preset="default", start="shipped", steps=1, **taught)
+    run = train(folders[0], tmp_path / "run", options)
+    before, shipped = load_checkpoint(weights_file(None))
+    after, settings = load_checkpoint(run.model)
+    assert settings.network == shipped.network
+    assert settings.network.rays is not None
+    for name, weights in before.state_dict().items():  # one step of the warm-up
+        assert (after.state_dict()[name] - weights).abs().max() < 1e-3, name
 
 
 def test_weights_are_not_removed_by_the_run_that_reads_them(folders, tmp_path):

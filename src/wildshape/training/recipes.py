@@ -12,6 +12,7 @@ from wildshape.io.store.store import Store
 from wildshape.method.encoders.named import Backbone
 from wildshape.method.multiview import LossConfig
 from wildshape.method.network import NetworkConfig
+from wildshape.method.ray_encoder import RayConfig
 from wildshape.records import SensorKind
 from wildshape.training.batches.fused import DrawConfig
 from wildshape.training.batches.occlusion_augmentation import OcclusionConfig
@@ -131,6 +132,11 @@ def tiny() -> Recipe:
         optim=optim,
         validate_every=100,
     )
+
+
+def with_rays(recipe: Recipe, rays: RayConfig | None) -> Recipe:
+    """The recipe with a network that sees rays, as that of the weights it goes on from."""
+    return replace(recipe, network=replace(recipe.network, rays=rays))
 
 
 def with_encoder(recipe: Recipe, backbone: Backbone) -> Recipe:

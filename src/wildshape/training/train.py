@@ -22,7 +22,7 @@ from wildshape.ops.device import choose_device
 from wildshape.training.config import Recipe
 from wildshape.training.loop import Run, StopRequested, fit, setup
 from wildshape.training.options import TrainingOptions
-from wildshape.training.recipes import recipe_for, with_encoder
+from wildshape.training.recipes import recipe_for, with_encoder, with_rays
 from wildshape.training.run_folder import begun_run, finish_run, open_training_data
 from wildshape.training.runtime.profiler import PROFILE
 
@@ -97,6 +97,8 @@ def train(
         store = open_training_data(data, out, options, progress)
         recipe = recipe_for(store, options.preset, options.steps)
         recipe = with_encoder(recipe, options.encoder or recipe.network.backbone)
+        if weights.start is not None:
+            recipe = with_rays(recipe, load_checkpoint(weights.start)[1].network.rays)
         run = _set_up(recipe, store, data, out, options, weights, device, progress)
     if options.profile and run.processes.leads:
         run.profile = out / PROFILE
