@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The weights that the package ships, all of them, by one command.
+"""Make weights of all the names that the package ships, by one command.
 
     python -m experiments.shipped_chain --cad CAD --out RUN
 

@@ -6,7 +6,7 @@
 
 CAD_FOLDER holds `manifest.csv` (columns category, file, split) and the meshes it names. Those of
 split `train` are seen as they are and stretched, beside our own procedural shapes; ten views of
-each, no labels. The first stage is trained as the paper has it (preset `views`); a second, left out
+each, no labels. The first stage learns from the views alone (preset `views`); a second, left out
 by default, starts from it and is taught by it: it poses and fuses the tracks. A car's two ends are
 too alike for views in no order, so that the second stage of cars asks the shipped LiDAR weights
 which way each view looks (`--headings src/wildshape/weights/default.safetensors`). The weights, in

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The scans of a track agree on which way is front (METHOD 11.1, 12.1). Label-free.
+"""The scans of a track agree on which way is front (METHOD 11, 12). Label-free.
 
 What fails in single scans of a near-symmetric object is the half turn. Where the scans of a track
 follow each other, the object does not turn around between them; that is seen from poses that turn

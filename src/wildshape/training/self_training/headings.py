@@ -3,7 +3,7 @@
 """All tracks agree on which way is front (beyond the paper), without a label.
 
 A near-symmetric object settles in either of two headings, a half turn apart, each track as chance
-has it (METHOD 12.2). What needs no label decides: within a track an object does not turn around
+has it (METHOD 12). What needs no label decides: within a track an object does not turn around
 between neighbouring scans, or, where the scans come in no order (`LossConfig.time_ordered` is
 false), they contradict each other if not posed alike (`heading_overlaps.py`); across tracks, the
 profiles of fused scans are more alike when turned the same way (`heading_profiles.py`). Each is a
