@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The folder of a run is gone on with only by the same training on the same tracks."""
 
+import shutil
 from dataclasses import replace
 
 import pytest
 
 from wildshape.errors import BadInputError
+from wildshape.io.inputs import open_tracks
 from wildshape.io.output import MARKER, begin
-from wildshape.io.scans.points import Coordinates
+from wildshape.io.scans.points import Coordinates, write_ply
 from wildshape.io.write_tracks import write_tracks
 from wildshape.method.checkpoint import load_checkpoint, weights_file
 from wildshape.training.options import TrainingOptions
@@ -43,6 +45,36 @@ def test_a_run_goes_on_with_its_own_tracks_alone(folders, tmp_path):
             open_training_data(one, out, replace(AGAIN, coordinates=other))
         with pytest.raises(BadInputError, match=r"in metres .* already"):
             open_training_data(packed.path, out, replace(OPTIONS, coordinates=other))
+
+
+@pytest.mark.parametrize("change", ["added", "removed", "replaced", "gone"])
+def test_a_run_is_not_gone_on_with_once_its_tracks_have_changed(folders, tmp_path, cars, change):
+    one, _ = folders
+    out = tmp_path / "run"
+    packed = open_training_data(one, out, OPTIONS)
+    track = one / cars[0].name
+    scan = sorted((track / "scans").iterdir())[0]
+    scan.touch()  # as a copy would
+    open_training_data(one, out, AGAIN)
+    if change == "added":
+        shutil.copytree(track, one / "new")
+    elif change == "replaced":
+        write_ply(scan, cars[0].scans[0][1:])
+    elif change == "removed":
+        scan.unlink()
+    else:
+        shutil.rmtree(one)
+    with pytest.raises(BadInputError, match=r"one: holds other files .* with .*data\.store"):
+        open_training_data(one, out, AGAIN)
+    assert open_training_data(packed.path, out, AGAIN).fingerprint == packed.fingerprint
+
+
+def test_a_run_that_kept_no_fingerprint_goes_on(folders, tmp_path):
+    one, _ = folders
+    origin = {"input": str(one.resolve()), "unit": "m", "origin": [0.0, 0.0, 0.0]}
+    store = tmp_path / "run" / "data.store"
+    write_tracks(open_tracks(one), store, "packed", command="train", settings=origin)
+    assert open_training_data(one, tmp_path / "run", AGAIN).path == store
 
 
 @pytest.mark.parametrize(

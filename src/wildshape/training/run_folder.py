@@ -13,6 +13,7 @@ from typing import Any
 
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import lock_folder, write_json
+from wildshape.io.fingerprint import fingerprint_of
 from wildshape.io.guard import read_json, reading
 from wildshape.io.inputs import open_tracks, refuse_other_coordinates
 from wildshape.io.output import MARKER, Output, begin, keep_apart, remove_leftovers
@@ -23,6 +24,7 @@ from wildshape.training.options import TrainingOptions
 from wildshape.training.state import STATE
 
 _PACKED = "data.store"
+_FILES_SEEN = "files"  # in the settings of what was packed: which files these were
 _SETTINGS = ("preset", "encoder", "steps", "seed")
 _FILES = (
     "*.safetensors",
@@ -120,7 +122,8 @@ def open_training_data(
             f" `wildshape convert folder {data} OUT`."
         )
     packed = out / _PACKED
-    origin = {"input": str(data.resolve()), **asdict(options.coordinates)}
+    place = {"input": str(data.resolve()), **asdict(options.coordinates)}
+    origin = {**place, _FILES_SEEN: fingerprint_of(data)}
     if options.resume and is_finished_store(packed):  # else it is none, or half-written
         return _packed_before(packed, data, origin)
     source = open_tracks(data, options.coordinates)
@@ -143,10 +146,18 @@ def open_training_data(
 def _packed_before(packed: Path, data: Path, origin: dict[str, Any]) -> Store:
     """The run's own store, if `origin` says that it is of these tracks, as they were then."""
     store = open_store(packed, data)
-    if store.provenance.get("settings") != json.loads(json.dumps(origin)):
+    then, now = dict(store.provenance.get("settings") or {}), json.loads(json.dumps(origin))
+    files = now.pop(_FILES_SEEN)
+    packed_files = then.pop(_FILES_SEEN, files)  # older runs did not keep it
+    if then != now:
         raise BadInputError(
             f"{data}: the run packed tracks of another place, --unit or --origin; resume with"
             f" those, with {packed} if they only moved, or choose a new --out."
+        )
+    if packed_files != files:
+        raise BadInputError(
+            f"{data}: holds other files than the run packed; resume with {packed} to go on with"
+            " the tracks as they were, or choose a new --out to train on what is there now."
         )
     return store
 

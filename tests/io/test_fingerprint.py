@@ -1,0 +1,37 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""A fingerprint follows the files that are read, and nothing else."""
+
+import shutil
+
+import pytest
+
+from wildshape.io.fingerprint import fingerprint_of
+from wildshape.io.write_tracks import write_tracks
+
+
+@pytest.fixture
+def dataset(cars, tmp_path):
+    """Two track folders."""
+    write_tracks(cars[:2], tmp_path / "data", "folders", command="x", settings={})
+    return tmp_path / "data"
+
+
+def test_copies_are_alike_and_strangers_do_not_count(dataset, tmp_path):
+    before = fingerprint_of(dataset)
+    shutil.copytree(dataset, tmp_path / "copy")
+    (dataset / "notes.txt").write_text("not read")
+    (dataset / "run").mkdir()
+    (dataset / "run" / "model.npy").write_text("not read")
+    assert fingerprint_of(dataset) == before == fingerprint_of(tmp_path / "copy")
+
+
+@pytest.mark.parametrize("name", ["track.json", "poses.txt", "shape.ply", "scans/000000.ply"])
+def test_each_file_that_is_read_counts(dataset, cars, name):
+    track = dataset / cars[0].name
+    places = dataset, track, track / "scans", track / "scans" / "000000.ply"
+    before = [fingerprint_of(place) for place in places]
+    with (track / name).open("ab") as file:
+        file.write(b" ")
+    changed = [fingerprint_of(place) != was for place, was in zip(places, before)]
+    assert changed == [True, True, *[name.startswith("scans")] * 2]
