@@ -3,6 +3,7 @@
 """A track made ready for evaluation: usable scans, turned, and the truth kept apart from them."""
 
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -70,6 +71,17 @@ class Case:
     def inputs(self) -> list[Points]:
         """Fresh copies of the scans: a method may do with them what it likes."""
         return [scan.copy() for scan in self.scans]
+
+    def part(self, which: Sequence[int]) -> "Case":
+        """Some scans alone, with their poses and rays."""
+        poses = self.T_sensor_object
+        return replace(
+            self,
+            scans=tuple(self.scans[i] for i in which),
+            scan_names=tuple(self.scan_names[i] for i in which),
+            T_sensor_object=None if poses is None else poses[torch.tensor(which)],
+            rays=tuple(self.rays[i] for i in which) if self.rays else (),
+        )
 
 
 def prepare(track: Track, rotate: Rotate, seed: int, limits: Limits) -> Case:

@@ -3,7 +3,6 @@
 """The evaluation protocol of METHOD 8: methods see points and the sensor, never the truth."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple, TypeVar
 
@@ -30,6 +29,7 @@ from wildshape.evaluation.metrics import (
     distance_floor,
     registration_error,
 )
+from wildshape.evaluation.refusals import taken
 from wildshape.evaluation.results import (
     CompletionScore,
     Limits,
@@ -175,7 +175,7 @@ def _score_canonical(method: CanonicalCompleter, case: Case, ledger: _Ledger) ->
     if case.truth is None:
         _skip_scans(case, ledger)
         return
-    found = _of_each(case, lambda scans, _: method.complete_canonical(scans, case.sensor))
+    found = _of_each(case, lambda part: method.complete_canonical(part.inputs(), part.sensor))
     for i, points in enumerate(found):
         answer = None if points is None else Spoken(points)
         _score_completion(answer, case, case.truth, SE3.identity(), i, ledger)
@@ -194,20 +194,20 @@ class Spoken(NamedTuple):
 def complete_scans(method: Completer, case: Case) -> Sequence[Answer | None]:
     """One answer a scan, in that scan's frame; None where the method refused it."""
     if case.rays and isinstance(method, SightedCompleter):
-        return _of_each(case, lambda scans, rays: method.complete_sighted(scans, case.sensor, rays))
+        return _of_each(
+            case, lambda part: method.complete_sighted(part.inputs(), part.sensor, part.rays)
+        )
     if isinstance(method, BatchCompleter):
-        return _of_each(case, lambda scans, _: method.complete_many(scans, case.sensor))
+        return _of_each(case, lambda part: method.complete_many(part.inputs(), part.sensor))
     return [_spoken(method.complete, scan, case) for scan in case.inputs()]
 
 
-def _of_each(case: Case, ask: Callable[[Any, Any], Iterable[Found]]) -> Sequence[Found | None]:
-    """What `ask` has of all scans and their rays; if it refuses one, of each alone."""
-    with suppress(BadInputError):
-        return list(ask(case.inputs(), case.rays))
+def _of_each(case: Case, ask: Callable[[Case], Iterable[Found]]) -> Sequence[Found | None]:
+    """What a method says of each scan; None of those that it refuses."""
+    kept, answer = taken(case, lambda part: list(ask(part)))
     found: list[Found | None] = [None] * len(case.scans)
-    for i, scan in enumerate(case.inputs()):
-        with suppress(BadInputError):
-            (found[i],) = ask([scan], case.rays[i : i + 1])
+    for i, one in zip(kept, answer or (), strict=True):
+        found[i] = one
     return found
 
 
@@ -275,18 +275,18 @@ def _score_registration(method: Registrar, case: Case, ledger: _Ledger) -> None:
         for i in range(len(case.scans)):
             ledger.skip(case, i, f"registration: {reason}")
         return
-    try:
-        T_middle_scan = method.register_track(case.inputs(), case.sensor)
-    except BadInputError:
-        for i in others:
+    kept, middle, T_middle_scan = _registered(method, case)
+    for i in range(len(case.scans)):
+        if i not in kept and i != middle:
             ledger.skip(case, i, f"registration: {REFUSED}")
-        return
     # The middle scan against itself is no test and is not counted.
-    index = torch.tensor(others)
+    others = [i for i in kept if i != middle]
+    if T_middle_scan is None or not others:
+        return
     error = registration_error(
-        T_middle_scan.to(torch.float64)[index],
-        case.T_sensor_object[index],
-        case.T_sensor_object[case.middle],
+        T_middle_scan[torch.tensor([kept.index(i) for i in others])],
+        case.T_sensor_object[torch.tensor(others)],
+        case.T_sensor_object[middle],
     )
     columns = tuple(getattr(error, part.name) for part in fields(error))
     for i, values in zip(others, torch.stack(columns, dim=1).tolist(), strict=True):
@@ -294,3 +294,17 @@ def _score_registration(method: Registrar, case: Case, ledger: _Ledger) -> None:
             ledger.skip(case, i, f"registration: {NOT_FINITE}")
             continue
         ledger.registrations.append(RegistrationScore(case.name, case.scan_names[i], *values))
+
+
+def _registered(method: Registrar, case: Case) -> tuple[Sequence[int], int, SE3 | None]:
+    """The scans that a method takes, the one that it registers them to, and `T_middle_scan`.
+
+    That is the middle scan, or where this is refused the middle one of those that are taken.
+    """
+    kept, T = taken(case, lambda part: method.register_track(part.inputs(), part.sensor))
+    if T is None:
+        return kept, case.middle, None
+    T, own = T.to(torch.float64), kept[len(kept) // 2]
+    if case.middle not in kept or case.middle == own:
+        return kept, own, T
+    return kept, case.middle, T[kept.index(case.middle)].inverse() @ T
