@@ -9,8 +9,8 @@ import pytest
 import torch
 
 from wildshape.errors import BadInputError
-from wildshape.io.scans.points import read_points
-from wildshape.io.scans.writers import CLOUD_SUFFIXES, cloud_writer, save
+from wildshape.io.scans.points import Coordinates, read_points
+from wildshape.io.scans.writers import CLOUD_SUFFIXES, cloud_writer, save, write_cloud
 
 OFFSET = np.array((83.1, -61.9, -2.2))
 POINTS = (np.random.default_rng(0).normal(size=(50, 3)) + OFFSET).astype(np.float32)
@@ -28,7 +28,7 @@ def test_pcd_is_binary_and_other_programs_read_it(tmp_path):
     from pypcd4.pypcd4 import PointCloud
 
     save(POINTS, tmp_path / "a.pcd")
-    save(POINTS[:0], tmp_path / "none.pcd")
+    write_cloud(tmp_path / "none.pcd", POINTS[:0])
     head = (tmp_path / "a.pcd").read_bytes()
     assert b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\n" in head
     assert b"DATA binary\n" in head
@@ -45,6 +45,33 @@ def test_whatever_is_an_array_is_saved(tmp_path):
     for wrong in (POINTS[:, :2], POINTS[0], "words", held, torch.zeros(3, 3, requires_grad=True)):
         with pytest.raises(BadInputError, match=r"x\.ply: cannot save"):
             save(wrong, tmp_path / "x.ply")
+
+
+MAP = np.array((691_234.5678, 5_334_567.8912, 519.1234))  # UTM, metres
+
+
+@pytest.mark.parametrize("suffix", CLOUD_SUFFIXES)
+def test_points_of_a_map_keep_their_millimetres_or_are_refused(suffix, tmp_path):
+    path, far = tmp_path / f"map{suffix}", POINTS.astype(np.float64) + MAP
+    if suffix in (".ply", ".pcd"):
+        with pytest.raises(BadInputError, match=r"map\.p.*float32, .* up to \d+ cm; subtract"):
+            save(far, path)
+        assert not path.exists()
+        save(POINTS.astype(np.float64) / 3, path)
+        np.testing.assert_allclose(read_points(path), POINTS / 3, atol=1e-5)
+    else:
+        save(far, path)
+        origin = Coordinates(origin=(MAP[0], MAP[1], MAP[2]))
+        np.testing.assert_allclose(read_points(path, origin), POINTS, atol=2e-4)
+
+
+def test_what_are_no_points_is_refused(tmp_path):
+    holed, endless = POINTS.copy(), POINTS.copy()
+    holed[3, 1], endless[0, 0] = np.nan, np.inf
+    for wrong in (POINTS.astype(complex), POINTS[:0], np.zeros((0, 3)), holed, endless):
+        with pytest.raises(BadInputError, match=r"x\.npy: cannot save"):
+            save(wrong, tmp_path / "x.npy")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_another_suffix_is_refused_and_leaves_nothing(tmp_path):

@@ -106,6 +106,10 @@ CLOUD_SUFFIXES = tuple(_WRITERS)
 """The suffixes of files that points are written to, in lower case."""
 
 
+_FLOAT32 = (".ply", ".pcd")  # what is written holds no more
+_MOST_ROUNDED_M = 1e-3
+
+
 def check_suffix(path: Path) -> None:
     """Refuse a name that tells no format.
 
@@ -127,11 +131,26 @@ def write_cloud(path: Path, points: Float[np.ndarray, "n 3"]) -> None:
         points: metres.
 
     Raises:
-        BadInputError: another suffix.
+        BadInputError: another suffix, or one of a format of float32 for points that it would move
+            by over a millimetre.
     """
     check_suffix(path)
+    if path.suffix.lower() in _FLOAT32:
+        _check_rounding(points, path)
     with atomic_write(path) as file:
         _WRITERS[path.suffix.lower()](cast("BinaryIO", file), points)
+
+
+def _check_rounding(points: Float[np.ndarray, "n 3"], path: Path) -> None:
+    if points.dtype == np.float32:
+        return
+    with np.errstate(over="ignore"):  # what float32 cannot hold is infinitely far off
+        moved = float(np.abs(points - points.astype(np.float32)).max(initial=0.0))
+    if moved > _MOST_ROUNDED_M:
+        raise BadInputError(
+            f"{path}: is a file of float32, which would move points by up to {100 * moved:.2g} cm;"
+            " subtract the sensor's position first, or write .npy, .xyz or .las."
+        )
 
 
 @contextmanager
@@ -162,18 +181,38 @@ def save(shape: object, path: str | Path) -> None:
 
     Args:
         shape: whatever `np.asarray` makes `(n, 3)` of; a `Completion` is its points.
-        path: .ply .pcd .npy .xyz .txt .las .laz; a file of that name is replaced.
+        path: .ply .pcd .npy .xyz .txt .las .laz; a file of that name is replaced. .ply and .pcd
+            hold float32, the others what float64 tells apart: .npy all of it, text a micrometre,
+            .las and .laz a tenth of a millimetre.
 
     Raises:
-        BadInputError: another suffix, or no array `(n, 3)`.
+        BadInputError: another suffix; no array `(n, 3)` of finite real numbers, or one without
+            points; or points that a file of float32 would move by over a millimetre.
     """
-    try:
-        points = np.asarray(shape, np.float32)
-    except (TypeError, ValueError, RuntimeError) as error:
-        raise BadInputError(f"{path}: cannot save what is no array of numbers: {error}") from error
+    points = _real_numbers(shape, path)
     if points.ndim != 2 or points.shape[1] != 3:
         raise BadInputError(f"{path}: cannot save an array of shape {points.shape}; pass (n, 3).")
+    if not len(points):
+        raise BadInputError(f"{path}: cannot save a cloud without points; check what made it.")
+    if not np.isfinite(points).all():
+        raise BadInputError(f"{path}: cannot save points that are NaN or infinite; drop these.")
     write_cloud(Path(path), points)
+
+
+def _real_numbers(shape: object, path: str | Path) -> Float[np.ndarray, "..."]:
+    """As float32 what is no finer, all else as float64.
+
+    Raises:
+        BadInputError: it is something else.
+    """
+    try:
+        found = np.asarray(shape)
+        if found.dtype.kind == "c":
+            raise TypeError("complex numbers have no place in space")
+        coarse = found.dtype.kind == "f" and found.dtype.itemsize <= np.float32().itemsize
+        return found.astype(np.float32 if coarse else np.float64, copy=False)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise BadInputError(f"{path}: cannot save what is no array of numbers: {error}") from error
 
 
 @dataclass(frozen=True)
