@@ -54,19 +54,23 @@ def test_a_sensor_that_stands_stays_where_it_is(scans):
 
 
 def test_poses_that_do_not_fit_the_scans_are_said():
-    """Right ones, inverse ones, scans in the world already, a camera's axes, cm, none at all."""
+    """Right ones, inverse ones, scans in the world, a camera's axes, other scales, none at all."""
     seen = street(frames=8)
     path = path_of(seen.places)
     turn = torch.tensor(((0, -1, 0, 5e5), (1, 0, 0, 5e6), (0, 0, 1, 90), (0, 0, 0, 1.0)))
     T_map_sensor = SE3.from_matrix(turn.double()) @ path
     placed = [path[frame].apply_numpy(scan) for frame, scan in enumerate(seen.scans)]
     camera = SE3.from_matrix(torch.eye(4).double()[[1, 2, 0, 3]])
+    late = torch.tensor([0.0] * 5 + [1.5] * 3).double()[:, None] * torch.eye(3).double()[0]
     for scans, poses, told in (
         (seen.scans, T_map_sensor, None),
         (seen.scans, T_map_sensor.inverse(), "inverse of the poses fits the scans better"),
         (placed, path, "lie better on each other without them"),
         (seen.scans, camera @ path @ camera.inverse(), "without them"),
         (seen.scans, SE3(path.rotation, 100 * path.translation), "without them: give T_world_"),
+        (seen.scans, SE3(path.rotation, path.translation / 2), "a wrong scale, order or frame"),
+        (seen.scans, path[torch.arange(7, -1, -1)], "in the order of the scans"),
+        (seen.scans, SE3(path.rotation, path.translation + late), "jump at frame 5"),
         (seen.scans, SE3.identity(8), "the sensor hardly moves, but its scans do not"),
         ([seen.scans[0]] * 8, SE3.identity(8), None),
     ):
