@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import pytest
 
 from wildshape.errors import BadInputError
-from wildshape.io.atomic import lock_folder, release_folders
+from wildshape.io.atomic import hold_folder, lock_folder, release_folders
 
 pytest.importorskip("fcntl", reason="this system has no locks of folders")
 HOLDER = (
@@ -57,3 +57,24 @@ def test_one_process_may_claim_again_and_others_after_it_gave_up(tmp_path):
     release_folders()
     with held(tmp_path), pytest.raises(BadInputError):
         lock_folder(tmp_path)
+
+
+def test_a_writer_keeps_out_others_of_its_process_and_leaves_an_earlier_claim(tmp_path):
+    lock_folder(tmp_path)
+    let_go = hold_folder(tmp_path)
+    with pytest.raises(BadInputError, match="another writer of this process"):
+        hold_folder(tmp_path)
+    let_go()
+    with pytest.raises(AssertionError), held(tmp_path):  # refused: the earlier claim holds
+        pass
+    hold_folder(tmp_path)
+    let_go()  # is none of the second writer's
+    with pytest.raises(BadInputError, match="another writer of this process"):
+        hold_folder(tmp_path)
+
+
+def test_after_a_writer_other_processes_may_write(tmp_path):
+    hold_folder(tmp_path)()
+    with held(tmp_path), pytest.raises(BadInputError, match="another process"):
+        hold_folder(tmp_path)
+    hold_folder(tmp_path)

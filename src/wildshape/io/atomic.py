@@ -11,7 +11,7 @@ import errno
 import json
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Lock
@@ -26,7 +26,10 @@ except ImportError:  # Windows
 
 _TAKEN = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES)
 _MASK = Lock()  # between setting and setting back, another thread would read what is set
-_held: dict[tuple[int, int], int] = {}
+_CLAIM = Lock()
+_Folder = tuple[int, int]  # device and inode
+_held: dict[_Folder, int] = {}
+_writers: dict[_Folder, object] = {}
 
 
 @contextmanager
@@ -122,7 +125,42 @@ def lock_folder(path: Path) -> None:
     _held[status.st_dev, status.st_ino] = folder
 
 
+def hold_folder(path: Path) -> Callable[[], None]:
+    """As `lock_folder`, but for one writer alone: a second of this process is refused, too.
+
+    Returns:
+        Lets go; a claim of `lock_folder` that was there before stays. Once more does nothing.
+
+    Raises:
+        BadInputError: another writer is at work there.
+        OSError: the folder cannot be made.
+    """
+    path.mkdir(parents=True, exist_ok=True)
+    status, writer = path.stat(), object()
+    folder = status.st_dev, status.st_ino
+    with _CLAIM:
+        if folder in _writers:
+            raise BadInputError(
+                f"{path}: another writer of this process is at work there; close it first, or"
+                " choose another place to write."
+            )
+        before = _held.get(folder)
+        lock_folder(path)
+        mine = None if before is not None else _held.get(folder)
+        _writers[folder] = writer
+
+    def let_go() -> None:
+        if _writers.get(folder) is not writer:
+            return
+        del _writers[folder]
+        if mine is not None and _held.get(folder) == mine:
+            os.close(_held.pop(folder))
+
+    return let_go
+
+
 def release_folders() -> None:
     """Give up all claims of this process."""
+    _writers.clear()
     while _held:
         os.close(_held.popitem()[1])

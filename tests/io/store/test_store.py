@@ -1,5 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
+import gc
 import json
 import pickle
 import time
@@ -166,6 +167,25 @@ def test_output_that_exists_is_refused(store: Store, tmp_path: Path, track: Trac
     with pytest.raises(BadInputError, match="no packed store"):
         StoreWriter(tmp_path / "notes", {}, overwrite=True)
     assert (tmp_path / "notes" / "thesis.txt").exists()
+
+
+def test_a_store_has_one_writer_at_a_time(track: Track, tmp_path: Path) -> None:
+    path = tmp_path / "store"
+    first = StoreWriter(path, {})
+    first.add(track)
+    for overwrite in (False, True):
+        with pytest.raises(BadInputError, match="another writer of this process"):
+            StoreWriter(path, {}, overwrite=overwrite)
+    first.close()
+    assert open_store(path).names == ("car-1",)
+    with pytest.raises(ZeroDivisionError), StoreWriter(path, {}, overwrite=True):
+        raise ZeroDivisionError
+    forgotten = StoreWriter(path, {}, overwrite=True)
+    del forgotten
+    gc.collect()
+    with StoreWriter(path, {}, overwrite=True) as writer:
+        writer.add(replace(track, name="car-2"))
+    assert open_store(path).names == ("car-2",)
 
 
 def test_bad_tracks_and_empty_stores_are_refused(track: Track, tmp_path: Path) -> None:

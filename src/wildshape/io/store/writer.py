@@ -8,13 +8,14 @@ import shutil
 from itertools import repeat
 from pathlib import Path
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 from jaxtyping import Float32
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.atomic import write_json
+from wildshape.io.atomic import hold_folder, write_json
 from wildshape.io.store.checks import cloud_crc, is_finite
 from wildshape.io.store.index import IndexWriter, file_record
 from wildshape.io.store.layout import (
@@ -43,7 +44,7 @@ class StoreWriter:
     """Appends tracks to a new packed store, which exists only once `close` has returned.
 
     As a context manager it closes at the end of the block, or leaves a half-written store, which
-    nothing will open, after an error.
+    nothing will open, after an error. Until then no other writer is let in.
     """
 
     def __init__(
@@ -63,16 +64,27 @@ class StoreWriter:
             shard_bytes: a shard is closed once it holds this much.
 
         Raises:
-            BadInputError: something is at `path` already.
+            BadInputError: something is at `path` already, or another writer is at work there.
         """
         self.path = Path(path)
         self._provenance = provenance
         self._shard_bytes = shard_bytes
+        if self.path.is_file():
+            check_room(self.path, overwrite=overwrite)
+        # Of a writer that is forgotten unclosed, too.
+        self._let_go = finalize(self, hold_folder(self.path))
+        try:
+            self._begin(overwrite=overwrite)
+        except BaseException:
+            self._let_go()
+            raise
+
+    def _begin(self, *, overwrite: bool) -> None:
         check_room(self.path, overwrite=overwrite)
         # First: a removal that was stopped then leaves a half-written store, not a foreign folder.
         write_json(
             self.path / WRITING_JSON,
-            {"format": FORMAT, "version": VERSION, "provenance": provenance},
+            {"format": FORMAT, "version": VERSION, "provenance": self._provenance},
         )
         remove_store(self.path)
         self._index = IndexWriter(self.path)
@@ -86,10 +98,13 @@ class StoreWriter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
-            self.close()
-        else:
-            self._abandon()
+        try:
+            if kind is None:
+                self.close()
+            else:
+                self._abandon()
+        finally:
+            self._let_go()
 
     def __len__(self) -> int:
         return self._index.count("track_names")
@@ -154,6 +169,7 @@ class StoreWriter:
         write_json(self.path / INDEX_JSON, manifest)
         (self.path / WRITING_JSON).unlink(missing_ok=True)
         self._closed = True
+        self._let_go()
 
     def _check(self, track: Track) -> None:
         """Refuse what no reader would take: one such track and the store never opens again."""
