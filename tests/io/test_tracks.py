@@ -129,6 +129,13 @@ def test_a_damaged_track_json(text: str, said: str, track: Track, tmp_path: Path
         read_track(tmp_path / "t")
 
 
+def test_a_shape_without_points_is_no_truth(track: Track, tmp_path: Path) -> None:
+    write_track(tmp_path / "car", track)
+    write_ply(tmp_path / "car" / "shape.ply", np.zeros((0, 3), np.float32))
+    with pytest.raises(BadInputError, match=r"shape\.ply: holds no finite points"):
+        read_track(tmp_path / "car")
+
+
 def test_an_existing_track_is_not_mixed(track: Track, tmp_path: Path) -> None:
     write_track(tmp_path / "t", track)
     with pytest.raises(BadInputError, match="holds a track already"):

@@ -198,7 +198,12 @@ def _read_truth(path: Path, count: int, kept: list[int], coordinates: Coordinate
 
 
 def _read_shape(path: Path, coordinates: Coordinates) -> Float32[ndarray, "n 3"] | None:
-    return read_points(path, coordinates) if path.exists() else None
+    if not path.exists():
+        return None
+    points = read_points(path, coordinates)
+    if not len(points):
+        raise BadInputError(f"{path}: holds no finite points; write it again, or remove it.")
+    return points
 
 
 def read_info(path: Path) -> dict[str, Any]:

@@ -21,10 +21,10 @@ from wildshape.records import Sensor, Track
 
 
 def _tracks(track: Track) -> list[Track]:
-    """Tracks with and without truth, of 1 to 3 scans, one of them empty."""
+    """Tracks with and without truth, of 1 to 3 scans, one of them of one point."""
     bare = Track("bare", (track.scans[1],), ("x",), Sensor("lidar", (0.2, 0.4)))
-    empty = Track("empty scan", (track.scans[0], track.scans[0][:0]), ("a", "b"))
-    return [track, bare, empty, replace(track, name="again", shape=None)]
+    sparse = Track("sparse scan", (track.scans[0], track.scans[0][:1]), ("a", "b"))
+    return [track, bare, sparse, replace(track, name="again", shape=None)]
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def store(track: Track, tmp_path: Path) -> Store:
 
 def test_round_trip(store: Store, track: Track) -> None:
     assert len(store) == 4
-    assert store.names == ("car-1", "bare", "empty scan", "again")
+    assert store.names == ("car-1", "bare", "sparse scan", "again")
     for found, truth in zip(store, _tracks(track), strict=True):
         assert found.name == truth.name
         assert found.scan_names == truth.scan_names
@@ -59,7 +59,7 @@ def _assert_same_truth(found: Track, truth: Track) -> None:
 
 def test_global_scan_index(store: Store, track: Track) -> None:
     assert store.track_starts.tolist() == [0, 3, 4, 6, 9]
-    assert store.scan_sizes.tolist() == [60, 20, 33, 20, 60, 0, 60, 20, 33]
+    assert store.scan_sizes.tolist() == [60, 20, 33, 20, 60, 1, 60, 20, 33]
     np.testing.assert_array_equal(store.scan_points(7), track.scans[1])
     np.testing.assert_array_equal(store.scan_points(-1), track.scans[2])
     for wrong in (9, -10):
@@ -86,7 +86,7 @@ def test_shards_are_ordinary_safetensors(store: Store) -> None:
 
     shards = sorted(store.path.glob("points-*.safetensors"))
     assert len(shards) > 1
-    assert sum(len(load_file(shard)["points"]) for shard in shards) == 306 + 60
+    assert sum(len(load_file(shard)["points"]) for shard in shards) == 307 + 60
     assert load_file(store.path / "index.safetensors")["poses"].shape == (6, 3, 4)
 
 
@@ -214,6 +214,10 @@ def test_bad_tracks_and_empty_stores_are_refused(track: Track, tmp_path: Path) -
         ({"T_sensor_object": SE3(torch.eye(3).expand(3, 3, 3), torch.ones(3, 3) / 0)}, "NaN"),
         ({"label_size_m": (4.0, 0.0, 1.5)}, "label_size_m"),
         ({"label_size_m": (4.0, np.nan, 1.5)}, "label_size_m"),
+        ({"label_size_m": (4.0, np.inf, 1.5)}, "label_size_m"),
+        ({"shape_kind": "nonsense"}, "shape_kind is 'nonsense', expected whole, mirrored or"),
+        ({"scans": (np.ones((5, 3)), np.ones((0, 3)), np.ones((5, 3)))}, "a scan without points"),
+        ({"shape": np.ones((0, 3), np.float32)}, "a shape without points"),
         ({"scans": (np.zeros((5, 4), np.float32),) * 3}, "x, y, z"),
         ({"scans": (np.full((5, 3), 1e300),) * 3}, "not finite"),
     ],

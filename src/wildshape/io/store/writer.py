@@ -3,11 +3,12 @@
 """Writing a packed store: points stream into shards and the index into its columns."""
 
 import json
+import math
 import os
 import shutil
 from itertools import repeat
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 from weakref import finalize
 
 import numpy as np
@@ -34,7 +35,7 @@ from wildshape.io.store.layout import (
 from wildshape.io.store.manifest import manifest_of
 from wildshape.io.store.rays import rows_of_rays
 from wildshape.io.tracks import sensor_to_json
-from wildshape.records import SightLines, Track
+from wildshape.records import ShapeKind, SightLines, Track
 
 _SHARD_BYTES = 256 << 20
 _HEADER_BYTES = 256
@@ -114,8 +115,9 @@ class StoreWriter:
 
         Raises:
             BadInputError: a name that was added before, no scans, poses and names of another
-                length than the scans, points that are not finite x, y, z, poses that are not
-                rigid, or a labelled box without a size.
+                length than the scans, a scan or shape without points, points that are not finite
+                x, y, z, poses that are not rigid, a labelled box without a size, or a kind of
+                shape that there is not.
             OSError: the disk is full.
             ValueError: the store is closed.
         """
@@ -188,6 +190,12 @@ class StoreWriter:
         clouds = track.scans if track.shape is None else (*track.scans, track.shape)
         if any(cloud.shape != (len(cloud), 3) for cloud in clouds):
             raise BadInputError(f"track {track.name}: points are x, y, z; leave out what is more.")
+        empty = [cloud is track.shape for cloud in clouds if not len(cloud)]
+        if empty:
+            raise BadInputError(
+                f"track {track.name}: has a {'shape' if empty[0] else 'scan'} without points; leave"
+                " it out."
+            )
         with np.errstate(over="ignore"):  # what float32 cannot hold is infinite
             finite = all(is_finite(np.asarray(cloud, np.float32)) for cloud in clouds)
         if not finite:  # a reader goes by the CRC alone
@@ -197,9 +205,15 @@ class StoreWriter:
 
     def _check_truth(self, track: Track) -> None:
         size = track.label_size_m
-        if size is not None and not (len(size) == 3 and all(side > 0 for side in size)):
+        if size is not None and not (len(size) == 3 and all(0 < side < math.inf for side in size)):
             raise BadInputError(
                 f"track {track.name}: label_size_m is {size}, expected length, width and height."
+            )
+        kinds = get_args(ShapeKind)
+        if track.shape_kind not in kinds:
+            raise BadInputError(
+                f"track {track.name}: shape_kind is {track.shape_kind!r}, expected"
+                f" {', '.join(kinds[:-1])} or {kinds[-1]}."
             )
         if track.T_sensor_object is not None:
             try:
