@@ -196,7 +196,9 @@ def _build_drives(folder: Path) -> None:
             for one in labelled.labels
         ]
         write_box_table(found / "boxes.csv", rows)
-        (found / "frames.csv").write_text("frame,scan,time,points\n0,000000,0,9\n1,000001,,9\n")
+        sizes = [scan.stat().st_size // 16 for scan in read_labels(labels, _ALL_COUNT).scans]
+        frames = "0,000000,0,{}\n1,000001,,{}\n".format(*sizes)
+        (found / "frames.csv").write_text(f"frame,scan,time,points\n{frames}")
         write_poses(found / "trajectory.txt", SE3.identity(2))
         for name in {row.track for row in rows}:
             write_track(found / "tracks" / name, replace(track(), name=name))

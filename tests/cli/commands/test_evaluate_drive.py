@@ -14,6 +14,13 @@ from wildshape.io.scans.points import write_ply
 SCANS = 3
 
 
+def write_frames(found, street):
+    """As `wildshape drive` does."""
+    scans = sorted((street / "velodyne" / "0000").glob("*.bin"))
+    rows = (f"{i},{scan.stem},,{scan.stat().st_size // 16}\n" for i, scan in enumerate(scans))
+    (found / "frames.csv").write_text(f"frame,scan,time,points\n{''.join(rows)}")
+
+
 @pytest.fixture(scope="module")
 def street(tmp_path_factory):
     """A simulated drive."""
@@ -79,8 +86,7 @@ def test_plain_boxes_around_the_same_clusters(wildshape, street, found):
             if int(row[0]) == frame and inside.sum() >= 16:
                 scans = found / "tracks" / row[2] / "scans"
                 write_ply(scans / f"{frame:06d}.ply", points[inside])
-    names = "".join(f"{i},{i:06d},{i / 10},1000\n" for i in range(SCANS))
-    (found / "frames.csv").write_text(f"frame,scan,time,points\n{names}")
+    write_frames(found, street)
     said = wildshape("evaluate-drive", found, "--labels", street, "--json")
     assert said.code == 0, said
     methods = json.loads(said.out)["methods"]
@@ -111,6 +117,25 @@ def test_sequences_of_one_folder(wildshape, street, found, tmp_path):
     said = wildshape("evaluate-drive", tmp_path / "drives", "--labels", street)
     assert said.code == 0, said
     assert "| wildshape | 100.0 | 100.0 | 100.0 | 100.0 | 100.0 |" in said.out
+
+
+def test_scans_that_are_not_the_labelled_ones(wildshape, refused, street, found, tmp_path):
+    """As many, of another place or of other numbers, are paired with no label."""
+    write_frames(found, street)
+    other = tmp_path / "other"
+    shutil.copytree(street, other)
+    first, *_, last = sorted((other / "velodyne" / "0000").glob("*.bin"))
+    last.rename(last.with_stem("000009"))
+    said = refused("evaluate-drive", found, "--labels", other)
+    assert "has scan 000002 where the labels have" in said
+    last.with_stem("000009").rename(last)
+    whole = first.read_bytes()
+    first.write_bytes(whole + bytes(16))  # a pulse that did not come back
+    assert wildshape("evaluate-drive", found, "--labels", other).code == 0
+    first.write_bytes(whole[:-16])
+    said = refused("evaluate-drive", found, "--labels", other)
+    assert "scan 000000 has" in said
+    assert str(first) in said
 
 
 HEADER = "frame,time,track,x,y,z,length,width,height,yaw,confidence,points,moving"

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `wildshape drive` left in its folder: boxes, trajectory, and the points of each track."""
 
-import csv
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,16 +12,16 @@ import numpy as np
 from wildshape.datasets.kitti.raw import read_velodyne
 from wildshape.errors import BadInputError
 from wildshape.evaluation.drives.overlap import UprightBox
+from wildshape.evaluation.drives.same_scans import FRAMES, read_frames
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.table import BoxRow, read_box_table
-from wildshape.io.guard import reading
 from wildshape.io.inputs import open_tracks
 from wildshape.io.poses import read_poses
 from wildshape.records import Points
 
 Clusters = dict[tuple[int, str], Points]
 _AROUND_M, _ABOVE_M, _FEWEST = 0.3, 0.2, 5
-BOXES, TRAJECTORY, FRAMES, TRACKS = "boxes.csv", "trajectory.txt", "frames.csv", "tracks"
+BOXES, TRAJECTORY, TRACKS = "boxes.csv", "trajectory.txt", "tracks"
 
 
 @dataclass(frozen=True)
@@ -165,9 +164,7 @@ def read_clusters(path: Path) -> Clusters:
     """
     if not (path / TRACKS).exists() or not (path / FRAMES).is_file():
         return {}
-    frames = path / FRAMES
-    with reading(frames, "a list of frames"), frames.open(encoding="utf-8", newline="") as file:
-        frame_of = {row["scan"]: int(row["frame"]) for row in csv.DictReader(file)}
+    frame_of = {name: frame for frame, name in enumerate(read_frames(path / FRAMES))}
     source = open_tracks(path / TRACKS)
     clusters: Clusters = {}
     for number in range(len(source)):

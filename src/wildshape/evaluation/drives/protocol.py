@@ -28,6 +28,7 @@ from wildshape.evaluation.drives.found import (
 from wildshape.evaluation.drives.labels import LabelledDrive, LabelledFrame, View
 from wildshape.evaluation.drives.overlap import Overlaps, UprightBox, overlaps
 from wildshape.evaluation.drives.rectangles import l_shape, smallest_rectangle
+from wildshape.evaluation.drives.same_scans import check_same_scans
 from wildshape.evaluation.drives.tracking import (
     Hota,
     Pairs,
@@ -157,8 +158,11 @@ def evaluate_drives(
         at: told how many rows are done.
 
     Raises:
-        BadInputError: nothing that counts is labelled, or kept points or scans are damaged.
+        BadInputError: nothing that counts is labelled, a drive was found in other scans than the
+            labelled ones, or kept points or scans are damaged.
     """
+    for drive, labels in zip(found, labelled, strict=True):
+        check_same_scans(drive.path, labels.scans)
     if not any(one.counted for drive in labelled for frame in drive.frames for one in frame.labels):
         raise BadInputError(
             f"{labelled[0].path}: no label counts: none is of a vehicle with"
