@@ -122,3 +122,14 @@ def test_no_rigid_transform_is_refused(matrix, said):
 @given(st.floats(-3e-4, 3e-4))
 def test_the_rounding_of_printed_poses_is_accepted(error):
     SE3.from_matrix(_with(0, 1, error))
+
+
+@pytest.mark.parametrize("take", [len, list, lambda T: T[0], lambda T: T[:2]])
+def test_one_transform_has_no_parts(take):
+    """It had three, of shapes (3,) and ()."""
+    with pytest.raises(TypeError, match="one transform has no"):
+        take(SE3.identity())
+    take(SE3.identity(2))
+    assert SE3.identity()
+    assert SE3.identity(1)
+    assert not SE3.identity(0)

@@ -85,13 +85,28 @@ class SE3:
         return np.asarray(self.matrix.detach().cpu().numpy(), dtype=dtype)
 
     def __len__(self) -> int:
+        self._check_batch()
         return len(self.translation)
+
+    def __bool__(self) -> bool:
+        """False of an empty batch alone, as of a list."""
+        return self.translation.ndim == 1 or len(self) > 0
 
     def __iter__(self) -> Iterator["SE3"]:
         return (self[i] for i in range(len(self)))
 
     def __getitem__(self, index: int | slice | Tensor) -> "SE3":
+        self._check_batch()
         return type(self)(self.rotation[index], self.translation[index])
+
+    def _check_batch(self) -> None:
+        """Rows of one transform are none.
+
+        Raises:
+            TypeError: it is one.
+        """
+        if self.translation.ndim == 1:
+            raise TypeError("one transform has no length and no parts; index its .matrix.")
 
     def inverse(self) -> "SE3":
         """`T_b_a` of `T_a_b`."""
