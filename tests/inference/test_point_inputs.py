@@ -9,7 +9,8 @@ import torch
 import trimesh
 
 from wildshape.errors import BadInputError
-from wildshape.inference.point_inputs import as_points, as_rays
+from wildshape.inference.point_inputs import as_points, as_rays, each_of
+from wildshape.io.scans.points import read_scan
 
 RNG = np.random.default_rng(0)
 
@@ -108,3 +109,24 @@ def test_what_may_not_be_written_is_copied():
     assert as_points(points) is points
     points.setflags(write=False)
     assert as_points(points).flags.writeable
+
+
+def test_a_place_counts_once_however_often_it_is_repeated(tmp_path):
+    points = scan()
+    often = np.concatenate([points[:30], points, points[::-1]])
+    np.testing.assert_array_equal(as_points(often), points)
+    np.save(tmp_path / "scan.npy", often)
+    np.testing.assert_array_equal(read_scan(tmp_path / "scan.npy").points, points)
+    few = np.repeat(points[:3], 8, axis=0)
+    np.save(tmp_path / "few.npy", few)
+    for given in (few, tmp_path / "few.npy"):
+        with pytest.raises(BadInputError, match="24 points in 3 places"):
+            as_points(given)
+
+
+def test_scans_may_be_handed_in_one_after_the_other():
+    scans = [scan(), scan()]
+    assert [one is other for one, other in zip(each_of(one for one in scans), scans)] == [True] * 2
+    for wrong in ({"a": scans[0]}, "scan.ply", 3):
+        with pytest.raises(BadInputError, match="expected a list of scans"):
+            each_of(wrong)

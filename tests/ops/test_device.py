@@ -50,6 +50,11 @@ def test_does_nothing_on_other_libraries(monkeypatch):
     assert not allocator.keep_memory()
 
 
-def test_a_device_that_torch_does_not_know_is_refused():
-    with pytest.raises(BadInputError, match="'tpu': there are cpu, cuda and auto"):
-        allocator.choose_device("tpu")
+@pytest.mark.parametrize("name", ["tpu", "meta", "mps", "None"])
+def test_a_device_that_nothing_is_computed_on_is_refused(name):
+    with pytest.raises(BadInputError, match=f"'{name}': there are cpu, cuda and auto"):
+        allocator.choose_device(name)
+
+
+def test_a_device_of_torch_is_taken():
+    assert allocator.choose_device(torch.device("cpu")) == "cpu"

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is handed in from Python as a scan."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from operator import attrgetter
 from pathlib import Path
 
@@ -16,8 +16,10 @@ from wildshape.io.scans.points import (
     LEAST_POINTS,
     check_near,
     check_one_object,
+    check_repeats,
     drop_nonfinite,
     read_scan,
+    without_repeats,
 )
 from wildshape.records import Points, Sensor, SightLines
 
@@ -27,7 +29,7 @@ _PLACES = ("xyz", "vertices", _OPEN3D_TENSOR, "points")
 
 
 def as_points(scan: object, name: str = "scan") -> Points:
-    """A scan handed in from Python as `(n, 3)` float32, rows that are not finite dropped.
+    """A scan handed in from Python as `(n, 3)` float32, finite and each place once.
 
     Args:
         scan: an array or tensor, a path of a scan file, or an object that holds points: of laspy
@@ -35,8 +37,8 @@ def as_points(scan: object, name: str = "scan") -> Points:
         name: for the error.
 
     Raises:
-        BadInputError: not `(n, 3)`, fewer than 16 finite points, all points equal, over 100 m
-            or under 1 cm across, or farther than 1 km from the origin.
+        BadInputError: not `(n, 3)`, fewer than 16 finite, different points, all points equal, over
+            100 m or under 1 cm across, or farther than 1 km from the origin.
     """
     if isinstance(scan, str | Path):
         return read_scan(scan).points
@@ -61,12 +63,25 @@ def as_points(scan: object, name: str = "scan") -> Points:
     if not spans(points).any():
         raise BadInputError(f"{name}: all {len(points)} points are equal; is the file damaged?")
     check_one_object(points, name)
+    check_repeats(points, name)
+    points = without_repeats(points)
     return np.require(points, requirements="W")  # torch warns of what may not be written
 
 
-def all_as_points(scans: Sequence[object], first: int = 0) -> list[Points]:
+def each_of(scans: object) -> Sequence[object]:
+    """Scans handed in from Python in whatever holds several, a generator, too.
+
+    Raises:
+        BadInputError: it holds none in an order.
+    """
+    if isinstance(scans, str | Path | Mapping) or not isinstance(scans, Iterable):
+        raise BadInputError(f"scans: expected a list of scans, found {type(scans).__name__}.")
+    return scans if isinstance(scans, Sequence) else list(scans)
+
+
+def all_as_points(scans: Iterable[object], first: int = 0) -> list[Points]:
     """Scans handed in from Python; errors count them from `first`."""
-    return [as_points(scan, f"scan {i}") for i, scan in enumerate(scans, first)]
+    return [as_points(scan, f"scan {i}") for i, scan in enumerate(each_of(scans), first)]
 
 
 def _coordinates(scan: object) -> object:
@@ -129,12 +144,26 @@ def check_sensor(sensor: object) -> None:
         raise BadInputError(f"sensor: expected a wildshape.Sensor, found {sensor!r}.")
 
 
-def rays_of_each(rays: Sequence[object], scans: Sequence[object]) -> list[SightLines | None]:
+def rays_of_each(rays: Iterable[object], scans: Sequence[object]) -> list[SightLines | None]:
     """`as_rays` of one set a scan, or of none at all.
 
     Raises:
         BadInputError: another number of sets than of scans, or no rays.
     """
-    if rays and len(rays) != len(scans):
+    rays = each_of(rays)
+    if len(rays) and len(rays) != len(scans):
         raise BadInputError(f"{len(rays)} sets of rays for {len(scans)} scans; give one a scan.")
     return [as_rays(one, f"rays {i}") for i, one in enumerate(rays)]
+
+
+def together(
+    scans: Iterable[object], rays: Iterable[object], sensor: object
+) -> tuple[list[Points], list[SightLines | None]]:
+    """All scans of a track, and the rays beside each.
+
+    Raises:
+        BadInputError: they, or the sensor, cannot be used.
+    """
+    check_sensor(sensor)
+    clouds = all_as_points(scans)
+    return clouds, rays_of_each(rays, clouds)

@@ -14,6 +14,7 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.ground import without_skirt
 from wildshape.geometry.sampling import sorted_points
 from wildshape.geometry.transforms.se3 import SE3, stack
+from wildshape.inference import point_inputs
 from wildshape.inference.boxes import box_seen
 from wildshape.inference.choose_hypothesis import (
     Found,
@@ -27,7 +28,6 @@ from wildshape.inference.compiled import compiled
 from wildshape.inference.confidence import glance_of, judged
 from wildshape.inference.config import InferenceConfig
 from wildshape.inference.free_space import Rays, Sights, without_free_space
-from wildshape.inference.point_inputs import all_as_points, as_points, check_sensor, rays_of_each
 from wildshape.inference.refine import Refined, denser, partners, refine, with_scan
 from wildshape.inference.registration import fuse_scans, registered, to_middle
 from wildshape.inference.tracks.complete_track import Gathered, complete_together
@@ -41,13 +41,13 @@ from wildshape.records import Completion, Points, Registration, Sensor
 
 BATCH = 32
 """Scans that are completed at once."""
-Each = Sequence[object]  # handed in from Python, one a scan
+Each = Iterable[object]  # handed in from Python, one a scan
 _DEFAULT = InferenceConfig()
 
 
 def load(
     model: str | Path | None = None,
-    device: str = "cpu",
+    device: str | torch.device = "cpu",
     *,
     raw: bool = False,
     level: bool = True,
@@ -139,11 +139,13 @@ class Predictor:
         self, scans: Each, sensor: Sensor | None = None, *, rays: Each = ()
     ) -> Iterator[Completion]:
         """`complete` for many scans, in batches; each is completed on its own."""
-        check_sensor(sensor)
-        known = rays_of_each(rays, scans)
+        point_inputs.check_sensor(sensor)
+        scans = point_inputs.each_of(scans)
+        known = point_inputs.rays_of_each(rays, scans)
         for start in range(0, len(scans), BATCH):
             part = slice(start, start + BATCH)
-            yield from self._each(all_as_points(scans[part], start), sensor, known[part])
+            clouds = point_inputs.all_as_points(scans[part], start)
+            yield from self._each(clouds, sensor, known[part])
 
     def complete_track(
         self, scans: Each, sensor: Sensor | None = None, *, rays: Each = ()
@@ -156,8 +158,8 @@ class Predictor:
         Raises:
             BadInputError: a scan is not `(n, 3)`, or has fewer than 16 finite points.
         """
-        check_sensor(sensor)
-        return list(self._together(all_as_points(scans), sensor, rays_of_each(rays, scans)))
+        clouds, known = point_inputs.together(scans, rays, sensor)
+        return list(self._together(clouds, sensor, known))
 
     def complete_checked(
         self,
@@ -226,9 +228,9 @@ class Predictor:
         self, source: object, target: object, sensor: Sensor | None = None, *, rays: Each = ()
     ) -> Registration:
         """`T_target_source = T_target_can inv(T_source_can)` (METHOD 7); `rays`: of both."""
-        check_sensor(sensor)
-        pair = (as_points(source, "source"), as_points(target, "target"))
-        done = self._each(pair, sensor, rays_of_each(rays, pair))
+        point_inputs.check_sensor(sensor)
+        pair = point_inputs.as_points(source, "source"), point_inputs.as_points(target, "target")
+        done = self._each(pair, sensor, point_inputs.rays_of_each(rays, pair))
         return registered(*pair, done, self.config.inliers)
 
     def register_track(
@@ -248,18 +250,17 @@ class Predictor:
         self, scans: Each, sensor: Sensor | None = None, *, track: bool = False, rays: Each = ()
     ) -> SE3:
         """`T_sensor_canonical` of each scan, as `register_track`."""
-        if not len(scans):
+        clouds, known = point_inputs.together(scans, rays, sensor)
+        if not clouds:
             raise BadInputError("no scans; hand in at least one.")
-        check_sensor(sensor)
-        known = rays_of_each(rays, scans)
-        done = self.complete_checked(all_as_points(scans), sensor, track=track, rays=known)
+        done = self.complete_checked(clouds, sensor, track=track, rays=known)
         return stack([item.pose for item in done])
 
     def fuse(
         self, scans: Each, sensor: Sensor | None = None, *, track: bool = False, rays: Each = ()
     ) -> Points:
         """All points of a track in its middle scan's frame, metres, as `register_track`."""
-        clouds = all_as_points(scans)
+        clouds = point_inputs.all_as_points(scans)
         return fuse_scans(clouds, self.register_track(clouds, sensor, track=track, rays=rays))
 
     @plain_torch()

@@ -9,6 +9,7 @@ import hashlib
 import json
 import math
 from dataclasses import asdict, dataclass, field
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -109,6 +110,8 @@ def weights_file(model: str | Path | None) -> Path:
     Raises:
         BadInputError: none of these; names the weights that are shipped.
     """
+    if not isinstance(model, str | PathLike | None):
+        raise BadInputError(f"model: expected a path or a name, found {model!r}.")
     path = Path(model) if model is not None else SHIPPED
     if path.is_dir():
         return path / MODEL

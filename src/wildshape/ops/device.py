@@ -17,22 +17,24 @@ _NEVER = 2**31 - 1
 _WORKSPACE_BYTES = 32 << 20
 
 
-def choose_device(device: str) -> str:
+def choose_device(device: str | torch.device) -> str:
     """What torch calls it, made ready; `auto` is the GPU where there is one.
 
     Raises:
-        BadInputError: torch knows no such device, or finds no GPU where one is asked for.
+        BadInputError: neither `cpu` nor `cuda`, or torch finds no GPU where one is asked for.
         OSError: a processor without memory for its matrix products.
     """
-    found = torch.cuda.is_available()
+    device, found = str(device), torch.cuda.is_available()
     if device.startswith("cuda") and not found:
         raise BadInputError(f"--device {device}: torch finds no GPU here; use --device cpu.")
     if device == "auto":
         device = "cuda" if found else "cpu"
     try:
-        torch.device(device)
-    except RuntimeError as error:
-        raise BadInputError(f"device {device!r}: there are cpu, cuda and auto.") from error
+        kind = torch.device(device).type
+    except RuntimeError:
+        kind = ""
+    if kind not in ("cpu", "cuda"):
+        raise BadInputError(f"device {device!r}: there are cpu, cuda and auto.")
     if device == "cpu":
         _take_workspace()
     return device

@@ -31,12 +31,14 @@ __all__ = [
     "Unit",
     "check_near",
     "check_one_object",
+    "check_repeats",
     "check_scan",
     "drop_nonfinite",
     "is_scan_file",
     "read_points",
     "read_scan",
     "read_turn",
+    "without_repeats",
     "write_ply",
 ]
 
@@ -205,20 +207,36 @@ def read_turn(path: Path, scan_time: float | None) -> Turn:
 
 
 def read_scan(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> ScanFile:
-    """A scan, its NaN and infinite points dropped and counted, that has passed `check_scan`.
+    """A scan that has passed `check_scan`, each place once.
+
+    NaN and infinite points are dropped and counted.
 
     Raises:
         BadInputError: the file cannot be read, or is no scan of an object in metres.
     """
     points = _read(Path(path), coordinates)
     check_scan(points, str(path))
-    return drop_nonfinite(points)
+    found = drop_nonfinite(points)
+    return ScanFile(without_repeats(found.points), found.dropped_nonfinite)
 
 
 def drop_nonfinite(points: Float[np.ndarray, "n 3"]) -> ScanFile:
     """The points as float32, without those that are NaN, infinite or beyond float32."""
     kept = _only_finite(points)
     return ScanFile(np.ascontiguousarray(kept, np.float32), len(points) - len(kept))
+
+
+def without_repeats(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "k 3"]:
+    """Each place once, in the order of the first: what a file repeats was not seen twice.
+
+    Args:
+        points: finite; the same array comes back where no place is repeated.
+    """
+    by_x = np.sort(points[:, 0])
+    if not (by_x[1:] == by_x[:-1]).any():
+        return points
+    _, first = np.unique(points, axis=0, return_index=True)
+    return points if len(first) == len(points) else points[np.sort(first)]
 
 
 def _read(path: Path, coordinates: Coordinates) -> Float[np.ndarray, "n 3"]:
@@ -246,8 +264,8 @@ def check_scan(points: Float[np.ndarray, "n 3"], name: str) -> None:
         name: the file, for the error.
 
     Raises:
-        BadInputError: fewer than 16 finite points, all points equal, an extent (the longest
-            side of the bounding box) over 100 m or under 1 cm, or farther than 1 km away.
+        BadInputError: fewer than 16 finite, different points, all points equal, an extent (the
+            longest side of the bounding box) over 100 m or under 1 cm, or farther than 1 km away.
     """
     if not len(points):
         raise BadInputError(
@@ -266,7 +284,22 @@ def check_scan(points: Float[np.ndarray, "n 3"], name: str) -> None:
             "is no scan."
         )
     check_one_object(points, name)
+    check_repeats(points, name)
     check_near(points, name)
+
+
+def check_repeats(points: Float[np.ndarray, "n 3"], name: str) -> None:
+    """Refuse a few places, however often they are repeated.
+
+    Raises:
+        BadInputError: fewer than 16 different points.
+    """
+    different = len(without_repeats(points))
+    if different < LEAST_POINTS:
+        raise BadInputError(
+            f"{name}: {len(points)} points in {different} places; a scan needs at least"
+            f" {LEAST_POINTS}: use a denser one."
+        )
 
 
 def check_one_object(points: Float[np.ndarray, "n 3"], name: str) -> None:
