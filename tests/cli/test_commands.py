@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+from wildshape.cli.commands import register
 from wildshape.inference.config import InferenceConfig
 from wildshape.io.scans.points import read_points
 from wildshape.io.store.store import open_store
@@ -101,6 +102,16 @@ def test_register_two_scans(wildshape, dataset, trained):
     text = wildshape("register", a, b, "--model", trained).out
     assert text.startswith("T_target_source\n")
     assert "inlier ratio" in text
+
+
+@pytest.mark.parametrize(("few", "told"), [(0.0, False), (1.1, True)])
+def test_register_doubts_scans_that_hardly_meet(
+    wildshape, dataset, trained, monkeypatch, few, told
+):
+    monkeypatch.setattr(register, "_FEW", few)
+    a, b = sorted((dataset / "000000" / "scans").iterdir())[:2]
+    done = wildshape("register", a, b, "--model", trained)
+    assert ("hardly any points lie on each other" in done.err) == told
 
 
 def test_register_a_track(wildshape, refused, dataset, trained, tmp_path):

@@ -31,7 +31,7 @@ from wildshape.io.tracks import (
 )
 from wildshape.records import Sensor, Track, as_text
 
-_NO_SCANS = ("poses.txt", "shape.ply")  # truth beside scans, not scans
+_NO_SCANS = ("poses.txt", "times.txt", "timestamps.txt", "shape.ply")  # beside scans, not scans
 _CURE = (
     "pass a scan file, a TRACK folder (with scans/), a DATASET folder of such tracks, a folder of "
     "scan files, or a packed store"

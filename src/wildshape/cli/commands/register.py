@@ -21,6 +21,8 @@ EXAMPLES = (
     "wildshape register mytracks --out registered --track",
 )
 
+_FEW = 0.05  # of the source's points, on the target's
+
 Source = Annotated[
     Path,
     Positional,
@@ -108,6 +110,8 @@ def _pair(settings: Settings, target: Path) -> None:
     }
     if found.reasons:
         say(reasons_sentence(found))
+    if found.inlier_ratio < _FEW:
+        say("hardly any points lie on each other: the scans show different sides, or objects.")
     answer("\n".join(("T_target_source", *lines, shares)), data, as_json=settings.scans.json)
 
 
