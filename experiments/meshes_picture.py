@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Meshes side by side, a row for each output of `wildshape complete --mesh`.
 
-    wildshape complete kitti --out before/kitti --mesh    # at one commit; `after` at another
-    python experiments/meshes_picture.py docs/meshes.webp before after
+    wildshape complete kitti --out one --mesh
+    wildshape complete kitti --out track --track --mesh
+    python experiments/meshes_picture.py docs/meshes.webp one track
 
-Ten tracks are drawn, evenly chosen by name; of each the middle scan.
+Ten tracks are drawn, evenly chosen by name, or all if there are fewer; of each the middle scan.
 """
 
 from dataclasses import dataclass
@@ -45,13 +46,15 @@ class Settings:
 
 
 def main(settings: Settings) -> None:
-    """Draw ten tracks, each row's panel below that of the row before."""
+    """Draw some tracks, each row's panel below that of the row before."""
     found = [[path.parent for path in find(row, OBJECTS)] for row in settings.rows]
     if not found or not found[0] or len({len(folders) for folders in found}) > 1:
         raise BadInputError("the folders hold no objects.json, or not the same tracks.")
-    chosen = np.linspace(0, len(found[0]) - 1, _SHOWN).round().astype(int)
+    shown = min(_SHOWN, len(found[0]))
+    chosen = np.linspace(0, len(found[0]) - 1, shown).round().astype(int)
     columns = [np.concatenate([panel(row[i], settings.width) for row in found]) for i in chosen]
-    lines = [columns[i : i + settings.columns] for i in range(0, _SHOWN, settings.columns)]
+    columns += [np.full_like(columns[0], 255)] * (-shown % settings.columns)  # the last line's end
+    lines = [columns[i : i + settings.columns] for i in range(0, len(columns), settings.columns)]
     picture = np.concatenate([np.concatenate(line, axis=1) for line in lines])
     Image.fromarray(picture).save(settings.out, quality=85)
 

@@ -56,7 +56,7 @@ class MeshConfig:
     smooth: float = 0.021
     around: float = 0.021
     rounds: int = 3
-    few: float = 0.02
+    few: float = 0.1
 
 
 class _Grid(NamedTuple):
