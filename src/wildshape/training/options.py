@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from wildshape.errors import BadInputError
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates
 from wildshape.method.encoders.named import Backbone
+from wildshape.training.recipes import recipe_named
 
 _SEEDS = 1 << 64  # torch takes no more
 
@@ -46,6 +47,8 @@ class TrainingOptions:
     profile: bool = False
 
     def __post_init__(self) -> None:
+        if not self.preset.startswith("dpc"):
+            recipe_named(self.preset)
         if not 0 <= self.seed < _SEEDS:
             raise BadInputError(f"--seed {self.seed}: expected 0 or more, below 2^64.")
         if self.steps is not None and self.steps < 1:

@@ -166,6 +166,17 @@ PRESETS = {
 }
 
 
+def recipe_named(preset: str) -> Recipe:
+    """The preset as it is.
+
+    Raises:
+        BadInputError: there is none of that name.
+    """
+    if preset not in PRESETS:
+        raise BadInputError(f"--preset {preset}: is unknown; use one of {', '.join(PRESETS)}.")
+    return PRESETS[preset]()
+
+
 def sensor_kind(store: Store) -> SensorKind:
     """The kind of sensor that took all tracks; costs milliseconds however many there are.
 
@@ -186,9 +197,10 @@ def recipe_for(store: Store, preset: str, steps: int | None) -> Recipe:
     """The preset, for the kind of sensor in the store, stretched to other steps if asked.
 
     Raises:
-        BadInputError: two kinds of sensor, or a preset of the paper that was made for the other.
+        BadInputError: an unknown preset, two kinds of sensor, or a preset of the paper that was
+            made for the other.
     """
-    recipe = PRESETS[preset]()
+    recipe = recipe_named(preset)
     kind = sensor_kind(store)
     if kind != recipe.views.sensor:
         if preset.startswith("paper-"):
