@@ -20,6 +20,7 @@ from wildshape.io.store.store import Store
 from wildshape.method.checkpoint import MODEL, load_checkpoint, weights_file
 from wildshape.ops.device import choose_device
 from wildshape.training.config import Recipe
+from wildshape.training.doubts import doubts_of
 from wildshape.training.loop import Run, StopRequested, fit, setup
 from wildshape.training.options import TrainingOptions
 from wildshape.training.recipes import recipe_for, with_encoder, with_rays
@@ -163,6 +164,8 @@ def _set_up(
 ) -> Run:
     learns = isinstance(weights.teacher, Path)
     leads = int(os.environ.get("RANK", "0")) == 0
+    for doubt in doubts_of(store, recipe) if leads else ():
+        progress.say(doubt)
     with (progress if learns and leads else SILENT).bar("fusing tracks", 0) as bar:
         return setup(
             recipe,
