@@ -26,6 +26,7 @@ from wildshape.evaluation.drives.found import (
     read_clusters,
 )
 from wildshape.evaluation.drives.labels import LabelledDrive, LabelledFrame, View
+from wildshape.evaluation.drives.motion import Correction, like_found
 from wildshape.evaluation.drives.overlap import Overlaps, UprightBox, overlaps
 from wildshape.evaluation.drives.rectangles import l_shape, smallest_rectangle
 from wildshape.evaluation.drives.same_scans import check_same_scans
@@ -114,10 +115,12 @@ class DriveScores:
     Attributes:
         rows: ours first.
         trajectories: one a drive; None where one of the two trajectories is not known.
+        corrections: one a drive; where its scans were corrected for motion, what of its labels.
     """
 
     rows: tuple[RowScores, ...]
     trajectories: tuple[TrajectoryError | None, ...]
+    corrections: tuple[Correction, ...]
 
 
 @dataclass(frozen=True)
@@ -168,18 +171,20 @@ def evaluate_drives(
             f"{labelled[0].path}: no label counts: none is of a vehicle with"
             f" {labelled[0].counting.points} points; give labels with their scans."
         )
+    kept = [read_clusters(drive.path) for drive in found]
+    labelled, corrections = zip(*map(like_found, labelled, kept))
     rows = [_row(OURS, found, labelled)]
     at(1)
     clusters = [
-        read_clusters(drive.path) or points_inside(drive, labels.scans)
-        for drive, labels in zip(found, labelled, strict=True)
+        own or points_inside(drive, labels.scans)
+        for own, drive, labels in zip(kept, found, labelled, strict=True)
     ]
     for number, (name, fit) in enumerate(BASELINES.items(), 2):
-        refitted = [_refitted(drive, kept, fit) for drive, kept in zip(found, clusters)]
+        refitted = [_refitted(drive, own, fit) for drive, own in zip(found, clusters)]
         rows.append(_row(name, refitted, labelled))
         at(number)
     errors = tuple(_trajectory(one, other) for one, other in zip(found, labelled, strict=True))
-    return DriveScores(tuple(rows), errors)
+    return DriveScores(tuple(rows), errors, corrections)
 
 
 def _refitted(

@@ -26,6 +26,10 @@ UNITS = {
     "rpe_m": "metres from scan to scan, root mean square",
     "rpe_deg": "degrees from scan to scan, root mean square",
 }
+_CORRECTED = {
+    "labels carried": "their labels were carried to the times of the scans",
+    "labels not carried": "their labels were not, so that **boxes and labels are of other times**",
+}
 _DASH = "–"  # noqa: RUF001
 
 
@@ -43,6 +47,7 @@ def as_json(scores: DriveScores, counting: Counting, made: Mapping[str, object])
         "counting": asdict(counting),
         "methods": rows,
         "trajectories": [None if one is None else asdict(one) for one in scores.trajectories],
+        "corrections": list(scores.corrections),
         "provenance": dict(made),
     }
 
@@ -105,6 +110,9 @@ def _notes(scores: DriveScores, counting: Counting) -> str:
         "AP in percent; recall in percent at IoU 0.5 in bird's eye view (BEV), as HOTA's overlap.",
         "Length, width, height: mean of found minus labelled.",
     ]
+    for correction, said in _CORRECTED.items():
+        if drives := scores.corrections.count(correction):
+            lines.append(f"Drives corrected for motion: {drives}; {said}.")
     known = [one for one in scores.trajectories if one is not None]
     drifts = [one.drift_percent for one in known if one.drift_percent is not None]
     if known:
