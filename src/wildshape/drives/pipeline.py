@@ -33,6 +33,7 @@ from wildshape.drives.completing.vehicles import (
 )
 from wildshape.drives.completing.whole_scans import held_against
 from wildshape.drives.config import DriveConfig
+from wildshape.drives.oddities import rate_told
 from wildshape.drives.result import DriveResult
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.detections import BoxCutter, Detections, check_cut, given_tracks
@@ -202,9 +203,10 @@ class Pipeline:
         """The same, found now."""
         if self.tracked:
             return given_tracks(read_cuts(self.cuts, len(self.drive)))
-        ticks = self.breaks.ticks(self.drive.ticks, self.config.tracks)
+        config = self.config.tracks.every(self.drive.scan_s)
+        ticks = self.breaks.ticks(self.drive.ticks, config)
         known = self.cuts, T_level_sensor
-        found = linked_clusters(*known, ticks, self.config.tracks)
+        found = linked_clusters(*known, ticks, config)
         return joined_where_they_stand(found, *known, self.config.standing, self.breaks.frames)
 
     def folder(self, seen: Sightings) -> Path:
@@ -298,6 +300,7 @@ class Pipeline:
         if empty := points.count(0):
             found.append(f"{empty} of {len(points)} scans are empty or cannot be read")
         found += self.breaks.told()
+        found += rate_told(self.drive, self.config.tracks)
         if leaps := list(jumps(T_world_sensor, self.drive.ticks, self.config.trajectory)):
             found.append(f"jumps of the sensor: {len(leaps)}, the first at frame {leaps[0]}")
         return tuple(found)

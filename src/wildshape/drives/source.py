@@ -101,6 +101,13 @@ class Drive:
         return len(self.scan_names)
 
     @property
+    def scan_s(self) -> float | None:
+        """From a scan to the next, the median, seconds, if times are known."""
+        if self.times is None or len(self) < 2:
+            return None
+        return float(np.median(np.diff(self.times)))
+
+    @property
     def fingerprint(self) -> str:
         """Of names, times, poses, contents: another one is another recording, or a mended one."""
         poses = None if self.T_world_sensor is None else self.T_world_sensor.matrix.tolist()

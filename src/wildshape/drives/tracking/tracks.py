@@ -107,8 +107,6 @@ def link(scans: Iterable[Seen], config: LinkConfig) -> list[Linked]:
 
 def _assigned(live: list[Linked], seen: Seen, config: LinkConfig) -> dict[int, int]:
     """For each cluster that goes on with a live object, the object's place in `live`."""
-    from scipy.optimize import linear_sum_assignment
-
     if not live or not len(seen.centres):
         return {}
     gaps = np.array([seen.tick - one.tick for one in live])
@@ -121,9 +119,22 @@ def _assigned(live: list[Linked], seen: Seen, config: LinkConfig) -> dict[int, i
     once = np.array([len(one.frames) == 1 for one in live])  # its speed is not known yet
     gate = np.where(once, config.first_gate_m, config.gate_m) + config.gate_per_tick_m * (gaps - 1)
     cost = apart + config.size_weight * unlike
-    cost = np.where(cost < gate[:, None], cost, _FORBIDDEN)
+    cost = np.where(cost < config.wider * gate[:, None], cost, _FORBIDDEN)
+    found = _cheapest(np.where(cost < gate[:, None], cost, _FORBIDDEN))
+    if config.wider > 1:
+        cost[unlike > config.like_m] = _FORBIDDEN
+        cost[list(found.values())] = _FORBIDDEN
+        cost[:, list(found)] = _FORBIDDEN
+        found |= _cheapest(cost)
+    return found
+
+
+def _cheapest(cost: Float[np.ndarray, "o k"]) -> dict[int, int]:
+    """For each column that is given to a row at the least total cost, that row."""
+    from scipy.optimize import linear_sum_assignment
+
     chosen = zip(*linear_sum_assignment(cost))
-    return {int(row): int(one) for one, row in chosen if cost[one, row] < _FORBIDDEN}
+    return {int(column): int(row) for row, column in chosen if cost[row, column] < _FORBIDDEN}
 
 
 def _shift(
