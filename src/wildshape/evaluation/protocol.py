@@ -100,6 +100,9 @@ def run(
         progress: called after each track with the number done and its name.
         limits: what of a track counts.
         helpers: who does the work.
+
+    Raises:
+        BadInputError: a method answers of fewer or more scans than it took.
     """
     ledgers: dict[str, _Ledger] = {name: _Ledger() for name in methods}
     task = _TrackEvaluation(methods, rotate, seed, limits)

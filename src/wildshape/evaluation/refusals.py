@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a method makes of a track of which it refuses some scans."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Sized
 from contextlib import suppress
 from typing import TypeVar
 
 from wildshape.errors import BadInputError
 from wildshape.evaluation.cases import Case
 
-Found = TypeVar("Found")
+Found = TypeVar("Found", bound=Sized)
 
 
 def taken(case: Case, ask: Callable[[Case], Found]) -> tuple[Sequence[int], Found | None]:
@@ -19,8 +19,21 @@ def taken(case: Case, ask: Callable[[Case], Found]) -> tuple[Sequence[int], Foun
 
     Args:
         case: the track.
-        ask: what the method answers of scans; `BadInputError` if it refuses one.
+        ask: what the method answers of scans, one a scan; `BadInputError` if it refuses one.
+
+    Raises:
+        BadInputError: the method answers of fewer or more scans than it took.
     """
+    kept, answer = _taken(case, ask)
+    if answer is not None and len(answer) != len(kept):
+        raise BadInputError(
+            f"{case.name}: the method answers {len(answer)} times for {len(kept)} scans; it must"
+            " give one shape or pose a scan."
+        )
+    return kept, answer
+
+
+def _taken(case: Case, ask: Callable[[Case], Found]) -> tuple[Sequence[int], Found | None]:
     every = range(len(case.scans))
     with suppress(BadInputError):
         return every, ask(case)
