@@ -113,6 +113,15 @@ def test_scans_in_the_frame_of_a_vehicle_are_said(scans):
     assert find_mounting(drive_of(scans), MountingConfig()).told() == []
 
 
+def test_scans_without_their_ground_and_scans_in_feet_are_said(scans):
+    bare = [scan[scan[:, 2] > -1.6] for scan in scans]
+    (told,) = find_mounting(drive_of(bare), MountingConfig()).told()
+    assert "hardly any ground is seen, 4 % of the points" in told
+    feet = [scan / np.float32(0.3048) for scan in scans]
+    (told,) = find_mounting(drive_of(feet), MountingConfig()).told()
+    assert "5.6 m below the sensor, more than on a vehicle" in told
+
+
 @pytest.mark.parametrize("pause", [600.0, 86_400.0, 1.7e9])
 def test_a_sensor_that_stands_stays_over_a_pause_and_when_its_clock_is_set(pause):
     """However long: the noise of the speed is not taken times the pause."""

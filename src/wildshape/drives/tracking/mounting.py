@@ -23,6 +23,8 @@ from wildshape.records import Points
 _MOST_POINTS, _FEWEST_POINTS = 4000, 100
 _OFF_UNIT = 1e-3
 _LOWEST_M = 0.15  # no sensor that sees vehicles sits lower
+_HIGHEST_M = 4.5  # nor higher, on a vehicle
+_LEAST_GROUND = 0.05  # of the points near the sensor; less is what a removal of ground leaves
 _UPSIDE_DOWN = np.array((1.0, -1.0, -1.0), np.float32)
 
 Plane = Float[np.ndarray, "4"]
@@ -36,11 +38,13 @@ class Mounting:
         height_m: above the ground.
         tilt_deg: between its z axis and the vertical.
         up: `(3,)` the vertical in the sensor frame, unit length; (0, 0, 1) for one held level.
+        ground: share of the points near the sensor that lie on the ground.
     """
 
     height_m: float
     tilt_deg: float
     up: tuple[float, float, float]
+    ground: float = 1.0
 
     def __post_init__(self) -> None:
         """Refuse what is no vertical.
@@ -57,13 +61,24 @@ class Mounting:
         return self.up != (0.0, 0.0, 1.0)
 
     def told(self) -> list[str]:
-        """A sentence, if the origin is hardly that of a sensor."""
-        if self.height_m > _LOWEST_M:
-            return []
-        return [
-            f"the ground lies {self.height_m:.2f} m below the origin: give scans as the sensor saw"
-            " them, not in a vehicle's or a map's frame"
-        ]
+        """A sentence on each thing that is odd about it."""
+        told = []
+        if self.height_m <= _LOWEST_M:
+            told.append(
+                f"the ground lies {self.height_m:.2f} m below the origin: give scans as the sensor"
+                " saw them, not in a vehicle's or a map's frame"
+            )
+        if self.height_m > _HIGHEST_M:
+            told.append(
+                f"the ground lies {self.height_m:.1f} m below the sensor, more than on a vehicle:"
+                " give scans in metres"
+            )
+        if self.ground < _LEAST_GROUND:
+            told.append(
+                f"hardly any ground is seen, {100 * self.ground:.0f} % of the points near the"
+                " sensor: give scans with their ground"
+            )
+        return told
 
     def levelling(self) -> SE3:
         """`T_level_sensor`: the smallest turn after which z is vertical; the origin stays."""
@@ -94,7 +109,8 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
             " For objects there is `wildshape complete --track`."
         )
     planes = [ground_plane(scan, config) for scan in scans]
-    if _hangs(scans, planes, config):
+    share = _on_ground(scans, planes, config)
+    if share <= config.ground and _hangs(scans, share, config):
         raise BadInputError(
             f"{drive.name}: the ground lies above the sensor, as if it hung upside down; turn the"
             " scans by 180 degrees about x, so that z points up."
@@ -113,7 +129,7 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
     if tilt < config.level_deg:
         up = np.array((0.0, 0.0, 1.0))
     x, y, z = up.tolist()
-    return Mounting(height, tilt, (x, y, z))
+    return Mounting(height, tilt, (x, y, z), share)
 
 
 def _is_an_object(scan: Points, config: MountingConfig) -> bool:
@@ -125,11 +141,8 @@ def _is_an_object(scan: Points, config: MountingConfig) -> bool:
     return bool(max(sides[:2]) < config.object_m and not around)
 
 
-def _hangs(scans: list[Points], planes: list[Plane | None], config: MountingConfig) -> bool:
-    """Whether most of the points lie where the sky should be; `planes`: taken for the ground."""
-    share = _on_ground(scans, planes, config)
-    if share > config.ground:
-        return False
+def _hangs(scans: list[Points], share: float, config: MountingConfig) -> bool:
+    """Whether most of the points lie where the sky is; `share`: on what looks like ground."""
     turned = [scan * _UPSIDE_DOWN for scan in scans]
     found = _on_ground(turned, [ground_plane(scan, config) for scan in turned], config)
     return found > max(config.ground, 2 * share)
