@@ -12,6 +12,7 @@ from tests.refusal import refused
 
 import wildshape
 from wildshape.drives.config import DriveConfig, LinkConfig, MountingConfig
+from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.mounting import Mounting, find_mounting
 from wildshape.drives.tracking.trajectory import Breaks, find_trajectory
@@ -120,6 +121,12 @@ def test_scans_without_their_ground_and_scans_in_feet_are_said(scans):
     feet = [scan / np.float32(0.3048) for scan in scans]
     (told,) = find_mounting(drive_of(feet), MountingConfig()).told()
     assert "5.6 m below the sensor, more than on a vehicle" in told
+
+
+def test_scans_of_no_finite_point_are_refused_as_that(tmp_path):
+    for frame in range(2):
+        np.save(tmp_path / f"{frame}.npy", np.full((500, 3), np.nan, np.float32))
+    refused(find_mounting, open_drive(tmp_path), MountingConfig(), match="all of them are NaN")
 
 
 @pytest.mark.parametrize("pause", [600.0, 86_400.0, 1.7e9])

@@ -164,6 +164,8 @@ def test_what_cannot_be_a_drive_is_refused_in_a_sentence(folder, tmp_path):
     refused(open_drive, folder, match="3 times for 4 scans")
     (folder / "times.txt").write_text("1\n2\n1.5\n3\n")
     refused(open_drive, folder, match=r"time 3 \(1.5\) is not after")
+    (folder / "times.txt").write_text("1\n2\n2\n3\n")
+    refused(open_drive, folder, match=r"time 3 \(2\) is the same as the one before it")
     (folder / "times.txt").write_text("1\n2\nnan\n3\n")
     refused(open_drive, folder, match="not finite")
     (folder / "times.txt").write_text("100\n200\n300\n500\n")

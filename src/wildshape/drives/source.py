@@ -81,10 +81,13 @@ class Drive:
         names = tuple(map(as_text, scan_names))
         for row, (before, after) in enumerate(pairwise(times or ()), 2):
             if not after > before:
-                raise BadInputError(
-                    f"{name}: time {row} ({after:.10g}) is not after the one before it; sort the"
-                    " scans in the order in which they were taken."
+                wrong = (
+                    "is the same as the one before it; give each scan its own"
+                    if after == before
+                    else "is not after the one before it; sort the scans in the order in which"
+                    " they were taken"
                 )
+                raise BadInputError(f"{name}: time {row} ({after:.10g}) {wrong}.")
         ticks, missing = _ticks(names, times)
         return cls(
             name=name,

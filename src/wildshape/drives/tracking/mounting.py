@@ -118,6 +118,10 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
     found = np.array([plane for plane in planes if plane is not None])
     if not len(found):
         drive.read(int(chosen[0]))  # says why if it cannot be read
+        if not any(map(len, scans)):
+            raise BadInputError(
+                f"{drive.name}: its scans hold no points, or all of them are NaN; write them again."
+            )
         raise BadInputError(
             f"{drive.name}: no ground is seen below the sensor; the scans must be full ones in the"
             " sensor's frame, metres, z up."
