@@ -268,6 +268,7 @@ def test_three_scans_an_empty_and_a_damaged_one_are_warnings(recording, tmp_path
     assert few.warnings == (
         "1 scan missing between the others",
         "2 of 5 scans are empty or cannot be read",
+        "3 scans with points: too few to tell which vehicles move",
     )
     assert few.vehicles
 

@@ -178,6 +178,18 @@ def test_what_cannot_be_a_drive_is_refused_in_a_sentence(folder, tmp_path):
     refused(open_drive, folder, match="are one frame")
 
 
+def test_scans_that_are_copies_of_the_ones_before_are_said(tmp_path):
+    rng = np.random.default_rng(0)
+    scans = [rng.normal(size=(500, 3)).astype(np.float32) for _ in range(3)]
+    nothing = np.empty((0, 3), np.float32)
+    for number, scan in enumerate(
+        [scans[0], scans[1], scans[1], scans[1], scans[2], *[nothing] * 2]
+    ):
+        np.save(tmp_path / f"{number}.npy", scan)
+    (told,) = open_drive(tmp_path).warnings
+    assert told.startswith("2 scans the same to the last bit as the one before, the first: frame 2")
+
+
 @pytest.mark.parametrize("suffix", [".ply", ".pcd"])
 def test_times_of_points_in_scan_files(tmp_path, suffix):
     rows = np.zeros(200, [(name, "<f4") for name in ("x", "y", "z")] + [("time", "<f8")])

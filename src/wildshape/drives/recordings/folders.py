@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wildshape.drives.oddities import copies_told
 from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
@@ -130,6 +131,7 @@ def _drive(
         read=_Files(tuple(files), None if times is None else tuple(times)),
         times=times,
         T_world_sensor=None if poses is None else read_poses(poses, len(files)),
+        warnings=copies_told(files),
         files=files,
     )
 
