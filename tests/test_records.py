@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Results turn into objects of other libraries, and come back as scans."""
 
+import copy
 import math
 import re
 import subprocess
@@ -35,6 +36,19 @@ def test_arrays_and_tensors(done):
     assert tensor.dtype == torch.float32
     tensor[:] = 0
     assert np.asarray(done).any(), "the tensor is no copy"
+
+
+def test_what_holds_arrays_is_equal_to_itself_alone(done):
+    """`==` raised that the truth of an array is ambiguous, and so did `in`."""
+    track = Track("car", (done.points,), ("0",))
+    found = Registration(done.pose, 1.0, 0.9)
+    for one in (done, done.pose, track, found):
+        other = copy.deepcopy(one)
+        assert one == one
+        assert one != other
+        assert other in [one, other]
+        assert len({one, other}) == 2
+    assert copy.deepcopy(done).box == done.box
 
 
 def test_clouds_of_other_libraries_are_scans_again(done):

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is handed between the parts: frozen records, metres, frames in the names.
 
-Points are numpy float32 `(n, 3)`; poses are `SE3` over float64 tensors on the CPU.
+Points are numpy float32 `(n, 3)`; poses are `SE3` over float64 tensors on the CPU. What holds
+arrays is equal to itself alone; boxes and sensors are equal by their numbers.
 """
 
 import math
@@ -78,7 +79,7 @@ class Sensor:
         return f"Sensor({self.kind}{steps}{pixels})"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Turn:
     """A whole scan: one turn of a sensor.
 
@@ -103,7 +104,7 @@ class Turn:
         return self.points if self.seconds is None else motion.carry(self.points, self.seconds)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Track:
     """The scans of one rigid object in time order: the method's only supervision.
 
@@ -209,7 +210,7 @@ class Box:
         return math.atan2(2 * (x * y + w * z), w * w + x * x - y * y - z * z)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Completion:
     """One scan completed; everything in that scan's sensor frame, metres.
 
@@ -312,18 +313,16 @@ class Completion:
             scan: the points completed, sensor frame; the mesh is then coloured by confidence, and
                 has the vertex attribute `confidence` (`geometry/meshing.py`).
         """
-        from wildshape.geometry.meshing import closed_mesh
+        from wildshape.geometry.meshing import closed_mesh, colour_by_confidence
 
         mesh = closed_mesh(self.pose.inverse().apply_numpy(self.points))
         mesh.apply_transform(self.pose.matrix.numpy())
         if scan is not None:
-            from wildshape.geometry.meshing import colour_by_confidence
-
             colour_by_confidence(mesh, scan, self.confidence)
         return mesh
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Registration:
     """Source registered to target.
 

@@ -21,9 +21,11 @@ from wildshape.geometry.transforms.rotation import (
 _TOLERANCE = 1e-3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SE3:
     """A batch of rigid transforms `x -> R x + t`.
+
+    `==` says whether two are the same object; compare their `.matrix` by numbers.
 
     Attributes:
         rotation: `(..., 3, 3)`, proper rotations.
