@@ -123,6 +123,15 @@ def test_scans_without_their_ground_and_scans_in_feet_are_said(scans):
     assert "5.6 m below the sensor, more than on a vehicle" in told
 
 
+def test_scans_in_one_common_frame_are_said():
+    seen = street(frames=5, speed=6.0)
+    places = np.column_stack((seen.places, np.zeros(5))).astype(np.float32)
+    common = [scan + place for scan, place in zip(seen.scans, places)]
+    (told,) = find_mounting(drive_of(common), MountingConfig()).told()
+    assert "one common frame" in told
+    assert find_mounting(drive_of(seen.scans), MountingConfig()).told() == []
+
+
 def test_scans_of_no_finite_point_are_refused_as_that(tmp_path):
     for frame in range(2):
         np.save(tmp_path / f"{frame}.npy", np.full((500, 3), np.nan, np.float32))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from wildshape.drives.config import MountingConfig
 from wildshape.drives.source import Drive
@@ -25,6 +25,8 @@ _OFF_UNIT = 1e-3
 _LOWEST_M = 0.15  # no sensor that sees vehicles sits lower
 _HIGHEST_M = 4.5  # nor higher, on a vehicle
 _LEAST_GROUND = 0.05  # of the points near the sensor; less is what a removal of ground leaves
+_SOON = (5, 10, 20)  # frames that are looked at beside those of the config
+_BELOW_M, _BELOW_POINTS, _BELOW_SCANS = 1.0, 10, 2  # ground seen right below the sensor
 _UPSIDE_DOWN = np.array((1.0, -1.0, -1.0), np.float32)
 
 Plane = Float[np.ndarray, "4"]
@@ -39,12 +41,14 @@ class Mounting:
         tilt_deg: between its z axis and the vertical.
         up: `(3,)` the vertical in the sensor frame, unit length; (0, 0, 1) for one held level.
         ground: share of the points near the sensor that lie on the ground.
+        common: whether scans seem to be in one frame, that of the first.
     """
 
     height_m: float
     tilt_deg: float
     up: tuple[float, float, float]
     ground: float = 1.0
+    common: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what is no vertical.
@@ -77,6 +81,11 @@ class Mounting:
             told.append(
                 f"hardly any ground is seen, {100 * self.ground:.0f} % of the points near the"
                 " sensor: give scans with their ground"
+            )
+        if self.common:
+            told.append(
+                "later scans show ground right below the sensor, the first none, as if all were in"
+                " one common frame or put together of several: give each as the sensor saw it"
             )
         return told
 
@@ -133,7 +142,26 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
     if tilt < config.level_deg:
         up = np.array((0.0, 0.0, 1.0))
     x, y, z = up.tolist()
-    return Mounting(height, tilt, (x, y, z), share)
+    return Mounting(height, tilt, (x, y, z), share, _in_common(drive, chosen, config))
+
+
+def _in_common(drive: Drive, chosen: Int[np.ndarray, "k"], config: MountingConfig) -> bool:
+    """Whether ground is seen where the sensor's own vehicle is, but not from the first scan on."""
+    soon = [frame for frame in _SOON if frame < len(drive)]
+    first, *later = sorted({*chosen.tolist(), *soon})
+    if not len(drive.scan(first)) or _seen_below(drive.scan(first), config):
+        return False
+    seen = [_seen_below(drive.scan(frame), config) for frame in later]
+    return sum(points > _BELOW_POINTS for points in seen) >= _BELOW_SCANS
+
+
+def _seen_below(scan: Points, config: MountingConfig) -> int:
+    """How many points of the ground lie right below the sensor."""
+    near = scan[(scan[:, :2] ** 2).sum(1) < _BELOW_M**2]
+    plane = ground_plane(scan, config) if len(near) else None
+    if plane is None:
+        return 0
+    return int((np.abs(near @ plane[:3] + plane[3]) < config.thick_m).sum())
 
 
 def _is_an_object(scan: Points, config: MountingConfig) -> bool:
