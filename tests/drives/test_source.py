@@ -11,6 +11,7 @@ import pytest
 from tests.refusal import refused
 
 from wildshape.drives.frame_cache import FrameCache
+from wildshape.drives.oddities import clock_told
 from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.source import Drive
 from wildshape.geometry.transforms.se3 import SE3
@@ -188,6 +189,19 @@ def test_scans_that_are_copies_of_the_ones_before_are_said(tmp_path):
         np.save(tmp_path / f"{number}.npy", scan)
     (told,) = open_drive(tmp_path).warnings
     assert told.startswith("2 scans the same to the last bit as the one before, the first: frame 2")
+
+
+def test_times_of_points_that_are_no_turn_s_are_not_used_and_told_of():
+    def drive_of(turn_s, times):
+        turn = Turn(np.zeros((200, 3), np.float32), np.linspace(0.0, turn_s, 200))
+        return Drive.of("street", ["a0", "a1", "a2"], lambda _: turn, times)
+
+    good, degrees = (drive_of(turn_s, (5.0, 5.1, 5.2)) for turn_s in (0.11, 0.36))
+    assert good.turn(1).seconds is not None
+    assert clock_told(good) == []
+    assert degrees.turn(1).seconds is None
+    assert "cannot be used: a turn would last much longer" in clock_told(degrees)[0]
+    assert "without a times.txt they are not corrected" in clock_told(drive_of(0.1, None))[0]
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".pcd"])

@@ -9,7 +9,9 @@ from pathlib import Path
 
 from wildshape.drives.config import LinkConfig
 from wildshape.drives.source import Drive
+from wildshape.errors import BadInputError
 from wildshape.io.progress import counted
+from wildshape.records import Turn
 
 _SLOW_S = 0.21  # 5 Hz is well enough
 _FEWEST_SCANS = 5
@@ -53,3 +55,29 @@ def rate_told(drive: Drive, config: LinkConfig) -> list[str]:
         f"at {1 / drive.scan_s:.2g} scans a second fast vehicles are often lost, those above"
         f" {fastest:.0f} m/s always"
     ]
+
+
+def clock_told(drive: Drive) -> list[str]:
+    """A sentence if points have times that the drive cannot use in any of some scans."""
+    turns = {frame: _read(drive, frame) for frame in (0, len(drive) // 2, len(drive) - 1)}
+    timed = [
+        frame for frame, turn in turns.items() if turn is not None and turn.seconds is not None
+    ]
+    if not timed or any(drive.turn(frame).seconds is not None for frame in timed):
+        return []
+    if drive.times is None:
+        return [
+            "points have times, but scans have none: without a times.txt they are not corrected for"
+            " the sensor's motion"
+        ]
+    return [
+        "times of points cannot be used: a turn would last much longer than it is from a scan to"
+        f" the next, {drive.scan_s:.2g} s; scans are not corrected for the sensor's motion"
+    ]
+
+
+def _read(drive: Drive, frame: int) -> Turn | None:
+    try:
+        return drive.read(frame)
+    except BadInputError:
+        return None

@@ -33,7 +33,7 @@ from wildshape.drives.completing.vehicles import (
 )
 from wildshape.drives.completing.whole_scans import held_against
 from wildshape.drives.config import DriveConfig
-from wildshape.drives.oddities import count_told, rate_told
+from wildshape.drives.oddities import clock_told, count_told, rate_told
 from wildshape.drives.result import DriveResult
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.detections import BoxCutter, Detections, check_cut, given_tracks
@@ -300,6 +300,7 @@ class Pipeline:
         if empty := points.count(0):
             found.append(f"{empty} of {len(points)} scans are empty or cannot be read")
         found += self.breaks.told()
+        found += clock_told(self.drive)
         found += count_told(len(points) - points.count(0))
         found += rate_told(self.drive, self.config.tracks)
         if leaps := list(jumps(T_world_sensor, self.drive.ticks, self.config.trajectory)):

@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 
@@ -26,6 +27,7 @@ _LONGEST_PAUSE = 1e9  # scans; more are no count
 _MOMENT_S, _LONGEST_TURN_S = 0.01, 2.0
 # Places that tell recordings apart: of all files about, of each at least and at most; bytes.
 _PLACES, _FEWEST_PLACES, _MOST_PLACES, _SAMPLE_BYTES = 1024, 2, 64, 4096
+_LONGEST_TURN = 1.5  # from a scan to the next; overlapping ones last a little longer
 _CLOCK_BEGAN_S = 1.0  # ago; twice the longest turn that has times
 _DATED = re.compile(r".*[0-9]{6}[^0-9.][0-9.]+$")  # 20260131_235959: minutes have 60 seconds
 _NOTHING = Turn(np.empty((0, 3), np.float32))
@@ -103,7 +105,7 @@ class Drive:
     def __len__(self) -> int:
         return len(self.scan_names)
 
-    @property
+    @cached_property
     def scan_s(self) -> float | None:
         """From a scan to the next, the median, seconds, if times are known."""
         if self.times is None or len(self) < 2:
@@ -120,13 +122,22 @@ class Drive:
     def turn(self, frame: int) -> Turn:
         """A frame as it was read; without points where its file is damaged or empty.
 
-        Without times of points where the scans have none: how long a turn takes is not known.
+        Without times of points where the scans have none: how long a turn takes is not known. Nor
+        where a turn would last much longer than it is to the next: the field holds something else.
         """
         try:
             turn = self.read(frame)
         except BadInputError:
             return _NOTHING
-        return Turn(turn.points) if self.times is None else self._timed(turn, self.times, frame)
+        if self.times is None or self._is_too_long(turn):
+            return Turn(turn.points)
+        return self._timed(turn, self.times, frame)
+
+    def _is_too_long(self, turn: Turn) -> bool:
+        """Whether its points' times are of more than what lies between two scans."""
+        if turn.seconds is None or not len(turn.seconds) or self.scan_s is None:
+            return False
+        return bool(np.ptp(turn.seconds) > _LONGEST_TURN * self.scan_s)
 
     def _timed(self, turn: Turn, times: tuple[float, ...], frame: int) -> Turn:
         """A turn that begins as long before or after its scan's time as the others do.
