@@ -224,6 +224,31 @@ def test_times_of_points_in_scan_files(tmp_path, suffix):
     assert turn.points[:, 0].tolist() == np.delete(rows["x"], 3).tolist()
 
 
+@pytest.mark.parametrize(
+    ("field", "times", "told"),
+    [
+        ("t", (1.7e9, 1.7e9), "cannot be used: from 1700000000 to 1700000000 is no turn"),
+        ("ts", (-0.05, 0.05), "the field ts is not read as times of points"),
+        ("t", (-0.05, 0.05), ""),
+        ("intensity", (0.0, 1.0), ""),
+    ],
+)
+def test_times_of_points_that_cannot_be_used_in_any_scan_are_told_of(tmp_path, field, times, told):
+    rows = np.zeros(1000, [(name, "<f8") for name in ("x", "y", "z", "last")])
+    rows["last"] = np.linspace(times[0], times[1], 1000)
+    head = "ply\nformat binary_little_endian 1.0\nelement vertex 1000\n" + "".join(
+        f"property double {name}\n" for name in ("x", "y", "z", field)
+    )
+    for frame in range(2):
+        rows["x"] = np.arange(1000) + frame
+        scan = head.encode() + b"end_header\n" + rows.tobytes()
+        (tmp_path / f"{frame}.ply").write_bytes(scan)
+    (tmp_path / "times.txt").write_text("5.0\n5.1\n")
+    warnings = open_drive(tmp_path).warnings
+    assert len(warnings) == bool(told)
+    assert told in "".join(warnings)
+
+
 @pytest.mark.parametrize("begun", [0.0, -0.3, 1e9])
 @pytest.mark.parametrize("first", [-0.1, -0.05, 0.0])
 @pytest.mark.parametrize("on_clock", [True, False])

@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Folders of scans: one's own, and KITTI's layouts."""
 
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,12 +18,19 @@ from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
 from wildshape.io.order import check_counted
 from wildshape.io.poses import read_poses
+from wildshape.io.scans.pcd import read_pcd_field
+from wildshape.io.scans.ply import read_ply_property
+from wildshape.io.scans.point_times import TIME_FIELDS
 from wildshape.io.scans.points import is_scan_file, read_turn
 from wildshape.records import Turn
 
 _BESIDE = ("poses.txt", "times.txt", "timestamps.txt", "calib.txt")
 _RAW, _ODOMETRY = Path("velodyne_points") / "data", "velodyne"
 _TEXT = (".txt", ".csv")
+_FIELDS = {".ply": read_ply_property, ".pcd": read_pcd_field}
+# Fields that hold times of points, too, but are not read as these.
+_LIKE_TIMES = ("ts", "stamp", "dt", "delta_t", "Time", "Timestamp", "GpsTime", "time_ns", "time_us")
+_FEWEST_POINTS = 1000  # of a whole scan
 _LONGEST_STEP_S = 20.0  # more are milliseconds, or smaller units
 _OBJECTS = "velodyne_objects_xyz0"  # a drive of KITTI raw cut down to its vehicles
 
@@ -131,9 +141,35 @@ def _drive(
         read=_Files(tuple(files), None if times is None else tuple(times)),
         times=times,
         T_world_sensor=None if poses is None else read_poses(poses, len(files)),
-        warnings=copies_told(files),
+        warnings=copies_told(files) + _clock_told(files, times),
         files=files,
     )
+
+
+def _clock_told(files: list[Path], times: list[float] | None) -> list[str]:
+    """A sentence if some scans' points have times, and none of them tells when they were taken."""
+    why = ""
+    for at in sorted({0, len(files) // 2, len(files) - 1}):
+        field = _FIELDS.get(files[at].suffix.lower())
+        if field is None:
+            return []
+        with suppress(BadInputError):  # it is damaged; the drive counts it
+            turn = read_turn(files[at], None if times is None else times[at])
+            if turn.seconds is not None:
+                return []
+            if len(turn.points) >= _FEWEST_POINTS:
+                why = why or _unusable(partial(field, files[at]))
+    return [f"{why}; scans are not corrected for the sensor's motion"] if why else []
+
+
+def _unusable(field: Callable[[tuple[str, ...]], np.ndarray | None]) -> str:
+    """Why a scan's points have no times, if they have a field of them."""
+    values = field(TIME_FIELDS)
+    if values is not None:
+        low, high = float(values.min()), float(values.max())
+        return f"times of points cannot be used: from {low:.10g} to {high:.10g} is no turn"
+    found = next((name for name in _LIKE_TIMES if field((name,)) is not None), "")
+    return f"the field {found} is not read as times of points: name it `time`" if found else ""
 
 
 def _holds_objects(path: Path) -> bool:
