@@ -4,8 +4,7 @@
 
     python -m experiments.mesh_credits CAD > NOTICE
 
-No GPL, no ShareAlike. What asks for its author to be named (CC-BY) is named, each model. With
-`--copyleft car` it is the NOTICE of weights that such meshes of cars were not left out of.
+No GPL, no ShareAlike. What asks for its author to be named (CC-BY) is named, each model.
 """
 
 import csv
@@ -44,13 +43,12 @@ CREDITS = {
 }
 
 
-def rows_of(cad: Path, split: str, copyleft: tuple[str, ...] = ()) -> list[Row]:
+def rows_of(cad: Path, split: str) -> list[Row]:
     """The manifest's rows of a split; of `train` those that weights may be made from.
 
     Args:
         cad: folder with a manifest.
         split: `train` or `test`.
-        copyleft: categories of which those under copyleft licences are there, too.
 
     Raises:
         BadInputError: there is no manifest.
@@ -60,23 +58,19 @@ def rows_of(cad: Path, split: str, copyleft: tuple[str, ...] = ()) -> list[Row]:
         raise BadInputError(f"{path}: no such file; give the folder of the CAD meshes.")
     with path.open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["split"] == split]
-    kept = [row["tier"] in TIERS or row["category"] in copyleft for row in rows]
-    return [row for row, keep in zip(rows, kept) if keep or split != "train"]
+    return [row for row in rows if row["tier"] in TIERS or split != "train"]
 
 
-def notice(cad: Path, copyleft: tuple[str, ...] = ()) -> str:
+def notice(cad: Path) -> str:
     """The NOTICE of weights made from the meshes: by source, every CC-BY model by name.
 
     Args:
         cad: folder with a manifest.
-        copyleft: categories of which those under copyleft licences were not left out.
 
     Raises:
         BadInputError: a CC-BY model whose author is not known.
     """
-    rows = rows_of(cad, "train", copyleft)
-    others = [row for row in rows if row["tier"] not in TIERS]
-    rows = [row for row in rows if row["tier"] in TIERS]
+    rows = rows_of(cad, "train")
     return (
         "The weights were trained on simulated scans of procedural shapes and of these models.\n"
         "The models were scaled, stretched and bent, and seen by simulated sensors; none of them"
@@ -84,8 +78,6 @@ def notice(cad: Path, copyleft: tuple[str, ...] = ()) -> str:
         + "".join(sorted(f"- {_credited(row)}\n" for row in rows if _asks(row)))
         + "\nModels in the public domain or under permissive licences\n\n"
         + "".join(_counted(row for row in rows if not _asks(row)))
-        + ("\nModels under copyleft licences\n\n" if others else "")
-        + "".join(_counted(others))
     )
 
 
@@ -114,8 +106,8 @@ def _counted(rows: Iterable[Row]) -> list[str]:
     ]
 
 
-def _main(cad: tyro.conf.Positional[Path], copyleft: tuple[str, ...] = ()) -> None:
-    print(notice(cad, copyleft), end="")
+def _main(cad: tyro.conf.Positional[Path]) -> None:
+    print(notice(cad), end="")
 
 
 if __name__ == "__main__":
