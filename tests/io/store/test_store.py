@@ -209,7 +209,7 @@ def test_bad_tracks_and_empty_stores_are_refused(track: Track, tmp_path: Path) -
     ("changes", "said"),
     [
         ({"T_sensor_object": SE3.identity(0)}, "0 poses do not fit"),
-        ({"T_sensor_object": SE3.identity()}, "3 poses do not fit"),  # one alone, not a batch
+        ({"T_sensor_object": SE3.identity()}, "single poses do not fit"),  # one alone, not a batch
         ({"T_sensor_object": SE3(torch.zeros(3, 3, 3), torch.zeros(3, 3))}, "no rotation"),
         ({"T_sensor_object": SE3(torch.eye(3).expand(3, 3, 3), torch.ones(3, 3) / 0)}, "NaN"),
         ({"label_size_m": (4.0, 0.0, 1.5)}, "label_size_m"),

@@ -175,15 +175,16 @@ class StoreWriter:
 
     def _check(self, track: Track) -> None:
         """Refuse what no reader would take: one such track and the store never opens again."""
-        poses = track.T_sensor_object
+        poses, posed = track.T_sensor_object, "no"
         lengths = {len(track.scans), len(track.scan_names), len(track.rays or track.scans)}
         if poses is not None:
-            lengths.add(len(poses) if poses.translation.ndim == 2 else 0)
+            batch = poses.translation.ndim == 2
+            lengths.add(len(poses) if batch else 0)
+            posed = str(len(poses)) if batch else "single"
         if len(lengths) > 1 or not track.scans:
             raise BadInputError(
                 f"track {track.name}: {len(track.scans)} scans, {len(track.scan_names)} names, "
-                f"{len(track.rays) or 'no'} rays and {'no' if poses is None else len(poses)} poses "
-                "do not fit together."
+                f"{len(track.rays) or 'no'} rays and {posed} poses do not fit together."
             )
         if track.name in self._names:
             raise BadInputError(f"two tracks are named '{track.name}'; rename one of them.")
