@@ -120,7 +120,7 @@ def test_scans_without_their_ground_and_scans_in_feet_are_said(scans):
     assert "hardly any ground is seen, 4 % of the points" in told
     feet = [scan / np.float32(0.3048) for scan in scans]
     (told,) = find_mounting(drive_of(feet), MountingConfig()).told()
-    assert "5.6 m below the sensor, more than on a vehicle" in told
+    assert "5.6 m below the sensor, higher than on any vehicle" in told
 
 
 def test_scans_in_one_common_frame_are_said():

@@ -11,7 +11,7 @@ import pytest
 from tests.refusal import refused
 
 from wildshape.drives.frame_cache import FrameCache
-from wildshape.drives.oddities import clock_told
+from wildshape.drives.recording_checks import clock_told
 from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.source import Drive
 from wildshape.geometry.transforms.se3 import SE3
@@ -188,7 +188,7 @@ def test_scans_that_are_copies_of_the_ones_before_are_said(tmp_path):
     ):
         np.save(tmp_path / f"{number}.npy", scan)
     (told,) = open_drive(tmp_path).warnings
-    assert told.startswith("2 scans the same to the last bit as the one before, the first: frame 2")
+    assert told.startswith("2 scans equal to the one before, to the last bit; the first: frame 2")
 
 
 def test_times_of_points_that_are_no_turn_s_are_not_used_and_told_of():

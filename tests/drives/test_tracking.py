@@ -15,7 +15,7 @@ from wildshape.drives.config import (
     MountingConfig,
     TrajectoryConfig,
 )
-from wildshape.drives.oddities import rate_told
+from wildshape.drives.recording_checks import rate_told
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.clusters import extents, find_clusters
 from wildshape.drives.tracking.ground import height_above_ground
@@ -186,7 +186,7 @@ def test_of_few_scans_a_second_what_drives_and_what_stands_are_followed():
     flicker = [((13.0, -3.0),) if i % 3 == 1 else () for i in range(8)]
     scans = [seen(i, (60.0 - 6.0 * i, 3.0), (9.0, -3.0), *flicker[i]) for i in range(8)]
     assert len(link(scans, LinkConfig())) > 3
-    found = link(scans, LinkConfig().every(0.5))
+    found = link(scans, LinkConfig(), LinkConfig().wider(0.5))
     assert [one.frames for one in found] == [list(range(8))] * 2 + [[1, 4, 7]]
     assert [one.rows for one in found[:2]] == [[0] * 8, [1] * 8]
 

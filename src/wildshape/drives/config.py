@@ -6,7 +6,7 @@ They are written into `wildshape.json` of every result and can be set from Pytho
 `wildshape.drive("recording", "found", DriveConfig(clusters=ClusterConfig(range_m=40.0)))`.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from wildshape.drives.object_config import (
     AssociationConfig,
@@ -175,12 +175,11 @@ class LinkConfig:
         size_weight: metres of distance that a metre of change in size counts.
         velocity_gain: share of a new velocity that is believed.
         fewest_scans: shorter tracks are left out.
-        scan_s: from a scan to the next.
-        usual_s: the same of scans that the gates are made for.
-        slow: so many times as much is slow: what was not found is looked for a second time, with
-            gates that are wider by as much.
-        widest: up to so many times.
-        like_m: and whose size changes by less.
+        usual_s: from a scan to the next, for which the gates are made.
+        slow: from so many times as much on, clusters left over are looked for again, with gates
+            that are wider by as much.
+        widest: the gates grow by no more.
+        like_m: and only among clusters whose size differs by less.
     """
 
     gate_m: float = 1.5
@@ -190,26 +189,15 @@ class LinkConfig:
     size_weight: float = 0.15
     velocity_gain: float = 0.3
     fewest_scans: int = 4
-    scan_s: float = 0.1
     usual_s: float = 0.1
     slow: float = 1.5
     widest: float = 3.0
     like_m: float = 1.0
 
-    @property
-    def wider(self) -> float:
-        """How much wider the second gates are; 1 where there are none."""
-        times = self.scan_s / self.usual_s
+    def wider(self, scan_s: float | None) -> float:
+        """How much wider the second gates are, 1 where there are none; seconds a scan, if known."""
+        times = 1.0 if scan_s is None else scan_s / self.usual_s
         return 1.0 if times < self.slow else min(times, self.widest)
-
-    @property
-    def fastest(self) -> float:
-        """What drives faster is not found again, metres per second."""
-        return self.wider * self.first_gate_m / self.scan_s
-
-    def every(self, scan_s: float | None) -> "LinkConfig":
-        """The same for scans so far apart in time, seconds; as it is where that is not known."""
-        return self if scan_s is None else replace(self, scan_s=scan_s)
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from wildshape.drives.completing.vehicles import (
 )
 from wildshape.drives.completing.whole_scans import held_against
 from wildshape.drives.config import DriveConfig
-from wildshape.drives.oddities import clock_told, count_told, rate_told
+from wildshape.drives.recording_checks import clock_told, count_told, rate_told
 from wildshape.drives.result import DriveResult
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.detections import BoxCutter, Detections, check_cut, given_tracks
@@ -203,10 +203,10 @@ class Pipeline:
         """The same, found now."""
         if self.tracked:
             return given_tracks(read_cuts(self.cuts, len(self.drive)))
-        config = self.config.tracks.every(self.drive.scan_s)
+        config = self.config.tracks
         ticks = self.breaks.ticks(self.drive.ticks, config)
         known = self.cuts, T_level_sensor
-        found = linked_clusters(*known, ticks, config)
+        found = linked_clusters(*known, ticks, config, config.wider(self.drive.scan_s))
         return joined_where_they_stand(found, *known, self.config.standing, self.breaks.frames)
 
     def folder(self, seen: Sightings) -> Path:
@@ -302,7 +302,8 @@ class Pipeline:
         found += self.breaks.told()
         found += clock_told(self.drive)
         found += count_told(len(points) - points.count(0))
-        found += rate_told(self.drive, self.config.tracks)
+        if not self.tracked:
+            found += rate_told(self.drive, self.config.tracks)
         if leaps := list(jumps(T_world_sensor, self.drive.ticks, self.config.trajectory)):
             found.append(f"jumps of the sensor: {len(leaps)}, the first at frame {leaps[0]}")
         return tuple(found)

@@ -123,7 +123,7 @@ class Drive:
         """A frame as it was read; without points where its file is damaged or empty.
 
         Without times of points where the scans have none: how long a turn takes is not known. Nor
-        where a turn would last much longer than it is to the next: the field holds something else.
+        where the times span much more than the step between scans: the field holds something else.
         """
         try:
             turn = self.read(frame)

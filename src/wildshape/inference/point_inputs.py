@@ -19,7 +19,6 @@ from wildshape.io.scans.points import (
     check_repeats,
     drop_nonfinite,
     read_scan,
-    without_repeats,
 )
 from wildshape.records import Points, Sensor, SightLines
 
@@ -63,8 +62,7 @@ def as_points(scan: object, name: str = "scan") -> Points:
     if not spans(points).any():
         raise BadInputError(f"{name}: all {len(points)} points are equal; is the file damaged?")
     check_one_object(points, name)
-    check_repeats(points, name)
-    points = without_repeats(points)
+    points = check_repeats(points, name)
     return np.require(points, requirements="W")  # torch warns of what may not be written
 
 

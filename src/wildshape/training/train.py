@@ -20,7 +20,7 @@ from wildshape.io.store.store import Store
 from wildshape.method.checkpoint import MODEL, load_checkpoint, weights_file
 from wildshape.ops.device import choose_device
 from wildshape.training.config import Recipe
-from wildshape.training.doubts import doubts_of
+from wildshape.training.data_checks import doubts_of
 from wildshape.training.loop import Run, StopRequested, fit, setup
 from wildshape.training.options import TrainingOptions
 from wildshape.training.recipes import recipe_for, with_encoder, with_rays

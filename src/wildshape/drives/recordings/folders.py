@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wildshape.drives.oddities import copies_told
+from wildshape.drives.recording_checks import copies_told
 from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
@@ -141,12 +141,12 @@ def _drive(
         read=_Files(tuple(files), None if times is None else tuple(times)),
         times=times,
         T_world_sensor=None if poses is None else read_poses(poses, len(files)),
-        warnings=copies_told(files) + _clock_told(files, times),
+        warnings=copies_told(files) + _unread_times_told(files, times),
         files=files,
     )
 
 
-def _clock_told(files: list[Path], times: list[float] | None) -> list[str]:
+def _unread_times_told(files: list[Path], times: list[float] | None) -> list[str]:
     """A sentence if some scans' points have times, and none of them tells when they were taken."""
     why = ""
     for at in sorted({0, len(files) // 2, len(files) - 1}):
@@ -168,6 +168,8 @@ def _unusable(field: Callable[[tuple[str, ...]], np.ndarray | None]) -> str:
     if values is not None:
         low, high = float(values.min()), float(values.max())
         return f"times of points cannot be used: from {low:.10g} to {high:.10g} is no turn"
+    if field(_LIKE_TIMES) is None:
+        return ""
     found = next((name for name in _LIKE_TIMES if field((name,)) is not None), "")
     return f"the field {found} is not read as times of points: name it `time`" if found else ""
 

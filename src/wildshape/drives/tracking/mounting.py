@@ -74,8 +74,8 @@ class Mounting:
             )
         if self.height_m > _HIGHEST_M:
             told.append(
-                f"the ground lies {self.height_m:.1f} m below the sensor, more than on a vehicle:"
-                " give scans in metres"
+                f"the ground lies {self.height_m:.1f} m below the sensor, higher than on any"
+                " vehicle: if it is on no mast, the scans may not be in metres"
             )
         if self.ground < _LEAST_GROUND:
             told.append(

@@ -57,7 +57,11 @@ class Linked:
 
 
 def linked_clusters(
-    cuts: Path, T_level_sensor: SE3, ticks: Sequence[int], config: LinkConfig
+    cuts: Path,
+    T_level_sensor: SE3,
+    ticks: Sequence[int],
+    config: LinkConfig,
+    wider: float = 1.0,
 ) -> list[Sightings]:
     """The objects of a drive that were seen in enough scans.
 
@@ -66,6 +70,7 @@ def linked_clusters(
         T_level_sensor: of every frame.
         ticks: when each frame was taken.
         config: see there.
+        wider: `LinkConfig.wider` of the drive.
     """
     counts = []
     usable = 0
@@ -77,7 +82,7 @@ def linked_clusters(
             usable += cut.scanned > 0
             yield Seen.of(ticks[frame], cut.moved(T_level_sensor[frame]))
 
-    found = link(seen(), config)
+    found = link(seen(), config, wider)
     fewest = min(config.fewest_scans, usable)
     return [
         Sightings.of(f"{number:04d}", one.frames, one.rows, counts)
@@ -85,13 +90,13 @@ def linked_clusters(
     ]
 
 
-def link(scans: Iterable[Seen], config: LinkConfig) -> list[Linked]:
+def link(scans: Iterable[Seen], config: LinkConfig, wider: float = 1.0) -> list[Linked]:
     """The objects seen in scans in time order, in the order in which they were first seen."""
     every: list[Linked] = []
     live: list[Linked] = []
     for frame, seen in enumerate(scans):
         live = [one for one in live if seen.tick - one.tick <= config.longest_gap]
-        pairs = _assigned(live, seen, config)
+        pairs = _assigned(live, seen, config, wider)
         for row in range(len(seen.centres)):
             if row in pairs:
                 _go_on(live[pairs[row]], seen, row, config)
@@ -105,7 +110,7 @@ def link(scans: Iterable[Seen], config: LinkConfig) -> list[Linked]:
     return every
 
 
-def _assigned(live: list[Linked], seen: Seen, config: LinkConfig) -> dict[int, int]:
+def _assigned(live: list[Linked], seen: Seen, config: LinkConfig, wider: float) -> dict[int, int]:
     """For each cluster that goes on with a live object, the object's place in `live`."""
     if not live or not len(seen.centres):
         return {}
@@ -119,9 +124,9 @@ def _assigned(live: list[Linked], seen: Seen, config: LinkConfig) -> dict[int, i
     once = np.array([len(one.frames) == 1 for one in live])  # its speed is not known yet
     gate = np.where(once, config.first_gate_m, config.gate_m) + config.gate_per_tick_m * (gaps - 1)
     cost = apart + config.size_weight * unlike
-    cost = np.where(cost < config.wider * gate[:, None], cost, _FORBIDDEN)
+    cost = np.where(cost < wider * gate[:, None], cost, _FORBIDDEN)
     found = _cheapest(np.where(cost < gate[:, None], cost, _FORBIDDEN))
-    if config.wider > 1:
+    if wider > 1:
         cost[unlike > config.like_m] = _FORBIDDEN
         cost[list(found.values())] = _FORBIDDEN
         cost[:, list(found)] = _FORBIDDEN

@@ -79,8 +79,6 @@ def at_scan_times(labelled: LabelledDrive, T_world_sensor: SE3) -> LabelledDrive
     last, frames = len(numbers) - 1, []
     for i, frame in enumerate(labelled.frames):
         start, end = max(i - 1, 0), min(i + 1, last)
-        if start == end:
-            return labelled  # how the sensor moves is not known
         turns = max(float(numbers[end] - numbers[start]), 1.0)
         motion = Twist.between(T_world_sensor[start], T_world_sensor[end], turns)
         frames.append(replace(frame, labels=tuple(_carried(one, motion) for one in frame.labels)))

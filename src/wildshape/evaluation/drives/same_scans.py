@@ -42,8 +42,8 @@ def read_frames(path: Path) -> Frames:
 def check_same_scans(found: Path, scans: Sequence[Path]) -> None:
     """Refuse what was found in other scans than the labelled ones.
 
-    Names are compared that are numbers, as those of labelled scans are. A folder without a list of
-    frames is believed.
+    Names are compared that are numbers, as those of labelled scans are, but for mere counts: scans
+    of bags have no other names. A folder without a list of frames is believed.
 
     Args:
         found: a folder that `wildshape drive` wrote.
@@ -60,8 +60,10 @@ def check_same_scans(found: Path, scans: Sequence[Path]) -> None:
         raise BadInputError(
             f"{path}: is of {len(frames)} scans, but the labels know {len(scans)}; {_CURE}."
         )
-    for (name, points), scan in zip(frames.items(), scans):
-        if name.isascii() and name.isdigit() and int(name) != int(scan.stem):
+    numbers = [int(name) if name.isascii() and name.isdigit() else None for name in frames]
+    named = numbers != list(range(len(numbers)))
+    for (name, points), number, scan in zip(frames.items(), numbers, scans):
+        if named and number is not None and number != int(scan.stem):
             raise BadInputError(f"{path}: has scan {name} where the labels have {scan}; {_CURE}.")
         if points and not _holds(scan, points):
             raise BadInputError(

@@ -235,8 +235,10 @@ def without_repeats(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "k 3"
     by_x = np.sort(points[:, 0])
     if not (by_x[1:] == by_x[:-1]).any():
         return points
-    _, first = np.unique(points, axis=0, return_index=True)
-    return points if len(first) == len(points) else points[np.sort(first)]
+    order = np.lexsort(points.T)  # stable: of equal places the first comes first
+    placed = points[order]
+    again = np.append(False, (placed[1:] == placed[:-1]).all(axis=1))
+    return points[np.sort(order[~again])] if again.any() else points
 
 
 def _read(path: Path, coordinates: Coordinates) -> Float[np.ndarray, "n 3"]:
@@ -288,18 +290,19 @@ def check_scan(points: Float[np.ndarray, "n 3"], name: str) -> None:
     check_near(points, name)
 
 
-def check_repeats(points: Float[np.ndarray, "n 3"], name: str) -> None:
-    """Refuse a few places, however often they are repeated.
+def check_repeats(points: Float[np.ndarray, "n 3"], name: str) -> Float[np.ndarray, "k 3"]:
+    """Each place once; a few places are refused, however often they are repeated.
 
     Raises:
         BadInputError: fewer than 16 different points.
     """
-    different = len(without_repeats(points))
-    if different < LEAST_POINTS:
+    places = without_repeats(points)
+    if len(places) < LEAST_POINTS:
         raise BadInputError(
-            f"{name}: {len(points)} points in {different} places; a scan needs at least"
+            f"{name}: {len(points)} points in {len(places)} places; a scan needs at least"
             f" {LEAST_POINTS}: use a denser one."
         )
+    return places
 
 
 def check_one_object(points: Float[np.ndarray, "n 3"], name: str) -> None:

@@ -9,7 +9,7 @@ import pytest
 from wildshape.io.progress import Silent
 from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.records import Sensor
-from wildshape.training.doubts import doubts_of
+from wildshape.training.data_checks import doubts_of
 from wildshape.training.options import TrainingOptions
 from wildshape.training.recipes import recipe_for
 from wildshape.training.train import train

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from wildshape.drives.config import LinkConfig
 from wildshape.drives.source import Drive
+from wildshape.drives.tracking.trajectory import FIRST_SCANS
 from wildshape.errors import BadInputError
 from wildshape.io.progress import counted
 from wildshape.records import Turn
@@ -34,7 +35,7 @@ def copies_told(files: Sequence[Path]) -> list[str]:
     if not copies:
         return []
     return [
-        f"{counted(len(copies), 'scan')} the same to the last bit as the one before, the first:"
+        f"{counted(len(copies), 'scan')} equal to the one before, to the last bit; the first:"
         f" frame {copies[0]}"
     ]
 
@@ -50,7 +51,7 @@ def rate_told(drive: Drive, config: LinkConfig) -> list[str]:
     """A sentence where scans are so far apart in time that fast vehicles are lost."""
     if drive.scan_s is None or drive.scan_s < _SLOW_S:
         return []
-    fastest = config.every(drive.scan_s).fastest
+    fastest = config.wider(drive.scan_s) * config.first_gate_m / drive.scan_s
     return [
         f"at {1 / drive.scan_s:.2g} scans a second fast vehicles are often lost, those above"
         f" {fastest:.0f} m/s always"
@@ -58,8 +59,8 @@ def rate_told(drive: Drive, config: LinkConfig) -> list[str]:
 
 
 def clock_told(drive: Drive) -> list[str]:
-    """A sentence if points have times that the drive cannot use in any of some scans."""
-    turns = {frame: _read(drive, frame) for frame in (0, len(drive) // 2, len(drive) - 1)}
+    """A sentence if points have times that the drive cannot use in any of the first scans."""
+    turns = {frame: _read(drive, frame) for frame in range(min(FIRST_SCANS, len(drive)))}
     timed = [
         frame for frame, turn in turns.items() if turn is not None and turn.seconds is not None
     ]
