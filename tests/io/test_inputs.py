@@ -43,6 +43,19 @@ def test_track_folder_plain_folder_and_one_scan(dataset: Path) -> None:
     assert (track.name, track.scan_names, len(track.scans[0])) == ("000011", ("000011",), 20)
 
 
+def test_a_packed_store_gives_each_place_once_as_a_folder_does(
+    track: Track, tmp_path: Path
+) -> None:
+    twice = replace(track, scans=tuple(np.concatenate((scan, scan)) for scan in track.scans))
+    with StoreWriter(tmp_path / "store", {}) as writer:
+        writer.add(twice)
+    write_track(tmp_path / "folder", twice)
+    for path in (tmp_path / "store", tmp_path / "folder"):
+        (found,) = open_tracks(path)
+        for scan, once in zip(found.scans, track.scans, strict=True):
+            np.testing.assert_array_equal(scan, once)
+
+
 def test_packed_store(track: Track, tmp_path: Path) -> None:
     with StoreWriter(tmp_path / "store", {}) as writer:
         writer.add(track)

@@ -17,6 +17,7 @@ from wildshape.io.scans.points import (
     check_scan,
     is_scan_file,
     read_scan,
+    without_repeats,
 )
 from wildshape.io.store.store import is_store, open_store
 from wildshape.io.tracks import (
@@ -285,7 +286,7 @@ def _in_unit_of(source: TrackSource, coordinates: Coordinates) -> Coordinates:
 
 
 def _checked(track: Track) -> TrackFile:
-    """A track that was not read from scan files, without the scans that cannot be used.
+    """A track that was not read from scan files: without useless scans, each place once.
 
     Raises:
         NoUsableScanError: all of them.
@@ -300,7 +301,11 @@ def _checked(track: Track) -> TrackFile:
         kept.append(number)
     if not kept:
         raise NoUsableScanError(Path(track.name), tuple(skipped))
-    return TrackFile(track if not skipped else track.part(kept), tuple(skipped))
+    usable = track.part(kept) if skipped else track
+    scans = tuple(without_repeats(scan) for scan in usable.scans)
+    if any(once is not scan for once, scan in zip(scans, usable.scans)):
+        usable = replace(usable, scans=scans)
+    return TrackFile(usable, tuple(skipped))
 
 
 def _single_scan(path: Path, coordinates: Coordinates) -> TrackSource:
