@@ -15,8 +15,6 @@ from wildshape.drives.config import (
     MountingConfig,
     TrajectoryConfig,
 )
-from wildshape.drives.recording_checks import rate_told
-from wildshape.drives.source import Drive
 from wildshape.drives.tracking.clusters import extents, find_clusters
 from wildshape.drives.tracking.ground import height_above_ground
 from wildshape.drives.tracking.mounting import Mounting, ground_plane
@@ -24,7 +22,6 @@ from wildshape.drives.tracking.sightings import Sightings, merged
 from wildshape.drives.tracking.tracks import Seen, link
 from wildshape.drives.tracking.trajectory import jumps
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.records import Turn
 
 
 def road(rng, count=20000, reach=30.0):
@@ -189,19 +186,6 @@ def test_of_few_scans_a_second_what_drives_and_what_stands_are_followed():
     found = link(scans, LinkConfig(), LinkConfig().wider(0.5))
     assert [one.frames for one in found] == [list(range(8))] * 2 + [[1, 4, 7]]
     assert [one.rows for one in found[:2]] == [[0] * 8, [1] * 8]
-
-
-def test_only_recordings_of_few_scans_a_second_are_told_to_lose_fast_vehicles():
-    nothing = Turn(np.empty((0, 3), np.float32))
-
-    def told(scan_s):
-        times = [scan_s * frame for frame in range(4)]
-        drive = Drive.of("street", ["a0", "a1", "a2", "a3"], lambda _: nothing, times)
-        return rate_told(drive, LinkConfig())
-
-    assert told(0.1) == told(0.05) == told(0.2) == []
-    assert "at 2 scans a second" in told(0.5)[0]
-    assert "above 18 m/s always" in told(0.5)[0]
 
 
 def test_an_object_of_which_less_is_seen_stays_the_same():

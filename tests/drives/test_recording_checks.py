@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is odd about a recording is said, and nothing of a good one."""
+
+import numpy as np
+import pytest
+
+from wildshape.drives.config import LinkConfig
+from wildshape.drives.recording_checks import clock_told, rate_told
+from wildshape.drives.recordings.recording_kinds import open_drive
+from wildshape.drives.source import Drive
+from wildshape.records import Turn
+
+
+def test_scans_that_are_copies_of_the_ones_before_are_said(tmp_path):
+    rng = np.random.default_rng(0)
+    scans = [rng.normal(size=(500, 3)).astype(np.float32) for _ in range(3)]
+    nothing = np.empty((0, 3), np.float32)
+    for number, scan in enumerate(
+        [scans[0], scans[1], scans[1], scans[1], scans[2], *[nothing] * 2]
+    ):
+        np.save(tmp_path / f"{number}.npy", scan)
+    (told,) = open_drive(tmp_path).warnings
+    assert told.startswith("2 scans equal to the one before, to the last bit; the first: frame 2")
+
+
+def test_times_of_points_that_are_no_turn_s_are_not_used_and_told_of():
+    def drive_of(turn_s, times):
+        turn = Turn(np.zeros((200, 3), np.float32), np.linspace(0.0, turn_s, 200))
+        return Drive.of("street", ["a0", "a1", "a2"], lambda _: turn, times)
+
+    good, degrees = (drive_of(turn_s, (5.0, 5.1, 5.2)) for turn_s in (0.11, 0.36))
+    assert good.turn(1).seconds is not None
+    assert clock_told(good) == []
+    assert degrees.turn(1).seconds is None
+    assert "cannot be used: a turn would last much longer" in clock_told(degrees)[0]
+    assert "without a times.txt they are not corrected" in clock_told(drive_of(0.1, None))[0]
+
+
+@pytest.mark.parametrize(
+    ("field", "times", "told"),
+    [
+        ("t", (1.7e9, 1.7e9), "cannot be used: from 1700000000 to 1700000000 is no turn"),
+        ("ts", (-0.05, 0.05), "the field ts is not read as times of points"),
+        ("t", (-0.05, 0.05), ""),
+        ("intensity", (0.0, 1.0), ""),
+    ],
+)
+def test_times_of_points_that_cannot_be_used_in_any_scan_are_told_of(tmp_path, field, times, told):
+    rows = np.zeros(1000, [(name, "<f8") for name in ("x", "y", "z", "last")])
+    rows["last"] = np.linspace(times[0], times[1], 1000)
+    head = "ply\nformat binary_little_endian 1.0\nelement vertex 1000\n" + "".join(
+        f"property double {name}\n" for name in ("x", "y", "z", field)
+    )
+    for frame in range(2):
+        rows["x"] = np.arange(1000) + frame
+        scan = head.encode() + b"end_header\n" + rows.tobytes()
+        (tmp_path / f"{frame}.ply").write_bytes(scan)
+    (tmp_path / "times.txt").write_text("5.0\n5.1\n")
+    warnings = open_drive(tmp_path).warnings
+    assert len(warnings) == bool(told)
+    assert told in "".join(warnings)
+
+
+def test_only_recordings_of_few_scans_a_second_are_told_to_lose_fast_vehicles():
+    nothing = Turn(np.empty((0, 3), np.float32))
+
+    def told(scan_s):
+        times = [scan_s * frame for frame in range(4)]
+        drive = Drive.of("street", ["a0", "a1", "a2", "a3"], lambda _: nothing, times)
+        return rate_told(drive, LinkConfig())
+
+    assert told(0.1) == told(0.05) == told(0.2) == []
+    assert "at 2 scans a second" in told(0.5)[0]
+    assert "above 18 m/s always" in told(0.5)[0]
