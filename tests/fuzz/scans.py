@@ -17,8 +17,7 @@ from wildshape.cli.pipe import as_file
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.inputs import open_tracks
 from wildshape.io.poses import read_poses, read_tum, write_poses, write_tum
-from wildshape.io.scans.checks import check_scan
-from wildshape.io.scans.points import read_points
+from wildshape.io.scans.points import check_scan, read_points
 from wildshape.io.tracks import read_info, read_track_file, write_track
 from wildshape.records import Intrinsics, Sensor, Track
 

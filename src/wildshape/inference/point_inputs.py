@@ -12,8 +12,14 @@ from torch import Tensor
 from wildshape.errors import BadInputError
 from wildshape.geometry.box import spans
 from wildshape.io.rays import read_rays
-from wildshape.io.scans.checks import LEAST_POINTS, check_near, check_one_object, check_repeats
-from wildshape.io.scans.points import drop_nonfinite, read_scan
+from wildshape.io.scans.points import (
+    LEAST_POINTS,
+    check_near,
+    check_one_object,
+    check_repeats,
+    drop_nonfinite,
+    read_scan,
+)
 from wildshape.records import Points, Sensor, SightLines
 
 _RAYS = ("directions", "ranges", "origins")

@@ -10,13 +10,14 @@ from pathlib import Path
 from wildshape.errors import BadInputError
 from wildshape.io.progress import counted
 from wildshape.io.rays import read_rays
-from wildshape.io.scans.checks import check_scan, without_repeats
 from wildshape.io.scans.points import (
     SENSOR_METRES,
     SUFFIXES,
     Coordinates,
+    check_scan,
     is_scan_file,
     read_scan,
+    without_repeats,
 )
 from wildshape.io.store.store import is_store, open_store
 from wildshape.io.tracks import (

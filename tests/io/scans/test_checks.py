@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wildshape.errors import BadInputError
-from wildshape.io.scans.checks import check_scan
+from wildshape.io.scans.points import check_scan
 
 
 def _scan(count: int, extent: float) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wildshape.io.scans.point_times import seconds_since
-from wildshape.io.scans.points import read_turn
+from wildshape.io.scans.turns import read_turn
 
 TURN = np.linspace(0.0, 0.1, 200)
 

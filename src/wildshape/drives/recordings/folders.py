@@ -21,7 +21,8 @@ from wildshape.io.poses import read_poses
 from wildshape.io.scans.pcd import read_pcd_field
 from wildshape.io.scans.ply import read_ply_property
 from wildshape.io.scans.point_times import TIME_FIELDS
-from wildshape.io.scans.points import is_scan_file, read_turn
+from wildshape.io.scans.points import is_scan_file
+from wildshape.io.scans.turns import read_turn
 from wildshape.records import Turn
 
 _BESIDE = ("poses.txt", "times.txt", "timestamps.txt", "calib.txt")

@@ -14,8 +14,8 @@ from wildshape.errors import BadInputError, MissingExtraError
 from wildshape.io.bags.clouds import cloud_of, message_types, stamp
 from wildshape.io.bags.storages import CLOUD, STORAGES, Key, Message
 from wildshape.io.guard import first_line, reading
-from wildshape.io.scans.checks import check_near
 from wildshape.io.scans.point_times import seconds_since
+from wildshape.io.scans.points import check_near
 from wildshape.records import Turn
 
 
