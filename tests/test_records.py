@@ -15,6 +15,7 @@ import pytest
 import torch
 
 import wildshape
+from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.point_inputs import as_points
 from wildshape.records import Box, Completion, Intrinsics, Registration, Sensor, Track
@@ -42,7 +43,8 @@ def test_what_holds_arrays_is_equal_to_itself_alone(done):
     """`==` raised that the truth of an array is ambiguous, and so did `in`."""
     track = Track("car", (done.points,), ("0",))
     found = Registration(done.pose, 1.0, 0.9)
-    for one in (done, done.pose, track, found):
+    rays = SightLines.of_returns(done.points[:3])
+    for one in (done, done.pose, track, found, rays):
         other = copy.deepcopy(one)
         assert one == one
         assert one != other

@@ -66,10 +66,14 @@ def dpc_recipe(options: TrainingOptions) -> DpcRecipe:
     """The preset, with another number of steps if asked.
 
     Raises:
-        BadInputError: several processes.
+        BadInputError: several processes, or there is no preset of DPC of that name.
     """
     if int(os.environ.get("WORLD_SIZE", "1")) > 1:
         raise BadInputError(f"preset {options.preset} trains in one process; drop torchrun.")
+    if options.preset not in PRESETS:
+        raise BadInputError(
+            f"--preset {options.preset}: is none of DPC; use one of {', '.join(PRESETS)}."
+        )
     recipe = PRESETS[options.preset]
     if options.steps is None:
         return recipe

@@ -17,7 +17,7 @@ from wildshape.errors import BadInputError
 _UNIT = 1e-3  # how far from 1 the length of a direction may be
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SightLines:
     """Rays of a frame near an object that did not hit it.
 
