@@ -22,7 +22,7 @@ from experiments.tables.make import Making, chosen_rows, make
 from experiments.tables.measure import measure, seeds_of
 from experiments.tables.rows import ORACLE
 from experiments.tables.show import as_printed
-from experiments.tables.size import SIZES, Size
+from experiments.tables.size import SIZES, changed
 from experiments.tables.table import Block, Row, Table, Trained
 from experiments.tables.train import Workshop
 
@@ -160,19 +160,6 @@ def jobs(made: dict[str, Table], given: Given) -> list[Job]:
                 found[name, row.name, of] = replace(job, blocks=(*job.blocks, block))
                 trained.add(of)
     return list(found.values())
-
-
-def changed(size: Size, share: float, steps: int | None) -> Size:
-    """A size with a share of the tracks and steps, or other steps, under a name of its own."""
-    assert size.steps is not None
-    if steps is not None:
-        size = replace(size, name=f"{size.name}-{steps}-steps", steps=steps)
-    if share == 1:
-        return size
-    counts = {
-        name: max(4, round(share * getattr(size, name))) for name in ("train", "test", "steps")
-    }
-    return replace(size, name=f"{size.name}-{share:g}", **counts)
 
 
 def left_s(todo: list[Job], spent: dict[str, float], all_jobs: list[Job]) -> float:

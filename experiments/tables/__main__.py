@@ -26,7 +26,7 @@ from experiments.tables import (
 from experiments.tables.command import begin
 from experiments.tables.given import Given
 from experiments.tables.make import chosen_protocols, chosen_rows, draw, make
-from experiments.tables.size import SIZES
+from experiments.tables.size import SIZES, changed
 from experiments.tables.train import Workshop
 
 TABLES = {
@@ -89,6 +89,7 @@ class Settings:
         rows: only rows whose names hold one of these, with commas; ^word: begin with it.
         rotate: only these input protocols (none, yaw, so3), with commas.
         seeds: trainings of each row, and turns of each baseline; 0: as the size has it.
+        steps: of each training instead of the size's own.
     """
 
     table: Annotated[Name, tyro.conf.Positional]
@@ -101,13 +102,16 @@ class Settings:
     rows: str = ""
     rotate: str = ""
     seeds: int = 0
+    steps: int | None = None
 
 
 def main(settings: Settings, command: str) -> None:
     """Make it and print the page."""
-    given = Given(SIZES[settings.size], settings.cad, settings.kitti)
+    size = changed(SIZES[settings.size], steps=settings.steps)
+    size = replace(size, seeds=settings.seeds) if settings.seeds > 0 else size
+    given = Given(size, settings.cad, settings.kitti)
     shop = Workshop(settings.out, settings.device, command)
-    name, results = f"{settings.table}-{settings.size}", settings.results or settings.out
+    name, results = f"{settings.table}-{size.name}", settings.results or settings.out
     if settings.table in FIGURES:
         print(draw(shop, given, FIGURES[settings.table], name, results))
         return

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Input, truth, ICP, shape and fusion of the best, the median and the worst object.
+"""Input, truth, ICP, DPC, shape and fusion of the best, the median and the worst object.
 
 The paper's figures 3 and 4 and those of its supplement. The objects are chosen by their CD, never
-by hand; the seed by its label-free cost.
+by hand; the seed by its label-free cost. DPC knows no such cost: seed 0.
 """
 
 from pathlib import Path
@@ -12,14 +12,15 @@ from typing import cast
 from experiments.tables.data import store_of
 from experiments.tables.given import Given
 from experiments.tables.make import Figure, selected
-from experiments.tables.measure import Measured, measure
-from experiments.tables.rows import default_form, views_form
+from experiments.tables.measure import Measured, measure, method_of
+from experiments.tables.rows import default_form, dpc_drives, dpc_views, views_form
 from experiments.tables.table import Block, Row, Shipped, Trained
-from experiments.tables.train import Workshop
+from experiments.tables.train import Workshop, model_of
 
 from wildshape.baselines.icp import LocalIcp
 from wildshape.baselines.pairs import Chained
 from wildshape.evaluation.examples import Example, gather
+from wildshape.evaluation.method import Completer
 from wildshape.evaluation.pictures import draw_examples
 from wildshape.inference.evaluation_adapter import Learned
 from wildshape.inference.predictor import load
@@ -32,13 +33,13 @@ def drives(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
     """Cars driven past, by the default form."""
     row = default_form(given.size, given.drives("train"))
     block = Block("objects", given.drives("test"), (row,))
-    return _draw(shop, row, block, range(given.size.seeds), given.size.max_scans, path)
+    return _draw(shop, given, row, block, given.size.seeds, path)
 
 
 def kitti(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
     """Real cars, by the weights that the package carries."""
     block = Block("objects", given.real_cars(), (Shipped(),))
-    return _draw(shop, Shipped(), block, range(1), given.size.max_scans, path)
+    return _draw(shop, given, Shipped(), block, 1, path)
 
 
 def trucks(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
@@ -46,27 +47,45 @@ def trucks(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
     cars, data = default_form(given.size, given.drives("train")), given.trucks()
     row = Trained("ours, default form, fine-tuned", cars.recipe, data, start=cars)
     block = Block("objects", data, (row,))
-    return _draw(shop, row, block, range(given.size.side_seeds), given.size.max_scans, path)
+    return _draw(shop, given, row, block, given.size.side_seeds, path)
 
 
 def views_of(category: Category) -> Figure:
     """Depth views of a category, by the paper's form."""
 
     def views(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
-        row = views_form(given.size, given.views(category, "train"))
+        data = given.views(category, "train")
+        row, (rival, _) = views_form(given.size, data), dpc_views(given.size, data)
         block = Block("objects", given.views(category, "test"), (row,))
-        return _draw(shop, row, block, range(given.size.side_seeds), given.size.max_scans, path)
+        return _draw(shop, given, row, block, given.size.side_seeds, path, rival)
 
     return views
 
 
 def _draw(
-    shop: Workshop, row: Row, block: Block, seeds: range, most: int | None, path: Path
+    shop: Workshop,
+    given: Given,
+    row: Row,
+    block: Block,
+    seeds: int,
+    path: Path,
+    rival: Trained | None = None,
 ) -> dict[str, object]:
-    """Measure the row, choose the seed and the objects, and write the figure."""
-    tried = [measure(shop, row, block, "none", seed, most) for seed in seeds]
+    """Measure the row, choose the seed and the objects, and write the figure.
+
+    Args:
+        shop: where everything is kept.
+        given: size and meshes.
+        row: what is drawn.
+        block: with the tested data.
+        seeds: trainings of the row.
+        path: of the figure.
+        rival: DPC; by default the paper's for LiDAR, trained on cars driven past.
+    """
+    most = given.size.max_scans
+    tried = [measure(shop, row, block, "none", seed, most) for seed in range(seeds)]
     best = _selected(row.name, tuple(cast("list[Measured]", tried)))
-    examples = _examples(shop, block, best)
+    examples = _examples(shop, block, best, rival or dpc_drives(given.size, given.drives("train")))
     with atomic_write(path) as file:
         draw_examples(examples).savefig(file, dpi=130, format="webp")
     drawn = {example.label: {"track": example.track, "cd_m": example.cd} for example in examples}
@@ -84,12 +103,14 @@ def _selected(name: str, measured: tuple[Measured, ...]) -> Measured:
     return measured[0] if len(measured) == 1 else selected(name, measured)
 
 
-def _examples(shop: Workshop, block: Block, best: Measured) -> list[Example]:
+def _examples(shop: Workshop, block: Block, best: Measured, rival: Trained) -> list[Example]:
     model = None if best.model is None else best.model.path
+    dpc = cast("Completer", method_of(shop, rival, model_of(shop, rival, seed=0)))
     return gather(
         open_tracks(store_of(shop.folder, block.test)),
         best.results,
         best.results.methods[0].name,
         Learned(load(model, shop.device, raw=model is not None)),
-        rival=Chained(LocalIcp()),
+        fused_by={"ICP, fused": Chained(LocalIcp())},
+        completed_by={f"{rival.name}, completed": dpc},
     )

@@ -82,6 +82,19 @@ SIZES = {
 }
 
 
+def changed(size: Size, share: float = 1.0, steps: int | None = None) -> Size:
+    """A size with a share of the tracks and steps, or other steps, under a name of its own."""
+    if steps is not None:
+        size = replace(size, name=f"{size.name}-{steps}-steps", steps=steps)
+    if share == 1:
+        return size
+    assert size.steps is not None
+    counts = {
+        name: max(4, round(share * getattr(size, name))) for name in ("train", "test", "steps")
+    }
+    return replace(size, name=f"{size.name}-{share:g}", **counts)
+
+
 def sized(recipe: Recipe, size: Size) -> Recipe:
     """The recipe at a size: what it minimises is kept, how large and how long is not.
 

@@ -62,12 +62,18 @@ def test_examples_and_figures(tmp_path):
     assert [p.name for p in paths] == ["errors.png", "examples.png"]
     assert all(p.read_bytes()[:4] == b"\x89PNG" for p in paths)
     assert len(draw_examples(examples).axes) == 3 * 4
-    beside = gather(tracks, results, "m", Method(), rival=Chained(LocalIcp()))
-    icp, ours = beside[0].rival, examples[0].fused
-    assert icp is not None
-    assert ours is not None
-    assert np.array_equal(icp, ours)  # the same ICP
-    assert len(draw_examples(beside).axes) == 3 * 5
+    icp, scan = Chained(LocalIcp()), OneScan()
+    beside = gather(
+        tracks, results, "m", Method(), fused_by={"ICP": icp}, completed_by={"scan": scan}
+    )
+    same = (("ICP", examples[0].fused), ("scan", examples[0].completed))  # by the same methods
+    for title, cloud in same:
+        made = beside[0].rivals[title]
+        assert made is not None
+        assert cloud is not None
+        assert np.array_equal(made, cloud)
+    titles = [ax.get_title() for ax in draw_examples(beside).axes[:6]]
+    assert titles == ["one scan", "truth", "ICP", "scan", "completed", "fused"]
 
 
 def test_drawing_keeps_aspect_and_survives_gaps():

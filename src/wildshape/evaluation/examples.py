@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects to look at, chosen by their error and never by hand."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,7 +28,7 @@ class Example:
         truth: `(g, 3)`.
         completed: `(m, 3)`, from the middle scan alone.
         fused: `(f, 3)`, all scans moved by the method; None if it does not register, or refuses.
-        rival: `(f, 3)`, all scans moved by another method; None if none was asked for.
+        rivals: what other methods made of it, by the title of the picture.
     """
 
     label: str
@@ -38,7 +38,7 @@ class Example:
     truth: Points
     completed: Points
     fused: Points | None
-    rival: Points | None = None
+    rivals: dict[str, Points | None] = field(default_factory=dict)
 
 
 def pick(scores: MethodScores) -> dict[str, tuple[str, float]]:
@@ -59,7 +59,8 @@ def gather(
     name: str,
     method: Method,
     *,
-    rival: Registrar | None = None,
+    fused_by: Mapping[str, Registrar] = {},
+    completed_by: Mapping[str, Completer] = {},
 ) -> list[Example]:
     """The three objects of a run, completed and fused once more for drawing.
 
@@ -68,7 +69,8 @@ def gather(
         results: of the run.
         name: the method's row; it must complete single scans.
         method: the same as in the run.
-        rival: fuses the same tracks, to be drawn beside the method.
+        fused_by: other methods by the titles of their pictures: the same tracks fused by them.
+        completed_by: likewise, the same scans completed by them.
     """
     chosen = pick(results[name])
     if not isinstance(method, Completer):
@@ -79,19 +81,33 @@ def gather(
         for track in tracks
         if track.name in wanted
     }
-    made = (_example(label, cd, cases[t], method, rival) for label, (t, cd) in chosen.items())
-    return [example for example in made if example is not None]
+    made = ((_example(label, cd, cases[t], method), cases[t]) for label, (t, cd) in chosen.items())
+    return [
+        replace(example, rivals=_rivals(case, fused_by, completed_by))
+        for example, case in made
+        if example is not None
+    ]
 
 
-def _example(
-    label: str, cd: float, case: Case, method: Completer, rival: Registrar | None
-) -> Example | None:
+def _rivals(
+    case: Case, fused_by: Mapping[str, Registrar], completed_by: Mapping[str, Completer]
+) -> dict[str, Points | None]:
+    """What other methods make of the track, in the object's true frame."""
+    made = {title: _fused(method, case) for title, method in fused_by.items()}
+    for title, method in completed_by.items():
+        completed = complete_scans(method, case)[case.middle]
+        made[title] = None if completed is None else completed.points
+    assert case.T_sensor_object is not None
+    T_object_middle = case.T_sensor_object[case.middle].inverse()
+    return {t: None if c is None else T_object_middle.apply_numpy(c) for t, c in made.items()}
+
+
+def _example(label: str, cd: float, case: Case, method: Completer) -> Example | None:
     completed = complete_scans(method, case)[case.middle]
     if completed is None or case.truth is None or case.T_sensor_object is None:
         return None
     T_object_middle = case.T_sensor_object[case.middle].inverse()
     fused = _fused(method, case) if isinstance(method, Registrar) else None
-    other = None if rival is None else _fused(rival, case)
     return Example(
         label=label,
         track=case.name,
@@ -100,7 +116,6 @@ def _example(
         truth=case.truth.shape,
         completed=T_object_middle.apply_numpy(completed.points),
         fused=None if fused is None else T_object_middle.apply_numpy(fused),
-        rival=None if other is None else T_object_middle.apply_numpy(other),
     )
 
 

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
 # From the front left and above, in the object's frame: orthographic, so sizes compare.
 AZIMUTH_DEG, _ELEVATION_DEG = 40.0, 22.0
-_PANELS = ("one scan", "truth", "completed", "fused")
-_WITH_RIVAL = ("one scan", "truth", "ICP, fused", "completed", "fused")
+_SEEN, _MADE = ("one scan", "truth"), ("completed", "fused")
 _MAX_DRAWN = 6000
 
 
@@ -42,10 +41,10 @@ def project(
 
 
 def draw_examples(examples: Sequence[Example]) -> Figure:
-    """A row an object: the scan, the truth, a rival's fused track, the completion, the fused."""
+    """A row an object: scan, truth, what its rivals made, the completion, the fused track."""
     from matplotlib.figure import Figure
 
-    panels = _WITH_RIVAL if any(e.rival is not None for e in examples) else _PANELS
+    panels = (*_SEEN, *(examples[0].rivals if examples else ()), *_MADE)
     figure = Figure(figsize=(3.2 * len(panels), 2.5 * len(examples)), layout="constrained")
     axes = figure.subplots(len(examples), len(panels), squeeze=False)
     for row, example in zip(axes, examples, strict=True):
@@ -56,8 +55,8 @@ def draw_examples(examples: Sequence[Example]) -> Figure:
 
 
 def _draw_example(row: Sequence[Axes], example: Example) -> None:
-    rival = (example.rival,) if len(row) == len(_WITH_RIVAL) else ()
-    clouds = (example.scan, example.truth, *rival, example.completed, example.fused)
+    rivals = example.rivals.values()
+    clouds = (example.scan, example.truth, *rivals, example.completed, example.fused)
     for ax, cloud in zip(row, clouds, strict=True):
         draw_panel(ax, cloud, example.truth)
     row[0].set_ylabel(f"{example.label}\nCD {example.cd:.3f} m", fontsize=9)
