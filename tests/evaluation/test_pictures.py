@@ -73,7 +73,7 @@ def test_examples_and_figures(tmp_path):
         assert cloud is not None
         assert np.array_equal(made, cloud)
     titles = [ax.get_title() for ax in draw_examples(beside).axes[:6]]
-    assert titles == ["one scan", "truth", "ICP", "scan", "completed", "fused"]
+    assert titles == ["one scan", "truth", "ICP", "scan", "ours, completed", "ours, fused"]
 
 
 def test_drawing_keeps_aspect_and_survives_gaps():

@@ -44,7 +44,9 @@ def draw_examples(examples: Sequence[Example]) -> Figure:
     """A row an object: scan, truth, what its rivals made, the completion, the fused track."""
     from matplotlib.figure import Figure
 
-    panels = (*_SEEN, *(examples[0].rivals if examples else ()), *_MADE)
+    rivals = tuple(examples[0].rivals) if examples else ()
+    made = tuple(f"ours, {title}" for title in _MADE) if rivals else _MADE
+    panels = (*_SEEN, *rivals, *made)
     figure = Figure(figsize=(3.2 * len(panels), 2.5 * len(examples)), layout="constrained")
     axes = figure.subplots(len(examples), len(panels), squeeze=False)
     for row, example in zip(axes, examples, strict=True):
