@@ -161,12 +161,14 @@ def test_an_unknown_list_value_names_the_known_ones(refused, store, tmp_path):
     assert "identity, one-scan" in refused("evaluate", store, *out, "--baselines", "identity,icp")
 
 
-def test_unknown_command_and_usage(wildshape, refused):
+def test_unknown_commands_and_options_are_refused_in_a_sentence(refused):
     assert "'compleet' is no command" in refused("compleet")
-    found = wildshape("complete")
-    assert (found.code, found.out) == (2, "")
-    found = wildshape("train", "x", "--out", "y", "--sped", "3")
-    assert (found.code, found.out) == (2, "")
+    said = refused("complete")
+    assert "INPUT" in said
+    assert said.endswith("(required); see wildshape complete --help.\n")
+    assert "--sped" in refused("train", "x", "--out", "y", "--sped", "3")
+    assert "'upside'" in refused("evaluate", "x", "--out", "y", "--rotate", "upside")
+    assert "'abc'; see wildshape" in refused("simulate", "x", "--tracks", "abc")
 
 
 def test_version(wildshape):

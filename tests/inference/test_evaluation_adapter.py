@@ -10,7 +10,7 @@ from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.evaluation_adapter import Learned
 from wildshape.inference.predictor import Predictor
-from wildshape.records import Box, Completion, Sensor
+from wildshape.records import Box, Completion, Sensor, SightLines
 
 LIDAR = Sensor()
 
@@ -63,3 +63,18 @@ def test_other_scans_another_sensor_and_changed_scans_are_looked_at_anew():
     assert network.asked == 5
     poses = [completion(scan).pose for scan in scans]
     torch.testing.assert_close(moved[0].matrix, (poses[1] @ poses[0].inverse()).matrix)
+
+
+def test_with_other_rays_scans_are_looked_at_anew_and_poses_are_of_the_last_shapes():
+    network = Counting()
+    method = Learned(network)
+    scans = [np.full((16, 3), i, np.float32) for i in range(3)]
+    rays = [SightLines.of_returns(scan[:1] + 1.0) for scan in scans]
+    method.complete_many(scans, LIDAR)
+    method.complete_sighted(scans, LIDAR, rays)
+    assert network.asked == 2
+    method.complete_sighted(scans, LIDAR, rays)
+    method.register_track(scans, LIDAR)
+    assert network.asked == 2
+    method.complete_many(scans, LIDAR)
+    assert network.asked == 3

@@ -13,6 +13,7 @@ import pytest
 import torch
 from tests.models import scan
 
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.predictor import load
 from wildshape.ops.nearest import nearest_k
 
@@ -47,7 +48,10 @@ def everything(model):
     done = [model.complete(SCANS[0]), *model.complete_track(SCANS)]
     found = [(one.points.tobytes(), np.asarray(one.pose).tobytes()) for one in done]
     trusted = [(one.confidence, one.box, one.evidence) for one in done]
-    return found, trusted, moved.matrix.tobytes(), moved.inlier_ratio, model.fuse(SCANS).tobytes()
+    corners = [one.box.corners.tobytes() for one in done]
+    read = SE3.from_matrix(moved.matrix) @ SE3.identity()
+    fused = model.fuse(SCANS).tobytes()
+    return found, trusted, corners, np.asarray(read).tobytes(), moved.inlier_ratio, fused
 
 
 @pytest.fixture(scope="module")

@@ -49,7 +49,7 @@ def test_plain_torch_is_a_sort():
 
 def test_trees_are_plain_torch():
     query, target = clouds(3, 30, 50)
-    sizes = torch.tensor((30, 0, 7)), torch.tensor((3, 50, 0))
+    sizes = torch.tensor((31, -1, 7)), torch.tensor((3, 51, 0))  # beyond either end: that end
     for most in (math.inf, 0.7):
         own, plain = (
             way(query, target, 4, *sizes, most=most) for way in (nearest_k_trees, nearest_k_torch)

@@ -3,10 +3,12 @@
 """The command line's door: it imports a command, and with it torch, only when one is named."""
 
 import errno
+import itertools
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr
+from io import StringIO
 from pathlib import Path
 from types import ModuleType
 
@@ -155,18 +157,33 @@ def _drop_output() -> None:
 def _parse(module: ModuleType, command: str, arguments: list[str]) -> object:
     import tyro
 
+    said = StringIO()
     try:
-        return tyro.cli(
-            module.Settings,
-            prog=f"wildshape {command}",
-            args=arguments,
-            config=(tyro.conf.FlagCreatePairsOff,),
-        )
+        with redirect_stderr(said):
+            return tyro.cli(
+                module.Settings,
+                prog=f"wildshape {command}",
+                args=arguments,
+                config=(tyro.conf.FlagCreatePairsOff,),
+            )
     except SystemExit as leaving:
-        if leaving.code in (0, None):
-            lines = ("", "examples:", *(f"  {line}" for line in module.EXAMPLES))
-            print("\n".join(lines), flush=True)
+        if leaving.code not in (0, None):
+            raise BadInputError(_framed(said.getvalue(), command)) from None
+        lines = ("", "examples:", *(f"  {line}" for line in module.EXAMPLES))
+        print("\n".join(lines), flush=True)
         raise
+
+
+def _framed(text: str, command: str) -> str:
+    """The sentence in the frame that tyro draws: below its title, above its next line."""
+    lines = [line.strip("│╭╰╮╯ ") for line in text.splitlines()]
+    first = 2 if len(lines) > 1 and _is_rule(lines[1]) else 1  # where a terminal knows ASCII alone
+    inside = itertools.takewhile(lambda line: not _is_rule(line), lines[first:])
+    return f"{' '.join(filter(None, inside)).rstrip('.')}; see wildshape {command} --help."
+
+
+def _is_rule(line: str) -> bool:
+    return line != "" and set(line) <= set("─-")
 
 
 def _stopped() -> str:

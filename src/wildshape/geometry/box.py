@@ -50,7 +50,8 @@ def body_sides(across: Float[np.ndarray, "n"]) -> tuple[float, float]:
 
 def box_axes(quaternion_wxyz: tuple[float, ...]) -> Float[np.ndarray, "3 3"]:
     """A box's own axes as columns, in the frame that its rotation leads to, float64."""
-    return rotation_from_quaternion(torch.tensor(quaternion_wxyz, dtype=torch.float64)).numpy()
+    held = torch.tensor(quaternion_wxyz, dtype=torch.float64, device="cpu")
+    return rotation_from_quaternion(held).numpy()
 
 
 def fit_box(points: Float[Tensor, "n 3"], *, count: int = 90, trim: float = 0.002) -> FittedBox:

@@ -20,10 +20,13 @@ class _Answer(NamedTuple):
 
     scans: list[Points]
     sensor: Sensor
+    rays: Rays
     done: list[Completion]
 
-    def is_of(self, scans: Sequence[Points], sensor: Sensor) -> bool:
-        """Whether these are the scans."""
+    def is_of(self, scans: Sequence[Points], sensor: Sensor, rays: Rays | None = None) -> bool:
+        """Whether these are the scans; `rays`: and these theirs."""
+        if rays is not None and list(rays) != list(self.rays):
+            return False
         same = len(scans) == len(self.scans) and sensor == self.sensor
         return same and all(map(np.array_equal, scans, self.scans))
 
@@ -36,7 +39,8 @@ class Learned:
         predictor: does the work.
         track: use all scans of a track together; each scan still gets a shape of its own.
 
-    The last answer is kept: the protocol asks for the shapes of scans, then for their poses.
+    The last answer is kept: the protocol asks for the shapes of scans, then for their poses. With
+    rays or without, poses are those of the shapes.
     """
 
     predictor: Predictor
@@ -58,14 +62,16 @@ class Learned:
 
     def complete_sighted(self, scans: list[Points], sensor: Sensor, rays: Rays) -> list[Completion]:
         """The same, with the rays of the scans' frames."""
-        if not (self._last and self._last[0].is_of(scans, sensor)):
+        if not (self._last and self._last[0].is_of(scans, sensor, rays)):
             copies = [np.array(scan) for scan in scans]  # a caller may change its own
-            self._last[:] = [_Answer(copies, sensor, self._completed(scans, sensor, rays))]
+            done = self._completed(scans, sensor, rays)
+            self._last[:] = [_Answer(copies, sensor, tuple(rays), done)]
         return self._last[0].done
 
     def register_track(self, scans: Sequence[Points], sensor: Sensor) -> SE3:
         """`T_middle_scan`, one a scan: takes each scan to the frame of the middle scan."""
-        done = self.complete_many(list(scans), sensor)
+        known = [one.done for one in self._last if one.is_of(scans, sensor)]
+        done = known[0] if known else self.complete_many(list(scans), sensor)
         return to_middle(stack([one.pose for one in done]))
 
     def _completed(self, scans: list[Points], sensor: Sensor, rays: Rays) -> list[Completion]:

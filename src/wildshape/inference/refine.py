@@ -258,7 +258,8 @@ def _allowed(
     """How far from the shape a scan may lie: no farther than before, or than a level one may."""
     if up is None:
         return before
-    askew = (start.rotation[:, 2] - up).norm(dim=-1) > math.radians(config.level_deg)
+    off = (start.rotation[:, 2] - up).norm(dim=-1)
+    askew = (off > math.radians(config.level_deg)) & (off < math.radians(config.tilted_deg))
     return torch.where(askew, before * config.level_may_cost, before)
 
 

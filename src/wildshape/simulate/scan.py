@@ -130,7 +130,6 @@ def scan(
         T_object_sensor: `(4, 4)` where it stands.
         returns: how pulses are lost.
         rng: the only source of chance.
-        backdrop: what stands around the scene, if anything.
     """
     half = target.bounds[1]
     grown = half + ((returns.rim_m, returns.rim_m, 0.0) if returns.ground else 0.0)

@@ -126,6 +126,12 @@ def test_one_scan_is_left_alone():
     assert refine_jointly(SCANS[:1], pose, mirror=True) is pose
 
 
+def test_of_more_scans_than_points_each_has_one():
+    """Over 16,384 scans none had any, and the search for neighbours was told of a k of 0."""
+    few = replace(FINE, most=len(SCANS) - 1)
+    assert len(refine_jointly(SCANS, TRUE, mirror=True, config=few).rotation) == len(SCANS)
+
+
 def test_the_same_result_every_time():
     start = spoilt(TRUE, seed=3)
     first, second = (refine_jointly(SCANS, start, mirror=True) for _ in range(2))

@@ -46,8 +46,8 @@ class SE3:
     @classmethod
     def identity(cls, *batch: int, dtype: torch.dtype = torch.float64) -> "SE3":
         """Transforms that change nothing, of the given batch shape."""
-        eye = torch.eye(3, dtype=dtype).expand(*batch, 3, 3)
-        return cls(eye, torch.zeros(*batch, 3, dtype=dtype))
+        eye = torch.eye(3, dtype=dtype, device="cpu").expand(*batch, 3, 3)
+        return cls(eye, torch.zeros(*batch, 3, dtype=dtype, device="cpu"))
 
     def where(self, chosen: Bool[Tensor, "*batch"], other: "SE3") -> "SE3":
         """These transforms where they are chosen, the other's elsewhere."""
@@ -64,10 +64,11 @@ class SE3:
             BadInputError: a matrix is of another shape, not finite, its left 3x3 block is no
                 rotation, or its last row is not 0 0 0 1 (as when it is column-major).
         """
-        m = torch.as_tensor(matrix, dtype=torch.float64)
+        given = matrix if isinstance(matrix, Tensor) else torch.from_numpy(np.asarray(matrix))
+        m = given.to(torch.float64)
         _check_layout(m)
         rotation, translation = m[..., :3, :3], m[..., :3, 3]
-        residual = rotation @ rotation.mT - torch.eye(3, dtype=torch.float64)
+        residual = rotation @ rotation.mT - torch.eye(3, dtype=m.dtype, device=m.device)
         determinant = torch.linalg.det(rotation)
         wrong = (residual.abs().amax((-2, -1)) > _TOLERANCE) | ((determinant - 1).abs() > 0.01)
         if bool(wrong.any()):

@@ -139,7 +139,8 @@ def refine_jointly(
     """
     if len(scans) < 2:
         return T_sensor_object
-    points = torch.from_numpy(_sampled(scans, min(config.points, config.most // len(scans))))
+    each = max(1, min(config.points, config.most // len(scans)))
+    points = torch.from_numpy(_sampled(scans, each))
     start = T_sensor_object.to(torch.float32).inverse()
     T_object_sensor = start
     onto = torch.arange(len(scans)) if onto is None else onto

@@ -77,12 +77,12 @@ def nearest_k_trees(
     squared = torch.zeros(*query.shape[:2], k, dtype=query.dtype)
     index = torch.zeros(*query.shape[:2], k, dtype=torch.int64)
     for b, (points, others) in enumerate(zip(query, target)):
-        n = len(points) if query_sizes is None else int(query_sizes[b])
-        m = len(others) if target_sizes is None else int(target_sizes[b])
+        n = len(points) if query_sizes is None else min(max(int(query_sizes[b]), 0), len(points))
+        m = len(others) if target_sizes is None else min(max(int(target_sizes[b]), 0), len(others))
         tree = KDTree(others[:m].numpy().reshape(-1, 3), balanced_tree=False)
         apart, place = tree.query(points[:n].numpy(), k=k)
         found = torch.from_numpy(apart).view(n, k).to(query.dtype)
-        near = found <= most
+        near = found.square() <= most * most
         squared[b, :n] = torch.where(near, found.square(), math.inf)
         index[b, :n] = torch.where(near & found.isfinite(), torch.from_numpy(place).view(n, k), 0)
     return Neighbourhoods(squared, index)

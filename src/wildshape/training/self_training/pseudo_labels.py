@@ -73,8 +73,9 @@ Fronts = Float[Tensor, "S 3"]
 class SelfTrainingConfig:
     """Everything that decides what a network is taught by another, but the networks.
 
-    It is saved with every model and run, in the recipe. Lengths are for vehicles; they shrink with
-    smaller objects (`unit_of`).
+    It is saved with every model and run, in the recipe. Lengths are for vehicles. Those by
+    which scans are posed, compared and fused shrink with smaller objects (`unit_of`); those of the
+    ground, of roofs and of profiles do not.
 
     Attributes:
         headings: which way tracks look; also agreed on in the midst of a run without a teacher.
