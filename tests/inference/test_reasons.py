@@ -9,7 +9,12 @@ import pytest
 
 from wildshape.geometry.projection.visibility import FacingBins
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.confidence import judged, reasons_of_result, reasons_of_scan
+from wildshape.inference.confidence import (
+    judged,
+    reasons_of_result,
+    reasons_of_scan,
+    reasons_of_track,
+)
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.network import NetworkConfig
 from wildshape.records import Box, Completion, Sensor
@@ -79,6 +84,26 @@ def test_reasons_of_probabilities(pose, box, kind, expected):
     done = completion(0.1, pose * box * kind)
     done = dataclasses.replace(done, p_pose=pose, p_box=box, p_kind=kind)
     assert reasons_of_result(done, SETTINGS) == expected
+
+
+@pytest.mark.parametrize(
+    ("heights", "expected"),
+    [
+        ((1.41, 2.33, 1.46, 2.25, 1.44, 2.36, 1.41, 2.26), ("scans_disagree",)),  # car and van
+        ((1.41, 1.45, 1.46, 1.52, 1.44, 1.38, 1.41, 2.26), ()),  # one went wrong
+        ((1.41, 2.33, 1.46), ()),  # too few to tell
+    ],
+)
+def test_a_track_of_two_vehicles_disagrees_on_its_height(heights, expected):
+    done = completion(0.1, 0.9)
+    each = [replace_height(done, height) for height in heights]
+    assert reasons_of_track(each) == expected
+
+
+def replace_height(done, height):
+    """The same, so high."""
+    box = dataclasses.replace(done.box, size=(*done.box.size[:2], height))
+    return dataclasses.replace(done, box=box)
 
 
 def test_a_track_keeps_what_speaks_against_the_scan():

@@ -7,7 +7,8 @@ are short names for machines (docs/formats.md). Asked of the scan: `other_sensor
 for weights of LiDARs, or the reverse), `too_large_for_model` (the bounding box's diagonal is above
 the largest trained on), `too_small_for_model` (below half of the smallest trained on: a scan may
 show a part of an object), `few_points`, `sensor_inside` (the points lie on all sides of the
-origin). Asked of the result: `poor_fit` (the label-free cost is far above that of scans held out in
+origin). Asked of a track: `scans_disagree` (on its height: perhaps they are of several objects).
+Asked of the result: `poor_fit` (the label-free cost is far above that of scans held out in
 training), `low_confidence`, and which of the probabilities is low: `unsure_heading`, `unsure_box`,
 `other_kind`. `ReasonRule` holds the bounds.
 """
@@ -37,6 +38,7 @@ from wildshape.records import Completion, Points, Registration, Sensor
 
 _RULE = ReasonRule()
 _LEAST_ODDS, _MOST_ODDS = 1e-3, 49.0
+_FEWEST_HEIGHTS = 4
 _OF_RESULT = ("poor_fit", "low_confidence", "unsure_heading", "unsure_box", "other_kind")
 
 
@@ -205,6 +207,20 @@ def reasons_of_result(
         "other_kind": done.p_kind is not None and done.p_kind < rule.least,
     }
     return tuple(reason for reason, held in holds.items() if held)
+
+
+def reasons_of_track(alone: Iterable[Completion], rule: ReasonRule = _RULE) -> tuple[str, ...]:
+    """What speaks against scans being of one object.
+
+    Args:
+        alone: a track's scans, each completed on its own.
+        rule: the bounds.
+    """
+    heights = [done.box.size[2] for done in alone]
+    if len(heights) < _FEWEST_HEIGHTS:
+        return ()
+    low, middle, high = np.quantile(heights, (0.2, 0.5, 0.8))
+    return ("scans_disagree",) if high - low > rule.disagree * middle else ()
 
 
 def odds_of(done: Completion) -> float:

@@ -247,6 +247,10 @@ class ReasonRule:
         low_confidence: of weights without probabilities: one chance in ten that the completion is
             as good as the median of those calibrated on.
         least: a probability, or the product of all three, below which it is rather wrong.
+        disagree: share of their median by which the heights that a track's scans have, each
+            completed on its own, may differ from the 20th to the 80th percentile. It was 0.07 at
+            most on 35 tracks of one object, 0.27 on 74 of half-hidden ones (4 % above this), and
+            from 0.21 on where two vehicles 0.3 m apart in height were mixed.
     """
 
     few_points: int = 32
@@ -255,6 +259,7 @@ class ReasonRule:
     poor_fit: float = 1.5
     low_confidence: float = 0.1
     least: float = 0.5
+    disagree: float = 0.2
 
 
 @dataclass(frozen=True)

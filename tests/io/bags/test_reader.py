@@ -103,6 +103,15 @@ def test_times_that_tell_of_no_turn_are_left_alone(written):
     never = [np.zeros(2000), np.linspace(0, 2e9, 2000), np.full(2000, np.nan)]
     drive = open_drive(written("bag", {TOPIC: scans(3)}, Fields(clock=("t", "f8")), times=never))
     assert [drive.turn(frame).seconds for frame in range(3)] == [None] * 3
+    (told,) = drive.warnings
+    assert told.startswith("times of points cannot be used: from 0 to 0 is no turn; scans are not")
+
+
+def test_a_field_that_is_not_read_as_times_is_named(written):
+    since = [np.linspace(0.0, 0.1, 2000)] * 3
+    drive = open_drive(written("bag", {TOPIC: scans(3)}, Fields(clock=("ts", "f8")), times=since))
+    (told,) = drive.warnings
+    assert told.startswith("the field ts is not read as times of points: name it `time`; scans")
 
 
 @every_kind
@@ -121,6 +130,26 @@ def test_stamps_of_the_scans_are_their_order(written, kind):
         True
     ] * 3
     assert drive.warnings == ("1 scans bear the time of another and were left out",)
+
+
+@every_kind
+def test_where_a_clock_was_set_back_the_time_of_recording_counts(written, kind):
+    """Sorted by their stamps scans were shuffled, and no way was found through them."""
+    stamps = [10**18 + frame * 10**8 - 4 * 10**8 * (frame >= 4) for frame in range(8)]
+    drive = open_drive(written(kind, {TOPIC: scans(8)}, stamps=stamps))
+    assert drive.times == pytest.approx(1e9 + np.arange(8) / 10, abs=1e-6)
+    assert all(np.array_equal(drive.scan(i), scans(8)[i]) for i in range(8))
+    (told,) = drive.warnings
+    assert told.startswith(f"the stamps of {TOPIC} fall by 0.4 s between scans")
+
+
+@every_kind
+def test_a_scan_that_was_recorded_late_stays_where_its_stamp_says(written, kind):
+    order = [0, 1, 2, 4, 3, 5, 6, 7]
+    stamps = [10**18 + at * 10**8 for at in order]
+    drive = open_drive(written(kind, {TOPIC: scans(8)}, stamps=stamps))
+    assert drive.warnings == ()
+    assert all(np.array_equal(drive.scan(at), scans(8)[i]) for i, at in enumerate(order))
 
 
 @every_kind

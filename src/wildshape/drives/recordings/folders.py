@@ -20,7 +20,7 @@ from wildshape.io.order import check_counted
 from wildshape.io.poses import read_poses
 from wildshape.io.scans.pcd import read_pcd_field
 from wildshape.io.scans.ply import read_ply_property
-from wildshape.io.scans.point_times import TIME_FIELDS
+from wildshape.io.scans.point_times import LIKE_TIMES, TIME_FIELDS, unusable_told
 from wildshape.io.scans.points import is_scan_file
 from wildshape.io.scans.turns import read_turn
 from wildshape.records import Turn
@@ -29,8 +29,6 @@ _BESIDE = ("poses.txt", "times.txt", "timestamps.txt", "calib.txt")
 _RAW, _ODOMETRY = Path("velodyne_points") / "data", "velodyne"
 _TEXT = (".txt", ".csv")
 _FIELDS = {".ply": read_ply_property, ".pcd": read_pcd_field}
-# Fields that hold times of points, too, but are not read as these.
-_LIKE_TIMES = ("ts", "stamp", "dt", "delta_t", "Time", "Timestamp", "GpsTime", "time_ns", "time_us")
 _FEWEST_POINTS = 1000  # of a whole scan
 _LONGEST_STEP_S = 20.0  # more are milliseconds, or smaller units
 _OBJECTS = "velodyne_objects_xyz0"  # a drive of KITTI raw cut down to its vehicles
@@ -166,13 +164,9 @@ def _unread_times_told(files: list[Path], times: list[float] | None) -> list[str
 def _unusable(field: Callable[[tuple[str, ...]], np.ndarray | None]) -> str:
     """Why a scan's points have no times, if they have a field of them."""
     values = field(TIME_FIELDS)
-    if values is not None:
-        low, high = float(values.min()), float(values.max())
-        return f"times of points cannot be used: from {low:.10g} to {high:.10g} is no turn"
-    if field(_LIKE_TIMES) is None:
-        return ""
-    found = next((name for name in _LIKE_TIMES if field((name,)) is not None), "")
-    return f"the field {found} is not read as times of points: name it `time`" if found else ""
+    if values is not None or field(LIKE_TIMES) is None:
+        return unusable_told(values)
+    return unusable_told(None, next(name for name in LIKE_TIMES if field((name,)) is not None))
 
 
 def _holds_objects(path: Path) -> bool:

@@ -33,7 +33,7 @@ def open_recording(path: Path, topic: str | None = None) -> Drive:
         scan_names=[f"{frame:06d}" for frame in range(len(bag.times))],
         read=bag,
         times=bag.times,
-        warnings=bag.warnings,
+        warnings=bag.warnings + bag.unread_times_told(),
         files=bag_files(path),
     )
 

@@ -20,7 +20,13 @@ from wildshape.geometry.surface import mirrored
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_to_scans
 from wildshape.inference.choose_hypothesis import Looked, NetworkInput
-from wildshape.inference.confidence import Glance, glance_of, judged, odds_of
+from wildshape.inference.confidence import (
+    Glance,
+    glance_of,
+    judged,
+    odds_of,
+    reasons_of_track,
+)
 from wildshape.inference.config import BoxConfig, InferenceConfig, ReasonRule, TrackConfig
 from wildshape.inference.free_space import Rays, Sights, without_free_space
 from wildshape.inference.refine import denser, drawn_to, padded, partners
@@ -143,6 +149,7 @@ def complete_together(
     whole = _denser(shape, config) if settings.facing else shape
     cost = track_cost(shape, fit.T_sensor_object, inputs, settings)
     mean = float(np.mean([item.confidence for item in done]))
+    reasons = reasons_of_track(done, config.reasons) if body else ()
     trust, evidence = settings.trust, _evidence(gathered, fit.T_sensor_object, fitted, cost)
 
     def together(i: int) -> Completion:
@@ -156,7 +163,7 @@ def complete_together(
             cost=float(cost[i]),
             refined=fit.refined,
             warning=said.warning,
-            reasons=said.reasons,
+            reasons=(*said.reasons, *reasons),
             features=said.features,
         )
         return judged(item, trust and trust.track, evidence[i], settings, config.reasons)

@@ -11,7 +11,7 @@ from jaxtyping import Float, Num
 
 from wildshape.errors import load_library
 from wildshape.io.bags.storages import CLOUD, INSTALL
-from wildshape.io.scans.point_times import TIME_FIELDS
+from wildshape.io.scans.point_times import LIKE_TIMES, TIME_FIELDS
 
 # sensor_msgs/PointField: the numbers of its datatypes.
 _DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
@@ -34,10 +34,12 @@ class Cloud(NamedTuple):
     Attributes:
         points: metres as recorded, those without a return included.
         clock: `(n,)` when each was taken, in the unit of its field; None without such a field.
+        like: a field that may hold times, too, but is not read.
     """
 
     points: Float[np.ndarray, "n 3"]
     clock: Num[np.ndarray, "n"] | None
+    like: str = ""
 
 
 def cloud_of(data: bytes, *, cdr: bool) -> Cloud:
@@ -68,7 +70,8 @@ def cloud_of(data: bytes, *, cdr: bool) -> Cloud:
     )
     points = np.stack([rows[name].ravel() for name in "xyz"], 1, dtype=_precision(rows.dtype))
     clock = next((name for name in rows.dtype.names or () if name in TIME_FIELDS), None)
-    return Cloud(points, None if clock is None else rows[clock].ravel())
+    like = next((field.name for field in cloud.fields if field.name in LIKE_TIMES), "")
+    return Cloud(points, None if clock is None else rows[clock].ravel(), like)
 
 
 def _precision(point: np.dtype) -> np.dtype:

@@ -11,12 +11,15 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from wildshape.errors import BadInputError, MissingExtraError
-from wildshape.io.bags.clouds import cloud_of, message_types, stamp
+from wildshape.io.bags.clouds import Cloud, cloud_of, message_types, stamp
 from wildshape.io.bags.storages import CLOUD, STORAGES, Key, Message
 from wildshape.io.guard import first_line, reading
-from wildshape.io.scans.point_times import seconds_since
+from wildshape.io.scans.point_times import seconds_since, unusable_told
 from wildshape.io.scans.points import check_near
 from wildshape.records import Turn
+
+_FEWEST_POINTS = 1000  # of a whole scan
+_SOME = 3  # scans that tell what a clock says
 
 
 class _Scan(NamedTuple):
@@ -54,12 +57,28 @@ class Bag:
         """
         scan = self.scans[frame]
         with reading(scan.file, f"a point cloud as scan {frame} of {self.topic}"):
-            data = STORAGES[scan.file.suffix](scan.file).data(scan.key)
-            points, clock = cloud_of(data, cdr=scan.cdr)
+            points, clock, _ = self._cloud(scan)
             check_near(points, f"{scan.file}, scan {frame}")
             kept = _returned(points)
             known = None if clock is None else seconds_since(clock[kept], self.times[frame])
             return Turn(points[kept].astype(np.float32), known)
+
+    def unread_times_told(self) -> tuple[str, ...]:
+        """A sentence if some scans' points have times, and none tells when they were taken."""
+        why = ""
+        for frame in sorted({0, len(self.scans) // 2, len(self.scans) - 1}):
+            with suppress(BadInputError), reading(self.scans[frame].file, "a point cloud"):
+                points, clock, like = self._cloud(self.scans[frame])
+                values = None if clock is None else clock[_returned(points)]
+                if values is not None and seconds_since(values, self.times[frame]) is not None:
+                    return ()
+                if len(points) >= _FEWEST_POINTS:
+                    why = why or unusable_told(values, like)
+        return (f"{why}; scans are not corrected for the sensor's motion",) if why else ()
+
+    @staticmethod
+    def _cloud(scan: _Scan) -> Cloud:
+        return cloud_of(STORAGES[scan.file.suffix](scan.file).data(scan.key), cdr=scan.cdr)
 
 
 def bag_files(path: Path) -> list[Path]:
@@ -156,6 +175,12 @@ def _all(names: list[str]) -> str:
 def _in_order(topic: str, scans: list[_Scan], told: tuple[str, ...]) -> Bag:
     """A bag of scans sorted in time, one an instant."""
     stamped = all(scan.stamped for scan in scans)
+    if stamped and (back := _set_back(scans)):
+        stamped = False
+        told += (
+            f"the stamps of {topic} fall by {back / 1e9:.2g} s between scans that were recorded one"
+            " after the other: a clock was set; the times of recording are used",
+        )
     taken = {scan.stamped if stamped else scan.logged: scan for scan in reversed(scans)}
     instants = sorted(taken)
     kept = tuple(taken[instant] for instant in instants)
@@ -165,3 +190,20 @@ def _in_order(topic: str, scans: list[_Scan], told: tuple[str, ...]) -> Bag:
     if dropped:
         told += (f"{dropped} points without a return were left out",)
     return Bag(topic, tuple(instant / 1e9 for instant in instants), told, kept)
+
+
+def _set_back(scans: list[_Scan]) -> float:
+    """By how many nanoseconds stamps fall for good while scans were recorded in order; 0: nowhere.
+
+    A scan that was recorded late falls back, too, but those after it do not.
+    """
+    stamps = np.array([scan.stamped for scan in scans], np.int64)
+    logged = np.array([scan.logged for scan in scans], np.int64)
+    if len(scans) < 2 * _SOME or not (np.diff(logged) > 0).all():
+        return 0.0
+    apart = (stamps - logged).astype(np.float64)
+    falls = np.flatnonzero(np.diff(stamps) < 0) + 1
+    falls = falls[(falls >= _SOME) & (falls <= len(scans) - _SOME)]
+    back = [float(np.median(apart[:at]) - np.median(apart[at:])) for at in falls]
+    step = float(np.median(np.diff(logged)))
+    return max((by for by in back if by > step), default=0.0)

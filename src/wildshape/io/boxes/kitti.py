@@ -94,16 +94,20 @@ def label_line(
     forward = pose_of(box).rotation[:, 0]
     turn = math.atan2(-float(forward[2]), float(forward[0]))
     alpha = math.remainder(turn - math.atan2(x, z), 2 * math.pi)
-    image = _NO_IMAGE if projection is None else _image_box(box, projection)
+    image = _NO_IMAGE if projection is None else _image_box(box, turn, projection)
     numbers = (alpha, *image, height, width, length, x, y + height / 2, z, turn)
     words = " ".join(f"{number:.6f}" for number in numbers)
     return f"{frame} {track} {kind} -1 -1 {words}"
 
 
-def _image_box(box: Box, projection: Float[np.ndarray, "3 4"]) -> tuple[float, ...]:
-    """Left, top, right, bottom, pixels, not cut at the image's edge; -1 behind the camera."""
-    pose = pose_of(box)
-    corners = _SIGNS * np.asarray(box.size) / 2 @ pose.rotation.numpy().T + np.asarray(box.centre)
+def _image_box(box: Box, turn: float, projection: Float[np.ndarray, "3 4"]) -> tuple[float, ...]:
+    """Left, top, right, bottom of the upright box, pixels, not cut at the image's edge.
+
+    -1 behind the camera.
+    """
+    cos, sin = math.cos(turn), math.sin(turn)
+    axes = np.array(((cos, 0.0, -sin), (sin, 0.0, cos), (0.0, -1.0, 0.0)))  # a row an axis
+    corners = _SIGNS * np.asarray(box.size) / 2 @ axes + np.asarray(box.centre)
     u, v, depth = projection @ np.pad(corners, ((0, 0), (0, 1)), constant_values=1.0).T
     if (depth <= 0).any():
         return _NO_IMAGE

@@ -13,6 +13,9 @@ from jaxtyping import Float, Num
 TIME_FIELDS = ("t", "time", "timestamp", "offset_time", "time_offset", "time_stamp", "gps_time")
 """Names of the fields that hold it, the likeliest first."""
 
+LIKE_TIMES = ("ts", "stamp", "dt", "delta_t", "Time", "Timestamp", "GpsTime", "time_ns", "time_us")
+"""Names under which times may stand, too, but which are not read."""
+
 _UNITS = (1.0, 1e-3, 1e-6, 1e-9)
 _SHORTEST_TURN_S, _LONGEST_TURN_S = 0.005, 0.5
 _FEWEST = 100
@@ -39,6 +42,19 @@ def seconds_since(
         if _SHORTEST_TURN_S <= span * unit <= _LONGEST_TURN_S:
             return (values - first) * unit + _first_seconds(float(first) * unit, scan_time)
     return None
+
+
+def unusable_told(values: Num[np.ndarray, "n"] | None, like: str = "") -> str:
+    """Why the points of a scan have no times, if they have a field of them.
+
+    Args:
+        values: of a field of `TIME_FIELDS` that tells of no turn; None: there is no such field.
+        like: a field of `LIKE_TIMES` that there is.
+    """
+    if values is not None and len(values):
+        low, high = float(values.min()), float(values.max())
+        return f"times of points cannot be used: from {low:.10g} to {high:.10g} is no turn"
+    return f"the field {like} is not read as times of points: name it `time`" if like else ""
 
 
 def _first_seconds(first: float, scan_time: float | None) -> float:
