@@ -13,6 +13,7 @@ from wildshape.training.self_training.heading_profiles import (
     _evidence,
     agreed_signs,
     difference,
+    nearest_profiles,
     profile,
     reversed_where,
     together,
@@ -74,3 +75,14 @@ def test_more_objects_than_agree_among_each_other_follow_these():
     signs = agreed_signs(objects, replace(CONFIG, references=8, neighbours=3))
     agreement = (signs > 0) == turned
     assert bool(agreement.all()) or not bool(agreement.any())
+
+
+def test_the_nearest_are_found_some_rows_at_a_time():
+    """150 objects: two whole parts and a piece of a third."""
+    draw = torch.Generator().manual_seed(0)
+    size = 3 + torch.rand(150, generator=draw)
+    tops, sides = (torch.rand(150, *bins, generator=draw) for bins in ((16,), (16, 6)))
+    many = Profiles(tops, sides, size, size / 3)
+    expected = difference(many, many).topk(20, largest=False).indices
+    assert torch.equal(nearest_profiles(many, 20), expected)
+    assert nearest_profiles(many, 200).shape == (150, 150)

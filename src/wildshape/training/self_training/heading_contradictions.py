@@ -20,7 +20,7 @@ from torch import Tensor
 from wildshape.training.self_training.heading_profiles import (
     ProfileConfig,
     Profiles,
-    difference,
+    nearest_profiles,
     reversed_where,
 )
 
@@ -124,8 +124,7 @@ def uncontradicted_signs(
         likeness: how unlike two profiles are.
     """
     turned = reversed_where(profiles, signs < 0)
-    unlike = difference(turned, turned, likeness)
-    near = unlike.topk(min(config.neighbours, len(signs)), largest=False).indices
+    near = nearest_profiles(turned, config.neighbours, likeness)
     opposed, seen = found.opposed[near].sum(1), found.all[near].sum(1)
     share = torch.where(seen >= config.fewest, opposed / seen.clamp_min(1), 0.0).amax(1)
     usual = found.opposed.sum() / found.all.sum().clamp_min(1)

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
 _SMALLEST = 1e-6
+_ROWS = 64  # of differences at a time: memory does not grow with the square of the tracks
 
 
 @dataclass(frozen=True)
@@ -150,11 +151,20 @@ def reversed_where(profiles: Profiles, chosen: Bool[Tensor, "J"]) -> Profiles:
 def difference(a: Profiles, b: Profiles, config: ProfileConfig = _DEFAULT) -> Float[Tensor, "I J"]:
     """How unlike objects are as they stand: tops, sides, over what both have seen, and sizes."""
     unseen = config.unseen_m
-    rows = [
-        _apart(tops, b.tops, unseen) + _apart(sides.flatten(), b.sides.flatten(1), unseen)
-        for tops, sides in zip(a.tops, a.sides)
-    ]
-    return torch.stack(rows) + _sizes_apart(a, b, config)
+    found = _sizes_apart(a, b, config)
+    for row, tops, sides in zip(found, a.tops, a.sides):
+        row += _apart(tops, b.tops, unseen) + _apart(sides.flatten(), b.sides.flatten(1), unseen)
+    return found
+
+
+def nearest_profiles(
+    profiles: Profiles, count: int, config: ProfileConfig = _DEFAULT
+) -> Int64[Tensor, "J k"]:
+    """The least unlike of each object, itself among them; some rows of `difference` at a time."""
+    parts = zip(*(part.split(_ROWS) for part in profiles))
+    least = min(count, len(profiles.length))
+    rows = (difference(Profiles(*part), profiles, config) for part in parts)
+    return torch.cat([unlike.topk(least, largest=False).indices for unlike in rows])
 
 
 def _sizes_apart(a: Profiles, b: Profiles, config: ProfileConfig) -> Float[Tensor, "I J"]:
