@@ -73,7 +73,6 @@ def test_poses_that_do_not_fit_the_scans_are_said():
         (seen.scans, path[torch.arange(7, -1, -1)], "in the order of the scans"),
         (seen.scans, SE3(path.rotation, path.translation + late), "jump at frame 5"),
         (seen.scans, SE3(path.rotation, 1.1 * path.translation), "with all ways 0.9 times as long"),
-        (seen.scans, SE3(path.rotation, 0.9 * path.translation), "with all ways 1.1 times as long"),
         (seen.scans, SE3.identity(8), "the sensor hardly moves, but its scans do not"),
         ([seen.scans[0]] * 8, SE3.identity(8), None),
     ):
