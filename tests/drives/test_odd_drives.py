@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A sensor that jumps, one that stands, and objects in place of scans."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.mounting import Mounting, find_mounting
 from wildshape.drives.tracking.trajectory import Breaks, find_trajectory
+from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Turn
 from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
@@ -80,6 +82,22 @@ def test_poses_that_do_not_fit_the_scans_are_said():
         found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
         assert len(found) == bool(told)
         assert (told or "") in "".join(found)
+
+
+def test_poses_whose_z_looks_down_are_said():
+    """On a nearly straight way what the near scans show hardly differs."""
+    seen = street(frames=10)
+    angle = torch.tensor(math.radians(1.5), dtype=torch.float64)
+    T_sensor_car = SE3(rotation_z(angle), torch.zeros(3, dtype=torch.float64))
+    scans = [T_sensor_car.apply_numpy(scan) for scan in seen.scans]
+    path = path_of(seen.places) @ T_sensor_car.inverse()
+    turn = torch.diag(torch.tensor((1.0, -1.0, -1.0), dtype=torch.float64))
+    axes = SE3(turn, torch.zeros(3, dtype=torch.float64))
+    for poses, told in ((path, []), (axes @ path @ axes, ["y and z reversed"])):
+        drive = replace(drive_of(scans), T_world_sensor=poses)
+        found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
+        assert len(found) == len(told)
+        assert all(word in said for word, said in zip(told, found))
 
 
 def path_of(places):

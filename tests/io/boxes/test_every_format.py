@@ -107,6 +107,12 @@ def test_a_kitti_line_by_hand(tmp_path):
     numbers[11] = -abs(numbers[11])  # a half turn has two names
     assert np.cos(numbers[0] - alpha) == pytest.approx(1)
     assert numbers[1:] == pytest.approx(expected[1:], abs=1e-4)
+    # Rolled by two degrees: the line's box stands upright, and so does the image's.
+    cos, sin = half * np.cos(np.radians(1.0)), half * np.sin(np.radians(1.0))
+    rolled = replace(one, box=replace(box, quaternion_wxyz=(cos, sin, sin, cos)))
+    (upright,) = write_kitti_labels(tmp_path / "rolled", [rolled], camera)
+    again = [float(word) for word in upright.read_text().split()[5:]]
+    assert again[1:11] == pytest.approx(numbers[1:11], abs=1e-4)
     # Half of it behind the camera: no place in the image.
     behind = replace(one, box=replace(box, centre=(0.5, 0.0, 0.0)))
     write_kitti_labels(tmp_path, [behind], camera)
