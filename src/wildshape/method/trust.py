@@ -163,7 +163,7 @@ OF_SCAN = Chosen(
     ),
 )  # fmt: skip
 OF_TRACK = Chosen(
-    pose=("rival", "log_moved", "log_range", "size_off", "log_apart"),
+    pose=("rival", "log_moved", "scan_cost", "size_off", "log_apart"),
     box=(
         "scan_cost", "rival", "log_moved", "length_spread", "size_off", "seen_length", "log_apart",
     ),
