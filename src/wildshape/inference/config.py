@@ -112,6 +112,8 @@ class HeadingVoteConfig:
 
     Attributes:
         neighbours: scans on either side that are compared.
+        own_alike: weight of what a scan found for itself, in neighbours posed alike, for each nat
+            of being sure: a sensor may turn a corner between two scans.
         slow_deg: tracks of which three quarters of the neighbours turn by less follow each other.
         far_m: misfits count no further than this.
         same_side_m: two scans that lie worse on each other than this see different sides.
@@ -123,6 +125,7 @@ class HeadingVoteConfig:
     """
 
     neighbours: int = 5
+    own_alike: float = 0.2
     slow_deg: float = 15.0
     far_m: float = 0.4
     same_side_m: float = 0.1

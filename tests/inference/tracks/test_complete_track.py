@@ -194,7 +194,7 @@ def test_the_heavier_part_says_which_way():
     back = torch.tensor([False, True, False, True, False, False])
     rotation = rotation_z(torch.where(back, yaw + torch.pi, yaw))
     assert torch.equal(followed_signs(rotation, torch.ones(6)) < 0, back)
-    heavy = torch.where(back, 5.0, 1.0)
+    heavy = torch.where(back, 0.9, 0.3)
     assert torch.equal(followed_signs(rotation, heavy) > 0, back)
     assert set(continuous_signs(rotation).tolist()) == {-1.0, 1.0}
 

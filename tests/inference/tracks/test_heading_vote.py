@@ -9,6 +9,7 @@ import torch
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.inference.config import HeadingVoteConfig
 from wildshape.inference.tracks.heading_vote import (
+    followed_signs,
     half_turn,
     likeness_of_next,
     nearness_of_next,
@@ -55,3 +56,16 @@ def test_views_of_opposite_sides_lie_on_each_other_s_reflection():
     found = likeness_of_next(views, 0.0, mirror=True)
     assert 0.8 * 2 * worse < float(found) < 2 * far
     assert abs(float(likeness_of_next(views, 0.0, mirror=False))) < 1e-3
+
+
+def test_a_sensor_that_turns_a_corner_turns_no_scan_that_is_sure_of_itself():
+    """Between two scans by more than a right angle: the half turn would be the smaller step."""
+    yaw = torch.deg2rad(torch.tensor([19.0] * 3 + [-74.0] * 5, dtype=torch.float64))
+    sure = torch.full((8,), 0.98, dtype=torch.float64)
+    assert followed_signs(rotation_z(yaw), sure).tolist() == [1.0] * 8
+
+
+def test_neighbours_turn_one_scan_around_however_sure_it_is():
+    yaw = torch.deg2rad(torch.tensor([19.0] * 4 + [199.0] + [19.0] * 3, dtype=torch.float64))
+    sure = torch.tensor([0.9] * 4 + [1.0] + [0.9] * 3, dtype=torch.float64)
+    assert followed_signs(rotation_z(yaw), sure).tolist() == [1.0] * 4 + [-1.0] + [1.0] * 3

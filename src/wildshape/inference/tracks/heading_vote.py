@@ -19,7 +19,7 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import HeadingVoteConfig
 from wildshape.ops.nearest import nearest
 
-_FEWEST, _SMALLEST_M, _STRETCH = 4, 1e-9, 128
+_FEWEST, _SMALLEST_M, _STRETCH, _SUREST = 4, 1e-9, 128, 0.993
 _DEFAULT = HeadingVoteConfig()
 
 
@@ -36,30 +36,43 @@ def turned_where(T_sensor_object: SE3, sign: Float[Tensor, "V"], middle_x: float
 
 
 def continuous_signs(
-    rotation: Float[Tensor, "V 3 3"], config: HeadingVoteConfig = _DEFAULT
+    rotation: Float[Tensor, "V 3 3"],
+    own: Float[Tensor, "V"] | None = None,
+    config: HeadingVoteConfig = _DEFAULT,
 ) -> Float[Tensor, "V"]:
-    """+1 or -1 for each pose: turn those of -1 by a half turn and no neighbours are opposed.
+    """+1 or -1 for each pose: turn those of -1 by a half turn and few neighbours are opposed.
 
     A problem of signs (Z2 synchronisation), solved by the leading eigenvector. That of a long track
     would be all but zero in most of it: stretches are solved that overlap by half.
+
+    Args:
+        rotation: `R_sensor_object`, in time order.
+        own: what speaks for each pose as it is, in neighbours posed alike; None: nothing, and which
+            way all look is left open.
+        config: which neighbours are compared.
     """
-    signs = _leading_signs(rotation[:_STRETCH], config)
+    own = rotation.new_zeros(len(rotation)) if own is None else own
+    signs = _leading_signs(rotation[:_STRETCH], own[:_STRETCH], config)
     for start in range(_STRETCH // 2, len(rotation) - _STRETCH // 2, _STRETCH // 2):
-        more = _leading_signs(rotation[start : start + _STRETCH], config)
+        part = slice(start, start + _STRETCH)
+        more = _leading_signs(rotation[part], own[part], config)
         known = len(signs) - start
         more = more if float((signs[start:] * more[:known]).sum()) >= 0 else -more
         signs = torch.cat((signs, more[known:]))
-    return signs
+    return signs if float((signs * own).sum()) >= 0 else -signs
 
 
 def _leading_signs(
-    rotation: Float[Tensor, "V 3 3"], config: HeadingVoteConfig
+    rotation: Float[Tensor, "V 3 3"], own: Float[Tensor, "V"], config: HeadingVoteConfig
 ) -> Float[Tensor, "V"]:
+    """What each pose says of itself is the vote of one more member, which is never turned."""
     relative = rotation[:, None].mT @ rotation[None]
     cosine = (_trace(relative) - 1) / 2
     order = torch.arange(len(rotation))
     near = (order[:, None] - order).abs() <= config.neighbours
-    eigenvector = torch.linalg.eigh(cosine * near).eigenvectors[:, -1]
+    votes = torch.nn.functional.pad(cosine * near, (0, 1, 0, 1))
+    votes[:-1, -1] = votes[-1, :-1] = own
+    eigenvector = torch.linalg.eigh(votes).eigenvectors[:-1, -1]
     return torch.where(eigenvector < 0, -torch.ones_like(eigenvector), 1.0)
 
 
@@ -91,8 +104,8 @@ def followed_signs(
         weights: how sure each scan is of its own pose, 0 to 1.
         config: which neighbours are compared.
     """
-    signs = continuous_signs(rotation, config)
-    return signs if float((signs * weights).sum()) >= 0 else -signs
+    odds = -(1 - weights.clamp_max(_SUREST)).log()
+    return continuous_signs(rotation, config.own_alike * odds, config)
 
 
 def voted_signs(
