@@ -125,7 +125,7 @@ def test_every_setting_is_checked(small, monkeypatch):
         (("facing",), 1, "facing is 1, expected bool"),
         (("cost_m",), [0.2, 0.1], "cost_m is 0.2, 0.1, expected a smaller and a larger"),
         (("calibration", "weights"), [0.0] * 9, "9 weights for 10 features"),
-        (("trust", "scan", "pose", "weights"), [0.0], "7 features has 1 weights"),
+        (("trust", "scan", "pose", "weights"), [0.0], "4 features has 1 weights"),
         (("trust", "track", "kind", "features"), ["luck"] * 6, r"unknown features \['luck'\]"),
         (("colour",), 3, "the whole has an unknown colour"),
     ],

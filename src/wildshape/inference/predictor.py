@@ -350,7 +350,7 @@ class Predictor:
         if not self.refines or exact:
             return judged(done, None, None, self.settings, config.reasons)
         rival = float(found.features[i, -1])
-        evidence = scan_features(done, seen, posed.surfaces[i], rival, found.rotation[i], standing)
+        evidence = scan_features(done, seen, posed.surfaces[i], rival, standing)
         return judged(done, trust and trust.scan, evidence, self.settings, config.reasons)
 
     def _off_ground(self, scan: Points, shape: Points, T_sensor_canonical: SE3) -> Points:

@@ -62,7 +62,6 @@ class ScanFeatures(NamedTuple):
         log_cost: label-free cost.
         rival: by how much the best hypothesis of another heading costs more, metres.
         entropy: of the network's belief in its hypotheses, nats.
-        log_moved: turn from the network's pose to the refined one, logarithm of degrees.
         log_points: logarithm of the scan's number of points.
         log_range: its distance.
         seen_length: extent of the scan along its box, a share of the box's length.
@@ -71,7 +70,6 @@ class ScanFeatures(NamedTuple):
         log_length: of the box.
         size_off: how far the box is from the nearest usual size, standard deviations.
         free: share of the shape where rays passed; NaN without rays.
-        hidden: share of it that something else hides; NaN without rays.
         square: of its `Surface`.
         rough: of it.
         bent: of it.
@@ -80,7 +78,6 @@ class ScanFeatures(NamedTuple):
     log_cost: float
     rival: float
     entropy: float
-    log_moved: float
     log_points: float
     log_range: float
     seen_length: float
@@ -89,7 +86,6 @@ class ScanFeatures(NamedTuple):
     log_length: float
     size_off: float
     free: float
-    hidden: float
     square: float
     rough: float
     bent: float
@@ -101,21 +97,15 @@ class TrackFeatures(NamedTuple):
     Means are over the scans as each was completed alone, the fuller the heavier.
 
     Attributes:
-        log_cost: label-free cost of the track's shape, mean.
-        scan_cost: the same in this scan.
+        scan_cost: label-free cost of the track's shape in this scan.
         rival: mean.
-        log_moved: mean.
-        seen_length: mean.
-        seen_width: mean.
         square: mean.
         rough: mean.
         bent: mean.
         own_off: mean of the scans' own `size_off`.
-        agree: share of the scans whose own heading is within 10 degrees of the track's.
         length_spread: standard deviation of the lengths of the scans' own boxes, logarithms.
         log_points: of the fullest scan.
         log_range: mean.
-        log_scans: logarithm of their number.
         log_apart: how far apart the views are, as an angle at the object: root mean square from
             their mean direction, logarithm of degrees. Scans from one place tell little more than
             one of them.
@@ -123,21 +113,15 @@ class TrackFeatures(NamedTuple):
         size_off: of the track's box.
     """
 
-    log_cost: float
     scan_cost: float
     rival: float
-    log_moved: float
-    seen_length: float
-    seen_width: float
     square: float
     rough: float
     bent: float
     own_off: float
-    agree: float
     length_spread: float
     log_points: float
     log_range: float
-    log_scans: float
     log_apart: float
     log_length: float
     size_off: float
@@ -152,10 +136,10 @@ class Chosen(NamedTuple):
 
 
 OF_SCAN = Chosen(
-    pose=("rival", "log_cost", "log_moved", "log_points", "log_range", "free", "hidden"),
+    pose=("rival", "log_cost", "entropy", "free"),
     box=(
-        "log_cost", "rival", "log_moved", "seen_length", "seen_width", "deep", "log_length",
-        "size_off", "free", "hidden",
+        "log_cost", "rival", "entropy", "seen_length", "seen_width", "deep", "log_length",
+        "size_off",
     ),
     kind=(
         "log_cost", "size_off", "rival", "seen_length", "seen_width", "log_points", "log_range",
@@ -163,12 +147,10 @@ OF_SCAN = Chosen(
     ),
 )  # fmt: skip
 OF_TRACK = Chosen(
-    pose=("rival", "log_moved", "scan_cost", "size_off", "log_apart"),
-    box=(
-        "scan_cost", "rival", "log_moved", "length_spread", "size_off", "seen_length", "log_apart",
-    ),
+    pose=("rival", "scan_cost", "size_off", "log_apart"),
+    box=("scan_cost", "rival", "length_spread", "size_off", "log_apart", "log_length"),
     kind=("own_off", "rival", "square", "rough", "bent", "log_range", "log_points"),
-)  # fmt: skip
+)
 
 
 def size_off(size_m: tuple[float, float, float]) -> float:

@@ -14,7 +14,6 @@ from wildshape.geometry.box import box_axes
 from wildshape.geometry.projection.sight_lines import Standing
 from wildshape.geometry.sampling import drawn, quantiles
 from wildshape.geometry.surface import moments, thinnest_axis
-from wildshape.geometry.transforms.rotation import rotation_angle
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.method.confidence import SMALLEST_M, ConfidenceFeatures
 from wildshape.method.network import Poses
@@ -33,7 +32,7 @@ from wildshape.method.trust import (
 from wildshape.ops.nearest import nearest_k
 from wildshape.records import Completion, Points
 
-_OUTERMOST, _UNTURNED_DEG, _ALIKE_DEG, _MOST_POINTS = 0.02, 0.3, 3.0, 500
+_OUTERMOST, _ALIKE_DEG, _MOST_POINTS = 0.02, 3.0, 500
 _THICKER, _LEAST_THICK_M, _TINY = 0.9, 1e-3, 1e-6
 
 
@@ -99,7 +98,6 @@ def scan_features(
     scan: Points,
     surface: Surface,
     rival: float,
-    R_sensor_canonical: Float[Tensor, "3 3"],
     standing: Standing | None,
 ) -> ScanFeatures:
     """All features of one completion.
@@ -109,7 +107,6 @@ def scan_features(
         scan: without the ground, sensor frame, metres.
         surface: of it.
         rival: see `rival_margin`.
-        R_sensor_canonical: as the network said.
         standing: what rays say of the shape's points, if any are known.
     """
     known, box = ConfidenceFeatures(*done.features), done.box
@@ -117,16 +114,10 @@ def scan_features(
     inside = (scan - np.asarray(box.centre)) @ box_axes(box.quaternion_wxyz)
     low, high = quantiles(inside.T, (_OUTERMOST, 1 - _OUTERMOST))
     seen_length, seen_width, _ = ((high - low) / (2 * half)).tolist()
-    turn = R_sensor_canonical.double().mT @ done.pose.rotation
-    moved = math.degrees(float(rotation_angle(turn)))
-    shares = (math.nan, math.nan)
-    if standing is not None:
-        shares = (float(standing.free.mean()), float(standing.hidden.mean()))
     return ScanFeatures(
         log_cost=known.log_cost,
         rival=rival,
         entropy=known.entropy,
-        log_moved=math.log(moved + _UNTURNED_DEG),
         log_points=known.log_points,
         log_range=known.log_range,
         seen_length=seen_length,
@@ -134,8 +125,7 @@ def scan_features(
         deep=float((np.abs(inside) < half - DEEP_M).all(1).mean()),
         log_length=math.log(max(box.size[0], SMALLEST_M)),
         size_off=size_off(box.size),
-        free=shares[0],
-        hidden=shares[1],
+        free=math.nan if standing is None else float(standing.free.mean()),
         square=surface.square,
         rough=surface.rough,
         bent=surface.bent,
@@ -161,34 +151,22 @@ def track_features(
     own = [ScanFeatures(*item.evidence) for item in done]
     points = np.exp([one.log_points for one in own])
     weights = np.sqrt(np.minimum(points, _MOST_POINTS))
-    ahead = torch.stack([item.pose.rotation[:, 0] for item in done])
-    poses = T_sensor_object[rows]
-    alike = (ahead * poses.rotation[:, :, 0]).sum(-1).numpy()
     costs = np.log(np.maximum(cost.numpy(), SMALLEST_M))
 
-    def mean(values: Sequence[float] | np.ndarray) -> float:
-        return float(np.average(values, weights=weights))
-
     def mean_of(name: str) -> float:
-        return mean([getattr(one, name) for one in own])
+        return float(np.average([getattr(one, name) for one in own], weights=weights))
 
     together = TrackFeatures(
-        log_cost=mean(costs[rows.numpy()]),
         scan_cost=0.0,
         rival=mean_of("rival"),
-        log_moved=mean_of("log_moved"),
-        seen_length=mean_of("seen_length"),
-        seen_width=mean_of("seen_width"),
         square=mean_of("square"),
         rough=mean_of("rough"),
         bent=mean_of("bent"),
         own_off=mean_of("size_off"),
-        agree=mean(alike > math.cos(math.radians(RIVAL_DEG))),
         length_spread=float(np.std([one.log_length for one in own])),
         log_points=max(one.log_points for one in own),
         log_range=mean_of("log_range"),
-        log_scans=math.log(len(own)),
-        log_apart=math.log(views_apart(poses) + _ALIKE_DEG),
+        log_apart=math.log(views_apart(T_sensor_object[rows]) + _ALIKE_DEG),
         log_length=math.log(max(size[0], SMALLEST_M)),
         size_off=size_off(size),
     )
