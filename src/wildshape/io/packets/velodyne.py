@@ -184,17 +184,39 @@ def _packets(file: IO[bytes], begin: int | None = None) -> Iterator[_Packet]:
     from dpkt import pcap
 
     records = pcap.UniversalReader(file)
-    size = _decoder().PACKET_SIZE
+    link, size = _link(records.datalink()), _decoder().PACKET_SIZE
     if begin is not None:
         file.seek(begin)
     begin = file.tell()
     for stamp, record in records:
-        found, sender = _datagram(record)
-        if found is not None and len(found.data) < found.ulen - _UDP_HEADER:
-            raise EOFError("it ends in the middle of a packet")
-        if found is not None and len(found.data) == size:
+        found, sender = _datagram(link(record))
+        if found is not None and found.ulen == size + _UDP_HEADER:
+            if len(found.data) < size:
+                raise EOFError("it ends in the middle of a packet")
             yield _Packet(begin, (sender, found.dport), float(stamp), found.data)
         begin = file.tell()
+
+
+def _link(kind: int) -> Any:
+    """How a record begins, by the number of its link layer.
+
+    Raises:
+        ValueError: none that a sensor sends through.
+    """
+    from dpkt import ethernet, ip, loopback, sll, sll2
+
+    # https://www.tcpdump.org/linktypes.html; 113 and 276 are of `tcpdump -i any`
+    links = {
+        0: loopback.Loopback,
+        1: ethernet.Ethernet,
+        101: ip.IP,
+        113: sll.SLL,
+        228: ip.IP,
+        276: sll2.SLL2,
+    }
+    if kind not in links:
+        raise ValueError(f"its link layer {kind} is not read; record from a network card")
+    return links[kind]
 
 
 def _packets_of(
@@ -204,15 +226,17 @@ def _packets_of(
     return islice((one for one in _packets(file, begin) if one.source == source), count)
 
 
-def _datagram(record: bytes) -> tuple[Any, bytes]:
-    """What UDP carried, None for other packets; and the address that it came from."""
-    from dpkt import ethernet, udp
+def _datagram(found: Any) -> tuple[Any, bytes]:
+    """What UDP carried, None for other packets; and the address that it came from.
 
-    found: Any = ethernet.Ethernet(record)
+    What ICMP answers quotes the beginning of a packet.
+    """
+    from dpkt import icmp, icmp6, udp
+
     sender = b""
-    while not isinstance(found, bytes | udp.UDP):
+    while not isinstance(found, bytes | udp.UDP | icmp.ICMP | icmp6.ICMP6):
         sender, found = getattr(found, "src", sender), found.data
-    return (None if isinstance(found, bytes) else found), sender
+    return (found if isinstance(found, udp.UDP) else None), sender
 
 
 def _described(path: Path, source: _Source, turns: list[_Turn]) -> _Sensor:
