@@ -167,6 +167,43 @@ def test_what_answers_and_cameras_send_ends_no_recording(turns, tmp_path):
     assert (len(drive), drive.warnings) == (3, ())
 
 
+def test_packets_that_were_recorded_twice_count_once(turns, tmp_path):
+    path = write_velodyne(tmp_path / "street.pcap", turns)
+    expected = open_drive(path).scan(1)
+
+    def double(records):
+        records[:] = [one for one in records for _ in range(2)]
+
+    drive = open_drive(rewrite(path, double))
+    assert (len(drive), drive.warnings) == (3, ())
+    assert np.array_equal(drive.scan(1), expected)
+
+
+def test_a_clock_that_was_set_back(turns, tmp_path):
+    """All was refused, to be sorted."""
+    path = write_velodyne(tmp_path / "street.pcap", [turns[0]] * 6)
+
+    def set_back(records):
+        for record in records[2 * PACKETS * 7 // 2 :]:
+            record[0] -= 1.0
+
+    drive = open_drive(rewrite(path, set_back))
+    assert np.diff(drive.times) == pytest.approx([PERIOD, PERIOD, 2 * PERIOD, PERIOD], abs=1e-3)
+    assert "the clock of street.pcap was set back by 1 s; later turns" in drive.warnings[1]
+
+
+def test_two_sensors_of_one_address_are_refused(turns, tmp_path):
+    """Their packets were put together to hundreds of turns."""
+    path = write_velodyne(tmp_path / "street.pcap", turns)
+
+    def mix(records):
+        later = records[PACKETS:] + records[:PACKETS]
+        pairs = zip(records[1::2], later[1::2])
+        records[:] = [[one[0], each[1]] for one, other in pairs for each in (one, other)]
+
+    refused(open_drive, rewrite(path, mix), match="record each sensor alone")
+
+
 def test_a_file_of_the_next_generation_may_bear_the_old_suffix(turns, tmp_path):
     """So dumpcap writes it."""
     path = write_velodyne(tmp_path / "street.pcapng", turns)
