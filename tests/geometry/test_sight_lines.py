@@ -62,6 +62,20 @@ def test_what_one_of_several_sensors_saw_through_is_free() -> None:
     assert standing(point, scan, SightLines.of_returns(ends[:1])).hidden.all()
 
 
+def test_what_sensors_on_two_sides_saw_is_not_free() -> None:
+    """Each sees its own side of a vehicle; the other side's returns lie behind what it saw."""
+    x, z = (axis.ravel() for axis in np.meshgrid(np.linspace(8, 12, 60), np.linspace(-1.5, 0, 30)))
+    sides = [np.stack((x, np.full_like(x, side), z), 1) for side in (-0.9, 0.9)]
+    starts = np.array([[10.0, -8.0, 1.0], [10.0, 8.0, 1.0]])
+    scan = np.concatenate(sides)
+    beyond = [np.array([[10.0, 0.0, 4.0]]) * 2 - start for start in starts]
+    rays = SightLines.of_returns(np.concatenate(beyond), starts)
+    between = scan + np.array((0.034, 0.0, 0.026))  # the returns
+    assert standing(between, scan, rays).free.mean() < 0.01
+    outside = np.array([[10.0, 0.0, 4.0]])  # where both sensors' rays passed
+    assert standing(outside, scan, rays).free.all()
+
+
 def test_rays_move_with_what_they_are_held_against() -> None:
     rays, scan, points = some_rays(400), some_points(50, 2, 0.5), some_points(300, 1)
     turn = rotation_z(torch.tensor(2.0)).double().numpy()

@@ -9,14 +9,18 @@ import pytest
 import torch
 
 from wildshape.geometry.centring import box_centre, frustum_centre
+from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.sampling import drawn, sorted_points
 from wildshape.geometry.transforms.rotation import random_rotation
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference import choose_hypothesis as module
 from wildshape.inference.choose_hypothesis import choose_hypothesis, look, look_twice, network_input
+from wildshape.inference.config import FreeSpaceConfig
+from wildshape.inference.free_space import Sights
 from wildshape.inference.predictor import load
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.multiview import LossConfig
+from wildshape.method.ray_encoder import RayConfig
 
 SCAN = Path(__file__).parents[2] / "examples" / "scan.npy"
 
@@ -26,6 +30,24 @@ def turned_scans(count: int) -> list[np.ndarray]:
     turns = random_rotation(count, torch.Generator().manual_seed(0)).double()
     still = torch.zeros(3, dtype=torch.float64)
     return [SE3(turn, still).apply_numpy(points) for turn in turns]
+
+
+def test_a_network_sees_no_rays_from_another_side():
+    """It made vehicles a metre too long by them."""
+    scan = np.load(SCAN)
+    ends = scan.mean(0) + np.random.default_rng(0).normal(0, 1.5, (60, 3))
+    own = SightLines.of_returns(ends)
+    beside = SightLines.of_returns(ends, np.full((60, 3), (0.0, 1.5, 0.3)))
+    facing = SightLines.of_returns(ends, np.full((60, 3), 2 * scan.mean(0)))
+    given = network_input([scan], 64, "lidar", facing=True)
+
+    def seen(*parts):
+        sights = Sights([scan], [SightLines.joined(parts)], FreeSpaceConfig())
+        return given.beside(sights, RayConfig()).rays
+
+    assert torch.equal(seen(own, facing), seen(own))
+    assert not torch.equal(seen(own, beside), seen(own))
+    assert not seen(facing).any()
 
 
 @torch.no_grad()

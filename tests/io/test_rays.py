@@ -11,9 +11,10 @@ from tests.io.store.stores import make_parts
 from tests.refusal import refused
 
 from wildshape.errors import BadInputError
-from wildshape.io.inputs import open_tracks
+from wildshape.inference.point_inputs import together
+from wildshape.io.inputs import open_tracks, with_rays
 from wildshape.io.rays import read_rays, write_rays
-from wildshape.io.scans.points import Coordinates
+from wildshape.io.scans.points import SENSOR_METRES, Coordinates
 from wildshape.io.store.join import join_stores
 from wildshape.io.store.layout import PARTS, WRITING_JSON
 from wildshape.io.store.store import StoreWriter, open_store
@@ -102,6 +103,29 @@ def test_rays_that_were_changed_are_refused(seen: Track, tmp_path: Path) -> None
     damaged[256 + 5] ^= 1  # rays come before the first scan
     shard.write_bytes(damaged)
     refused(open_store(tmp_path / "s").track, 0, match="rays of scan 0 of the store are not those")
+
+
+@pytest.mark.parametrize("times", [0.001, 0.01, 100, 1000])
+def test_rays_of_another_unit_than_the_scans_are_refused(
+    track: Track, tmp_path: Path, times: float
+) -> None:
+    """Nothing noticed; all of the object was taken for free space, or for hidden."""
+    scan = track.scans[0] + np.float32((10, 2, 0))
+    beside = scan[:, None] * np.linspace(0.8, 3.0, 4, dtype=np.float32)[None, :, None]
+    rays = SightLines.of_returns(beside.reshape(-1, 3))
+    write_track(tmp_path / "t", replace(track.part([0]), scans=(scan,), rays=(rays,)))
+    assert len(read_track(tmp_path / "t").rays) == 1
+    file = next((tmp_path / "t" / "rays").iterdir())
+    wrong = SightLines(rays.directions, rays.ranges * times)
+    write_rays(file, wrong)
+    match = "as far away as their object lies; give their ranges and origins in the unit"
+    refused(read_track, tmp_path / "t", match=f"{file.name}: .*{match}")
+    alone = next((tmp_path / "t" / "scans").iterdir())
+    refused(lambda path: list(open_tracks(path)), alone, match=match)
+    refused(together, [scan], [wrong], None, match=f"rays 0: .*{match}")
+    file.rename(tmp_path / "r.npz")
+    source = open_tracks(alone)
+    refused(with_rays, source, tmp_path / "r.npz", SENSOR_METRES, match=f"r.npz: .*{match}")
 
 
 def test_units_and_refusals_name_the_file(tmp_path: Path) -> None:

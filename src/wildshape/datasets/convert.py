@@ -45,6 +45,7 @@ class ConversionOptions:
 
 
 _DEFAULT = ConversionOptions()
+_NAMED = 3  # reasons, where nothing is left
 
 
 @dataclass(frozen=True)
@@ -164,6 +165,7 @@ def _nothing(root: str, results: list[PartResult]) -> str:
         return f"{damaged[0].rstrip('.')}{others}."
     reasons = left_out(results)
     # Of equals the cause: an object has no scans left because they were left out.
-    most = max(reasons, key=lambda why: (reasons[why], why.startswith("scan")), default="")
-    why = f" (most often, {reasons[most]} times: {most.rstrip('.')})" if most else ""
+    most = sorted(reasons, key=lambda why: (-reasons[why], not why.startswith("scan")))[:_NAMED]
+    why = "; ".join(f"{reason.rstrip('.')}, {counted(reasons[reason], 'time')}" for reason in most)
+    why = f" ({why})" if most else ""
     return f"{root}: no track came out of the source{why}; check it and its options."

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.box import spans
-from wildshape.io.rays import read_rays
+from wildshape.io.rays import check_unit, read_rays
 from wildshape.io.scans.points import (
     LEAST_POINTS,
     check_near,
@@ -164,4 +164,16 @@ def together(
     """
     check_sensor(sensor)
     clouds = all_as_points(scans)
-    return clouds, rays_of_each(rays, clouds)
+    known = rays_of_each(rays, clouds)
+    check_units(known, clouds)
+    return clouds, known
+
+
+def check_units(rays: Sequence[SightLines | None], scans: Sequence[Points], first: int = 0) -> None:
+    """Refuse rays of another unit than their scans; errors count them from `first`.
+
+    Raises:
+        BadInputError: see `check_unit`.
+    """
+    for i, (one, scan) in enumerate(zip(rays, scans), first):
+        check_unit(one, scan, f"rays {i}")

@@ -145,6 +145,7 @@ class Predictor:
         for start in range(0, len(scans), BATCH):
             part = slice(start, start + BATCH)
             clouds = point_inputs.all_as_points(scans[part], start)
+            point_inputs.check_units(known[part], clouds, start)
             yield from self._each(clouds, sensor, known[part])
 
     def complete_track(
@@ -230,7 +231,9 @@ class Predictor:
         """`T_target_source = T_target_can inv(T_source_can)` (METHOD 7); `rays`: of both."""
         point_inputs.check_sensor(sensor)
         pair = point_inputs.as_points(source, "source"), point_inputs.as_points(target, "target")
-        done = self._each(pair, sensor, point_inputs.rays_of_each(rays, pair))
+        known = point_inputs.rays_of_each(rays, pair)
+        point_inputs.check_units(known, pair)
+        done = self._each(pair, sensor, known)
         return registered(*pair, done, self.config.inliers)
 
     def register_track(

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from wildshape.errors import BadInputError
 from wildshape.io.progress import counted
-from wildshape.io.rays import read_rays
+from wildshape.io.rays import check_unit, read_rays
 from wildshape.io.scans.points import (
     SENSOR_METRES,
     SUFFIXES,
@@ -268,6 +268,7 @@ def with_rays(source: TrackSource, path: Path, coordinates: Coordinates) -> Trac
             f"{path}: rays of one scan, but {source.path} holds {len(track.scans)}; keep those of a"
             " track in its folder rays/, named as the scans."
         )
+    check_unit(rays, track.scans[0], str(path))
     dropped = tuple(
         (name.removeprefix(f"{track.name}/"), count) for name, count in source.dropped_nonfinite
     )
@@ -316,12 +317,12 @@ def _single_scan(path: Path, coordinates: Coordinates) -> TrackSource:
 
 def _read_single(path: Path, coordinates: Coordinates) -> TrackFile:
     """One scan; where it lies in a TRACK folder, with its rays, its unit and its sensor."""
-    sensor, rays = Sensor(), ()
-    if path.parent.name == "scans":
+    sensor, is_in_track = Sensor(), path.parent.name == "scans"
+    if is_in_track:
         info = read_info(path.parent.parent / "track.json")
         sensor, coordinates = info["sensor"], coordinates.in_unit(info["unit"])
-        rays = (rays_beside(path, coordinates),)
     scan = read_scan(path, coordinates)
+    rays = (rays_beside(path, scan.points, coordinates),) if is_in_track else ()
     dropped = ((path.name, scan.dropped_nonfinite),) if scan.dropped_nonfinite else ()
     track = Track(path.stem, (scan.points,), (path.stem,), sensor=sensor, rays=rays)
     return TrackFile(track, (), dropped)

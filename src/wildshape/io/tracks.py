@@ -20,7 +20,7 @@ from wildshape.io.atomic import write_json
 from wildshape.io.guard import read_json
 from wildshape.io.order import out_of_order
 from wildshape.io.poses import read_poses, write_poses
-from wildshape.io.rays import read_rays, write_rays
+from wildshape.io.rays import check_unit, read_rays, write_rays
 from wildshape.io.scans.points import (
     METRES,
     SENSOR_METRES,
@@ -108,7 +108,7 @@ def read_track_file(folder: Path | str, coordinates: Coordinates = SENSOR_METRES
         source=info["source"],
         T_sensor_object=poses,
         shape=_read_shape(folder / "shape.ply", Coordinates(coordinates.unit)),
-        rays=tuple(rays_beside(file, coordinates) for file in kept),
+        rays=tuple(rays_beside(file, scan, coordinates) for file, scan in kept.items()),
         label_size_m=info["label_size_m"],
         shape_kind=info["shape_kind"],
     )
@@ -176,16 +176,27 @@ def _stems(files: list[Path]) -> tuple[str, ...]:
     return stems if len(set(stems)) == len(stems) else tuple(file.name for file in files)
 
 
-def rays_beside(scan: Path, coordinates: Coordinates) -> SightLines | None:
+def rays_beside(
+    path: Path, scan: Float32[ndarray, "n 3"], coordinates: Coordinates
+) -> SightLines | None:
     """The rays of a scan of a track folder, if it has any; they bear its name, or its file's.
 
+    Args:
+        path: of the scan.
+        scan: as it was read, metres.
+        coordinates: of the files.
+
     Raises:
-        BadInputError: they are damaged.
+        BadInputError: they are damaged, or of another unit.
     """
-    folder = scan.parent.parent / "rays"
-    names = (f"{scan.stem}.npz", f"{scan.name}.npz")
+    folder = path.parent.parent / "rays"
+    names = (f"{path.stem}.npz", f"{path.name}.npz")
     file = next((folder / name for name in names if (folder / name).is_file()), None)
-    return None if file is None else read_rays(file, coordinates)
+    if file is None:
+        return None
+    rays = read_rays(file, coordinates)
+    check_unit(rays, scan, str(file))
+    return rays
 
 
 def _read_truth(path: Path, count: int, kept: list[int], coordinates: Coordinates) -> SE3 | None:

@@ -340,3 +340,17 @@ def test_two_tracks_of_one_name_are_refused(wildshape, drives, tmp_path):
         found = wildshape("convert", "kitti-raw", drives, out, "--layout", layout, "--workers", 1)
         assert found.code == 2
         assert "two tracks are named" in found.err.splitlines()[-1]
+
+
+def test_where_nothing_is_left_the_rarer_reasons_are_named_too(wildshape, drives, tmp_path):
+    """Of a data set that is there in part, missing files hid that an option left out the rest."""
+    part = tmp_path / "part"
+    shutil.copytree(drives, part)
+    for scans in part.rglob("velodyne_points/data"):
+        for file in sorted(scans.iterdir())[1:]:
+            file.unlink()
+    options = ("--workers", 1, "--largest-m", 0.1)
+    found = wildshape("convert", "kitti-raw", part, tmp_path / "out", *options)
+    assert found.code == 2
+    assert "the frame has no LiDAR file, " in found.err
+    assert "over 0.1 m across" in found.err

@@ -161,6 +161,8 @@ def test_truth_is_built_where_poses_are(tmp_path):
     truth = TruthBuilder("mirrored")
     result = convert_part(Posed(), "part", tmp_path / "0", truth=truth)
     assert result.left_out == {"truth: no shape, for the object has no poses": 1}
+    stripped = convert_part(Posed(), "part", tmp_path / "1", truth=replace(truth, strip=9.0))
+    assert stripped.left_out == result.left_out | {"truth: no shape, for no point is left of it": 1}
     seen, bare = open_store(tmp_path / "0" / STORE)
     assert seen.shape is not None
     assert np.ptp(seen.shape, axis=0) == pytest.approx([4.2, 1.7, 1.35], abs=0.1)

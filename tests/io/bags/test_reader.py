@@ -122,6 +122,25 @@ def test_an_empty_scan_is_a_scan(written, kind):
 
 
 @every_kind
+def test_of_two_sensors_in_a_topic_the_one_with_most_scans_is_taken(written, kind):
+    """Each in its own frame: no way was found through them."""
+    frames = ["left", "right", "left", "left", "right", "left"]
+    drive = open_drive(written(kind, {TOPIC: scans()}, frames=frames))
+    assert [np.array_equal(drive.scan(i), scans()[j]) for i, j in enumerate((0, 2, 3, 5))] == [
+        True
+    ] * 4
+    assert drive.warnings[0] == (
+        f"{TOPIC} holds scans in 2 frames; those in left were taken, which are most, and those in"
+        " right left out"
+    )
+
+
+def test_a_frame_that_got_another_name_on_the_way_is_one_sensor_s(written):
+    drive = open_drive(written("mcap", {TOPIC: scans()}, frames=["", *["lidar"] * 5]))
+    assert (len(drive), drive.warnings) == (6, ())
+
+
+@every_kind
 def test_stamps_of_the_scans_are_their_order(written, kind):
     stamps = [3 * 10**8, 10**8, 2 * 10**8, 2 * 10**8]
     drive = open_drive(written(kind, {TOPIC: scans(4)}, stamps=stamps))

@@ -32,7 +32,7 @@ PLAIN = Fields()
 _NUMBERS = {"f4": 7, "f8": 8, "i2": 3, "u4": 6}
 
 
-def cloud(points, stamped, fields=PLAIN, times=None, *, ros1=False):
+def cloud(points, stamped, fields=PLAIN, times=None, *, ros1=False, frame="lidar"):
     """A message: a ring number, y, z, x and a time a point; rows are padded with four bytes."""
     order = ">" if fields.big else "<"
     y, z, x = (fields.names[i] for i in (1, 2, 0))
@@ -56,7 +56,7 @@ def cloud(points, stamped, fields=PLAIN, times=None, *, ros1=False):
         for name, kind in known
     ]
     time = types["builtin_interfaces/msg/Time"](*divmod(stamped, 10**9))
-    header = types["std_msgs/msg/Header"](*((7,) if ros1 else ()), time, "lidar")
+    header = types["std_msgs/msg/Header"](*((7,) if ros1 else ()), time, frame)
     data = np.frombuffer(b"".join(bytes_), np.uint8)
     width = rows.shape[1]
     message = types[CLOUD](
@@ -65,7 +65,9 @@ def cloud(points, stamped, fields=PLAIN, times=None, *, ros1=False):
     return (_ROS1.serialize_ros1 if ros1 else _ROS2.serialize_cdr)(message, CLOUD)
 
 
-def write_bag(path, kind, scans, fields=PLAIN, stamps=None, times=None, packed=False, extra=()):
+def write_bag(
+    path, kind, scans, fields=PLAIN, stamps=None, times=None, packed=False, extra=(), frames=()
+):
     """A recording of scans, 0.1 s apart; its file.
 
     Args:
@@ -73,6 +75,7 @@ def write_bag(path, kind, scans, fields=PLAIN, stamps=None, times=None, packed=F
         stamps: of each scan, nanoseconds.
         times: of each scan's points, as they are recorded.
         extra: topics of text.
+        frames: the name of each scan's frame.
     """
     if kind == "bag":
         writer, types, path = Ros1Writer(path.with_suffix(".bag")), _ROS1, path.with_suffix(".bag")
@@ -89,11 +92,12 @@ def write_bag(path, kind, scans, fields=PLAIN, stamps=None, times=None, packed=F
         topics = {topic: writer.add_connection(topic, CLOUD, typestore=types) for topic in scans}
         for topic in extra:
             writer.add_connection(topic, "std_msgs/msg/String", typestore=types)
-        for topic, frames in scans.items():
-            for frame, points in enumerate(frames):
+        for topic, taken_there in scans.items():
+            for frame, points in enumerate(taken_there):
                 at = 10**18 + frame * TENTH
                 stamped = at if stamps is None else stamps[frame]
                 taken = None if times is None else times[frame]
-                data = cloud(points, stamped, fields, taken, ros1=kind == "bag")
+                name = frames[frame] if frames else "lidar"
+                data = cloud(points, stamped, fields, taken, ros1=kind == "bag", frame=name)
                 writer.write(topics[topic], at, data)
     return path

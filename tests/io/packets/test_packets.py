@@ -122,6 +122,88 @@ def test_packets_that_overtook_each_other_begin_no_turn(turns, tmp_path, place):
     assert len(drive.turn(1).points) == pytest.approx(len(points_of(turns[0])), rel=0.03)
 
 
+@pytest.mark.parametrize(
+    ("link", "header"),
+    [
+        (0, b"\x02\0\0\0"),
+        (101, b""),
+        (113, b"\0\0\0\1\0\6" + bytes(8) + b"\x08\0"),
+        (276, b"\x08\0\0\0\0\0\0\2\0\1\0\6" + bytes(8)),
+    ],
+)
+def test_packets_recorded_on_any_interface(turns, tmp_path, link, header):
+    """As `tcpdump -i any` does; nothing was found in them."""
+    path = write_velodyne(tmp_path / "street.pcap", turns)
+    expected = open_drive(path).scan(1)
+
+    def capture(records):
+        for record in records:
+            record[1] = header + record[1][14:]
+
+    drive = open_drive(rewrite(path, capture, link))
+    assert (len(drive), drive.warnings) == (3, ())
+    assert np.array_equal(drive.scan(1), expected)
+
+
+def test_packets_of_a_link_layer_that_is_not_read(turns, tmp_path):
+    path = rewrite(write_velodyne(tmp_path / "street.pcap", turns), lambda _: None, 105)
+    refused(open_drive, path, match="link layer 105 is not read; record from a network card")
+
+
+def test_what_answers_and_cameras_send_ends_no_recording(turns, tmp_path):
+    """Parts of packets in ICMP, and fragments, were taken for the end of the file."""
+    path = write_velodyne(tmp_path / "street.pcap", turns)
+
+    def add(records):
+        stamp, sent = records[PACKETS]
+        at, quoted = [1, 192, 168, 1, 77, 192, 168, 1, 201], sent[14:562]
+        answer = bytes((0x45, 0, 2, 64, 0, 0, 0, 0, 64, *at[:1], 0, 0, *at[1:]))
+        answer += b"\3\3" + bytes(6) + quoted
+        fragment = bytes((0x45, 0, 1, 28, 0, 0, 0x20, 0, 64, 17, 0, 0, *at[1:]))
+        fragment += b"\0\5\0\5\x20\0\0\0" + bytes(256)
+        records[PACKETS:PACKETS] = [[stamp, sent[:14] + one] for one in (answer, fragment)]
+
+    drive = open_drive(rewrite(path, add))
+    assert (len(drive), drive.warnings) == (3, ())
+
+
+def test_packets_that_were_recorded_twice_count_once(turns, tmp_path):
+    path = write_velodyne(tmp_path / "street.pcap", turns)
+    expected = open_drive(path).scan(1)
+
+    def double(records):
+        records[:] = [one for one in records for _ in range(2)]
+
+    drive = open_drive(rewrite(path, double))
+    assert (len(drive), drive.warnings) == (3, ())
+    assert np.array_equal(drive.scan(1), expected)
+
+
+def test_a_clock_that_was_set_back(turns, tmp_path):
+    """All was refused, to be sorted."""
+    path = write_velodyne(tmp_path / "street.pcap", [turns[0]] * 6)
+
+    def set_back(records):
+        for record in records[2 * PACKETS * 7 // 2 :]:
+            record[0] -= 1.0
+
+    drive = open_drive(rewrite(path, set_back))
+    assert np.diff(drive.times) == pytest.approx([PERIOD, PERIOD, 2 * PERIOD, PERIOD], abs=1e-3)
+    assert "the clock of street.pcap was set back by 1 s; later turns" in drive.warnings[1]
+
+
+def test_two_sensors_of_one_address_are_refused(turns, tmp_path):
+    """Their packets were put together to hundreds of turns."""
+    path = write_velodyne(tmp_path / "street.pcap", turns)
+
+    def mix(records):
+        later = records[PACKETS:] + records[:PACKETS]
+        pairs = zip(records[1::2], later[1::2])
+        records[:] = [[one[0], each[1]] for one, other in pairs for each in (one, other)]
+
+    refused(open_drive, rewrite(path, mix), match="record each sensor alone")
+
+
 def test_a_file_of_the_next_generation_may_bear_the_old_suffix(turns, tmp_path):
     """So dumpcap writes it."""
     path = write_velodyne(tmp_path / "street.pcapng", turns)

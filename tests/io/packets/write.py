@@ -90,13 +90,16 @@ def points_of(ranges):
     return places[distances > 0.5]
 
 
-def rewrite(path, change):
-    """Write a `.pcap` again, its records `[seconds, bytes]` changed; every second holds points."""
+def rewrite(path, change, link=pcap.DLT_EN10MB):
+    """Write a `.pcap` again, its records `[seconds, bytes]` changed; every second holds points.
+
+    `link`: the number of their link layer.
+    """
     with path.open("rb") as file:
         records = [[float(stamp), data] for stamp, data in pcap.Reader(file)]
     change(records)
     with path.open("wb") as file:
-        writer = pcap.Writer(file)
+        writer = pcap.Writer(file, linktype=link)
         for stamp, data in records:
             writer.writepkt(data, ts=stamp)
     return path

@@ -156,7 +156,9 @@ def _counted(source: Source, result: PartResult, truth: TruthBuilder | None) -> 
     for track in source.tracks_of(result.part):
         shaped = track if truth is None else truth.with_shape(track)
         if shaped is None:
-            reason = "truth: no shape, for the object has no poses"
+            posed = track.T_sensor_object is not None
+            lacking = "no point is left of it" if posed else "the object has no poses"
+            reason = f"truth: no shape, for {lacking}"
             result.left_out[reason] = result.left_out.get(reason, 0) + 1
         chosen = shaped or track
         result.count(chosen)

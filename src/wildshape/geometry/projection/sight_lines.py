@@ -5,6 +5,7 @@
 A ray that ended before a point hides it. A ray that went on says that nothing stands there.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -15,6 +16,7 @@ from jaxtyping import Bool, Float, Int
 from wildshape.errors import BadInputError
 
 _UNIT = 1e-3  # how far from 1 the length of a direction may be
+_ALIKE = math.cos(math.radians(45.0))  # between places that see much the same side of an object
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +152,8 @@ def standing(
     The rays that pass a point nearest are asked, the object's own returns among them, and they
     must agree: at a silhouette, and over a flat roof, one ray alone passes what the next one hits.
     Rays of which nothing came back say nothing: dark paint and glass swallow them, too. Where
-    several sensors are merged, what one of them saw through is free.
+    several sensors are merged, what one of them saw through is free; where they see the object from
+    different sides, a return beyond a point may be another one's, and says nothing.
 
     Args:
         points: of a shape, sensor frame, metres.
@@ -161,18 +164,42 @@ def standing(
         nearest: how many rays must agree, as far as so many pass near.
     """
     free, hidden = np.zeros(len(points), bool), np.zeros(len(points), bool)
-    for origin, rows in _by_origin(rays.returned):
+    places = _by_origin(rays.returned)
+    apart = _are_apart(np.array([origin for origin, _ in places]), scan)
+    for origin, rows in places:
         seen = scan - origin.astype(scan.dtype)
         own = SightLines.of_returns(seen[seen.any(axis=1)])  # a point at the sensor is no return
         others = rays.returned.part(rows)
         directions = np.concatenate((own.directions, others.directions))
         ranges = np.concatenate((own.ranges, others.ranges))
         ray, beyond = _nearest(points - origin, directions, ranges, within_m, nearest)
+        if apart:
+            beyond[(ray < len(own)) & (beyond > beyond_m)] = np.nan
         known = np.isfinite(beyond).any(1)
         free |= known & (np.where(np.isfinite(beyond), beyond, np.inf).min(1) > beyond_m)
         before = (beyond < -beyond_m) & (ray >= len(own))
         hidden |= known & (before | ~np.isfinite(beyond)).all(1)
     return Standing(free, hidden & ~free)
+
+
+def seen_alike(
+    starts: Float[np.ndarray, "m 3"], start: Float[np.ndarray, "3"], middle: Float[np.ndarray, "3"]
+) -> Bool[np.ndarray, "m"]:
+    """From which places an object is seen from much the same side as from another place.
+
+    Args:
+        starts: of rays.
+        start: the other place, the same frame.
+        middle: of the object.
+    """
+    toward, from_there = middle - starts, middle - start
+    lengths = np.linalg.norm(toward, axis=1) * np.linalg.norm(from_there)
+    return toward @ from_there >= _ALIKE * lengths
+
+
+def _are_apart(places: Float[np.ndarray, "k 3"], scan: Float[np.ndarray, "s 3"]) -> bool:
+    """Whether an object is seen from different sides."""
+    return bool(len(places) and not seen_alike(places, places[0], scan.mean(0)).all())
 
 
 def _by_origin(rays: SightLines) -> list[tuple[Float[np.ndarray, "3"], Int[np.ndarray, "k"]]]:

@@ -28,6 +28,13 @@ def stamp(data: bytes, *, cdr: bool) -> int:
     return seconds * 10**9 + nanoseconds
 
 
+def frame_name(data: bytes, *, cdr: bool) -> str:
+    """The frame that a message's points lie in; its name follows the stamp."""
+    big = cdr and data[1] % 2 == 0
+    (length,) = struct.unpack_from(">I" if big else "<I", data, 12)
+    return data[16 : 16 + length].rstrip(b"\0").decode("utf-8", "replace")
+
+
 class Cloud(NamedTuple):
     """The points of a message.
 

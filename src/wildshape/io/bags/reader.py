@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scans of a recording of ROS: listed in one pass over its files, then read one by one."""
 
+from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from wildshape.errors import BadInputError, MissingExtraError
-from wildshape.io.bags.clouds import Cloud, cloud_of, message_types, stamp
+from wildshape.io.bags.clouds import Cloud, cloud_of, frame_name, message_types, stamp
 from wildshape.io.bags.storages import CLOUD, STORAGES, Key, Message
 from wildshape.io.guard import first_line, reading
 from wildshape.io.scans.point_times import seconds_since, unusable_told
@@ -31,6 +33,7 @@ class _Scan(NamedTuple):
     key: Key
     cdr: bool
     dropped: int
+    frame: str
 
 
 @dataclass(frozen=True)
@@ -127,7 +130,8 @@ def open_bag(path: Path, topic: str | None = None) -> Bag:
     if not scans:
         raise BadInputError(f"{path}: {'; '.join([*damaged, f'{chosen} holds no scan'])}.")
     told = tuple(f"{one}; {len(scans)} scans could be read" for one in damaged)
-    return _in_order(chosen, scans, told)
+    scans, others = _of_one_sensor(chosen, scans)
+    return _in_order(chosen, scans, (*told, *others))
 
 
 def _said(error: Exception) -> str:
@@ -141,7 +145,8 @@ def _listed(message: Message, file: Path) -> _Scan:
         points = cloud_of(message.data, cdr=message.cdr).points
         dropped = len(points) - int(_returned(points).sum())
     stamped = stamp(message.data, cdr=message.cdr)
-    return _Scan(stamped, message.logged, file, message.key, message.cdr, dropped)
+    frame = frame_name(message.data, cdr=message.cdr)
+    return _Scan(stamped, message.logged, file, message.key, message.cdr, dropped, frame)
 
 
 def _returned(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
@@ -170,6 +175,24 @@ def _chosen(path: Path, topic: str | None, topics: dict[str, str], damaged: list
 
 def _all(names: list[str]) -> str:
     return ", ".join(names)
+
+
+def _of_one_sensor(topic: str, scans: list[_Scan]) -> tuple[list[_Scan], tuple[str, ...]]:
+    """Of sensors that take turns in a topic the one with most scans, and a sentence on the others.
+
+    A frame that only got another name on the way is still that of one sensor.
+    """
+    frames = [scan.frame for scan in sorted(scans, key=lambda scan: scan.logged)]
+    counts = Counter(frames)
+    if sum(one != other for one, other in pairwise(frames)) < max(2, len(counts)):
+        return scans, ()
+    most = max(counts, key=counts.__getitem__)
+    others = " and ".join(name or "no name" for name in counts if name != most)
+    told = (
+        f"{topic} holds scans in {len(counts)} frames; those in {most or 'no name'} were taken,"
+        f" which are most, and those in {others} left out"
+    )
+    return [scan for scan in scans if scan.frame == most], (told,)
 
 
 def _in_order(topic: str, scans: list[_Scan], told: tuple[str, ...]) -> Bag:

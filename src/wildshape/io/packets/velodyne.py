@@ -10,7 +10,7 @@ import json
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import compress, islice
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -24,6 +24,7 @@ _INSTALL = "pip install 'wildshape[pcap]'"
 _AZIMUTH = slice(2, 4)  # of a packet's first block, hundredths of a degree, clockwise from ahead
 _BACK, _ROUND = 18000, 36000
 _UDP_HEADER = 8  # bytes
+_SHORTEST_S = 0.025  # of a turn: half of that at the highest speed
 _WHOLE = 0.9  # of the packets of the turns around it that a turn must have
 _AROUND = 10  # turns before and after: returns and speed may be changed amid a recording
 _LONGEST = 1.5  # times the usual time from turn to turn: longer are pieces of several
@@ -128,8 +129,9 @@ def open_velodyne(path: Path) -> VelodyneTurns:
             f" taken, which are most, and those of {others} left out"
         )
     found = turns[source] if source is not None else []
+    _check_pace(path, found)
     sound = _are_whole(found)
-    whole = tuple(turn for turn, is_whole in zip(found, sound) if is_whole)
+    whole = tuple(compress(found, sound))
     # A recording begins and ends amid a turn, which is no loss.
     if lacking := sound[1:-1].count(False):
         warnings.append(f"{lacking} turns with missing packets are left out")
@@ -138,8 +140,42 @@ def open_velodyne(path: Path) -> VelodyneTurns:
         damaged = models[source].total() - max(models[source].values())
         if damaged:
             warnings.append(f"{damaged} packets end in another model than most and are left out")
-    times = tuple(turn.stamp for turn in whole)
-    return VelodyneTurns(path, times, tuple(warnings), source, whole, described)
+    times, back_s = _rising([turn.stamp for turn in found])
+    if back_s:
+        warnings.append(
+            f"the clock of {path.name} was set back by {back_s:.2g} s; later turns are taken to"
+            " have gone on at the usual pace"
+        )
+    whole_times = tuple(compress(times, sound))
+    return VelodyneTurns(path, whole_times, tuple(warnings), source, whole, described)
+
+
+def _rising(stamps: list[float]) -> tuple[tuple[float, ...], float]:
+    """Times that go on as usual where a clock was set back, and by how much it was in all, seconds.
+
+    Times that rise less often than not stay as they are.
+    """
+    steps = np.diff(stamps)
+    falls = steps <= 0
+    if not falls.any() or falls.mean() > 0.5:
+        return tuple(stamps), 0.0
+    back = np.where(falls, float(np.median(steps[~falls])) - steps, 0.0)
+    later = np.concatenate(([0.0], np.cumsum(back)))
+    return tuple((np.array(stamps) + later).tolist()), float(back.sum())
+
+
+def _check_pace(path: Path, turns: list[_Turn]) -> None:
+    """Refuse turns that are none: packets of two sensors, each of which looks elsewhere.
+
+    Raises:
+        BadInputError: most are far shorter than a sensor's.
+    """
+    period = np.median(np.diff([turn.stamp for turn in turns])) if len(turns) > 2 else np.inf
+    if abs(period) < _SHORTEST_S:
+        raise BadInputError(
+            f"{path}: a turn of {period:.2g} s is none of a Velodyne; record each sensor alone or"
+            " with an address of its own, and play recordings back no faster than they were made."
+        )
 
 
 def _count(packet: _Packet, turns: list[_Turn]) -> None:
@@ -184,17 +220,43 @@ def _packets(file: IO[bytes], begin: int | None = None) -> Iterator[_Packet]:
     from dpkt import pcap
 
     records = pcap.UniversalReader(file)
-    size = _decoder().PACKET_SIZE
+    link, size = _link(records.datalink()), _decoder().PACKET_SIZE
     if begin is not None:
         file.seek(begin)
     begin = file.tell()
+    before: dict[_Source, bytes] = {}
     for stamp, record in records:
-        found, sender = _datagram(record)
-        if found is not None and len(found.data) < found.ulen - _UDP_HEADER:
-            raise EOFError("it ends in the middle of a packet")
-        if found is not None and len(found.data) == size:
-            yield _Packet(begin, (sender, found.dport), float(stamp), found.data)
+        found, sender = _datagram(link(record))
+        if found is not None and found.ulen == size + _UDP_HEADER:
+            if len(found.data) < size:
+                raise EOFError("it ends in the middle of a packet")
+            source = sender, found.dport
+            if found.data != before.get(source):  # a switch's mirror sends packets twice
+                yield _Packet(begin, source, float(stamp), found.data)
+            before[source] = found.data
         begin = file.tell()
+
+
+def _link(kind: int) -> Any:
+    """How a record begins, by the number of its link layer.
+
+    Raises:
+        ValueError: none that a sensor sends through.
+    """
+    from dpkt import ethernet, ip, loopback, sll, sll2
+
+    # https://www.tcpdump.org/linktypes.html; 113 and 276 are of `tcpdump -i any`
+    links = {
+        0: loopback.Loopback,
+        1: ethernet.Ethernet,
+        101: ip.IP,
+        113: sll.SLL,
+        228: ip.IP,
+        276: sll2.SLL2,
+    }
+    if kind not in links:
+        raise ValueError(f"its link layer {kind} is not read; record from a network card")
+    return links[kind]
 
 
 def _packets_of(
@@ -204,15 +266,17 @@ def _packets_of(
     return islice((one for one in _packets(file, begin) if one.source == source), count)
 
 
-def _datagram(record: bytes) -> tuple[Any, bytes]:
-    """What UDP carried, None for other packets; and the address that it came from."""
-    from dpkt import ethernet, udp
+def _datagram(found: Any) -> tuple[Any, bytes]:
+    """What UDP carried, None for other packets; and the address that it came from.
 
-    found: Any = ethernet.Ethernet(record)
+    What ICMP answers quotes the beginning of a packet.
+    """
+    from dpkt import icmp, icmp6, udp
+
     sender = b""
-    while not isinstance(found, bytes | udp.UDP):
+    while not isinstance(found, bytes | udp.UDP | icmp.ICMP | icmp6.ICMP6):
         sender, found = getattr(found, "src", sender), found.data
-    return (None if isinstance(found, bytes) else found), sender
+    return (found if isinstance(found, udp.UDP) else None), sender
 
 
 def _described(path: Path, source: _Source, turns: list[_Turn]) -> _Sensor:
