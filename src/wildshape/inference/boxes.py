@@ -95,9 +95,7 @@ def carried(fitted: FittedBox, T_sensor_canonical: SE3) -> Box:
     return Box((x, y, z), (length, width, height), (qw, qx, qy, qz))
 
 
-def _level(
-    shape: Float[Tensor, "P 3"], config: BoxConfig, *, body: bool
-) -> Float[Tensor, "3 3"]:
+def _level(shape: Float[Tensor, "P 3"], config: BoxConfig, *, body: bool) -> Float[Tensor, "3 3"]:
     """The small turn about y after which the rectangle around the side view has least area.
 
     The canonical frame is level on average, not for each shape; a degree is 8 cm of a car's length.
