@@ -155,7 +155,7 @@ def test_a_picture_of_depths_is_no_depth_image(tmp_path):
 
 @pytest.mark.parametrize("change", [{"depth_scale": 10}, {"fx": 0.9, "fy": 0.9}])
 def test_objects_as_large_as_a_town_are_left_out(tmp_path, change):
-    """Millimetres taken for metres (the images have 10,000 a metre); focal lengths in image widths."""
+    """A wrong depth_scale (the images have 10,000 a metre); focal lengths in image widths."""
     write_sequence(tmp_path / "kitchen", count=2)
     (tmp_path / "kitchen" / "camera.json").write_text(json.dumps(CAMERA | change))
     source = Rgbd(tmp_path)
