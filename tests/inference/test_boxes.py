@@ -97,7 +97,7 @@ def test_a_canonical_frame_of_depth_views_may_have_any_pitch(degrees):
 
 def test_a_large_turn_that_gains_little_is_not_taken():
     """A ball's side view is as large however it is turned."""
-    ball = torch.nn.functional.normalize(surface(size=1.0), dim=-1)
+    ball = torch.nn.functional.normalize(surface(size=torch.ones(3)), dim=-1)
     fitted = fit_to_scans(ball, [], mirror=True, body=False)
     assert abs(math.degrees(math.asin(float(fitted.rotation[0, 2])))) <= 4.0
 

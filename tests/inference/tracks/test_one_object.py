@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from tests.cars import poses_of
 from tests.inference.tracks.known_car import (
     SHAPE,
@@ -78,7 +78,7 @@ def test_what_exact_scans_saw_is_in_the_shape_of_their_track():
     for sensor in ("lidar", "camera"):
         settings = replace(SETTINGS, facing=True, sensor=sensor)
         found = together(done, TRACK.scans, settings)
-        trees = [cKDTree(one.points) for one in found]
+        trees = [KDTree(one.points) for one in found]
         apart[sensor] = [tree.query(s)[0].mean() for tree, s in zip(trees, TRACK.scans)]
         assert len({len(one.points) for one in found}) == 1
     assert np.mean(apart["camera"]) < 0.5 * np.mean(apart["lidar"])
