@@ -15,8 +15,8 @@ from wildshape.io.scans.writers import MESH_FORMATS, write_mesh
 CENTRE = np.array([40.0, -25.0, -1.0])
 
 
-def ball() -> Any:
-    made = trimesh.creation.icosphere(subdivisions=3)
+def ball(radius: float = 1.0) -> Any:
+    made = trimesh.creation.icosphere(subdivisions=3, radius=radius)
     made.apply_translation(CENTRE)
     return made
 
@@ -33,8 +33,10 @@ def test_confidence_falls_with_the_distance_to_what_was_measured():
     np.testing.assert_allclose(found, [1, 1 - 0.48 / 2, 0.52, 0.52], atol=1e-5)
 
 
-def test_the_half_not_seen_is_less_sure():
-    mesh = ball()
+@pytest.mark.parametrize("radius", [1.0, 0.05])
+def test_the_half_not_seen_is_less_sure(radius):
+    """Also of a small object, of which nothing is half a metre from anything."""
+    mesh = ball(radius)
     colour_by_confidence(mesh, front(mesh), 0.9)
     held = mesh.vertex_attributes["confidence"]
     seen = (mesh.vertices - CENTRE) @ CENTRE < 0

@@ -86,6 +86,22 @@ def test_a_canonical_frame_that_leans_is_made_level(degrees):
     torch.testing.assert_close(fitted.size, SIZE, atol=0.03, rtol=0)
 
 
+@pytest.mark.parametrize("degrees", [-40.0, 23.0])
+def test_a_canonical_frame_of_depth_views_may_have_any_pitch(degrees):
+    """As that of the shipped chairs, whose boxes were half as long again and stood askew."""
+    tipped = about_y(degrees)
+    fitted = fit_to_scans(surface() @ tipped.mT, [], mirror=True, body=False)
+    torch.testing.assert_close(fitted.rotation, tipped, atol=1e-6, rtol=0)
+    torch.testing.assert_close(fitted.size, SIZE, atol=0.03, rtol=0)
+
+
+def test_a_large_turn_that_gains_little_is_not_taken():
+    """A ball's side view is as large however it is turned."""
+    ball = torch.nn.functional.normalize(surface(size=torch.ones(3)), dim=-1)
+    fitted = fit_to_scans(ball, [], mirror=True, body=False)
+    assert abs(math.degrees(math.asin(float(fitted.rotation[0, 2])))) <= 4.0
+
+
 def test_carried_to_the_sensor_with_the_pose():
     turn = rotation_from_quaternion(torch.tensor((0.8, 0.1, -0.2, 0.5), dtype=torch.float64))
     pose = SE3(turn, torch.tensor((9.0, -3.0, 1.0), dtype=torch.float64))

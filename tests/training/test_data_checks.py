@@ -29,6 +29,11 @@ def doubts(tmp_path):
     return told
 
 
+def unit_size(track):
+    """As a depth camera sees it, its diagonal about 1."""
+    return replace(track, sensor=Sensor("camera"), scans=tuple(scan / 5 for scan in track.scans))
+
+
 @pytest.mark.parametrize("preset", ["small", "default", "paper-lidar"])
 def test_tracks_of_the_presets_sensor_are_not_doubted(doubts, cars, preset):
     assert doubts(preset, cars[0], cars[1].part([0])) == []
@@ -41,7 +46,7 @@ def test_scans_of_another_sensor_are_doubted(doubts, cars):
     (said,) = doubts("small", replace(cars[0], sensor=Sensor("camera")))
     assert "camera scans, but preset small" in said
     assert "are paper-views, views" in said
-    assert doubts("views", replace(cars[0], sensor=Sensor("camera"))) == []
+    assert doubts("views", unit_size(cars[0])) == []
 
 
 def test_tracks_without_two_usable_scans_are_doubted(doubts, cars):
@@ -51,6 +56,24 @@ def test_tracks_without_two_usable_scans_are_doubted(doubts, cars):
     sparse = replace(two, scans=(two.scans[0], two.scans[1][:99]))
     assert len(doubts("small", sparse)) == 1
     assert doubts("small", two) == []
+
+
+def test_scans_that_are_not_trained_on_are_counted(doubts, cars):
+    sparse = replace(cars[1], scans=tuple(scan[:99] for scan in cars[1].scans))
+    (said,) = doubts("small", cars[0], sparse)
+    count = len(sparse.scans)
+    assert f"{count} of {count + len(cars[0].scans)} scans have fewer than 100 points" in said
+    assert "1 of 2 tracks have no others" in said
+
+
+def test_objects_of_another_size_than_the_presets_are_doubted(doubts, cars):
+    """Cups in metres for a preset whose lengths are those of objects of unit size."""
+    cup = replace(unit_size(cars[0]), scans=tuple(s / 50 for s in cars[0].scans))
+    (said,) = doubts("views", cup)
+    assert "but preset views has the lengths for objects of 0.4 to 2.5 m" in said
+    assert doubts("views", unit_size(cars[0])) == []
+    (said,) = doubts("small", replace(cars[0], scans=tuple(s / 10 for s in cars[0].scans)))
+    assert "objects of 1 to 25 m" in said
 
 
 def test_a_training_says_so(cars, tmp_path):

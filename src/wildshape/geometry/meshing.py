@@ -19,6 +19,7 @@ import torch
 from jaxtyping import Bool, Float, UInt8
 
 from wildshape.errors import BadInputError, load_library
+from wildshape.geometry.box import extent, unit_of
 from wildshape.ops.nearest import nearest
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 _MARGIN = 3  # cells around the swollen points
 _OFF_LEVEL = 1e-3  # of a cell: what keeps corners of the surface apart
 _ALIKE = 1e-3  # of the longest side: so near to a point its reflection is one, too
+_GUESSED_M = 0.5
 # Blue to orange (Okabe & Ito's two, a light grey between): told apart by colour-blind readers.
 _SCALE = np.array([(0, 114, 178), (196, 200, 206), (213, 94, 0)], np.float64)
 
@@ -216,7 +218,7 @@ def place_confidence(
     scan: Float[np.ndarray, "m 3"],
     confidence: float,
     *,
-    guessed_m: float = 0.5,
+    guessed_m: float = _GUESSED_M,
     guessed: float = 0.65,
 ) -> Float[np.ndarray, "n"]:
     """The chance that each place lies within 20 cm of the true surface, 0 to 1, roughly.
@@ -242,8 +244,13 @@ def place_confidence(
 def colour_by_confidence(
     mesh: "trimesh.Trimesh", scan: Float[np.ndarray, "m 3"], confidence: float
 ) -> None:
-    """Colour a mesh's vertices, blue for 1 to orange for 0; they get the attribute `confidence`."""
-    found = place_confidence(mesh.vertices.view(np.ndarray), scan, confidence)
+    """Colour a mesh's vertices, blue for 1 to orange for 0; they get the attribute `confidence`.
+
+    Of objects smaller than vehicles the distances are as much smaller (`unit_of`).
+    """
+    places = mesh.vertices.view(np.ndarray)
+    guessed_m = _GUESSED_M * unit_of(extent(places))
+    found = place_confidence(places, scan, confidence, guessed_m=guessed_m)
     visual: Any = mesh.visual
     visual.vertex_colors = share_colours(1.0 - found)
     mesh.vertex_attributes["confidence"] = found.astype(np.float32)

@@ -64,7 +64,7 @@ def fit_to_scans(
         config: what is not believed.
     """
     exact = shape.double()
-    axes = _level(exact, config) if mirror else fit_box(exact).rotation
+    axes = _level(exact, config, body=body) if mirror else fit_box(exact).rotation
     reflect = mirror and not body
     config = config if body else replace(config, shape_share=0.0, seen_share=0.0)
     low, high = _ends(_rows(exact, axes), config)
@@ -95,12 +95,27 @@ def carried(fitted: FittedBox, T_sensor_canonical: SE3) -> Box:
     return Box((x, y, z), (length, width, height), (qw, qx, qy, qz))
 
 
-def _level(shape: Float[Tensor, "P 3"], config: BoxConfig) -> Float[Tensor, "3 3"]:
+def _level(shape: Float[Tensor, "P 3"], config: BoxConfig, *, body: bool) -> Float[Tensor, "3 3"]:
     """The small turn about y after which the rectangle around the side view has least area.
 
     The canonical frame is level on average, not for each shape; a degree is 8 cm of a car's length.
+    That of depth views need not be level at all: nothing says what is up. There a large turn is
+    taken where the rectangle becomes much smaller.
     """
-    steps = round(config.level_deg / config.step_deg)
+    angle, area = _least_area(shape, config.level_deg, config)
+    if not body:
+        far, less = _least_area(shape, config.tipped_deg, config)
+        angle = far if less < (1 - config.tipped_gain) * area else angle
+    c, s = angle.cos(), angle.sin()
+    zero, one = torch.zeros_like(c), torch.ones_like(c)
+    return torch.stack((c, zero, s, zero, one, zero, -s, zero, c)).view(3, 3)
+
+
+def _least_area(
+    shape: Float[Tensor, "P 3"], most_deg: float, config: BoxConfig
+) -> tuple[Tensor, Tensor]:
+    """Of turns about y by up to `most_deg` the best, radians, and the area of its rectangle."""
+    steps = round(most_deg / config.step_deg)
     angles = torch.deg2rad(torch.arange(-steps, steps + 1, dtype=shape.dtype) * config.step_deg)
     angles = angles[angles.abs().argsort(stable=True)]  # of equals the smallest
     cos, sin = angles.cos()[:, None], angles.sin()[:, None]
@@ -110,10 +125,8 @@ def _level(shape: Float[Tensor, "P 3"], config: BoxConfig) -> Float[Tensor, "3 3
         x, z, strays = x[: len(x) // 2], z[: len(z) // 2], strays // 2
     low, high = _without_outermost(torch.stack((x * cos - z * sin, x * sin + z * cos)), strays)
     across = high - low
-    best = angles[(across[0] * across[1]).argmin()]
-    c, s = best.cos(), best.sin()
-    zero, one = torch.zeros_like(c), torch.ones_like(c)
-    return torch.stack((c, zero, s, zero, one, zero, -s, zero, c)).view(3, 3)
+    area, best = (across[0] * across[1]).min(0)
+    return angles[best], area
 
 
 def _rows(points: Float[Tensor, "n 3"], axes: Float[Tensor, "3 3"]) -> Float[Tensor, "3 n"]:

@@ -4,9 +4,14 @@
 
 import numpy as np
 
+from wildshape.geometry.box import extent
 from wildshape.io.store.store import Store
 from wildshape.training.config import Recipe
 from wildshape.training.recipes import PRESETS, recipe_named
+
+_SAMPLE = 200
+_USUAL_M = {"lidar": (1.0, 25.0), "camera": (0.4, 2.5)}
+"""Diagonals of what presets are for: vehicles; objects of unit size, or chairs in metres."""
 
 
 def doubts_of(store: Store, recipe: Recipe) -> list[str]:
@@ -31,4 +36,25 @@ def doubts_of(store: Store, recipe: Recipe) -> list[str]:
             f"{store.named}: no track has two scans of {least} points or more, but shapes and poses"
             " are learned from several scans of one object; expect a model that knows neither"
         )
-    return doubts
+    elif few := store.scan_count - int(usable.sum()):
+        without = int((usable == 0).sum())
+        doubts.append(
+            f"{store.named}: {few:,} of {store.scan_count:,} scans have fewer than {least} points"
+            f" and are not trained on; {without:,} of {len(store):,} tracks have no others"
+        )
+    return doubts if made_for != kind else doubts + _doubts_of_size(store, recipe)
+
+
+def _doubts_of_size(store: Store, recipe: Recipe) -> list[str]:
+    """Where scans are far from the size of object that the preset's lengths were chosen for."""
+    rows = np.random.default_rng(0).permutation(store.scan_count)[:_SAMPLE]
+    scans = (store.scan_points(int(row)) for row in rows)
+    size = float(np.median([extent(scan) for scan in scans if len(scan)]))
+    low, high = _USUAL_M[recipe_named(recipe.name).views.sensor]
+    if low <= size <= high:
+        return []
+    return [
+        f"{store.named}: scans are {size:.3g} m across (median), but preset {recipe.name} has the"
+        f" lengths for objects of {low:g} to {high:g} m and may learn little; scale the"
+        " coordinates, or give their --unit"
+    ]

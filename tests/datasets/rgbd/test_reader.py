@@ -4,6 +4,7 @@
 
 import json
 import pickle
+import re
 import shutil
 
 import numpy as np
@@ -144,6 +145,36 @@ def test_it_is_a_source_and_travels_to_workers(tmp_path):
 refused = refusal_of(lambda root: list(all_tracks(Rgbd(root))))
 
 
+def test_a_picture_of_depths_is_no_depth_image(tmp_path):
+    """Its grey values were taken for millimetres: a chair of 6 cm, 12 cm away."""
+    write_sequence(tmp_path / "kitchen", count=2)
+    for image in (tmp_path / "kitchen" / "depth").glob("*.png"):
+        write_png(image, np.full((120, 160), 200, np.uint8))
+    refused(tmp_path, r"000000\.png: holds 8 bits a pixel, expected a 16-bit depth PNG")
+
+
+@pytest.mark.parametrize("change", [{"depth_scale": 10}, {"fx": 0.9, "fy": 0.9}])
+def test_objects_as_large_as_a_town_are_left_out(tmp_path, change):
+    """A wrong depth_scale (the images have 10,000 a metre); focal lengths in image widths."""
+    write_sequence(tmp_path / "kitchen", count=2)
+    (tmp_path / "kitchen" / "camera.json").write_text(json.dumps(CAMERA | change))
+    source = Rgbd(tmp_path)
+    assert list(all_tracks(source)) == []
+    assert source.rejected["scan: over 100 m across: check the unit, or depth_scale"] == 4
+
+
+def test_a_camera_of_images_of_another_size_is_doubted(tmp_path):
+    write_sequence(tmp_path / "kitchen", count=1)
+    source = Rgbd(tmp_path)
+    assert list(all_tracks(source))
+    assert source.doubts == ()
+    twice = {name: 2 * CAMERA[name] for name in ("fx", "fy", "cx", "cy")}
+    (tmp_path / "kitchen" / "camera.json").write_text(json.dumps(CAMERA | twice))
+    assert list(all_tracks(source))
+    (doubt,) = source.doubts
+    assert re.search(r"camera\.json: cx 157\.4, cy 122\.4 .* 160 x 120 pixels", doubt)
+
+
 def test_missing_and_damaged_files_are_named(tmp_path):
     folder = tmp_path / "kitchen"
     refused(
@@ -161,6 +192,8 @@ def test_missing_and_damaged_files_are_named(tmp_path):
     refused(tmp_path, r"camera\.json: lacks cx, cy")
     camera.write_text(json.dumps(CAMERA | {"depth_scale": 0}))
     refused(tmp_path, r"camera\.json: depth_scale is 0, expected a number above 0")
+    camera.write_text(json.dumps(CAMERA | {"depth_scale": 0.001}))
+    refused(tmp_path, r"camera\.json: depth_scale is 0\.001, .* metres in a unit, write 1000\.$")
     camera.write_text(json.dumps(CAMERA | {"width": 320}))
     refused(tmp_path, r"160 x 120 pixels, expected 320 x 120")
     camera.write_text(good[0])

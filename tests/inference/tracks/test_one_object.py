@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from scipy.spatial import KDTree
 from tests.cars import poses_of
 from tests.inference.tracks.known_car import (
     SHAPE,
@@ -68,6 +69,19 @@ def test_shapes_of_scans_turned_towards_their_object_become_denser():
     done = completed(poses_of(TRACK))[:2]
     facing = together(done, TRACK.scans, replace(SETTINGS, facing=True))
     assert len(facing[0].points) == 2 * CONFIG.points
+
+
+def test_what_exact_scans_saw_is_in_the_shape_of_their_track():
+    """As in that of one scan; without it chairs lost their legs to the mean of all views."""
+    done = completed(poses_of(TRACK))[:3]
+    apart = {}
+    for sensor in ("lidar", "camera"):
+        settings = replace(SETTINGS, facing=True, sensor=sensor)
+        found = together(done, TRACK.scans, settings)
+        trees = [KDTree(one.points) for one in found]
+        apart[sensor] = [tree.query(s)[0].mean() for tree, s in zip(trees, TRACK.scans)]
+        assert len({len(one.points) for one in found}) == 1
+    assert np.mean(apart["camera"]) < 0.5 * np.mean(apart["lidar"])
 
 
 @pytest.mark.parametrize("sensor", ["lidar", "camera"])

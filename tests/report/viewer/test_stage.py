@@ -11,7 +11,13 @@ from typing import Any, cast
 import numpy as np
 from tests.report.viewer.shown import perfect, track
 
-from wildshape.report.viewer.colours import COLOURINGS, GUESSED, by_distance, by_height
+from wildshape.report.viewer.colours import (
+    COLOURINGS,
+    GUESSED,
+    by_distance,
+    by_height,
+    completed_colours,
+)
 from wildshape.report.viewer.details import details
 from wildshape.report.viewer.registrations import BEFORE
 from wildshape.report.viewer.stage import POINTS_A_CLOUD, Stage, Wish
@@ -94,6 +100,9 @@ def test_colours_say_how_far_and_how_high() -> None:
     near, far = by_distance(points, points[:1], 0.5).astype(int)
     assert near[2] - near[0] > 100  # blue
     assert far[0] - far[2] > 100  # orange
+    small = completed_colours(GUESSED, points / 10, None, points[:1], None)
+    assert small is not None  # of an object of 10 cm its other end is far
+    assert small[1].tolist() == by_distance(points, points[:1], 0.5)[1].tolist()
     low, high = by_height(np.array([0.0, 1.0]), "#0072b2").astype(int)
     assert high.sum() > low.sum()
     assert GUESSED in COLOURINGS

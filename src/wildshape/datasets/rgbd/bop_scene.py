@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from wildshape.datasets.rgbd.depth_image import read_png
+from wildshape.datasets.rgbd.depth_image import read_depth_png
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import read_json, reading
@@ -86,7 +86,7 @@ class Scene:
             BadInputError: missing or damaged.
         """
         path = self.folder / "depth" / f"{frame.stem}.png"
-        return read_png(path, "a 16-bit depth PNG") * frame.metres
+        return read_depth_png(path) * frame.metres
 
 
 def open_scene(folder: Path) -> Scene:
@@ -100,7 +100,7 @@ def open_scene(folder: Path) -> Scene:
     first = min(truth, key=int, default=None)
     if first is None:
         raise BadInputError(f"{folder / 'scene_gt.json'}: holds no image; take another scene.")
-    size = read_png(folder / "depth" / f"{int(first):06d}.png", "a 16-bit depth PNG").shape
+    size = read_depth_png(folder / "depth" / f"{int(first):06d}.png").shape
     frames = []
     for key in sorted(truth, key=int):
         if key not in cameras:

@@ -39,6 +39,22 @@ def read_png(path: Path, what: str) -> Shaped[np.ndarray, "h w"]:
         return np.array(image)
 
 
+def read_depth_png(path: Path) -> Shaped[np.ndarray, "h w"]:
+    """The numbers in a 16-bit depth PNG, in its own unit.
+
+    Raises:
+        BadInputError: as `read_png`, or of 8 bits: a picture of depths, whose numbers are none.
+        MissingExtraError: Pillow is not installed.
+    """
+    raw = read_png(path, "a 16-bit depth PNG")
+    if raw.dtype.itemsize < 2:
+        raise BadInputError(
+            f"{path}: holds 8 bits a pixel, expected a 16-bit depth PNG; export the depths"
+            " themselves, not a picture of them."
+        )
+    return raw
+
+
 def back_project(depth: Float[np.ndarray, "h w"], camera: Intrinsics) -> Points:
     """Points `(n, 3)` float32 of the pixels with a depth: x right, y down, z forward, metres.
 

@@ -63,6 +63,7 @@ class Rgbd:
         longest: most scans of a track.
         rays: with each scan keep the rays of its frame that passed the object by, too.
         rejected: see `Source`.
+        doubts: on the camera of the sequence that was read last.
     """
 
     root: Path
@@ -72,6 +73,7 @@ class Rgbd:
     longest: int = 300
     rays: bool = False
     rejected: dict[str, int] = field(default_factory=Counter, init=False)
+    doubts: tuple[str, ...] = field(default=(), init=False)
 
     def parts(self) -> list[str]:
         """The sequences: folders with depth/ in them.
@@ -97,6 +99,7 @@ class Rgbd:
             BadInputError: camera.json, a depth image, a mask or poses.txt is missing or damaged.
         """
         sequence = open_sequence(Path(self.root) / part)
+        self.doubts = (sequence.doubt,) if sequence.doubt else ()
         sensor = Sensor("camera", intrinsics=sequence.camera)
         gathering = Gathering(self.selection, sensor, self.rejected, rays=self.rays)
         names = Names(self.gap, self.longest * self.selection.every)

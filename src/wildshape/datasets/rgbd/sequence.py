@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Shaped
 
-from wildshape.datasets.rgbd.depth_image import read_png
+from wildshape.datasets.rgbd.depth_image import read_depth_png
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import read_json
@@ -24,6 +24,7 @@ _KEYS = ("fx", "fy", "cx", "cy")
 _DEPTH_SCALE = 1000.0
 _INSTANCE = re.compile(r"[0-9]{1,9}")
 _MOST, _LEAST = 1e9, 1e-6
+_MIDDLE = (0.3, 0.7)  # of an image: where a camera's axis meets it, unless it is a part of one
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Sequence:
         Raises:
             BadInputError: damaged, or of another size than camera.json says.
         """
-        raw = read_png(path, "a 16-bit depth PNG")
+        raw = read_depth_png(path)
         self.check_size(raw, path)
         return raw / self.depth_scale
 
@@ -83,6 +84,19 @@ class Sequence:
         alone = sorted(folder.glob(f"*/{stem}.png"), key=lambda file: file.parent.name)
         return [(_number(file.parent), file) for file in alone]
 
+    @property
+    def doubt(self) -> str:
+        """A sentence where the camera seems to be of images of another size; else nothing."""
+        camera, (low, high) = self.camera, _MIDDLE
+        across, down = camera.cx / camera.width, camera.cy / camera.height
+        if low <= min(across, down) and max(across, down) <= high:
+            return ""
+        return (
+            f"{self.folder / 'camera.json'}: cx {camera.cx - 0.5:g}, cy {camera.cy - 0.5:g} lie far"
+            f" from the middle of images of {camera.width} x {camera.height} pixels; if they are of"
+            " another size, scale fx, fy, cx and cy with them"
+        )
+
     def place(self, frame: int, points: Points) -> Float[np.ndarray, "3"] | None:
         """Where the middle of some points lies in the world, metres, if the camera's pose says."""
         if self.T_world_camera is None or not len(points):
@@ -106,13 +120,13 @@ def open_sequence(folder: Path) -> Sequence:
         raise BadInputError(f"{folder / 'masks'}: no such folder; a sequence keeps its masks here.")
     expected = f"JSON with {', '.join(_KEYS)} and depth_scale"
     raw = read_json(folder / "camera.json", expected, dict)
-    size = read_png(depth[0], "a 16-bit depth PNG").shape[::-1]
+    size = read_depth_png(depth[0]).shape[::-1]
     poses = folder / "poses.txt"
     return Sequence(
         folder,
         depth,
         _camera(raw, (int(size[0]), int(size[1])), folder / "camera.json"),
-        _positive(raw.get("depth_scale", _DEPTH_SCALE), "depth_scale", folder / "camera.json"),
+        _depth_scale(raw.get("depth_scale", _DEPTH_SCALE), folder / "camera.json"),
         _categories(folder / "objects.json"),
         read_poses(poses, len(depth)) if poses.exists() else None,
     )
@@ -148,6 +162,17 @@ def _camera(raw: dict[str, Any], size: tuple[int, int], path: Path) -> Intrinsic
 
 
 _SIZES = ("width", "height")
+
+
+def _depth_scale(value: object, path: Path) -> float:
+    """Units in a metre; no image of 16 bits has units larger than metres."""
+    scale = _positive(value, "depth_scale", path)
+    if scale < 1:
+        raise BadInputError(
+            f"{path}: depth_scale is {scale:g}, expected the units in a metre; if it is metres in a"
+            f" unit, write {1 / scale:g}."
+        )
+    return scale
 
 
 def _positive(value: object, key: str, path: Path) -> float:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from wildshape.datasets.rgbd.depth_image import read_png
+from wildshape.datasets.rgbd.depth_image import read_depth_png
 from wildshape.datasets.shapenet.matlab import read_matrices
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
@@ -53,7 +53,7 @@ def read_view(path: Path) -> View:
     number = _NAME.fullmatch(path.name)
     if number is None:
         raise BadInputError(f"{path}: expected a name such as depth_0.png.")
-    raw = read_png(path, "a 16-bit depth PNG")
+    raw = read_depth_png(path)
     depth = np.where(raw < _STEPS, raw * (_FARTHEST / _STEPS), np.inf)
     cam = path.with_name(f"camera_{number[1]}.mat")
     found = _matrices(cam, ("extrinsic", "K"))

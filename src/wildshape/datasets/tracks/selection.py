@@ -13,6 +13,7 @@ from wildshape.records import Points, Track
 Motion = Literal["any", "moving", "parked"]
 _FARTHEST_RETURN_M = 1000.0
 _FARTHEST_M = 10_000.0
+_LARGEST_EXTENT_M = 100.0  # no command takes a larger scan
 _SECTORS, _FULL = 36, 0.9
 LARGEST_M = 21.1
 """What the shipped weights for vehicles take for one: 1.5 times the largest that they learned."""
@@ -52,8 +53,11 @@ class Selection:
             return f"scan: fewer than {least} points on the object"
         if not (np.abs(points) < _FARTHEST_M).all():  # NaN is none either
             return "scan: its points are none or farther than any sensor sees"
-        if np.linalg.norm(np.ptp(points, axis=0)) > self.largest_m:
+        sides = np.ptp(points, axis=0)
+        if np.linalg.norm(sides) > self.largest_m:
             return _too_large(points, self.largest_m)
+        if sides.max() > _LARGEST_EXTENT_M:
+            return f"scan: over {_LARGEST_EXTENT_M:g} m across: check the unit, or depth_scale"
         low, high = self.range_m
         if (low, high) == (0.0, float("inf")):
             return ""

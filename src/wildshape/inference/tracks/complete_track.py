@@ -29,7 +29,7 @@ from wildshape.inference.confidence import (
 )
 from wildshape.inference.config import BoxConfig, InferenceConfig, ReasonRule, TrackConfig
 from wildshape.inference.free_space import Rays, Sights, without_free_space
-from wildshape.inference.refine import denser, drawn_to, padded, partners
+from wildshape.inference.refine import denser, drawn_to, padded, partners, with_scan
 from wildshape.inference.tracks.heading_vote import (
     followed_signs,
     half_turn,
@@ -147,6 +147,8 @@ def complete_together(
         solid = without_free_space(shape, fit.T_sensor_object, sights)
     fitted = _box(solid, scans, fit.T_sensor_object, config.box, mirror=mirror, body=body)
     whole = _denser(shape, config) if settings.facing else shape
+    if settings.facing and not body:
+        whole = _with_scans(whole, len(shape), scans, fit.T_sensor_object, config.track)
     cost = track_cost(shape, fit.T_sensor_object, inputs, settings)
     mean = float(np.mean([item.confidence for item in done]))
     reasons = reasons_of_track(done, config.reasons) if body else ()
@@ -184,6 +186,19 @@ def _evidence(
 
 def _denser(shape: Float[Tensor, "P 3"], config: InferenceConfig) -> Float[Tensor, "Q 3"]:
     return denser(shape[None], partners(shape[None], config.refine.partner))[0]
+
+
+def _with_scans(
+    whole: Float[Tensor, "Q 3"],
+    own: int,
+    scans: list[Points],
+    T_sensor_object: SE3,
+    config: TrackConfig,
+) -> Float[Tensor, "R 3"]:
+    """A shape with points of its scans, as one scan's has its own (`with_scan`); object frame."""
+    seen = fused(scans, T_sensor_object, slice(None), config.most_points)
+    points = with_scan(whole.float().numpy(), own, seen.float().numpy())
+    return torch.from_numpy(points).to(whole)
 
 
 def _in_units(scans: list[Points], T_sensor_object: SE3, unit: float) -> tuple[list[Points], SE3]:

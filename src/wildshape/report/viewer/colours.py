@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, UInt8
 
+from wildshape.geometry.box import extent, unit_of
 from wildshape.geometry.meshing import share_colours
 from wildshape.ops.nearest import nearest
 from wildshape.records import Points
@@ -16,8 +17,8 @@ COLOURINGS = (PLAIN, CONFIDENCE, GUESSED, WRONG)
 LEGENDS = {
     PLAIN: "darker points lie lower",
     CONFIDENCE: "of the scan: orange 0, blue 1",
-    GUESSED: "blue beside a measured point, orange 0.5 m from any",
-    WRONG: "blue on the true surface, orange 0.3 m off it",
+    GUESSED: "blue beside a measured point, orange 0.5 m from any (less for objects below 5 m)",
+    WRONG: "blue on the true surface, orange 0.3 m off it (less for objects below 5 m)",
 }
 _FAR_M = {GUESSED: 0.5, WRONG: 0.3}
 
@@ -43,7 +44,7 @@ def completed_colours(
     others = {GUESSED: scan, WRONG: truth}.get(colouring)
     if others is None or not len(others):
         return None
-    return by_distance(points, others, _FAR_M[colouring])
+    return by_distance(points, others, _FAR_M[colouring] * unit_of(extent(points)))
 
 
 def by_distance(points: Points, others: Points, far: float) -> Rgb:
