@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects chosen by their error, and how they are drawn."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.cars import drive_by
@@ -46,6 +48,13 @@ def test_an_object_whose_scans_are_refused_is_drawn_without_their_fusion():
     tracks = [drive_by(scans=3, points=100)]
     results = run({"m": Refusing()}, tracks)
     assert [one.fused for one in gather(tracks, results, "m", Refusing())] == 3 * [None]
+
+
+def test_the_picture_counts_a_tracks_cloud_for_each_of_its_scans():
+    rows = (replace(completion("a", 0.1, 0.3), scans=3), completion("b", 0.5, 0.5))
+    (line,) = draw_errors(Results("none", 0, (MethodScores("m", rows, (), ()),))).axes[1].lines
+    x, y = map(np.asarray, line.get_data())
+    assert y[x <= 0.5].max() == pytest.approx(75)
 
 
 def test_examples_and_figures(tmp_path):
