@@ -10,6 +10,7 @@ from tests.cars import car_surface, drive_by, poses_of
 from wildshape.datasets.tracks.truth import (
     TruthBuilder,
     fuse_by_truth,
+    misplaced,
     shape_mirrored,
     shape_partial,
     whole_shape,
@@ -73,6 +74,19 @@ def _count(made):
     shape = made.shape if isinstance(made, Track) else made
     assert shape is not None
     return len(shape)
+
+
+def test_truth_that_is_not_where_the_scans_are_is_told():
+    track = drive_by(scans=9)
+    assert track.shape is not None
+    bare, inverse = replace(track, shape=None), poses_of(track).inverse()
+    for one in (track, bare, replace(track, shape=shape_partial(track))):
+        assert misplaced(one) == ""
+    told = "off its true shape"
+    for shape in (track.shape * np.float32(1000), track.shape + np.float32(2)):
+        assert told in misplaced(replace(track, shape=shape))
+    assert told in misplaced(replace(track, T_sensor_object=inverse))
+    assert "do not bring its scans together" in misplaced(replace(bare, T_sensor_object=inverse))
 
 
 def test_no_poses_no_truth():

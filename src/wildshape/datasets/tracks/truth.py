@@ -16,6 +16,7 @@ from wildshape.geometry.sampling import radius_inliers, statistical_inliers, vox
 from wildshape.records import Points, Track
 
 _VOXEL_M, _SMALL_M = 0.04, 2.4
+_OFF, _APART = 0.1, 4.0  # of the object's diagonal, and of the largest scan's
 
 
 def fine_voxel(points: Points) -> float:
@@ -89,6 +90,30 @@ def whole_shape(track: Track) -> Points | None:
     if track.shape is None or track.shape_kind != "partial":
         return track.shape
     return _thinned(_mirrored(track.shape))
+
+
+def misplaced(track: Track) -> str:
+    """What is odd about where true poses put the scans, or nothing.
+
+    Poses the wrong way round and shapes of another unit or frame would make figures meaningless.
+
+    Raises:
+        BadInputError: the track has no poses.
+    """
+    from scipy.spatial import KDTree
+
+    finite = [scan[np.isfinite(scan).all(axis=1)] for scan in track.scans]
+    points = fuse_by_truth(replace(track, scans=tuple(finite)))
+    if not len(points):
+        return ""
+    if track.shape is None or not len(track.shape):
+        largest = max(extent(scan) for scan in finite if len(scan))
+        apart = extent(points) > _APART * largest
+        return "its true poses do not bring its scans together" if apart else ""
+    off = float(np.median(KDTree(track.shape).query(points)[0]))
+    if off <= _OFF * min(extent(points), extent(track.shape)):
+        return ""
+    return f"by its true poses its scans lie {off:.3g} m off its true shape"
 
 
 @dataclass(frozen=True)
