@@ -11,6 +11,7 @@ import pytest
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
+from wildshape.io.poses import read_poses, write_poses
 from wildshape.io.scans import writers
 from wildshape.io.scans.points import read_points, write_ply
 
@@ -110,6 +111,20 @@ def test_a_dataset_goes_on_without_bad_scans(wildshape, dataset, trained, tmp_pa
     objects = json.loads((tmp_path / "c" / "000000" / "objects.json").read_text())
     assert [entry["scan"] for entry in objects["skipped"]] == ["000001.ply"]
     assert len((tmp_path / "c" / "000000" / "poses.txt").read_text().splitlines()) == 5
+
+
+def test_evaluate_says_that_true_poses_are_the_wrong_way_round(
+    wildshape, dataset, trained, tmp_path
+):
+    data, words = tmp_path / "data", ("--model", trained, "--baselines", "none")
+    track = shutil.copytree(dataset / "000000", data / "000000")
+    found = wildshape("evaluate", data, "--out", tmp_path / "right", *words)
+    assert found.code == 0
+    assert "true poses" not in found.err
+    write_poses(track / "poses.txt", read_poses(track / "poses.txt").inverse())
+    found = wildshape("evaluate", data, "--out", tmp_path / "wrong", *words)
+    assert "000000: by its true poses its scans lie " in found.err
+    assert "poses.txt holds T_sensor_object" in found.err
 
 
 def test_what_evaluate_cannot_read_is_counted_as_skipped(wildshape, dataset, trained, tmp_path):

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects chosen by their error, and how they are drawn."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.cars import drive_by
@@ -12,12 +14,16 @@ from wildshape.baselines.identity import OneScan
 from wildshape.baselines.pairs import Chained
 from wildshape.errors import BadInputError
 from wildshape.evaluation.examples import gather, pick
-from wildshape.evaluation.pictures import draw_errors, draw_examples, project, write_figures
-from wildshape.evaluation.protocol import run
-from wildshape.evaluation.results import (
-    MethodScores,
-    Results,
+from wildshape.evaluation.pictures import (
+    draw_confidence,
+    draw_errors,
+    draw_examples,
+    project,
+    write_figures,
 )
+from wildshape.evaluation.protocol import run
+from wildshape.evaluation.results import MethodScores, Results, together
+from wildshape.evaluation.summary import curve_of
 
 
 def test_examples_are_picked_by_error():
@@ -46,6 +52,29 @@ def test_an_object_whose_scans_are_refused_is_drawn_without_their_fusion():
     tracks = [drive_by(scans=3, points=100)]
     results = run({"m": Refusing()}, tracks)
     assert [one.fused for one in gather(tracks, results, "m", Refusing())] == 3 * [None]
+
+
+def test_the_picture_counts_a_tracks_cloud_for_each_of_its_scans():
+    rows = (replace(completion("a", 0.1, 0.3), scans=3), completion("b", 0.5, 0.5))
+    (line,) = draw_errors(Results("none", 0, (MethodScores("m", rows, (), ()),))).axes[1].lines
+    x, y = map(np.asarray, line.get_data())
+    assert y[x <= 0.5].max() == pytest.approx(75)
+
+
+def test_the_pictures_are_of_all_seeds_as_metrics_json_is():
+    rows = [
+        replace(completion(name, cd, 0.0), confidence=sure)
+        for name, cd, sure in (("a", 0.1, 0.9), ("b", 0.3, 0.2), ("a", 0.7, 0.6), ("b", 0.2, 0.1))
+    ]
+    seeds = [MethodScores("m", tuple(rows[i : i + 2]), (), ()) for i in (0, 2)]
+    other = MethodScores("selected", seeds[1].completions, (), ())
+    runs = [Results("yaw", 0, (seeds[0],)), Results("yaw", 1, (seeds[1], other))]
+    shown = together(runs)
+    assert [len(row.completions) for row in shown.methods] == [4, 2]
+    figure, curve = draw_confidence(shown), curve_of(seeds)
+    assert figure is not None
+    assert curve is not None
+    assert figure.axes[0].lines[0].get_ydata() == pytest.approx(curve.risk)
 
 
 def test_examples_and_figures(tmp_path):

@@ -252,7 +252,7 @@ def test_what_is_left_out_is_counted_with_its_reason():
         "all points equal": 2,
         "completion: refused by the method": 1,
         "completion: prediction empty or not finite": 1,
-        "completion: no true shape": 5,
+        "completion: no true poses": 5,
     }
     assert [row.scan for row in results["picky"].completions] == ["000005", "000006", "000007"]
     # Named, too.

@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables for people, and the rows that the paper prints."""
 
+from dataclasses import replace
+
 import pytest
-from tests.evaluation.scores import scores
+from tests.evaluation.scores import completion, scores
 
 from wildshape.evaluation.paper import ABLATION_ROWS, LIDAR_ROWS, VIEW_ROWS
-from wildshape.evaluation.results import (
-    Results,
-)
+from wildshape.evaluation.results import MethodScores, Results
 from wildshape.evaluation.tables import markdown, paper_markdown, write_table
 
 
@@ -25,6 +25,21 @@ def test_table_shows_every_row_what_was_left_out_and_the_paper_apart(tmp_path):
     assert "| SemanticKITTI | paper, mean of 5 seeds | 0.200 |" in text
     lines = [line for line in table.splitlines() if line.startswith("|")]
     assert len({line.count("|") for line in lines}) == 1
+
+
+def test_table_says_where_scans_have_truth_of_two_kinds():
+    mirrored = replace(completion("a", 0.1, 0.3), partial_points=150)
+    known = replace(completion("b", 0.2, 0.4), truth="shape", error_partial=None)
+    said = {
+        truths: markdown([Results("none", 0, (MethodScores("ours", rows, (), ()),))])
+        for truths, rows in {"both": (mirrored, known), "one": (mirrored, mirrored)}.items()
+    }
+    assert "Truth: mirrored and shape, " in said["both"]
+    for table in said.values():
+        assert "Mirrored truth is made of the scans" in table
+    told = "CD partial is of the scans with mirrored truth alone"
+    assert told in said["both"]
+    assert told not in said["one"]
 
 
 def test_paper_rows_add_up():

@@ -12,6 +12,7 @@ from wildshape.baselines.dpc import completer as dpc
 from wildshape.baselines.dpc.checkpoint import is_dpc
 from wildshape.baselines.dpc.completer import Dpc
 from wildshape.baselines.named import NAMES, baseline
+from wildshape.datasets.tracks.truth import misplaced
 from wildshape.errors import BadInputError
 from wildshape.evaluation.evaluate import evaluate_once, write_evaluation
 from wildshape.evaluation.method import Method
@@ -25,6 +26,7 @@ from wildshape.io.scans.points import SENSOR_METRES, Coordinates
 from wildshape.method.checkpoint import MODEL, fingerprint, weights_file
 from wildshape.ops.device import choose_device
 from wildshape.parallel.team import team
+from wildshape.records import Track
 
 OURS = "wildshape"
 """The name of our row, where it has no other."""
@@ -116,7 +118,12 @@ def compare(
     """
     baselines = {name: baseline(name) for name in options.baselines if name != "none"}
     source = open_tracks(data, options.coordinates)
-    _check_truth(source)
+    first = _first_with_poses(source)
+    if odd := misplaced(first):
+        progress.say(
+            f"{first.name}: {odd}; poses.txt holds T_sensor_object, shape.ply is in the object's"
+            " frame and of the scans' unit"
+        )
     models = load_models(options.models, options.device, raw=options.raw)
     for told in _other_sensors(source, models):
         progress.say(told)
@@ -222,9 +229,11 @@ def _other_sensors(source: TrackSource, models: Mapping[str, Model]) -> list[str
     ]
 
 
-def _check_truth(source: TrackSource) -> None:
-    if all(track.T_sensor_object is None for track in source):
-        raise BadInputError(
-            f"{source.path}: no track has true poses (poses.txt) to measure against;"
-            " complete it instead."
-        )
+def _first_with_poses(source: TrackSource) -> Track:
+    for track in source:
+        if track.T_sensor_object is not None:
+            return track
+    raise BadInputError(
+        f"{source.path}: no track has true poses (poses.txt) to measure against;"
+        " complete it instead."
+    )

@@ -100,7 +100,8 @@ def draw_errors(results: Results) -> Figure:
     rotation, cd = figure.subplots(1, 2)
     for i, scores in enumerate(results.methods):
         _draw_shares(rotation, [r.rotation_deg for r in scores.registrations], scores, i)
-        _draw_shares(cd, [r.error.cd for r in scores.completions], scores, i)
+        cds = [r.error.cd for r in scores.completions for _ in range(r.scans)]  # as in the table
+        _draw_shares(cd, cds, scores, i)
     rotation.axvline(ACCURATE_DEG, color="0.6", linestyle=":", linewidth=1)
     rotation.set_xscale("log")
     rotation.set_xlim(0.1, 180)

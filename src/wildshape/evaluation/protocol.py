@@ -171,7 +171,12 @@ def _score_scans(method: Completer, case: Case, ledger: _Ledger) -> None:
 
 def _skip_scans(case: Case, ledger: _Ledger) -> None:
     for i in range(len(case.scans)):
-        ledger.skip(case, i, "completion: no true shape")
+        ledger.skip(case, i, _no_truth(case))
+
+
+def _no_truth(case: Case) -> str:
+    """A shape alone does not help: where it lies in a scan, the true pose says."""
+    return f"completion: no true {'poses' if case.T_sensor_object is None else 'shape'}"
 
 
 def _score_canonical(method: CanonicalCompleter, case: Case, ledger: _Ledger) -> None:
@@ -223,7 +228,7 @@ def _spoken(complete: Callable[[Any, Sensor], Points], given: Any, case: Case) -
 
 def _score_whole(method: TrackCompleter, case: Case, ledger: _Ledger) -> None:
     if case.truth is None or case.T_sensor_object is None:
-        ledger.skip(case, case.middle, "completion: no true shape")
+        ledger.skip(case, case.middle, _no_truth(case))
         return
     answer = _spoken(method.complete_track, case.inputs(), case)
     T_sensor_object = case.T_sensor_object[case.middle]

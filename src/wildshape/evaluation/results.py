@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a run of the protocol found: one record a scan, and what was left out by name."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from wildshape.evaluation.metrics import BoxScore, CompletionError, RegistrationScore
@@ -108,3 +109,19 @@ class Results:
 
     def __getitem__(self, name: str) -> MethodScores:
         return next(scores for scores in self.methods if scores.name == name)
+
+
+def together(runs: Sequence[Results]) -> Results:
+    """All scans of runs that differ in their seed only, row by row, as if of the first."""
+    rows: dict[str, MethodScores] = {}
+    for row in (row for run in runs for row in run.methods):
+        known = rows.setdefault(
+            row.name, replace(row, completions=(), registrations=(), skipped=())
+        )
+        rows[row.name] = replace(
+            known,
+            completions=known.completions + row.completions,
+            registrations=known.registrations + row.registrations,
+            skipped=known.skipped + row.skipped,
+        )
+    return replace(runs[0], methods=tuple(rows.values()))

@@ -82,12 +82,14 @@ def notes(summaries: Sequence[Summary]) -> str:
     truths = sorted({summary.truth for summary in summaries if summary.truth})
     points = {summary.mean["truth_points"] for summary in summaries} - {None}
     counts = ", ".join(f"{count:.0f}" for count in sorted(p for p in points if p is not None))
-    lines = []
+    partial, lines = _partial(summaries), []
     if truths:
-        lines.append(f"Truth: {', '.join(truths)}, {counts} points (median){_partial(summaries)}.")
+        lines.append(f"Truth: {', '.join(truths)}, {counts} points (median){partial}.")
         lines.append("CD floor: 0.5 sqrt(area / count), both sides; compare CD at like counts.")
-    if "mirrored" in truths:
+    if any("mirrored" in truth for truth in truths):
         lines.append("Mirrored truth is made of the scans; clouds of them can be under the floor.")
+    if partial and any("shape" in truth for truth in truths):
+        lines.append("CD partial is of the scans with mirrored truth alone, CD of all.")
     lines += [f"{summary.name}: {summary.about}." for summary in summaries if summary.about]
     lines += [
         f"Left out, {summary.name}: {count} x {reason}."

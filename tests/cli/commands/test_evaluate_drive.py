@@ -39,6 +39,14 @@ def found(street, tmp_path):
     return folder
 
 
+def test_a_range_that_does_not_count_is_said(wildshape, street, found):
+    words = ("evaluate-drive", found, "--labels", street, "--json")
+    plain, near = wildshape(*words), wildshape(*words, "--range", "20")
+    assert json.loads(near.out)["methods"] == json.loads(plain.out)["methods"]
+    assert "--range 20 is no limit" in near.err
+    assert "--range" not in plain.err
+
+
 def test_the_truth_is_right(wildshape, street, found, tmp_path):
     out = tmp_path / "evaluation"
     said = wildshape("evaluate-drive", found, "--labels", street, "--out", out, "--json")

@@ -7,8 +7,17 @@ import pytest
 from scipy.spatial import KDTree
 from tests.cars import car_surface, drive_by, poses_of
 
-from wildshape.datasets.tracks.truth import fuse_by_truth, shape_mirrored, shape_partial
+from wildshape.datasets.tracks.truth import (
+    TruthBuilder,
+    fuse_by_truth,
+    misplaced,
+    shape_mirrored,
+    shape_partial,
+    whole_shape,
+)
 from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.records import Track
 
 
 def test_scans_of_a_drive_meet_on_the_objects_surface():
@@ -42,6 +51,42 @@ def test_outliers_and_ground_are_removed_and_the_cloud_is_thin():
     assert shape[:, 2].min() >= -0.4
     cells = np.floor(fuse_by_truth(track) / 0.1)
     assert len(shape) <= len(np.unique(cells, axis=0))
+
+
+@pytest.mark.parametrize("size", [0.2, 0.02])
+def test_the_truth_of_small_objects_is_about_as_dense_as_that_of_vehicles(size):
+    track = drive_by(scans=9)
+    assert track.shape is not None
+    poses = poses_of(track)
+    small = replace(
+        track,
+        scans=tuple(scan * np.float32(size) for scan in track.scans),
+        T_sensor_object=SE3(poses.rotation, poses.translation * size),
+        shape=track.shape * np.float32(size),
+        shape_kind="partial",
+    )
+    for made in (shape_partial, shape_mirrored, whole_shape, TruthBuilder().with_shape):
+        few, many = (_count(made(one)) for one in (small, replace(track, shape_kind="partial")))
+        assert few > many / 2
+
+
+def _count(made):
+    shape = made.shape if isinstance(made, Track) else made
+    assert shape is not None
+    return len(shape)
+
+
+def test_truth_that_is_not_where_the_scans_are_is_told():
+    track = drive_by(scans=9)
+    assert track.shape is not None
+    bare, inverse = replace(track, shape=None), poses_of(track).inverse()
+    for one in (track, bare, replace(track, shape=shape_partial(track))):
+        assert misplaced(one) == ""
+    told = "off its true shape"
+    for shape in (track.shape * np.float32(1000), track.shape + np.float32(2)):
+        assert told in misplaced(replace(track, shape=shape))
+    assert told in misplaced(replace(track, T_sensor_object=inverse))
+    assert "do not bring its scans together" in misplaced(replace(bare, T_sensor_object=inverse))
 
 
 def test_no_poses_no_truth():

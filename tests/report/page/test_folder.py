@@ -10,6 +10,11 @@ import pytest
 import torch
 
 from wildshape.errors import BadInputError
+from wildshape.evaluation.drives.found import Found, FoundDrive
+from wildshape.evaluation.drives.labels import Counting, Label, LabelledDrive, LabelledFrame
+from wildshape.evaluation.drives.overlap import UprightBox
+from wildshape.evaluation.drives.protocol import evaluate_drives
+from wildshape.evaluation.drives.results import write_results
 from wildshape.evaluation.tables import COUNTED
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
@@ -232,6 +237,21 @@ def test_folder_without_anything_to_report_is_refused(tmp_path: Path, content: s
         (tmp_path / "metrics.json").write_text(content, encoding="utf-8")
     with pytest.raises(BadInputError, match=tmp_path.name):
         report_from_folder(tmp_path)
+
+
+def test_an_evaluation_of_drives_has_the_figures_of_its_table(tmp_path: Path) -> None:
+    box = UprightBox(15.0, 2.0, -0.9, 4.0, 1.8, 1.5, 0.1)
+    label = LabelledFrame((Label(4, True, box, True),), np.empty((0, 4)))
+    labelled = LabelledDrive(Path("labels"), (label,) * 3, (), None, None, Counting())
+    frames = ((Found("0", 0.9, box._replace(length=4.2)),), (Found("1", 0.8, box),), ())
+    scores = evaluate_drives([FoundDrive(Path("none"), frames, None)], [labelled])
+    written = write_results(tmp_path, scores, Counting(), {})
+    lines = [line.strip("| ").split(" | ") for line in written.splitlines() if line[:1] == "|"]
+    (table,) = report_from_folder(tmp_path).tables
+    assert list(table.columns) == [*lines[0], *lines[5][1:]]
+    assert list(table.rows[0]) == [*lines[2], *lines[7][1:]]
+    assert "66.7" in table.rows[0]
+    assert "3 labels of 1 vehicles" in table.caption
 
 
 def test_scans_that_are_named_must_be_there(tmp_path: Path) -> None:

@@ -59,7 +59,7 @@ def run(settings: Settings) -> None:
     Raises:
         BadInputError: drives or labels that cannot be used, or that do not belong together.
     """
-    from wildshape.cli.terminal import TERMINAL, answer
+    from wildshape.cli.terminal import TERMINAL, answer, say
     from wildshape.evaluation.drives.found import drives_of, read_found
     from wildshape.evaluation.drives.labels import Counting, read_labels
     from wildshape.evaluation.drives.protocol import evaluate_drives
@@ -76,6 +76,8 @@ def run(settings: Settings) -> None:
             found.append(read_found(folder, len(labelled[-1].frames)))
             bar.at(len(found))
         scores = evaluate_drives(found, labelled, lambda rows: bar.at(len(found) + rows))
+    if settings.range != Counting.range_m and any(one.view is None for one in labelled):
+        say(f"--range {settings.range:g} is no limit where labels are of all around, as these are")
     made = {**provenance(command_line()), "settings": _identity(settings)}
     if settings.out is not None:
         _write(settings, scores, counting, made)

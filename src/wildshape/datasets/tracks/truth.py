@@ -11,10 +11,22 @@ from typing import Literal
 import numpy as np
 
 from wildshape.errors import BadInputError
+from wildshape.geometry.box import extent
 from wildshape.geometry.sampling import radius_inliers, statistical_inliers, voxel_thin
 from wildshape.records import Points, Track
 
-VOXEL_M = 0.04
+_VOXEL_M, _SMALL_M = 0.04, 2.4
+_OFF, _APART = 0.1, 4.0  # of the object's diagonal, and of the largest scan's
+
+
+def fine_voxel(points: Points) -> float:
+    """Edge of the cubes that a true shape is thinned by, metres.
+
+    0.04; less for what has a diagonal under 2.4 m: of an object of unit size, cubes for vehicles
+    would leave a few hundred points, of a hand's breadth a dozen.
+    """
+    diagonal = extent(points) if len(points) else 0.0
+    return _VOXEL_M * min(1.0, (diagonal or _SMALL_M) / _SMALL_M)
 
 
 def fuse_by_truth(track: Track) -> Points:
@@ -30,28 +42,36 @@ def fuse_by_truth(track: Track) -> Points:
     return np.concatenate(moved) if moved else np.zeros((0, 3), np.float32)
 
 
-def shape_partial(track: Track, *, floor: float | None = None, voxel: float = VOXEL_M) -> Points:
+def shape_partial(
+    track: Track, *, floor: float | None = None, voxel: float | None = None
+) -> Points:
     """What the sensor saw of the object over the track: `(g, 3)` in the object frame, metres.
 
     Args:
         track: with poses, x forward along the object's heading.
         floor: object-frame height under which points are ground; None where the reader has
             already removed it.
-        voxel: edge of the cubes the cloud is thinned by, metres.
+        voxel: edge of the cubes the cloud is thinned by, metres; None: `fine_voxel`.
 
     Raises:
         BadInputError: the track has no poses.
     """
-    return voxel_thin(_clean(track, floor), voxel)
+    return _thinned(_clean(track, floor), voxel)
 
 
-def shape_mirrored(track: Track, *, floor: float | None = None, voxel: float = VOXEL_M) -> Points:
+def shape_mirrored(
+    track: Track, *, floor: float | None = None, voxel: float | None = None
+) -> Points:
     """`shape_partial` with its reflection at the object's own x-z plane (y -> -y) added.
 
     Raises:
         BadInputError: the track has no poses.
     """
-    return voxel_thin(_mirrored(_clean(track, floor)), voxel)
+    return _thinned(_mirrored(_clean(track, floor)), voxel)
+
+
+def _thinned(points: Points, voxel: float | None = None) -> Points:
+    return voxel_thin(points, fine_voxel(points) if voxel is None else voxel)
 
 
 def _mirrored(points: Points) -> Points:
@@ -69,7 +89,31 @@ def whole_shape(track: Track) -> Points | None:
     """The track's shape, with its reflection where it is `partial`: what errors are against."""
     if track.shape is None or track.shape_kind != "partial":
         return track.shape
-    return voxel_thin(_mirrored(track.shape), VOXEL_M)
+    return _thinned(_mirrored(track.shape))
+
+
+def misplaced(track: Track) -> str:
+    """What is odd about where true poses put the scans, or nothing.
+
+    Poses the wrong way round and shapes of another unit or frame would make figures meaningless.
+
+    Raises:
+        BadInputError: the track has no poses.
+    """
+    from scipy.spatial import KDTree
+
+    finite = [scan[np.isfinite(scan).all(axis=1)] for scan in track.scans]
+    points = fuse_by_truth(replace(track, scans=tuple(finite)))
+    if not len(points):
+        return ""
+    if track.shape is None or not len(track.shape):
+        largest = max(extent(scan) for scan in finite if len(scan))
+        apart = extent(points) > _APART * largest
+        return "its true poses do not bring its scans together" if apart else ""
+    off = float(np.median(KDTree(track.shape).query(points)[0]))
+    if off <= _OFF * min(extent(points), extent(track.shape)):
+        return ""
+    return f"by its true poses its scans lie {off:.3g} m off its true shape"
 
 
 @dataclass(frozen=True)
@@ -86,7 +130,7 @@ class TruthBuilder:
             that have not already done so.
         lowest: share of the points that may lie under the ground from which `strip` counts: one
             stray point must not be what it is measured from.
-        voxel: edge of the cubes that the shape is thinned by, metres.
+        voxel: edge of the cubes that the shape is thinned by, metres; None: `fine_voxel`.
     """
 
     kind: Literal["partial", "mirrored"] = "partial"
@@ -95,7 +139,7 @@ class TruthBuilder:
     neighbours: int = 8
     strip: float = 0.0
     lowest: float = 0.005
-    voxel: float = VOXEL_M
+    voxel: float | None = None
 
     def with_shape(self, track: Track) -> Track | None:
         """The track with its shape.
@@ -109,7 +153,7 @@ class TruthBuilder:
             points = _mirrored(points)
         if not len(points):
             return None
-        return replace(track, shape=voxel_thin(points, self.voxel), shape_kind=self.kind)
+        return replace(track, shape=_thinned(points, self.voxel), shape_kind=self.kind)
 
     def _clean(self, points: Points) -> Points:
         if self.outliers == "statistical":

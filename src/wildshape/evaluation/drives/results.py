@@ -10,12 +10,17 @@ from typing import Any
 import numpy as np
 
 from wildshape.evaluation.drives.labels import Counting
-from wildshape.evaluation.drives.protocol import DriveScores, RowScores
+from wildshape.evaluation.drives.protocol import DriveScores
 from wildshape.evaluation.tables import pipe_table
 from wildshape.io.atomic import write_json, write_text
 
 FORMAT = 1
 FILES = ("metrics.json", "vehicles.json", "table.md")
+DETECTION = (
+    *(f"AP {name}" for name in ("BEV 0.5", "BEV 0.7", "3D 0.5", "3D 0.7")),
+    "recall at 90 %",
+)
+TRACKING = ("HOTA", "switches", "tracks a vehicle", "impure", "length, width, height, m")
 UNITS = {
     "average_precision": "0 to 1, area under the envelope of precision over recall",
     "recall_at_90": "0 to 1, largest recall at a precision of 0.9 or more",
@@ -66,34 +71,33 @@ def write_results(
 
 def markdown(scores: DriveScores, counting: Counting) -> str:
     """Detection, tracking, and what counted."""
-    heading = ["boxes", *(f"AP {name}" for name in ("BEV 0.5", "BEV 0.7", "3D 0.5", "3D 0.7"))]
-    detection = pipe_table([*heading, "recall at 90 %"], [_detection(row) for row in scores.rows])
-    heading = [
-        "boxes",
-        "HOTA",
-        "switches",
-        "tracks a vehicle",
-        "impure",
-        "length, width, height, m",
-    ]
-    tracking = pipe_table(heading, [_tracking(row) for row in scores.rows])
-    return f"{detection}\n\n{tracking}\n\n{_notes(scores, counting)}\n"
+    found = as_json(scores, counting, {})
+    rows = found["methods"].items()
+    detection = [[name, *detection_cells(figures)] for name, figures in rows]
+    tracking = [[name, *tracking_cells(figures)] for name, figures in rows]
+    tables = (
+        pipe_table(["boxes", *DETECTION], detection),
+        pipe_table(["boxes", *TRACKING], tracking),
+    )
+    return "\n\n".join((*tables, "\n".join(f"- {line}" for line in notes(found)))) + "\n"
 
 
-def _detection(row: RowScores) -> list[str]:
-    precisions = [_percent(one.average_precision) for one in row.detections]
-    return [row.name, *precisions, _percent(row.detections[0].recall_at_90)]
+def detection_cells(figures: Mapping[str, Any]) -> list[str]:
+    """The `DETECTION` of a row of `metrics.json`."""
+    detections = figures["detections"]
+    precisions = [_percent(one["average_precision"]) for one in detections]
+    return [*precisions, _percent(detections[0]["recall_at_90"])]
 
 
-def _tracking(row: RowScores) -> list[str]:
-    tracks = row.purity.tracks_per_vehicle
-    bias = row.size_bias_m
+def tracking_cells(figures: Mapping[str, Any]) -> list[str]:
+    """The `TRACKING` of a row of `metrics.json`."""
+    purity, bias = figures["purity"], figures["size_bias_m"]
+    tracks = purity["tracks_per_vehicle"]
     return [
-        row.name,
-        _percent(None if row.hota is None else row.hota.hota),
-        str(row.identity_switches),
+        _percent(None if figures["hota"] is None else figures["hota"]["hota"]),
+        str(figures["identity_switches"]),
         _DASH if tracks is None else f"{tracks:.2f}",
-        str(row.purity.impure_tracks),
+        str(purity["impure_tracks"]),
         _DASH if bias is None else " ".join(f"{side:+.2f}" for side in bias),
     ]
 
@@ -102,25 +106,27 @@ def _percent(value: float | None) -> str:
     return _DASH if value is None else f"{100 * value:.1f}"
 
 
-def _notes(scores: DriveScores, counting: Counting) -> str:
-    ours = scores.rows[0]
+def notes(found: Mapping[str, Any]) -> list[str]:
+    """What the figures of `metrics.json` are of, a sentence or two each."""
+    ours = next(iter(found["methods"].values()))
     lines = [
-        f"Counted: {ours.labels} labels of {ours.purity.vehicles} vehicles with"
-        f" {counting.points} points or more; {ours.purity.vehicles_found} vehicles found.",
+        f"Counted: {ours['labels']} labels of {ours['purity']['vehicles']} vehicles with"
+        f" {found['counting']['points']} points or more;"
+        f" {ours['purity']['vehicles_found']} vehicles found.",
         "AP in percent; recall in percent at IoU 0.5 in bird's eye view (BEV), as HOTA's overlap.",
         "Length, width, height: mean of found minus labelled.",
     ]
     for correction, said in _CORRECTED.items():
-        if drives := scores.corrections.count(correction):
+        if drives := found["corrections"].count(correction):
             lines.append(f"Drives corrected for motion: {drives}; {said}.")
-    known = [one for one in scores.trajectories if one is not None]
-    drifts = [one.drift_percent for one in known if one.drift_percent is not None]
+    known = [one for one in found["trajectories"] if one is not None]
+    drifts = [one["drift_percent"] for one in known if one["drift_percent"] is not None]
     if known:
         drift = f"{np.mean(drifts):.2f} %, at most {max(drifts):.2f} %" if drifts else _DASH
         lines.append(
-            f"Trajectory: drift {drift} of {sum(one.way_m for one in known):.0f} m; ATE"
-            f" {np.mean([one.ate_m for one in known]):.3f} m; RPE"
-            f" {np.mean([one.rpe_m for one in known]):.4f} m,"
-            f" {np.mean([one.rpe_deg for one in known]):.3f} degrees."
+            f"Trajectory: drift {drift} of {sum(one['way_m'] for one in known):.0f} m; ATE"
+            f" {np.mean([one['ate_m'] for one in known]):.3f} m; RPE"
+            f" {np.mean([one['rpe_m'] for one in known]):.4f} m,"
+            f" {np.mean([one['rpe_deg'] for one in known]):.3f} degrees."
         )
-    return "\n".join(f"- {line}" for line in lines)
+    return lines

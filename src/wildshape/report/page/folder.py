@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""A report of whatever `complete`, `register`, `evaluate` and `train` left in a folder.
+"""A report of whatever `complete`, `register`, `train` and evaluations left in a folder.
 
 Looked for in the folder and two levels below: metrics.json with the figures beside it, log.jsonl,
 wildshape.json, and track folders with objects.json, completed/, poses.txt. What is absent is left

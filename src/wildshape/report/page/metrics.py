@@ -8,6 +8,13 @@ from typing import Any
 import numpy as np
 
 from wildshape.baselines.named import NAMES
+from wildshape.evaluation.drives.results import (
+    DETECTION,
+    TRACKING,
+    detection_cells,
+    notes,
+    tracking_cells,
+)
 from wildshape.evaluation.protocol import ONE_SCAN
 from wildshape.evaluation.summary import FIGURES
 from wildshape.evaluation.tables import COUNTED, ROTATE, cell
@@ -20,6 +27,24 @@ _SURE = 0.5
 
 def metrics_table(metrics: Mapping[str, Any]) -> Table:
     """The content of `metrics.json` as a table; our rows, those of no baseline, are bold."""
+    return _of_drives(metrics) if "trajectories" in metrics else _of_tracks(metrics)
+
+
+def _of_drives(metrics: Mapping[str, Any]) -> Table:
+    """What `evaluate-drive` wrote, as its table.md has it."""
+    return Table(
+        title="Drives against labels",
+        columns=("boxes", *DETECTION, *TRACKING),
+        rows=tuple(
+            (name, *detection_cells(figures), *tracking_cells(figures))
+            for name, figures in metrics["methods"].items()
+        ),
+        caption=" ".join(notes(metrics)).replace("**", ""),
+        emphasis=(0,),
+    )
+
+
+def _of_tracks(metrics: Mapping[str, Any]) -> Table:
     methods: dict[str, dict[str, Any]] = dict(metrics.get("methods") or {})
     known = {name for row in methods.values() for name in row if row[name] is not None}
     columns = [figure for figure in FIGURES if figure.heading and figure.name in known]
