@@ -110,7 +110,7 @@ def test_rays_of_another_unit_than_the_scans_are_refused(
     track: Track, tmp_path: Path, times: float
 ) -> None:
     """Nothing noticed; all of the object was taken for free space, or for hidden."""
-    scan = track.scans[0] + np.float32((10, 2, 0))
+    scan = track.scans[0] + np.array((10, 2, 0), np.float32)
     beside = scan[:, None] * np.linspace(0.8, 3.0, 4, dtype=np.float32)[None, :, None]
     rays = SightLines.of_returns(beside.reshape(-1, 3))
     write_track(tmp_path / "t", replace(track.part([0]), scans=(scan,), rays=(rays,)))

@@ -188,6 +188,7 @@ def test_a_clock_that_was_set_back(turns, tmp_path):
             record[0] -= 1.0
 
     drive = open_drive(rewrite(path, set_back))
+    assert drive.times is not None
     assert np.diff(drive.times) == pytest.approx([PERIOD, PERIOD, 2 * PERIOD, PERIOD], abs=1e-3)
     assert "the clock of street.pcap was set back by 1 s; later turns" in drive.warnings[1]
 

@@ -198,7 +198,8 @@ def _of_one_sensor(topic: str, scans: list[_Scan]) -> tuple[list[_Scan], tuple[s
 def _in_order(topic: str, scans: list[_Scan], told: tuple[str, ...]) -> Bag:
     """A bag of scans sorted in time, one an instant."""
     stamped = all(scan.stamped for scan in scans)
-    if stamped and (back := _set_back(scans)):
+    recorded = sorted(scans, key=lambda scan: scan.logged)  # file 10 comes before file 2
+    if stamped and (back := _set_back(recorded)):
         stamped = False
         told += (
             f"the stamps of {topic} fall by {back / 1e9:.2g} s between scans that were recorded one"
