@@ -112,8 +112,9 @@ class HeadingVoteConfig:
 
     Attributes:
         neighbours: scans on either side that are compared.
-        own_alike: weight of what a scan found for itself, in neighbours posed alike, for each nat
-            of being sure: a sensor may turn a corner between two scans.
+        own_alike: what a scan found for itself weighs as so many neighbours posed alike, times
+            -log(1 - p) of being right: a sensor may turn a corner between two scans.
+        own_most: no scan weighs as one with a larger logarithm.
         slow_deg: tracks of which three quarters of the neighbours turn by less follow each other.
         far_m: misfits count no further than this.
         same_side_m: two scans that lie worse on each other than this see different sides.
@@ -126,6 +127,7 @@ class HeadingVoteConfig:
 
     neighbours: int = 5
     own_alike: float = 0.2
+    own_most: float = 5.0
     slow_deg: float = 15.0
     far_m: float = 0.4
     same_side_m: float = 0.1

@@ -2,13 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """What each voice in the vote on a heading is worth."""
 
+import itertools
 import math
 
+import pytest
 import torch
 
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.inference.config import HeadingVoteConfig
 from wildshape.inference.tracks.heading_vote import (
+    continuous_signs,
     followed_signs,
     half_turn,
     likeness_of_next,
@@ -65,7 +68,30 @@ def test_a_sensor_that_turns_a_corner_turns_no_scan_that_is_sure_of_itself():
     assert followed_signs(rotation_z(yaw), sure).tolist() == [1.0] * 8
 
 
-def test_neighbours_turn_one_scan_around_however_sure_it_is():
-    yaw = torch.deg2rad(torch.tensor([19.0] * 4 + [199.0] + [19.0] * 3, dtype=torch.float64))
-    sure = torch.tensor([0.9] * 4 + [1.0] + [0.9] * 3, dtype=torch.float64)
-    assert followed_signs(rotation_z(yaw), sure).tolist() == [1.0] * 4 + [-1.0] + [1.0] * 3
+def test_neighbours_turn_scans_around_however_sure_these_are():
+    """Eight of 128 that follow each other: by an eigenvector a scan weighs the more, the more there
+    are."""
+    yaw = torch.deg2rad(2.0 * torch.arange(128, dtype=torch.float64))
+    back = torch.zeros(128, dtype=torch.bool)
+    back[60:68] = True
+    rotation = rotation_z(torch.where(back, yaw + torch.pi, yaw))
+    sure = torch.full((128,), 0.99, dtype=torch.float64)
+    assert torch.equal(followed_signs(rotation, sure) < 0, back)
+
+
+def test_the_signs_have_the_most_votes():
+    """Of all there are, for poses that turn at random and speak for or against themselves."""
+    generator = torch.Generator().manual_seed(0)
+    reach = HeadingVoteConfig().neighbours
+    for count in (1, 2, 5, 9):
+        rotation = rotation_z(6.28 * torch.rand(count, generator=generator, dtype=torch.float64))
+        own = torch.rand(count, generator=generator, dtype=torch.float64) - 0.3
+        alike = ((rotation[:, None] * rotation).sum((-2, -1)) - 1) / 2
+        near = alike.triu(1) - alike.triu(reach + 1)
+
+        def votes(signs):
+            return float(signs @ own + signs @ near @ signs)  # noqa: B023
+
+        every = itertools.product((1.0, -1.0), repeat=count)
+        most = max(votes(torch.tensor(signs, dtype=torch.float64)) for signs in every)
+        assert votes(continuous_signs(rotation, own)) == pytest.approx(most)

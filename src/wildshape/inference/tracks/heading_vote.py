@@ -11,6 +11,7 @@ same. The track's mean shape is asked, too, which knows front from back better t
 scan, and what a scan found for itself counts the more the surer it is.
 """
 
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -19,7 +20,7 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import HeadingVoteConfig
 from wildshape.ops.nearest import nearest
 
-_FEWEST, _SMALLEST_M, _STRETCH, _SUREST = 4, 1e-9, 128, 0.993
+_FEWEST, _SMALLEST_M = 4, 1e-9
 _DEFAULT = HeadingVoteConfig()
 
 
@@ -42,8 +43,8 @@ def continuous_signs(
 ) -> Float[Tensor, "V"]:
     """+1 or -1 for each pose: turn those of -1 by a half turn and few neighbours are opposed.
 
-    A problem of signs (Z2 synchronisation), solved by the leading eigenvector. That of a long track
-    would be all but zero in most of it: stretches are solved that overlap by half.
+    A problem of signs (Z2 synchronisation) among neighbours in time, solved exactly: the best signs
+    up to a scan are kept for each choice of the last ones (Viterbi's algorithm).
 
     Args:
         rotation: `R_sensor_object`, in time order.
@@ -51,29 +52,25 @@ def continuous_signs(
             way all look is left open.
         config: which neighbours are compared.
     """
-    own = rotation.new_zeros(len(rotation)) if own is None else own
-    signs = _leading_signs(rotation[:_STRETCH], own[:_STRETCH], config)
-    for start in range(_STRETCH // 2, len(rotation) - _STRETCH // 2, _STRETCH // 2):
-        part = slice(start, start + _STRETCH)
-        more = _leading_signs(rotation[part], own[part], config)
-        known = len(signs) - start
-        more = more if float((signs[start:] * more[:known]).sum()) >= 0 else -more
-        signs = torch.cat((signs, more[known:]))
-    return signs if float((signs * own).sum()) >= 0 else -signs
-
-
-def _leading_signs(
-    rotation: Float[Tensor, "V 3 3"], own: Float[Tensor, "V"], config: HeadingVoteConfig
-) -> Float[Tensor, "V"]:
-    """What each pose says of itself is the vote of one more member, which is never turned."""
-    relative = rotation[:, None].mT @ rotation[None]
-    cosine = (_trace(relative) - 1) / 2
-    order = torch.arange(len(rotation))
-    near = (order[:, None] - order).abs() <= config.neighbours
-    votes = torch.nn.functional.pad(cosine * near, (0, 1, 0, 1))
-    votes[:-1, -1] = votes[-1, :-1] = own
-    eigenvector = torch.linalg.eigh(votes).eigenvectors[:-1, -1]
-    return torch.where(eigenvector < 0, -torch.ones_like(eigenvector), 1.0)
+    count, reach = len(rotation), config.neighbours
+    own_votes = np.zeros(count) if own is None else own.double().numpy()
+    turns = rotation.double().reshape(count, 9).numpy()
+    # A state holds the signs of the last `reach` scans, the latest in its lowest bit.
+    states = 1.0 - 2.0 * (np.arange(1 << reach)[:, None] >> np.arange(reach) & 1)
+    score = np.zeros(len(states))
+    dropped = np.empty((count, len(states)), np.int64)
+    for i in range(count):
+        before = turns[max(i - reach, 0) : i][::-1]
+        alike = (before @ turns[i] - 1) / 2  # cosine of the angle between both poses
+        lean = own_votes[i] + states[:, : len(alike)] @ alike
+        both = np.stack((score + lean, score - lean)).reshape(2, 2, -1)  # sign, oldest sign, rest
+        dropped[i] = both.argmax(axis=1).T.ravel()
+        score = both.max(axis=1).T.ravel()
+    signs, state = rotation.new_ones(count), int(score.argmax())
+    for i in reversed(range(count)):
+        signs[i] = states[state, 0]
+        state = state >> 1 | int(dropped[i, state]) << (reach - 1)
+    return signs
 
 
 def slow(rotation: Float[Tensor, "V 3 3"], config: HeadingVoteConfig = _DEFAULT) -> bool:
@@ -97,15 +94,15 @@ def followed_signs(
     weights: Float[Tensor, "V"],
     config: HeadingVoteConfig = _DEFAULT,
 ) -> Float[Tensor, "V"]:
-    """+1 or -1 for each scan of a `slow` track: turn those of -1 around, and all are posed one way.
+    """+1 or -1 for each scan of a `slow` track: turn those of -1, and most are posed one way.
 
     Args:
         rotation: `R_sensor_object`, as each scan found it.
         weights: how sure each scan is of its own pose, 0 to 1.
         config: which neighbours are compared.
     """
-    odds = -(1 - weights.clamp_max(_SUREST)).log()
-    return continuous_signs(rotation, config.own_alike * odds, config)
+    nats = -(1 - weights).log().clamp_min(-config.own_most)
+    return continuous_signs(rotation, config.own_alike * nats, config)
 
 
 def voted_signs(
