@@ -15,9 +15,11 @@ import numpy as np
 import torch
 from experiments.trust_data import Both, Known, of_street, of_tracks
 
+from wildshape.errors import BadInputError
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import atomic_write
 from wildshape.io.inputs import open_tracks
+from wildshape.method.trust import ScanFeatures, TrackFeatures
 from wildshape.parallel.team import team
 from wildshape.simulate.config import SimulationConfig
 from wildshape.simulate.generate import simulate_tracks
@@ -108,4 +110,8 @@ def _behind(parts: Parts, name: str, predictor: Predictor) -> Both:
 
 def _read(path: Path) -> Both:
     with np.load(path) as found:
-        return Both(*(Known(*(found[f"{p}_{n}"] for n in Known._fields)) for p in Both._fields))
+        both = Both(*(Known(*(found[f"{p}_{n}"] for n in Known._fields)) for p in Both._fields))
+    wide = [known.features.shape[1] for known in both]
+    if wide != [len(ScanFeatures._fields), *[len(TrackFeatures._fields)] * 2]:
+        raise BadInputError(f"{path}: was completed with other features; give another --out.")
+    return both

@@ -22,7 +22,7 @@ from wildshape.evaluation.pictures import (
     write_figures,
 )
 from wildshape.evaluation.protocol import run
-from wildshape.evaluation.results import MethodScores, Results, together
+from wildshape.evaluation.results import MethodScores, Results, pooled
 from wildshape.evaluation.summary import curve_of
 
 
@@ -69,7 +69,7 @@ def test_the_pictures_are_of_all_seeds_as_metrics_json_is():
     seeds = [MethodScores("m", tuple(rows[i : i + 2]), (), ()) for i in (0, 2)]
     other = MethodScores("selected", seeds[1].completions, (), ())
     runs = [Results("yaw", 0, (seeds[0],)), Results("yaw", 1, (seeds[1], other))]
-    shown = together(runs)
+    shown = pooled(runs)
     assert [len(row.completions) for row in shown.methods] == [4, 2]
     figure, curve = draw_confidence(shown), curve_of(seeds)
     assert figure is not None

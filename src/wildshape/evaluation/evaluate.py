@@ -10,7 +10,7 @@ from typing import Any
 from wildshape.evaluation.examples import gather
 from wildshape.evaluation.method import Method
 from wildshape.evaluation.protocol import run as run_protocol
-from wildshape.evaluation.results import Limits, Results, Rotate, Skipped, together
+from wildshape.evaluation.results import Limits, Results, Rotate, Skipped, pooled
 from wildshape.evaluation.summary import write_metrics, write_scores
 from wildshape.evaluation.tables import markdown, write_table
 from wildshape.io.inputs import TrackSource
@@ -78,7 +78,7 @@ def write_evaluation(
     write_scores(out, runs)
     write_table(out, runs, views=has_views(source))
     write_metrics(out, runs, provenance)
-    write_figures(out, together(runs), gather(source, runs[0], *drawn))
+    write_figures(out, pooled(runs), gather(source, runs[0], *drawn))
     return markdown(runs)
 
 

@@ -111,7 +111,7 @@ class Results:
         return next(scores for scores in self.methods if scores.name == name)
 
 
-def together(runs: Sequence[Results]) -> Results:
+def pooled(runs: Sequence[Results]) -> Results:
     """All scans of runs that differ in their seed only, row by row, as if of the first."""
     rows: dict[str, MethodScores] = {}
     for row in (row for run in runs for row in run.methods):

@@ -221,7 +221,9 @@ def place_confidence(
     guessed_m: float = _GUESSED_M,
     guessed: float = 0.65,
 ) -> Float[np.ndarray, "n"]:
-    """The chance that each place lies within 20 cm of the true surface, 0 to 1, roughly.
+    """The chance that each place of a vehicle lies within 20 cm of the true surface, roughly.
+
+    Of smaller objects, with a smaller `guessed_m`, within as much less.
 
     1 on a measured point, falling linearly with the distance to any, to `guessed` at `guessed_m`.
     Of 120,000 places of 60 simulated cars, within 20 cm of the true surface are all that lie within

@@ -23,6 +23,7 @@ from wildshape.inference.config import BoxConfig
 from wildshape.records import Box, Points
 
 _PART = 64
+_COARSE_DEG = 1.0
 _DEFAULT = BoxConfig()
 
 
@@ -102,9 +103,10 @@ def _level(shape: Float[Tensor, "P 3"], config: BoxConfig, *, body: bool) -> Flo
     That of depth views need not be level at all: nothing says what is up. There a large turn is
     taken where the rectangle becomes much smaller.
     """
-    angle, area = _least_area(shape, config.level_deg, config)
+    angle, area = _least_area(shape, config.level_deg, config.step_deg, config)
     if not body:
-        far, less = _least_area(shape, config.tipped_deg, config)
+        far, _ = _least_area(shape, config.tipped_deg, _COARSE_DEG, config)
+        far, less = _least_area(shape, _COARSE_DEG, config.step_deg, config, about=far)
         angle = far if less < (1 - config.tipped_gain) * area else angle
     c, s = angle.cos(), angle.sin()
     zero, one = torch.zeros_like(c), torch.ones_like(c)
@@ -112,12 +114,19 @@ def _level(shape: Float[Tensor, "P 3"], config: BoxConfig, *, body: bool) -> Flo
 
 
 def _least_area(
-    shape: Float[Tensor, "P 3"], most_deg: float, config: BoxConfig
+    shape: Float[Tensor, "P 3"],
+    most_deg: float,
+    step_deg: float,
+    config: BoxConfig,
+    about: Tensor | float = 0.0,
 ) -> tuple[Tensor, Tensor]:
-    """Of turns about y by up to `most_deg` the best, radians, and the area of its rectangle."""
-    steps = round(most_deg / config.step_deg)
-    angles = torch.deg2rad(torch.arange(-steps, steps + 1, dtype=shape.dtype) * config.step_deg)
-    angles = angles[angles.abs().argsort(stable=True)]  # of equals the smallest
+    """Of turns about y by up to `most_deg` from `about` the best, and its rectangle's area.
+
+    Turns are in radians but for `most_deg` and `step_deg`.
+    """
+    steps = round(most_deg / step_deg)
+    angles = torch.deg2rad(torch.arange(-steps, steps + 1, dtype=shape.dtype) * step_deg)
+    angles = angles[angles.abs().argsort(stable=True)] + about  # of equals the smallest
     cos, sin = angles.cos()[:, None], angles.sin()[:, None]
     x, _, z = shape.T.contiguous()
     strays = config.strays

@@ -104,7 +104,7 @@ def _rays_seen(
     centre: Float[Tensor, "3"],
     config: RayConfig,
 ) -> Float[Tensor, "R 6"]:
-    """Rays of a sensor at the origin, or beside it: no network has seen those from another side."""
+    """Rays of a sensor at the origin, or beside it: shipped weights have seen no others."""
     if rays is None:
         return centre.new_zeros(config.count, 3 + KINDS)
     found = rays.returned

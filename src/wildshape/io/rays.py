@@ -17,7 +17,7 @@ from wildshape.io.scans.points import METRES, SENSOR_METRES, Coordinates
 from wildshape.records import Points
 
 _FEWEST = 20  # rays that tell a unit
-_MOST = 30.0  # of real rays 5 % end before 1.6 times the object's distance, half behind 0.4
+_FARTHER, _NEARER = 60.0, 30.0  # a cup in a hall: 31; of drives 5 % end before 2.8 times as far
 
 _NEEDED, _OPTIONAL = ("directions", "ranges"), "origins"
 
@@ -60,7 +60,7 @@ def check_unit(rays: SightLines | None, scan: Points, name: str) -> None:
         name: for the error.
 
     Raises:
-        BadInputError: nearly all end 30 times as far away, or most that much nearer.
+        BadInputError: nearly all end 60 times as far away, or most 30 times as near.
     """
     came = None if rays is None else rays.returned
     if came is None or len(came) < _FEWEST or not len(scan):
@@ -68,8 +68,8 @@ def check_unit(rays: SightLines | None, scan: Points, name: str) -> None:
     middle = ((scan.mean(0) - came.starts) ** 2).sum(1)
     away = np.sqrt(middle + scan.var(axis=0).sum())  # root mean square
     low, high = np.quantile(came.ranges / away, (0.05, 0.5))
-    if low > _MOST or high < 1 / _MOST:
-        times = low if low > _MOST else high
+    if low > _FARTHER or high < 1 / _NEARER:
+        times = low if low > _FARTHER else high
         raise BadInputError(
             f"{name}: the rays end {times:.2g} times as far away as their object lies; give their"
             " ranges and origins in the unit of the scans."

@@ -160,7 +160,7 @@ def test_objects_as_large_as_a_town_are_left_out(tmp_path, change):
     (tmp_path / "kitchen" / "camera.json").write_text(json.dumps(CAMERA | change))
     source = Rgbd(tmp_path)
     assert list(all_tracks(source)) == []
-    assert source.rejected["scan: over 100 m across: check the unit, or depth_scale"] == 4
+    assert source.rejected["scan: over 100 m across: check the unit"] == 4
 
 
 def test_a_camera_of_images_of_another_size_is_doubted(tmp_path):

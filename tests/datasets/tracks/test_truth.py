@@ -46,10 +46,10 @@ def test_outliers_and_ground_are_removed_and_the_cloud_is_thin():
     track = drive_by(scans=5)
     stray = poses_of(track)[0].apply_numpy(np.array([[0, 0, 5], [9, 0, 0]], np.float32))
     track = replace(track, scans=(np.concatenate((track.scans[0], stray)), *track.scans[1:]))
-    shape = shape_partial(track, floor=-0.4, voxel=0.1)
+    shape = shape_partial(track, floor=-0.4)
     assert np.abs(shape).max() < 2.5
     assert shape[:, 2].min() >= -0.4
-    cells = np.floor(fuse_by_truth(track) / 0.1)
+    cells = np.floor(fuse_by_truth(track) / 0.04)
     assert len(shape) <= len(np.unique(cells, axis=0))
 
 

@@ -84,6 +84,18 @@ def test_what_exact_scans_saw_is_in_the_shape_of_their_track():
     assert np.mean(apart["camera"]) < 0.5 * np.mean(apart["lidar"])
 
 
+def test_a_scan_that_lies_far_off_leaves_no_points_in_the_shape_of_its_track():
+    """Its pose is wrong, which no neighbour can tell where all are far apart."""
+    done = completed(poses_of(TRACK))
+    astray = done[3].pose
+    moved = SE3(astray.rotation, astray.translation + torch.tensor((0.0, 0.0, 2.0)))
+    done[3] = replace(done[3], pose=moved, confidence=0.01)
+    found = together(done, TRACK.scans, replace(SETTINGS, facing=True, sensor="camera"))
+    T_object_sensor = found[0].pose.inverse()
+    off = KDTree(SHAPE).query(T_object_sensor.apply_numpy(found[0].points))[0]
+    assert off.max() < 0.5
+
+
 @pytest.mark.parametrize("sensor", ["lidar", "camera"])
 def test_of_objects_half_as_large_all_lengths_are_half_as_large(sensor):
     """One scan of them looks back."""

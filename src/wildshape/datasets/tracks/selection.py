@@ -8,12 +8,12 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
+from wildshape.io.scans.points import LARGEST_EXTENT_M
 from wildshape.records import Points, Track
 
 Motion = Literal["any", "moving", "parked"]
 _FARTHEST_RETURN_M = 1000.0
 _FARTHEST_M = 10_000.0
-_LARGEST_EXTENT_M = 100.0  # no command takes a larger scan
 _SECTORS, _FULL = 36, 0.9
 LARGEST_M = 21.1
 """What the shipped weights for vehicles take for one: 1.5 times the largest that they learned."""
@@ -56,8 +56,8 @@ class Selection:
         sides = np.ptp(points, axis=0)
         if np.linalg.norm(sides) > self.largest_m:
             return _too_large(points, self.largest_m)
-        if sides.max() > _LARGEST_EXTENT_M:
-            return f"scan: over {_LARGEST_EXTENT_M:g} m across: check the unit, or depth_scale"
+        if sides.max() > LARGEST_EXTENT_M:
+            return f"scan: over {LARGEST_EXTENT_M:g} m across: check the unit"
         low, high = self.range_m
         if (low, high) == (0.0, float("inf")):
             return ""

@@ -42,36 +42,31 @@ def fuse_by_truth(track: Track) -> Points:
     return np.concatenate(moved) if moved else np.zeros((0, 3), np.float32)
 
 
-def shape_partial(
-    track: Track, *, floor: float | None = None, voxel: float | None = None
-) -> Points:
+def shape_partial(track: Track, *, floor: float | None = None) -> Points:
     """What the sensor saw of the object over the track: `(g, 3)` in the object frame, metres.
 
     Args:
         track: with poses, x forward along the object's heading.
         floor: object-frame height under which points are ground; None where the reader has
             already removed it.
-        voxel: edge of the cubes the cloud is thinned by, metres; None: `fine_voxel`.
 
     Raises:
         BadInputError: the track has no poses.
     """
-    return _thinned(_clean(track, floor), voxel)
+    return _thinned(_clean(track, floor))
 
 
-def shape_mirrored(
-    track: Track, *, floor: float | None = None, voxel: float | None = None
-) -> Points:
+def shape_mirrored(track: Track, *, floor: float | None = None) -> Points:
     """`shape_partial` with its reflection at the object's own x-z plane (y -> -y) added.
 
     Raises:
         BadInputError: the track has no poses.
     """
-    return _thinned(_mirrored(_clean(track, floor)), voxel)
+    return _thinned(_mirrored(_clean(track, floor)))
 
 
-def _thinned(points: Points, voxel: float | None = None) -> Points:
-    return voxel_thin(points, fine_voxel(points) if voxel is None else voxel)
+def _thinned(points: Points) -> Points:
+    return voxel_thin(points, fine_voxel(points))
 
 
 def _mirrored(points: Points) -> Points:
@@ -130,7 +125,6 @@ class TruthBuilder:
             that have not already done so.
         lowest: share of the points that may lie under the ground from which `strip` counts: one
             stray point must not be what it is measured from.
-        voxel: edge of the cubes that the shape is thinned by, metres; None: `fine_voxel`.
     """
 
     kind: Literal["partial", "mirrored"] = "partial"
@@ -139,7 +133,6 @@ class TruthBuilder:
     neighbours: int = 8
     strip: float = 0.0
     lowest: float = 0.005
-    voxel: float | None = None
 
     def with_shape(self, track: Track) -> Track | None:
         """The track with its shape.
@@ -153,7 +146,7 @@ class TruthBuilder:
             points = _mirrored(points)
         if not len(points):
             return None
-        return replace(track, shape=_thinned(points, self.voxel), shape_kind=self.kind)
+        return replace(track, shape=_thinned(points), shape_kind=self.kind)
 
     def _clean(self, points: Points) -> Points:
         if self.outliers == "statistical":

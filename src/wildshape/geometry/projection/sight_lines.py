@@ -199,7 +199,8 @@ def seen_alike(
 
 def _are_apart(places: Float[np.ndarray, "k 3"], scan: Float[np.ndarray, "s 3"]) -> bool:
     """Whether an object is seen from different sides."""
-    return bool(len(places) and not seen_alike(places, places[0], scan.mean(0)).all())
+    middle = scan.mean(0)
+    return not all(seen_alike(places, place, middle).all() for place in places)
 
 
 def _by_origin(rays: SightLines) -> list[tuple[Float[np.ndarray, "3"], Int[np.ndarray, "k"]]]:

@@ -46,9 +46,11 @@ from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.trust import TrackFeatures
 from wildshape.method.trust_features import track_features
 from wildshape.ops.device import plain_torch
+from wildshape.ops.nearest import nearest
 from wildshape.records import Completion, Points, Sensor
 
 _LEAST_SURE = 1e-3
+_ASTRAY = 2.0  # times as far from the shape as scans usually are
 _DEFAULT = InferenceConfig()
 
 
@@ -195,9 +197,17 @@ def _with_scans(
     T_sensor_object: SE3,
     config: TrackConfig,
 ) -> Float[Tensor, "R 3"]:
-    """A shape with points of its scans, as one scan's has its own (`with_scan`); object frame."""
-    seen = fused(scans, T_sensor_object, slice(None), config.most_points)
-    points = with_scan(whole.float().numpy(), own, seen.float().numpy())
+    """A shape with points of its scans, as one scan's has its own (`with_scan`); object frame.
+
+    Scans that lie farther from it than twice the usual are left out: their poses may be wrong.
+    """
+    each = max(1, config.most_points // len(scans))
+    seen = [fused([s], T_sensor_object[i : i + 1], slice(None), each) for i, s in enumerate(scans)]
+    target = whole.float()[None]
+    off = [float(nearest(one[None], target).distance_squared.sqrt().mean()) for one in seen]
+    usual = float(np.median(off))
+    near = torch.cat([one for one, apart in zip(seen, off) if apart <= _ASTRAY * usual])
+    points = with_scan(whole.float().numpy(), own, near.numpy())
     return torch.from_numpy(points).to(whole)
 
 

@@ -173,8 +173,8 @@ def _check_pace(path: Path, turns: list[_Turn]) -> None:
     period = np.median(np.diff([turn.stamp for turn in turns])) if len(turns) > 2 else np.inf
     if abs(period) < _SHORTEST_S:
         raise BadInputError(
-            f"{path}: a turn of {period:.2g} s is none of a Velodyne; record each sensor alone or"
-            " with an address of its own, and play recordings back no faster than they were made."
+            f"{path}: a turn of {period:.2g} s is too short for a Velodyne; record each sensor alone"
+            " or with an address of its own, and play recordings back no faster than they were made."
         )
 
 
@@ -243,15 +243,19 @@ def _link(kind: int) -> Any:
     Raises:
         ValueError: none that a sensor sends through.
     """
-    from dpkt import ethernet, ip, loopback, sll, sll2
+    from dpkt import ethernet, ip, ip6, loopback, sll, sll2
+
+    def raw(record: bytes) -> Any:
+        return ip6.IP6(record) if record[:1] >= b"\x60" else ip.IP(record)  # by its version
 
     # https://www.tcpdump.org/linktypes.html; 113 and 276 are of `tcpdump -i any`
     links = {
         0: loopback.Loopback,
         1: ethernet.Ethernet,
-        101: ip.IP,
+        101: raw,
         113: sll.SLL,
-        228: ip.IP,
+        228: raw,
+        229: raw,
         276: sll2.SLL2,
     }
     if kind not in links:

@@ -60,7 +60,8 @@ SUFFIXES = tuple(_READERS)
 
 LEAST_POINTS = 16
 """Finite points that a scan has at least."""
-_LARGEST_EXTENT = 100.0
+LARGEST_EXTENT_M = 100.0
+"""No command takes a larger scan."""
 _SMALLEST_EXTENT = 0.01
 _FARTHEST = 1000.0
 _ENOUGH = 10_000  # points that tell where a scan lies
@@ -294,10 +295,10 @@ def check_one_object(points: Float[np.ndarray, "n 3"], name: str) -> None:
             "normalised coordinates (write them in metres), or a unit that does not fit "
             "(drop --unit mm if the file is in metres)."
         )
-    if extent > _LARGEST_EXTENT:
+    if extent > LARGEST_EXTENT_M:
         raise BadInputError(
             f"{name}: {extent:.4g} m across, but a scan of one object is at most "
-            f"{_LARGEST_EXTENT:g} m: "
+            f"{LARGEST_EXTENT_M:g} m: "
             "coordinates in millimetres (then pass --unit mm or cm) or degrees, or a whole scene "
             "(then cut the object out first)."
         )
