@@ -173,8 +173,9 @@ def _check_pace(path: Path, turns: list[_Turn]) -> None:
     period = np.median(np.diff([turn.stamp for turn in turns])) if len(turns) > 2 else np.inf
     if abs(period) < _SHORTEST_S:
         raise BadInputError(
-            f"{path}: a turn of {period:.2g} s is too short for a Velodyne; record each sensor alone"
-            " or with an address of its own, and play recordings back no faster than they were made."
+            f"{path}: a turn of {period:.2g} s is too short for a Velodyne; record each sensor"
+            " alone or with an address of its own, and play recordings back no faster than they"
+            " were made."
         )
 
 
