@@ -111,11 +111,12 @@ class NuScenes:
 
     def _wanted(self, scene: Scene) -> dict[str, tuple[str, str]]:
         """Name and category of the objects to be taken, by token."""
-        part = scene.name
+        short = {token[:_TOKEN_LETTERS] for token in scene.categories}
+        alike = len(short) < len(scene.categories)  # tokens of one's own may begin alike
         wanted = {}
         for token, category in scene.categories.items():
             if _is_of(category, self.selection.categories or VEHICLES):
-                name = f"{part}_{token[:_TOKEN_LETTERS]}"
+                name = f"{scene.name}_{token if alike else token[:_TOKEN_LETTERS]}"
                 wanted[token] = (name, category.removeprefix("vehicle."))
             else:
                 self.rejected[f"object: category {category}"] += 1
