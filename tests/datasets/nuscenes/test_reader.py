@@ -7,6 +7,7 @@ import os
 import pickle
 import shutil
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -72,6 +73,13 @@ def test_parts_are_scenes_and_readers_are_pickled(written, cache):
     assert source.parts() == ["scene-0061", "scene-0103"]
     assert NuScenes(written / "v1.0-mini", cache=cache).parts() == source.parts()
     assert pickle.loads(pickle.dumps(source)) == source
+    assert [len(track.scans) for track in source.tracks_of("scene-0103")] == [2]
+
+
+def test_scans_are_found_where_one_stands_in_the_tables(own, tmp_path, monkeypatch):
+    monkeypatch.chdir(own / "v1.0-mini")
+    source = NuScenes(Path(), cache=tmp_path / "cache")
+    assert source.parts() == ["scene-0103"]
     assert [len(track.scans) for track in source.tracks_of("scene-0103")] == [2]
 
 

@@ -23,7 +23,7 @@ from wildshape.datasets.tracks.labelled_boxes import (
     crop_objects,
     described,
 )
-from wildshape.datasets.tracks.parts import found_in
+from wildshape.datasets.tracks.parts import found_in, named
 from wildshape.datasets.tracks.selection import Selection, measured
 from wildshape.errors import BadInputError
 from wildshape.io.scans.arrays import read_rows
@@ -152,7 +152,7 @@ def find_tables(root: Path) -> Path:
         BadInputError: there is none, or there are several.
     """
     if (root / "scene.json").is_file():
-        return root
+        return named(root)
     if not root.is_dir():
         raise BadInputError(f"{root}: no such folder; expected {_LAYOUT}.")
     found = [path.parent for name in _TABLES for path in sorted(root.glob(f"{name}/scene.json"))]
