@@ -60,8 +60,9 @@ def test_a_full_turn_of_a_sensor_is_read_as_points_and_refused_as_an_object(
 
 def test_bare_numbers_of_another_row_are_no_kitti_scan(tmp_path: Path, cloud: np.ndarray) -> None:
     five = np.hstack([cloud, np.ones((len(cloud), 2), np.float32)])[: len(cloud) // 4 * 4]
+    five = np.vstack([five, np.full((4, 5), np.nan, np.float32)])  # nothing came back
     five.tofile(tmp_path / "scan.pcd.bin")  # nuScenes
-    np.testing.assert_array_equal(read_points(tmp_path / "scan.pcd.bin"), five[:, :3])
+    np.testing.assert_array_equal(read_points(tmp_path / "scan.pcd.bin"), five[:-4, :3])
     five.tofile(tmp_path / "scan.bin")
     four = five[: len(five) // 5 * 5, :4]
     four.tofile(tmp_path / "four.pcd.bin")
