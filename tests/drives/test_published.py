@@ -122,7 +122,7 @@ def test_waymo_segments(tmp_path):
 def test_kitti_s_layouts(tmp_path):
     scan = np.zeros((20, 4), np.float32)
     layouts = {
-        "KITTI tracking": ("training/velodyne/0000", "training/velodyne/0001"),
+        "KITTI tracking": ("training/velodyne/0000", "testing/velodyne/0000"),
         "KITTI odometry or SemanticKITTI": ("sequences/00/velodyne", "sequences/08/velodyne"),
     }
     for what, folders in layouts.items():

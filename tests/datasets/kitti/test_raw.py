@@ -4,6 +4,7 @@
 
 import math
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -87,6 +88,14 @@ def test_ground_margin_and_every(drive):
 def test_root_may_be_a_drive_a_date_or_the_folder_above(drive, level):
     root = (drive, *drive.parents)[level]
     assert [track.name for track in all_tracks(KittiRaw(root))] == [f"{drive.name}_0000"]
+
+
+def test_a_drive_has_its_name_and_calibration_where_one_stands_in_it(drive, monkeypatch):
+    write_world(drive, forward=0.0)
+    monkeypatch.chdir(drive)
+    source = KittiRaw(Path(), Selection(motion="moving"))
+    assert source.parts() == [drive.name]
+    assert [track.name for track in all_tracks(source)] == [f"{drive.name}_0000"]
 
 
 def test_cut_scans_stand_in_where_full_ones_are_missing(drive):

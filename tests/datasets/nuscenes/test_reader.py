@@ -7,6 +7,7 @@ import os
 import pickle
 import shutil
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -72,6 +73,13 @@ def test_parts_are_scenes_and_readers_are_pickled(written, cache):
     assert source.parts() == ["scene-0061", "scene-0103"]
     assert NuScenes(written / "v1.0-mini", cache=cache).parts() == source.parts()
     assert pickle.loads(pickle.dumps(source)) == source
+    assert [len(track.scans) for track in source.tracks_of("scene-0103")] == [2]
+
+
+def test_scans_are_found_where_one_stands_in_the_tables(own, tmp_path, monkeypatch):
+    monkeypatch.chdir(own / "v1.0-mini")
+    source = NuScenes(Path(), cache=tmp_path / "cache")
+    assert source.parts() == ["scene-0103"]
     assert [len(track.scans) for track in source.tracks_of("scene-0103")] == [2]
 
 
@@ -305,3 +313,18 @@ def test_numbers_and_words_that_no_table_has(own, tmp_path, table, key, value):
     for row in lidar:
         edit(own, table, key, value, row)
     refused(own, cache=tmp_path, match=rf"{table}\.json: ")
+
+
+def test_objects_whose_tokens_begin_alike_stay_apart(own, tmp_path):
+    """As in tables of one's own, whose tokens are words and numbers."""
+    table = own / "v1.0-mini" / "instance.json"
+    (row,) = json.loads(table.read_text())
+    rows = [row | {"token": f"instance-token-{number}"} for number in (1, 2)]
+    table.write_text(json.dumps(rows))
+    table = own / "v1.0-mini" / "sample_annotation.json"
+    first, second = json.loads(table.read_text())
+    first["instance_token"], second["instance_token"] = (row["token"] for row in rows)
+    table.write_text(json.dumps([first, second]))
+    found = list(NuScenes(own, cache=tmp_path).tracks_of("scene-0103"))
+    assert [track.name for track in found] == [f"scene-0103_{row['token']}" for row in rows]
+    assert [len(track.scans) for track in found] == [1, 1]

@@ -114,7 +114,8 @@ def test_long_sequences_and_gaps_make_several_tracks(tmp_path):
     assert again["kitchen_00002"] == ("000000", "000001")
     assert again["kitchen_00002_1"] == ("000005", "000006")
     assert source.rejected == {"frame: no mask": 3}
-    assert len(tracks(tmp_path, gap=5)) == 2
+    assert len(tracks(tmp_path, gap=3)) == 2
+    assert len(tracks(tmp_path, gap=0)) == 4
 
 
 def test_images_that_are_counted_without_leading_zeros_are_refused(tmp_path):

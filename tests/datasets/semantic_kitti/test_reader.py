@@ -159,10 +159,11 @@ def test_an_object_that_is_seen_again_is_one_unless_asked(tmp_path):
     parked = Selection(motion="parked")
     (whole,) = tracks(folder, selection=parked).values()
     assert whole.scan_names == ("000000", "000001", "000004", "000005")
-    assert list(tracks(folder, selection=parked, gap=3)) == [PARKED]
-    first, again = tracks(folder, selection=parked, gap=2).values()
+    assert list(tracks(folder, selection=parked, gap=2)) == [PARKED]
+    first, again = tracks(folder, selection=parked, gap=1).values()
     assert (first.name, again.name) == (PARKED, f"{PARKED}_2")
     assert first.scan_names + again.scan_names == whole.scan_names
+    assert len(tracks(folder, selection=parked, gap=0)) == 2
 
 
 def test_objects_are_handed_out_right_after_their_last_frame(tmp_path):

@@ -7,8 +7,16 @@ import warnings
 import numpy as np
 import torch
 
-from wildshape.datasets.tracks.labelled_boxes import Crop, rows_in_box
+from wildshape.datasets.tracks.gathering import Gathering
+from wildshape.datasets.tracks.labelled_boxes import (
+    Crop,
+    LabelledObject,
+    crop_objects,
+    rows_in_box,
+)
+from wildshape.datasets.tracks.selection import Selection
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.records import Sensor
 
 
 def test_points_inside_are_found_as_by_the_definition() -> None:
@@ -32,3 +40,14 @@ def test_a_damaged_height_is_outside_without_a_word() -> None:
         warnings.simplefilter("error")
         rows = rows_in_box(cloud, SE3.identity(), (2.0, 2.0, 2.0), Crop())
     assert rows.tolist() == [3]
+
+
+def test_an_object_that_is_labelled_twice_in_a_frame_gives_one_scan() -> None:
+    cloud = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 3)).astype(np.float32)
+    box = LabelledObject("car", 1, "car", "", (2.0, 2.0, 2.0), SE3.identity(), None)
+    gathering = Gathering(Selection(min_points=1), Sensor("lidar"), {})
+    for frame, boxes in (("0", (box, box)), ("1", (box,))):
+        crop_objects(boxes, frame, lambda: cloud, Crop(), gathering)
+    (track,) = gathering.finished()
+    assert track.scan_names == ("0", "1")
+    assert gathering.rejected == {"scan: a second box of the object in one frame": 1}

@@ -127,6 +127,19 @@ def test_motion_and_categories_select(split):
         tokens(categories=("car",))
 
 
+def test_a_split_that_lacks_another_table_is_counted(own):
+    other = "2601205676330128831"
+    for component in ("lidar", "lidar_box"):
+        (own.parent / "validation" / component).mkdir(parents=True)
+        (own.parent / "validation" / component / f"{other}.parquet").touch()
+    source = Waymo(own.parent)
+    assert source.parts() == [SEGMENT, other]
+    assert len(list(source.tracks_of(SEGMENT))) > 0
+    missing = "validation: no lidar_calibration, lidar_pose, vehicle_pose beside lidar; download"
+    with pytest.raises(BadInputError, match=missing):
+        list(source.tracks_of(other))
+
+
 def test_a_split_without_labels_is_passed_over(own):
     shutil.copytree(own / "lidar", own.parent / "testing" / "lidar")
     assert find_splits(own.parent) == [own]

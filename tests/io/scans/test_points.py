@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from wildshape.errors import BadInputError
+from wildshape.io.scans.arrays import read_rows
 from wildshape.io.scans.points import (
     SUFFIXES,
     Coordinates,
@@ -59,11 +60,19 @@ def test_a_full_turn_of_a_sensor_is_read_as_points_and_refused_as_an_object(
 
 def test_bare_numbers_of_another_row_are_no_kitti_scan(tmp_path: Path, cloud: np.ndarray) -> None:
     five = np.hstack([cloud, np.ones((len(cloud), 2), np.float32)])[: len(cloud) // 4 * 4]
+    five = np.vstack([five, np.full((4, 5), np.nan, np.float32)])  # nothing came back
     five.tofile(tmp_path / "scan.pcd.bin")  # nuScenes
-    np.testing.assert_array_equal(read_points(tmp_path / "scan.pcd.bin"), five[:, :3])
+    np.testing.assert_array_equal(read_points(tmp_path / "scan.pcd.bin"), five[:-4, :3])
     five.tofile(tmp_path / "scan.bin")
-    with pytest.raises(BadInputError, match="are no intensities"):
-        read_points(tmp_path / "scan.bin")
+    four = five[: len(five) // 5 * 5, :4]
+    four.tofile(tmp_path / "four.pcd.bin")
+    # As commands read a scan, and as the readers of data sets do.
+    for read in (read_points, lambda path: read_rows(path, "x y z intensity")):
+        with pytest.raises(BadInputError, match="are no intensities"):
+            read(tmp_path / "scan.bin")
+    for read in (read_points, lambda path: read_rows(path, "x y z intensity ring")):
+        with pytest.raises(BadInputError, match="are no intensities"):
+            read(tmp_path / "four.pcd.bin")
 
 
 def test_a_full_scan_of_a_map_is_brought_to_its_sensor(tmp_path: Path, full_scan) -> None:

@@ -22,7 +22,7 @@ from wildshape.datasets.tracks.labelled_boxes import (
     crop_objects,
     described,
 )
-from wildshape.datasets.tracks.parts import part_name
+from wildshape.datasets.tracks.parts import named, part_name
 from wildshape.datasets.tracks.selection import Selection, measured
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
@@ -71,7 +71,7 @@ class KittiRaw:
             BadInputError: a file of the drive is missing or corrupt.
         """
         root = Path(self.root)
-        drive = root if _is_drive(root) else root / part
+        drive = named(root) if _is_drive(root) else root / part
         if (drive / _TRACKLETS).is_file():
             yield from self._drive_tracks(drive)
         else:

@@ -23,7 +23,7 @@ from wildshape.datasets.tracks.labelled_boxes import (
     crop_objects,
     described,
 )
-from wildshape.datasets.tracks.parts import found_in
+from wildshape.datasets.tracks.parts import found_in, named
 from wildshape.datasets.tracks.selection import Selection, measured
 from wildshape.errors import BadInputError
 from wildshape.io.scans.arrays import read_rows
@@ -111,11 +111,12 @@ class NuScenes:
 
     def _wanted(self, scene: Scene) -> dict[str, tuple[str, str]]:
         """Name and category of the objects to be taken, by token."""
-        part = scene.name
+        short = {token[:_TOKEN_LETTERS] for token in scene.categories}
+        alike = len(short) < len(scene.categories)  # tokens of one's own may begin alike
         wanted = {}
         for token, category in scene.categories.items():
             if _is_of(category, self.selection.categories or VEHICLES):
-                name = f"{part}_{token[:_TOKEN_LETTERS]}"
+                name = f"{scene.name}_{token if alike else token[:_TOKEN_LETTERS]}"
                 wanted[token] = (name, category.removeprefix("vehicle."))
             else:
                 self.rejected[f"object: category {category}"] += 1
@@ -151,7 +152,7 @@ def find_tables(root: Path) -> Path:
         BadInputError: there is none, or there are several.
     """
     if (root / "scene.json").is_file():
-        return root
+        return named(root)
     if not root.is_dir():
         raise BadInputError(f"{root}: no such folder; expected {_LAYOUT}.")
     found = [path.parent for name in _TABLES for path in sorted(root.glob(f"{name}/scene.json"))]

@@ -196,7 +196,7 @@ class Names:
     def of(self, thing: str, frame: int) -> str:
         """The track that a frame of an object belongs to: `mug`, `mug_1` later on."""
         track, offers, last = self._seen.get(thing, (0, 0, frame))
-        if frame - last > self.gap or offers >= self.longest:
+        if frame - last - 1 > self.gap or offers >= self.longest:
             track, offers = track + 1, 0
         self._seen[thing] = (track, offers + 1, frame)
         return thing + (f"_{track}" if track else "")

@@ -138,6 +138,8 @@ def count_points(files: Mapping[int, Path], class_ids: Iterable[int]) -> dict[in
 
 def visits_of(label: int, frames: list[int], gap: int | None) -> list[Visit]:
     """An object's frames, cut where it is not seen for more than `gap` frames; None: never."""
-    cuts = [i for i in range(1, len(frames)) if gap is not None and frames[i] - frames[i - 1] > gap]
+    cuts: list[int] = []
+    if gap is not None:
+        cuts = [i for i in range(1, len(frames)) if frames[i] - frames[i - 1] - 1 > gap]
     bounds = zip([0, *cuts], [*cuts, len(frames)])
     return [Visit(label, tuple(frames[a:b]), i) for i, (a, b) in enumerate(bounds) if a < b]

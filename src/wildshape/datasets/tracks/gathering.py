@@ -158,6 +158,9 @@ class Gathering:
             self.reject(objection)
             return
         seen = self._objects[name]
+        if scan_name in seen.names[-1:]:
+            self.reject("scan: a second box of the object in one frame")
+            return
         seen.scans.append(np.ascontiguousarray(points, np.float32))
         seen.names.append(scan_name)
         if T_sensor_object is not None:

@@ -10,9 +10,14 @@ from wildshape.errors import BadInputError
 _LEAST, _MOST_PARTS = 32, 1000
 
 
+def named(folder: Path) -> Path:
+    """A folder by a path that has its name and the folder above it: `.` has neither."""
+    return folder if folder.name not in ("", "..") else folder.resolve()
+
+
 def part_name(folder: Path, root: Path) -> str:
     """A folder as seen from the root, of which it may be the whole."""
-    return folder.name if folder == root else folder.relative_to(root).as_posix()
+    return named(folder).name if folder == root else folder.relative_to(root).as_posix()
 
 
 def found_in(folder: Path) -> str:

@@ -69,7 +69,9 @@ class Waymo:
             BadInputError: `root` has no split with the tables needed, or an unknown category.
         """
         _check_categories(self.selection.categories)
-        splits = find_splits(Path(self.root))
+        find_splits(Path(self.root))
+        # One that lacks another table is none to pass over: its segments are counted as damaged.
+        splits = [split for split in _splits(Path(self.root)) if not _absent(split, ("lidar_box",))]
         stems = (file.stem for split in splits for file in split.glob("lidar/*.parquet"))
         return sorted(stem for stem in stems if not stem.startswith("."))
 
@@ -187,14 +189,22 @@ def find_splits(root: Path, components: tuple[str, ...] = COMPONENTS) -> list[Pa
     """
     if not root.is_dir():
         raise BadInputError(f"{root}: no such folder; expected {_LAYOUT}.")
-    splits = [path for path in (root, *sorted(root.iterdir())) if (path / "lidar").is_dir()]
+    splits = _splits(root)
     whole = [path for path in splits if not _absent(path, components)]
     if splits and not whole:
-        absent = ", ".join(_absent(splits[0], components))
-        raise BadInputError(f"{splits[0]}: no {absent} beside lidar; download these components.")
+        raise _lacking(splits[0], components)
     if not splits:
         raise _not_waymo(root)
     return whole
+
+
+def _splits(root: Path) -> list[Path]:
+    return [path for path in (root, *sorted(root.iterdir())) if (path / "lidar").is_dir()]
+
+
+def _lacking(split: Path, components: tuple[str, ...]) -> BadInputError:
+    absent = ", ".join(_absent(split, components))
+    return BadInputError(f"{split}: no {absent} beside lidar; download these components.")
 
 
 def _not_waymo(root: Path) -> BadInputError:
@@ -216,11 +226,14 @@ def tables_of(
     """The file of each component of a segment.
 
     Raises:
-        BadInputError: no split has all of them, or none has the segment.
+        BadInputError: no split has all of them, none has the segment, or its split lacks some.
     """
-    for split in find_splits(root, components):
+    whole = find_splits(root, components)
+    for split in (*whole, *_splits(root)):
         tables = {name: split / name / f"{segment}.parquet" for name in components}
         if tables["lidar"].is_file():
+            if split not in whole:
+                raise _lacking(split, components)
             return tables
     raise BadInputError(f"{root}: no segment {segment} in any split; check its name.")
 

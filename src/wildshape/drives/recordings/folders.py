@@ -97,9 +97,9 @@ def open_kitti_raw(path: Path) -> Drive:
 
 
 def find_kitti_tracking(root: Path) -> list[Path]:
-    """The folders of scans of KITTI tracking's sequences, in the folder of a half or above it."""
-    for above in (root, root / "training", root / "testing"):
-        folders = sorted((above / _ODOMETRY).glob("*/"))
+    """The folders of scans of KITTI tracking's sequences, in the folder of a half or above both."""
+    for halves in ((root,), (root / "training", root / "testing")):
+        folders = (folder for half in halves for folder in sorted((half / _ODOMETRY).glob("*/")))
         found = [folder for folder in folders if folder.name.isdigit()]
         if found:
             return found

@@ -31,16 +31,8 @@ def read_kitti_bin(path: Path) -> Float32[np.ndarray, "n 3"]:
     Raises:
         BadInputError: the size is no multiple of a row's, or the rows have another length.
     """
-    if path.name.lower().endswith(".pcd.bin"):
-        return read_rows(path, "x y z intensity ring")
-    rows = _rows(path, "x y z intensity")
-    least = float(rows[:, 3].min())
-    if least < _LEAST_INTENSITY:
-        raise BadInputError(
-            f"{path}: its fourth numbers, {least:.3g} for example, are no intensities: its rows are"
-            " not float32 x y z intensity; write it as .npy."
-        )
-    return rows[:, :3]
+    ring = " ring" if path.name.lower().endswith(".pcd.bin") else ""
+    return read_rows(path, f"x y z intensity{ring}")
 
 
 def read_rows(path: Path, columns: str) -> Float32[np.ndarray, "n 3"]:
@@ -48,12 +40,20 @@ def read_rows(path: Path, columns: str) -> Float32[np.ndarray, "n 3"]:
 
     Args:
         path: of the file.
-        columns: names of all, x y z first.
+        columns: names of all, x y z intensity first.
 
     Raises:
-        BadInputError: missing, or its size is no multiple of a row's, or 0.
+        BadInputError: missing, or its size is no multiple of a row's, or 0, or the rows have
+            another length.
     """
-    return _rows(path, columns)[:, :3]
+    rows = _rows(path, columns)
+    least = float(np.fmin.reduce(rows[:, 3]))  # of those that are numbers
+    if least < _LEAST_INTENSITY:
+        raise BadInputError(
+            f"{path}: its fourth numbers, {least:.3g} for example, are no intensities: its rows are"
+            f" not float32 {columns}; write these, or a single scan as .npy."
+        )
+    return rows[:, :3]
 
 
 def _rows(path: Path, columns: str) -> Float32[np.ndarray, "n c"]:
