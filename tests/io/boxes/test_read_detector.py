@@ -85,6 +85,17 @@ def test_a_folder_is_read_file_by_file(tmp_path):
     assert [one.scan for one in read(tmp_path)] == ["000004", "000005"]
 
 
+def test_files_of_several_drives_are_refused_and_those_of_several_tracks_are_not(tmp_path):
+    line = LABEL.format(turn=0)
+    for track in (1, 2):
+        written(tmp_path / f"{track:04d}.txt", f"0 {track} {line}\n1 {track} {line}\n")
+    assert [one.scan for one in read(tmp_path)] == ["0", "1", "0", "1"]
+    written(tmp_path / "0002.txt", f"1 1 {line}\n2 1 {line}\n2 2 {line}\n")
+    refused(read, tmp_path, match="0001.txt and 0002.txt both hold boxes of scan 1, .* alone")
+    written(tmp_path / "0002.txt", f"2 1 {line}\n2 2 {line}\n")  # a file a scan
+    assert len(read(tmp_path)) == 4
+
+
 def test_a_fingerprint_tells_names_and_contents(tmp_path):
     path = written(tmp_path / "000001.txt", LABEL.format(turn=0))
     one = fingerprint(tmp_path)
