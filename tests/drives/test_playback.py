@@ -125,6 +125,16 @@ def test_kitti_labels_of_a_drive_are_found_again(found, tmp_path, first):
             assert box.box.centre == pytest.approx(true, abs=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("names", "numbers"),
+    [(("0007", "0012"), {7, 12}), (("0007", "0012+1"), {0, 1}), (("7", "007"), {0, 1})],
+)
+def test_tracks_are_numbered_by_names_that_count(found, names, numbers):
+    vehicles = tuple(replace(one, name=name) for one, name in zip(found.vehicles, names))
+    named = detections_of(replace(found, vehicles=vehicles))
+    assert {one.track_number for one in named} == numbers
+
+
 def test_rerun_holds_boxes_shapes_scans_and_the_way(found):
     read = pytest.importorskip("rerun.chunk", reason="did not run: rerun-sdk is not installed")
     rows = defaultdict(int)

@@ -40,7 +40,7 @@ class Detection:
 
     Attributes:
         track: name of the object.
-        track_number: of the object among all that are written, from 0.
+        track_number: of the object among all that are written, from 0, or what its name counts.
         scan: name.
         scan_number: the scan's name where that is a whole number, else its place in the track.
         category: for example `car`; empty if unknown.
