@@ -69,14 +69,14 @@ class DetectionFile:
         given = {"detections": fingerprint(self.path), "detections_calibration": calibration}
         return {**given, **scored}
 
-    def boxes(self) -> list[DetectorBox]:
-        """All of them.
+    def boxes(self, scans: int) -> list[DetectorBox]:
+        """All of them; `scans`: of the drive.
 
         Raises:
             BadInputError: a file cannot be read, or has none of the scores asked for.
         """
         camera = read_camera(self.calibration) if self.calibration else camera_at_the_lidar()
-        found = read_detector_boxes(self.path, camera.T_rect_sensor)
+        found = read_detector_boxes(self.path, camera.T_rect_sensor, scans)
         scored = not found or any(box.score is not None for box in found)
         if self.least_score is not None and not scored:
             raise BadInputError(f"{self.path}: no box has a score; leave --min-score away.")
@@ -118,7 +118,7 @@ def find_detections(file: DetectionFile, drive: Drive) -> Detections:
         BadInputError: a file cannot be read; no box is of a vehicle and of a scan of the drive; a
             track has two boxes in one frame.
     """
-    given = file.boxes()
+    given = file.boxes(len(drive))
     boxes = [box for box in given if file.is_sure(box)]
     vehicles = [box for box in boxes if _is_vehicle(box.category)]
     others = Counter(box.category for box in boxes if not _is_vehicle(box.category))

@@ -18,17 +18,18 @@ _FORMATS = "KITTI's .txt, nuScenes', OpenPCDet's or mmdetection3d's .json, or bo
 _PICKLES = (".pkl", ".pickle")
 
 
-def read_detector_boxes(path: Path, T_rect_sensor: SE3) -> list[DetectorBox]:
+def read_detector_boxes(path: Path, T_rect_sensor: SE3, scans: int) -> list[DetectorBox]:
     """All boxes of a file, or of the files in a folder by name.
 
     Args:
         path: of either.
         T_rect_sensor: from the scans' frame to KITTI's rectified camera frame.
+        scans: of the drive.
 
     Raises:
         BadInputError: no such format, a file of it that is damaged, or files of several drives.
     """
-    found = {file: _read(file, T_rect_sensor) for file in _files(path)}
+    found = {file: _read(file, T_rect_sensor, scans) for file in _files(path)}
     if len(found) > 1:
         _check_one_drive(path, found)
     return [box for boxes in found.values() for box in boxes]
@@ -87,12 +88,12 @@ def _files(path: Path) -> list[Path]:
     return files
 
 
-def _read(path: Path, T_rect_sensor: SE3) -> list[DetectorBox]:
+def _read(path: Path, T_rect_sensor: SE3, scans: int) -> list[DetectorBox]:
     kind = path.suffix.lower()
     if kind == ".txt":
         return read_kitti_file(path, T_rect_sensor)
     if kind == ".json":
-        return read_results(path)
+        return read_results(path, scans)
     if kind == ".csv":
         return _table(path)
     if kind in _PICKLES:
