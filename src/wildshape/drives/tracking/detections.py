@@ -146,10 +146,11 @@ def find_detections(file: DetectionFile, drive: Drive) -> Detections:
     if placed < len(vehicles):
         left = len(vehicles) - placed
         warnings.append(f"{left} detections belong to scans that the drive does not have")
-    tracked = all(box.track is not None for row in frames for box in row)
-    if tracked:
+    without = sum(box.track is None for row in frames for box in row)
+    if not without:
         _check_tracks(file.path, frames)
-    return Detections(file.path, frames, tracked, tuple(warnings))
+    told = _untracked_told(without, placed)
+    return Detections(file.path, frames, not without, (*warnings, *told))
 
 
 def _is_vehicle(category: str) -> bool:
@@ -177,6 +178,13 @@ def _frame(scan: str | int, names: dict[str, int], numbers: dict[int, int]) -> i
         if name in names:
             return names[name]
     return numbers.get(number_of(path.stem, -1))
+
+
+def _untracked_told(without: int, placed: int) -> list[str]:
+    """A sentence if some boxes have tracks and others have none."""
+    if without in (0, placed):
+        return []
+    return [f"{without} of {placed} detections have no track: tracks are found anew"]
 
 
 def _check_tracks(path: Path, frames: Iterable[tuple[DetectorBox, ...]]) -> None:
