@@ -20,7 +20,7 @@ from wildshape.drives.tracking.segmentation import CutScan, Cutter
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.errors import BadInputError
 from wildshape.inference.folders.box_files import read_camera
-from wildshape.io.boxes.detections import frame_number, number_of, pose_of
+from wildshape.io.boxes.detections import frame_numbers, number_of, pose_of
 from wildshape.io.boxes.detector import DetectorBox
 from wildshape.io.boxes.kitti import camera_at_the_lidar
 from wildshape.io.boxes.read_detector import fingerprint, read_detector_boxes, takes_calibration
@@ -161,7 +161,7 @@ def _is_vehicle(category: str) -> bool:
 def _by_frame(boxes: list[DetectorBox], drive: Drive) -> tuple[tuple[DetectorBox, ...], ...]:
     """A scan is known by its name, by the end of a path, or by its number."""
     names = {name: frame for frame, name in enumerate(drive.scan_names)}
-    numbers = {frame_number(name, frame): frame for name, frame in names.items()}
+    numbers = {number: frame for frame, number in enumerate(frame_numbers(drive.scan_names))}
     frames: list[list[DetectorBox]] = [[] for _ in drive.scan_names]
     for box in boxes:
         frame = _frame(box.scan, names, numbers)

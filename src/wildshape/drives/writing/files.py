@@ -13,7 +13,7 @@ from wildshape.drives.writing.playback.mcap import check_mcap, write_mcap
 from wildshape.drives.writing.playback.rerun import load_rerun, write_rerun
 from wildshape.geometry.meshing import closed_mesh
 from wildshape.inference.folders.box_files import BoxFiles
-from wildshape.io.boxes.detections import Detection, frame_number, number_of
+from wildshape.io.boxes.detections import Detection, frame_numbers, number_of
 from wildshape.io.scans.writers import MeshFormat, write_mesh
 
 _ROUNDED_NS = 1000  # more than what a float of seconds since 1970 loses
@@ -71,7 +71,7 @@ class DriveFiles:
 
 def detections_of(found: FinishedDrive) -> Iterator[Detection]:
     """All boxes of a drive, for the formats of data sets."""
-    times = found.times
+    times, numbers = found.times, frame_numbers(found.scan_names)
     for number, one in zip(_track_numbers(found), found.vehicles):
         velocities = found.velocities(one).tolist()
         for frame, box, points, (x, y, _) in zip(one.frames, one.boxes, one.points, velocities):
@@ -80,7 +80,7 @@ def detections_of(found: FinishedDrive) -> Iterator[Detection]:
                 track=one.name,
                 track_number=number,
                 scan=scan,
-                scan_number=frame_number(scan, frame),
+                scan_number=numbers[frame],
                 category=CATEGORY,
                 sensor="lidar",
                 score=one.confidence,
