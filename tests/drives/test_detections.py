@@ -185,6 +185,19 @@ def stopped_after_tracks(street, out, detections, monkeypatch):
     return read_sightings(out / "stages" / "tracks.json")
 
 
+def test_one_box_without_a_track_is_said_for_no_track_is_used_then(street, tmp_path):
+    given = kitti_tracking(street, tmp_path)
+    lines = given.path.read_text().splitlines()
+    at = next(n for n, line in enumerate(lines) if " Car " in line)
+    lines[at] = " ".join((lines[at].split()[0], "-1", *lines[at].split()[2:]))
+    path = tmp_path / "labels.txt"
+    path.write_text("\n".join(lines))
+    found = find_detections(replace(given, path=path), street.drive)
+    placed = sum(map(len, found.frames))
+    assert not found.tracked
+    assert f"1 of {placed} detections have no track: tracks are found anew" in found.warnings
+
+
 def test_boxes_without_tracks_are_linked_to_those_of_the_truth(street, tmp_path, monkeypatch):
     objects = stopped_after_tracks(
         street, tmp_path / "out", openpcdet(street, tmp_path), monkeypatch

@@ -111,9 +111,11 @@ def test_a_scan_named_by_its_time_keeps_it_to_the_nanosecond(found):
     assert {one.time_ns for one in detections_of(named)} == set(stamps)
 
 
-@pytest.mark.parametrize("first", ["000000000007", "1700000000123456"])
+@pytest.mark.parametrize("first", [7, 1700000000123456, 1])
 def test_kitti_labels_of_a_drive_are_found_again(found, tmp_path, first):
-    names = [f"{int(first) + frame:012d}" for frame in range(FRAMES)]
+    names = [f"{first + frame:012d}" for frame in range(FRAMES)]
+    if first == 1:  # the last scan's place is the number of the one before it
+        names[-1] = "once more"
     named = replace(found, scan_names=tuple(names))
     drive = Drive.of("drive", names, lambda _: Turn(np.empty((0, 3), np.float32)))
     BoxFiles(("kitti",)).write_detections(tmp_path, list(detections_of(named)))
@@ -123,6 +125,16 @@ def test_kitti_labels_of_a_drive_are_found_again(found, tmp_path, first):
         for box, one in zip(boxes, seen, strict=True):
             true = one.boxes[one.frames.index(frame)].centre
             assert box.box.centre == pytest.approx(true, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("names", "numbers"),
+    [(("0007", "0012"), {7, 12}), (("0007", "0012+1"), {0, 1}), (("7", "007"), {0, 1})],
+)
+def test_tracks_are_numbered_by_names_that_count(found, names, numbers):
+    vehicles = tuple(replace(one, name=name) for one, name in zip(found.vehicles, names))
+    named = detections_of(replace(found, vehicles=vehicles))
+    assert {one.track_number for one in named} == numbers
 
 
 def test_rerun_holds_boxes_shapes_scans_and_the_way(found):

@@ -17,7 +17,7 @@ from wildshape.drives.tracking.detections import DetectionFile, find_detections
 from wildshape.drives.writing.files import DriveFiles
 from wildshape.drives.writing.folder import BOXES, FRAMES
 from wildshape.inference.predictor import Predictor, load
-from wildshape.io.output import begin, finished, keep_apart
+from wildshape.io.output import begin, finished, keep_apart, remove_leftovers
 from wildshape.method.checkpoint import weights_file
 from wildshape.parallel.team import ALONE, team
 
@@ -85,6 +85,7 @@ def drive(
             found = replace(run, helpers=helpers).perform()
         output.finish(result={**asdict(found), "out": str(out)})
     else:
+        remove_leftovers(out)  # of a second pass, or of the files asked for
         found = earlier_result(out, done)
     if isinstance(adapt, AdaptConfig):
         from wildshape.drives.adapting.adapt import adapt_to

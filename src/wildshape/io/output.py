@@ -161,6 +161,11 @@ def is_begun(path: Path) -> bool:
     return path.is_dir() and any(entry not in leftovers for entry in path.iterdir())
 
 
+def is_output(path: Path) -> bool:
+    """Whether a folder is itself an output, whole or not; those below it do not make it one."""
+    return any((path / name).is_file() for name in (MARKER, _REMOVED))
+
+
 def remove_leftovers(path: Path) -> None:
     """Remove what a process left that was killed while writing; no other may be at work."""
     for leftover in path.rglob(_LEFTOVER):

@@ -75,9 +75,19 @@ def test_a_drive_where_the_adaptation_goes_is_refused(tmp_path):
     )
 
 
-def test_several_drives_do_not_go_beside_what_was_found_in_one(tmp_path):
+@pytest.mark.parametrize("marker", ["wildshape.json", "wildshape-removed.json"])
+def test_several_drives_do_not_go_beside_what_was_found_in_one(marker, tmp_path):
     (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "wildshape.json").write_text("{}")
+    (tmp_path / "out" / marker).write_text("{}")
     settings = Settings(source=(tmp_path,), out=tmp_path / "out")
     with pytest.raises(BadInputError, match="holds an output already; several drives"):
         _folders(settings, [tmp_path / "a", tmp_path / "b"])
+
+
+def test_several_drives_are_gone_on_with(tmp_path):
+    for name in ("a", "adapted"):
+        (tmp_path / "out" / name).mkdir(parents=True)
+        (tmp_path / "out" / name / "wildshape.json").write_text("{}")
+    settings = Settings(source=(tmp_path,), out=tmp_path / "out", adapt=True)
+    found = _folders(settings, [tmp_path / "a", tmp_path / "b"])
+    assert list(found.values()) == [tmp_path / "out" / "a", tmp_path / "out" / "b"]

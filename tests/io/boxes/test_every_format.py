@@ -29,7 +29,7 @@ from wildshape.io.boxes.argoverse2 import write_argoverse2_boxes
 from wildshape.io.boxes.detections import (
     Detection,
     detections_of,
-    frame_number,
+    frame_numbers,
     number_of,
     read_detections,
     write_box_list,
@@ -184,7 +184,7 @@ def test_categories_are_the_inputs_however_they_are_written(tmp_path):
 def test_argoverse2_has_the_time_that_a_scan_is_named_by(name, tmp_path):
     scan = {"scan": name, "confidence": 0.5, "box": json.loads(_BOX)}
     (of_track,) = detections_of({"track": "car", "scans": [scan]}, 0)
-    of_drive = replace(of_track, sequence="drive", scan_number=frame_number(name, 3))
+    of_drive = replace(of_track, sequence="drive", scan_number=frame_numbers([name])[0])
     path = tmp_path / "annotations.feather"
     write_argoverse2_boxes(path, [of_track, of_drive, replace(of_drive, time_ns=5)])
     stamps = feather.read_table(path).column("timestamp_ns").to_pylist()

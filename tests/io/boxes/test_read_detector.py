@@ -19,8 +19,8 @@ CENTRE, SIZE, FORWARD = (10.0, 2.0, -1.0), (4.0, 1.8, 1.6), (0.0, 1.0, 0.0)
 LEFT = [10, 2, -1, 4.0, 1.8, 1.6, math.pi / 2]
 
 
-def read(path):
-    return read_detector_boxes(path, CAMERA)
+def read(path, scans=1):
+    return read_detector_boxes(path, CAMERA, scans)
 
 
 def written(path, content):
@@ -83,6 +83,26 @@ def test_a_folder_is_read_file_by_file(tmp_path):
     written(tmp_path / "README", "no boxes")
     written(tmp_path / "._000004.txt", "left by macOS")
     assert [one.scan for one in read(tmp_path)] == ["000004", "000005"]
+
+
+def test_files_of_several_drives_are_refused_and_those_of_several_tracks_are_not(tmp_path):
+    line = LABEL.format(turn=0)
+    for track in (1, 2):
+        written(tmp_path / f"{track:04d}.txt", f"0 {track} {line}\n1 {track} {line}\n")
+    assert [one.scan for one in read(tmp_path)] == ["0", "1", "0", "1"]
+    written(tmp_path / "0002.txt", f"1 1 {line}\n2 1 {line}\n2 2 {line}\n")
+    refused(read, tmp_path, match="0001.txt and 0002.txt both hold boxes of scan 1, .* alone")
+    written(tmp_path / "0002.txt", f"2 1 {line}\n2 2 {line}\n")  # a file a scan
+    assert len(read(tmp_path)) == 4
+
+
+def test_a_list_that_names_no_scans_has_one_for_each(tmp_path):
+    one = {"name": ["Car"], "boxes_lidar": [LEFT]}
+    path = written(tmp_path / "results.json", [one, one])
+    assert [box.scan for box in read(path, 2)] == [0, 1]
+    refused(read, path, 3, match="a list of 2 scans, and the drive has 3; name each")
+    named = [{**one, "frame_id": name} for name in ("000004", "000005")]
+    assert len(read(written(path, named), 3)) == 2
 
 
 def test_a_fingerprint_tells_names_and_contents(tmp_path):

@@ -289,11 +289,11 @@ def _folders(settings: Settings, drives: list[Path]) -> dict[Path, Path]:
     """Where each drive goes."""
     from wildshape.drives.adapting.adapt import ADAPTED
     from wildshape.drives.recordings.recording_kinds import names_of
-    from wildshape.io.output import is_begun
+    from wildshape.io.output import is_output
 
     if len(drives) == 1:
         return {drives[0]: settings.out}
-    if is_begun(settings.out):
+    if is_output(settings.out):
         raise BadInputError(
             f"{settings.out}: holds an output already; several drives go into folders of their"
             " own, so choose another --out."

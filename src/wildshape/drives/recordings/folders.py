@@ -15,8 +15,10 @@ import numpy as np
 from wildshape.drives.recording_checks import copies_told
 from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
+from wildshape.io.bags.storages import STORAGES
 from wildshape.io.guard import reading
 from wildshape.io.order import check_counted
+from wildshape.io.packets.reader import SUFFIXES
 from wildshape.io.poses import read_poses
 from wildshape.io.scans.pcd import read_pcd_field
 from wildshape.io.scans.ply import read_ply_property
@@ -28,6 +30,7 @@ from wildshape.records import Turn
 _BESIDE = ("poses.txt", "times.txt", "timestamps.txt", "calib.txt")
 _RAW, _ODOMETRY = Path("velodyne_points") / "data", "velodyne"
 _TEXT = (".txt", ".csv")
+_RECORDINGS = (*STORAGES, *SUFFIXES)  # that are one file each
 _FIELDS = {".ply": read_ply_property, ".pcd": read_pcd_field}
 _FEWEST_POINTS = 1000  # of a whole scan
 _LONGEST_STEP_S = 20.0  # more are milliseconds, or smaller units
@@ -68,8 +71,9 @@ def open_folder(path: Path) -> Drive:
         BadInputError: no full scans; times or poses of another number or not in order.
     """
     if not path.is_dir():
+        what = "a file of another kind" if path.is_file() else "no such folder"
         raise BadInputError(
-            f"{path}: no such folder; a drive is a folder of full scans, a data set's folder or a"
+            f"{path}: {what}; a drive is a folder of full scans, a data set's folder or a"
             " recording of ROS or of packets (docs/drive.md)."
         )
     if _holds_objects(path):
@@ -184,6 +188,9 @@ def _files(folder: Path) -> list[Path]:
     certain = [file for file in files if file.suffix.lower() not in _TEXT]  # text may be anything
     files = certain or files
     if not files:
+        for entry in entries:
+            if entry.suffix.lower() in _RECORDINGS:
+                raise BadInputError(f"{folder}: holds recordings; name each, such as {entry}.")
         raise BadInputError(f"{folder}: holds no scan (.bin .pcd .ply .npy .laz ...).")
     for one, other in pairwise(files):
         if one.stem == other.stem:

@@ -20,7 +20,7 @@ from wildshape.drives.tracking.segmentation import CutScan, Cutter
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.errors import BadInputError
 from wildshape.inference.folders.box_files import read_camera
-from wildshape.io.boxes.detections import frame_number, number_of, pose_of
+from wildshape.io.boxes.detections import frame_numbers, number_of, pose_of
 from wildshape.io.boxes.detector import DetectorBox
 from wildshape.io.boxes.kitti import camera_at_the_lidar
 from wildshape.io.boxes.read_detector import fingerprint, read_detector_boxes, takes_calibration
@@ -69,14 +69,14 @@ class DetectionFile:
         given = {"detections": fingerprint(self.path), "detections_calibration": calibration}
         return {**given, **scored}
 
-    def boxes(self) -> list[DetectorBox]:
-        """All of them.
+    def boxes(self, scans: int) -> list[DetectorBox]:
+        """All of them; `scans`: of the drive.
 
         Raises:
             BadInputError: a file cannot be read, or has none of the scores asked for.
         """
         camera = read_camera(self.calibration) if self.calibration else camera_at_the_lidar()
-        found = read_detector_boxes(self.path, camera.T_rect_sensor)
+        found = read_detector_boxes(self.path, camera.T_rect_sensor, scans)
         scored = not found or any(box.score is not None for box in found)
         if self.least_score is not None and not scored:
             raise BadInputError(f"{self.path}: no box has a score; leave --min-score away.")
@@ -118,7 +118,7 @@ def find_detections(file: DetectionFile, drive: Drive) -> Detections:
         BadInputError: a file cannot be read; no box is of a vehicle and of a scan of the drive; a
             track has two boxes in one frame.
     """
-    given = file.boxes()
+    given = file.boxes(len(drive))
     boxes = [box for box in given if file.is_sure(box)]
     vehicles = [box for box in boxes if _is_vehicle(box.category)]
     others = Counter(box.category for box in boxes if not _is_vehicle(box.category))
@@ -146,10 +146,11 @@ def find_detections(file: DetectionFile, drive: Drive) -> Detections:
     if placed < len(vehicles):
         left = len(vehicles) - placed
         warnings.append(f"{left} detections belong to scans that the drive does not have")
-    tracked = all(box.track is not None for row in frames for box in row)
-    if tracked:
+    without = sum(box.track is None for row in frames for box in row)
+    if not without:
         _check_tracks(file.path, frames)
-    return Detections(file.path, frames, tracked, tuple(warnings))
+    told = _untracked_told(without, placed)
+    return Detections(file.path, frames, not without, (*warnings, *told))
 
 
 def _is_vehicle(category: str) -> bool:
@@ -160,7 +161,7 @@ def _is_vehicle(category: str) -> bool:
 def _by_frame(boxes: list[DetectorBox], drive: Drive) -> tuple[tuple[DetectorBox, ...], ...]:
     """A scan is known by its name, by the end of a path, or by its number."""
     names = {name: frame for frame, name in enumerate(drive.scan_names)}
-    numbers = {frame_number(name, frame): frame for name, frame in names.items()}
+    numbers = {number: frame for frame, number in enumerate(frame_numbers(drive.scan_names))}
     frames: list[list[DetectorBox]] = [[] for _ in drive.scan_names]
     for box in boxes:
         frame = _frame(box.scan, names, numbers)
@@ -177,6 +178,13 @@ def _frame(scan: str | int, names: dict[str, int], numbers: dict[int, int]) -> i
         if name in names:
             return names[name]
     return numbers.get(number_of(path.stem, -1))
+
+
+def _untracked_told(without: int, placed: int) -> list[str]:
+    """A sentence if some boxes have tracks and others have none."""
+    if without in (0, placed):
+        return []
+    return [f"{without} of {placed} detections have no track: tracks are found anew"]
 
 
 def _check_tracks(path: Path, frames: Iterable[tuple[DetectorBox, ...]]) -> None:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a finished drive is written as beside its tables: boxes of data sets, meshes, recordings."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from wildshape.drives.writing.playback.mcap import check_mcap, write_mcap
 from wildshape.drives.writing.playback.rerun import load_rerun, write_rerun
 from wildshape.geometry.meshing import closed_mesh
 from wildshape.inference.folders.box_files import BoxFiles
-from wildshape.io.boxes.detections import Detection, frame_number
+from wildshape.io.boxes.detections import Detection, frame_numbers, number_of
 from wildshape.io.scans.writers import MeshFormat, write_mesh
 
 _ROUNDED_NS = 1000  # more than what a float of seconds since 1970 loses
@@ -71,8 +71,8 @@ class DriveFiles:
 
 def detections_of(found: FinishedDrive) -> Iterator[Detection]:
     """All boxes of a drive, for the formats of data sets."""
-    times = found.times
-    for number, one in enumerate(found.vehicles):
+    times, numbers = found.times, frame_numbers(found.scan_names)
+    for number, one in zip(_track_numbers(found), found.vehicles):
         velocities = found.velocities(one).tolist()
         for frame, box, points, (x, y, _) in zip(one.frames, one.boxes, one.points, velocities):
             scan = found.scan_names[frame]
@@ -80,7 +80,7 @@ def detections_of(found: FinishedDrive) -> Iterator[Detection]:
                 track=one.name,
                 track_number=number,
                 scan=scan,
-                scan_number=frame_number(scan, frame),
+                scan_number=numbers[frame],
                 category=CATEGORY,
                 sensor="lidar",
                 score=one.confidence,
@@ -90,6 +90,13 @@ def detections_of(found: FinishedDrive) -> Iterator[Detection]:
                 points=points,
                 velocity=None if times is None else (round(x, 3), round(y, 3)),
             )
+
+
+def _track_numbers(found: FinishedDrive) -> Sequence[int]:
+    """What the vehicles' names count, as given tracks do, if all do; else their places."""
+    numbers = [number_of(one.name, -1) for one in found.vehicles]
+    told_apart = len(set(numbers)) == len(numbers) and -1 not in numbers
+    return numbers if told_apart else range(len(numbers))
 
 
 def _time_ns(seconds: float, scan: str) -> int:

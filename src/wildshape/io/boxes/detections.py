@@ -40,7 +40,7 @@ class Detection:
 
     Attributes:
         track: name of the object.
-        track_number: of the object among all that are written, from 0.
+        track_number: of the object among all that are written, from 0, or what its name counts.
         scan: name.
         scan_number: the scan's name where that is a whole number, else its place in the track.
         category: for example `car`; empty if unknown.
@@ -94,10 +94,14 @@ def number_of(scan: str, place: int) -> int:
     return int(scan) if counts and int(scan) < _TOO_LARGE else place
 
 
-def frame_number(scan: str, frame: int) -> int:
-    """The number of a drive's scan: what its name counts, or its frame if that is a time."""
-    number = number_of(scan, frame)
-    return number if number < _LARGEST_COUNT else frame
+def frame_numbers(scans: Sequence[str]) -> list[int]:
+    """The numbers of a drive's scans: what each name counts, or its frame if that is a time.
+
+    Frames alone if two scans would have one number.
+    """
+    numbers = [number_of(scan, frame) for frame, scan in enumerate(scans)]
+    numbers = [n if n < _LARGEST_COUNT else frame for frame, n in enumerate(numbers)]
+    return numbers if len(set(numbers)) == len(numbers) else list(range(len(numbers)))
 
 
 def read_detections(out: Path) -> list[Detection]:

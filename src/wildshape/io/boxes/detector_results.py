@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from wildshape.errors import BadInputError
 from wildshape.io.boxes.detector import DetectorBox, checked, upright_box
 from wildshape.io.guard import read_json, reading
 from wildshape.records import Box
@@ -13,20 +14,29 @@ from wildshape.records import Box
 _LIDAR = "LiDAR"
 
 
-def read_results(path: Path) -> list[DetectorBox]:
+def read_results(path: Path, scans: int) -> list[DetectorBox]:
     """The boxes of one file.
 
     A JSON object with `results` is of nuScenes; its boxes are taken to be in each scan's sensor
     frame, as `write_nuscenes_boxes` writes them. A list is of OpenPCDet or mmdetection3d, an object
     a scan; an object with `bboxes_3d` is one scan of mmdetection3d, named as the file.
 
+    Args:
+        path: of the file.
+        scans: of the drive; a list that does not name its own has as many.
+
     Raises:
-        BadInputError: it cannot be read, or holds something else.
+        BadInputError: it cannot be read, holds something else, or a list of other scans.
     """
     expected = "results of nuScenes, OpenPCDet or mmdetection3d in JSON"
     said = read_json(path, expected)
     with reading(path, expected):
         if isinstance(said, list):
+            if len(said) != scans and any("frame_id" not in one for one in said):
+                raise BadInputError(
+                    f"{path}: a list of {len(said)} scans, and the drive has {scans}; name each by"
+                    " its 'frame_id'."
+                )
             return [box for place, one in enumerate(said) for box in _scan(one, place)]
         if "bboxes_3d" in said:
             return list(_scan({"frame_id": path.stem, **said}, 0))

@@ -3,6 +3,7 @@
 """The boxes that somebody else's detector found, in any format that we read (docs/drive.md)."""
 
 import hashlib
+from collections import Counter
 from pathlib import Path
 
 from wildshape.errors import BadInputError
@@ -17,17 +18,42 @@ _FORMATS = "KITTI's .txt, nuScenes', OpenPCDet's or mmdetection3d's .json, or bo
 _PICKLES = (".pkl", ".pickle")
 
 
-def read_detector_boxes(path: Path, T_rect_sensor: SE3) -> list[DetectorBox]:
+def read_detector_boxes(path: Path, T_rect_sensor: SE3, scans: int) -> list[DetectorBox]:
     """All boxes of a file, or of the files in a folder by name.
 
     Args:
         path: of either.
         T_rect_sensor: from the scans' frame to KITTI's rectified camera frame.
+        scans: of the drive.
 
     Raises:
-        BadInputError: no such format, or a file of it that is damaged.
+        BadInputError: no such format, a file of it that is damaged, or files of several drives.
     """
-    return [box for file in _files(path) for box in _read(file, T_rect_sensor)]
+    found = {file: _read(file, T_rect_sensor, scans) for file in _files(path)}
+    if len(found) > 1:
+        _check_one_drive(path, found)
+    return [box for boxes in found.values() for box in boxes]
+
+
+def _check_one_drive(folder: Path, found: dict[Path, list[DetectorBox]]) -> None:
+    """Refuse files of several drives, whose scans bear the same numbers.
+
+    A file may be of one scan, or of one track, which has one box a scan.
+    """
+    files_of: dict[str | int, list[Path]] = {}
+    whole = set[Path]()
+    for file, boxes in found.items():
+        counts = Counter(box.scan for box in boxes)
+        if max(counts.values(), default=0) > 1:
+            whole.add(file)
+        for scan in counts:
+            files_of.setdefault(scan, []).append(file)
+    for scan, files in files_of.items():
+        if len(files) > 1 and not whole.isdisjoint(files):
+            raise BadInputError(
+                f"{folder}: {files[0].name} and {files[1].name} both hold boxes of scan {scan}, as"
+                " if they were of two drives; give the file of this drive alone."
+            )
 
 
 def takes_calibration(path: Path) -> bool:
@@ -62,12 +88,12 @@ def _files(path: Path) -> list[Path]:
     return files
 
 
-def _read(path: Path, T_rect_sensor: SE3) -> list[DetectorBox]:
+def _read(path: Path, T_rect_sensor: SE3, scans: int) -> list[DetectorBox]:
     kind = path.suffix.lower()
     if kind == ".txt":
         return read_kitti_file(path, T_rect_sensor)
     if kind == ".json":
-        return read_results(path)
+        return read_results(path, scans)
     if kind == ".csv":
         return _table(path)
     if kind in _PICKLES:
