@@ -27,7 +27,7 @@ def made_up(folder: Path, frames: int = 6) -> Path:
     for name in ("velodyne", "labels"):
         (folder / name).mkdir(parents=True)
     for i in range(frames):
-        points = rng.uniform(-40, 40, (_POINTS, 4)).astype("<f4")
+        points = rng.uniform((-40, -40, -40, 0), (40, 40, 40, 1), (_POINTS, 4)).astype("<f4")
         labels = np.full(_POINTS, 40, "<u4")
         for car in range(_CARS):
             mine = slice(car * _ON_CAR, (car + 1) * _ON_CAR)
