@@ -111,7 +111,7 @@ class HeadingVoteConfig:
     """How the scans of a track agree on which way is front (`tracks/heading_vote.py`).
 
     Attributes:
-        neighbours: scans on either side that are compared.
+        neighbours: scans on either side that are compared; each one more doubles the time.
         own_alike: what a scan found for itself weighs as so many neighbours posed alike, times
             -log(1 - p) of being right: a sensor may turn a corner between two scans.
         own_most: no scan weighs as one with a larger logarithm.
