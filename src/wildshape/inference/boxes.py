@@ -6,6 +6,7 @@ Labels are of the body: mirrors, aerials and stray points stick out of it. They 
 shape and in a scan, and do not count at the ends and sides. A decoder draws towards what is usual:
 where more of a scan than that lies outside of the shape, the box ends where the scan does. Of a
 LiDAR this is of the side seen alone: reflected, it would count the mirror plane's error twice.
+An end that no scan came near is drawn where such ends may be: there more points do not count.
 """
 
 from collections.abc import Iterable
@@ -25,6 +26,7 @@ from wildshape.records import Box, Points
 _PART = 64
 _COARSE_DEG = 1.0
 _DEFAULT = BoxConfig()
+_WHOLE = {"shape_share": 0.0, "hidden_share": 0.0, "seen_share": 0.0}
 
 
 def box_seen(
@@ -67,10 +69,11 @@ def fit_to_scans(
     exact = shape.double()
     axes = _level(exact, config, body=body) if mirror else fit_box(exact).rotation
     reflect = mirror and not body
-    config = config if body else replace(config, shape_share=0.0, seen_share=0.0)
-    low, high = _ends(_rows(exact, axes), config)
+    config = config if body else replace(config, **_WHOLE)
+    shown = _rows(exact, axes)
+    low, high = _ends(shown, config)
     reach = config.reach * (high - low).norm()
-    lows, highs, scans = [low], [high], 0
+    lows, highs, scans = [], [], 0
     for points in seen:
         scans += 1
         rows = _rows(points.double(), axes)
@@ -81,9 +84,12 @@ def fit_to_scans(
             begins, ends = _seen_ends(near, config)
             highs.append(ends)
             lows.append(_reflected(begins, ends) if reflect else begins)
-    rank = min(scans // config.scans_a_witness, len(lows) - 1)
-    low = torch.minimum(low, torch.stack(lows).sort(0).values[rank])
-    high = torch.maximum(high, torch.stack(highs).sort(0).values[-1 - rank])
+    rank = scans // config.scans_a_witness
+    if rank < len(lows):
+        first = torch.stack(lows).sort(0).values[rank]
+        last = torch.stack(highs).sort(0).values[-1 - rank]
+        low[0], high[0] = _drawn_back(shown, (low[0], high[0]), (first[0], last[0]), config)
+        low, high = torch.minimum(low, first), torch.maximum(high, last)
     return FittedBox(axes @ ((low + high) / 2), high - low, axes)
 
 
@@ -155,6 +161,26 @@ def _seen_ends(rows: Float[Tensor, "3 n"], config: BoxConfig) -> tuple[Tensor, T
     low, high = _without_outermost(rows, int(config.seen_share * rows.shape[1]))
     bottom, top = _without_outermost(rows[2:], config.strays)
     return torch.cat((low[:2], bottom)), torch.cat((high[:2], top))
+
+
+def _drawn_back(
+    shown: Float[Tensor, "3 n"],
+    ends: tuple[Tensor, Tensor],
+    seen: tuple[Tensor, Tensor],
+    config: BoxConfig,
+) -> tuple[Tensor, Tensor]:
+    """Front and rear end of a shape, drawn back where no scan came near.
+
+    Args:
+        shown: the shape's points along the box's axes.
+        ends: lowest and highest x of the shape.
+        seen: the same of the scans.
+        config: how far.
+    """
+    count = max(int(config.hidden_share * shown.shape[1]), config.strays)
+    least, most = (end[0] for end in _without_outermost(shown[:1], count))
+    (low, high), (first, last) = ends, seen
+    return (first - config.near_m).clamp(low, least), (last + config.near_m).clamp(most, high)
 
 
 def _without_outermost(rows: Float[Tensor, "*k n"], count: int) -> tuple[Tensor, Tensor]:

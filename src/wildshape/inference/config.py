@@ -200,7 +200,10 @@ class BoxConfig:
 
     Attributes:
         shape_share: share of the shape's points that do not count at each end and side.
-        seen_share: the same of a scan's points.
+        hidden_share: the same at the front or rear end that no scan came near: what a decoder puts
+            there is spread over where such ends may be.
+        near_m: a scan came near an end if it reaches that far from it.
+        seen_share: of a scan's points, those that do not count.
         strays: the shape's highest and lowest points that do not count; at least as many do not at
             its ends and sides.
         reach: share of the box's diagonal by which a scan may reach beyond the shape and is
@@ -215,6 +218,8 @@ class BoxConfig:
     """
 
     shape_share: float = 0.01
+    hidden_share: float = 0.02
+    near_m: float = 0.2
     seen_share: float = 0.03
     strays: int = 2
     reach: float = 0.08
