@@ -77,6 +77,16 @@ def test_an_end_that_no_scan_came_near_is_drawn_back_into_where_it_may_be(front)
     assert float(whole.size[0]) == pytest.approx(4.4, abs=0.03)
 
 
+def test_ground_left_around_the_wheels_is_no_end_or_side():
+    ring = surface(600, seed=4) * torch.tensor((1.12, 1.2, 0.0), dtype=torch.float64)
+    ring = ring[(ring[:, 0].abs() > 2.0) | (ring[:, 1].abs() > 0.9)] - torch.tensor((0, 0, 0.7))
+    scan = torch.cat((surface(600, seed=1), ring))
+    fitted = fit_to_scans(surface(), [scan], mirror=True)
+    torch.testing.assert_close(fitted.size, SIZE, atol=0.02, rtol=0)
+    whole = fit_to_scans(surface(), [scan], mirror=True, body=False)
+    assert whole.size.tolist() == pytest.approx((4.48, 2.16, 1.5), abs=0.05)
+
+
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("side", [-9.0, 9.0])
 def test_a_few_strays_far_outside_are_not_believed(axis, side):

@@ -7,8 +7,10 @@ shape and in a scan, and do not count at the ends and sides. A decoder draws tow
 where more of a scan than that lies outside of the shape, the box ends where the scan does. Of a
 LiDAR this is of the side seen alone: reflected, it would count the mirror plane's error twice.
 An end that no scan came near is drawn where such ends may be: there more points do not count.
+Ground that was left around the wheels is no end or side.
 """
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -26,7 +28,7 @@ from wildshape.records import Box, Points
 _PART = 64
 _COARSE_DEG = 1.0
 _DEFAULT = BoxConfig()
-_WHOLE = {"shape_share": 0.0, "hidden_share": 0.0, "seen_share": 0.0}
+_WHOLE = {"shape_share": 0.0, "hidden_share": 0.0, "seen_share": 0.0, "ground_share": -math.inf}
 
 
 def box_seen(
@@ -73,6 +75,7 @@ def fit_to_scans(
     shown = _rows(exact, axes)
     low, high = _ends(shown, config)
     reach = config.reach * (high - low).norm()
+    floor = low[2] + config.ground_share * (high[2] - low[2])
     lows, highs, scans = [], [], 0
     for points in seen:
         scans += 1
@@ -81,7 +84,7 @@ def fit_to_scans(
             rows[1].abs_()
         near = rows[:, ((rows > (low - reach)[:, None]) & (rows < (high + reach)[:, None])).all(0)]
         if near.shape[1]:
-            begins, ends = _seen_ends(near, config)
+            begins, ends = _seen_ends(near, floor, config)
             highs.append(ends)
             lows.append(_reflected(begins, ends) if reflect else begins)
     rank = scans // config.scans_a_witness
@@ -156,11 +159,16 @@ def _ends(rows: Float[Tensor, "3 n"], config: BoxConfig) -> tuple[Tensor, Tensor
     return torch.cat((low[:2], bottom)), torch.cat((high[:2], top))
 
 
-def _seen_ends(rows: Float[Tensor, "3 n"], config: BoxConfig) -> tuple[Tensor, Tensor]:
-    """Where what a scan saw begins and ends; beside it more stands out than above it."""
-    low, high = _without_outermost(rows, int(config.seen_share * rows.shape[1]))
+def _seen_ends(
+    rows: Float[Tensor, "3 n"], floor: Tensor, config: BoxConfig
+) -> tuple[Tensor, Tensor]:
+    """Where what a scan saw begins and ends; what lies below the floor is no end or side."""
     bottom, top = _without_outermost(rows[2:], config.strays)
-    return torch.cat((low[:2], bottom)), torch.cat((high[:2], top))
+    above = rows[:2, rows[2] > floor]
+    if above.shape[1] == 0:
+        above = rows[:2]
+    low, high = _without_outermost(above, int(config.seen_share * above.shape[1]))
+    return torch.cat((low, bottom)), torch.cat((high, top))
 
 
 def _drawn_back(

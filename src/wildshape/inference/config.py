@@ -204,6 +204,8 @@ class BoxConfig:
             there is spread over where such ends may be.
         near_m: a scan came near an end if it reaches that far from it.
         seen_share: of a scan's points, those that do not count.
+        ground_share: of its points those that lie lower than this share of the shape's height are
+            no ends and sides: they may be ground.
         strays: the shape's highest and lowest points that do not count; at least as many do not at
             its ends and sides.
         reach: share of the box's diagonal by which a scan may reach beyond the shape and is
@@ -221,6 +223,7 @@ class BoxConfig:
     hidden_share: float = 0.02
     near_m: float = 0.2
     seen_share: float = 0.03
+    ground_share: float = 0.15
     strays: int = 2
     reach: float = 0.08
     scans_a_witness: int = 4
