@@ -61,19 +61,20 @@ def test_where_a_scan_ends_beyond_the_shape_a_body_ends_with_it_on_the_side_seen
 
 
 @pytest.mark.parametrize("front", [True, False])
-def test_an_end_that_no_scan_came_near_is_drawn_back_into_where_it_may_be(front):
+def test_an_end_that_scans_came_near_without_seeing_it_is_drawn_back(front):
     ends = torch.tensor((1.0 if front else -1.0, 1.0, 1.0), dtype=torch.float64)
     tail = surface(90, seed=2) * torch.tensor((0.1, 1.0, 1.0), dtype=torch.float64)
     tail[:, 0] = 2.0 + 0.4 * torch.arange(1, 91) / 90  # 3 % of the shape, spread over 0.4 m
     shape = torch.cat((surface(), tail)) * ends
     scan = surface(3000, seed=1) * ends
-    near, far = scan[scan[:, 0] * ends[0] < 0], scan
-    seen_nowhere, believed = 2.4 - 0.4 * 30 / 90, 2.4 - 0.4 * 61 / 90
-    for seen, wanted in ((near, believed), (far, 2.2), ((near[:0]), seen_nowhere)):
+    before, far_before = (scan[scan[:, 0] * ends[0] < x] for x in (1.6, 0.5))
+    own, drawn_back = 2.4 - 0.4 * 30 / 90, 2.4 - 0.4 * 61 / 90
+    cases = (before, drawn_back), (scan, 2.2), (far_before, own), (scan[:0], own)
+    for seen, wanted in cases:
         fitted = fit_to_scans(shape, [seen], mirror=True)
         end = float(fitted.centre[0]) * float(ends[0]) + float(fitted.size[0]) / 2
         assert end == pytest.approx(wanted, abs=0.02)
-    whole = fit_to_scans(shape, [near], mirror=True, body=False)
+    whole = fit_to_scans(shape, [before], mirror=True, body=False)
     assert float(whole.size[0]) == pytest.approx(4.4, abs=0.03)
 
 

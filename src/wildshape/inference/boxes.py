@@ -6,7 +6,8 @@ Labels are of the body: mirrors, aerials and stray points stick out of it. They 
 shape and in a scan, and do not count at the ends and sides. A decoder draws towards what is usual:
 where more of a scan than that lies outside of the shape, the box ends where the scan does. Of a
 LiDAR this is of the side seen alone: reflected, it would count the mirror plane's error twice.
-An end that no scan came near is drawn where such ends may be: there more points do not count.
+At an end that scans came near without seeing it more points do not count: they are drawn where
+such ends may be.
 Ground that was left around the wheels is no end or side.
 """
 
@@ -172,23 +173,27 @@ def _seen_ends(
 
 
 def _drawn_back(
-    shown: Float[Tensor, "3 n"],
+    rows: Float[Tensor, "3 n"],
     ends: tuple[Tensor, Tensor],
     seen: tuple[Tensor, Tensor],
     config: BoxConfig,
 ) -> tuple[Tensor, Tensor]:
-    """Front and rear end of a shape, drawn back where no scan came near.
+    """Front and rear end of a shape, drawn back where the scans ended a little before.
 
     Args:
-        shown: the shape's points along the box's axes.
+        rows: the shape's points along the box's axes.
         ends: lowest and highest x of the shape.
         seen: the same of the scans.
         config: how far.
     """
-    count = max(int(config.hidden_share * shown.shape[1]), config.strays)
-    least, most = (end[0] for end in _without_outermost(shown[:1], count))
+    count = max(int(config.hidden_share * rows.shape[1]), config.strays)
+    least, most = (end[0] for end in _without_outermost(rows[:1], count))
     (low, high), (first, last) = ends, seen
-    return (first - config.near_m).clamp(low, least), (last + config.near_m).clamp(most, high)
+    if first - low < config.unknown_m:
+        low = (first - config.near_m).clamp(low, least)
+    if high - last < config.unknown_m:
+        high = (last + config.near_m).clamp(most, high)
+    return low, high
 
 
 def _without_outermost(rows: Float[Tensor, "*k n"], count: int) -> tuple[Tensor, Tensor]:

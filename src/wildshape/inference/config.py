@@ -200,9 +200,11 @@ class BoxConfig:
 
     Attributes:
         shape_share: share of the shape's points that do not count at each end and side.
-        hidden_share: the same at the front or rear end that no scan came near: what a decoder puts
-            there is spread over where such ends may be.
-        near_m: a scan came near an end if it reaches that far from it.
+        hidden_share: the same at a front or rear end before which the scans ended: what a decoder
+            puts there is spread over where such ends may be.
+        near_m: scans that come so near to an end saw it.
+        unknown_m: of scans that ended so far before it something else hid the rest, and a decoder
+            makes that too short as often as too long.
         seen_share: of a scan's points, those that do not count.
         ground_share: of its points those that lie lower than this share of the shape's height are
             no ends and sides: they may be ground.
@@ -222,6 +224,7 @@ class BoxConfig:
     shape_share: float = 0.01
     hidden_share: float = 0.02
     near_m: float = 0.2
+    unknown_m: float = 1.0
     seen_share: float = 0.03
     ground_share: float = 0.15
     strays: int = 2
