@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from wildshape.errors import BadInputError
 from wildshape.geometry.meshing import colour_by_confidence, place_confidence
 from wildshape.io.scans.writers import MESH_FORMATS, write_mesh
 
@@ -31,6 +32,17 @@ def test_confidence_falls_with_the_distance_to_what_was_measured():
     places = scan[:1] + np.array([[0, 0, 0], [0, 0.25, 0], [0.5, 0, 0], [0, 0, 3]])
     found = place_confidence(places, scan, confidence=0.8)
     np.testing.assert_allclose(found, [1, 1 - 0.48 / 2, 0.52, 0.52], atol=1e-5)
+
+
+def test_points_that_are_none_measured_nothing():
+    """One NaN, as sensors leave where nothing came back, made all of a mesh a guess."""
+    scan = np.array([[30.0, 5, -1], [31, 5, -1], [np.nan] * 3, [np.inf, 0, 0]], np.float32)
+    places = scan[:1] + np.array([[0, 0, 0], [0, 0.25, 0]])
+    expected = place_confidence(places, scan[:2], confidence=0.8)
+    np.testing.assert_array_equal(place_confidence(places, scan, confidence=0.8), expected)
+    for none in (scan[2:], scan[:0]):
+        with pytest.raises(BadInputError, match="no finite point"):
+            place_confidence(places, none, confidence=0.8)
 
 
 @pytest.mark.parametrize("radius", [1.0, 0.05])

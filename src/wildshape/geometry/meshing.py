@@ -231,14 +231,21 @@ def place_confidence(
 
     Args:
         places: in the scan's frame, metres.
-        scan: the points measured.
+        scan: the points measured; NaN are none.
         confidence: of the whole completion.
         guessed_m: from any measured point, beyond which a place is a guess, metres.
         guessed: the chance of a guess, times the completion's confidence.
+
+    Raises:
+        BadInputError: no point of the scan is finite; those that are not measured nothing.
     """
+    measured = np.asarray(scan, np.float64)
+    measured = measured[np.isfinite(measured).all(1)]
+    if not len(measured):
+        raise BadInputError("scan: no finite point; hand in the points that were completed.")
     # In double and about the middle of the scan: far from the sensor float32 counts in millimetres.
-    middle = np.asarray(scan, np.float64).mean(0)
-    a, b = (torch.from_numpy((np.asarray(p) - middle)[None]).float() for p in (places, scan))
+    middle = measured.mean(0)
+    a, b = (torch.from_numpy((np.asarray(p) - middle)[None]).float() for p in (places, measured))
     apart = nearest(a, b).distance_squared[0].clamp_min(0).sqrt().numpy()
     return 1.0 - (1.0 - guessed * confidence) * np.minimum(apart / guessed_m, 1.0)
 

@@ -176,6 +176,14 @@ def test_a_camera_of_images_of_another_size_is_doubted(tmp_path):
     assert re.search(r"camera\.json: cx 157\.4, cy 122\.4 .* 160 x 120 pixels", doubt)
 
 
+def test_two_folders_of_one_instance_are_refused(tmp_path):
+    """3 and 03: one of the two objects was lost without a word."""
+    write_sequence(tmp_path / "kitchen", apart=True)
+    masks = tmp_path / "kitchen" / "masks"
+    (masks / "2").rename(masks / "01")
+    refused(tmp_path, "masks/1: 01 beside it is of the same instance")
+
+
 def test_missing_and_damaged_files_are_named(tmp_path):
     folder = tmp_path / "kitchen"
     refused(

@@ -36,7 +36,9 @@ def _metrics() -> dict[str, Any]:
 
 
 def _index() -> Table:
-    rows = tuple((f"car {i}", f"{i * 7 % 11}.5", "far" if i % 2 else "") for i in range(8))
+    """One name is longer than the page is wide: it hid all figures beyond the right edge."""
+    names = ("car " + "0123456789" * 25, *(f"car {i}" for i in range(1, 8)))
+    rows = tuple((name, f"{i * 7 % 11}.5", "far" if i % 2 else "") for i, name in enumerate(names))
     objects = (0, 1, *[None] * 6)
     return Table("All", ("object", "CD, m", "warning"), rows, sortable=True, objects=objects)
 

@@ -45,6 +45,13 @@ def test_vehicles_stand_at_their_places_and_the_chosen_one_shows_its_shape(found
         assert "&lt;7&gt;" in page.text.content
         assert "0.94" in page.text.content.partition("box right")[2]
         assert np.linalg.norm(page.server.initial_camera.look_at - [26.8, -2, -0.95]) < 0.01
+        for name, handle in (("shapes", whole), ("scan", around)):
+            page.layers[name].value = False
+            page.refresh()
+            assert not handle.visible
+            page.layers[name].value = True
+            page.refresh()
+            assert handle.visible
         page.picker.value = NOTHING
         page.choose()
         assert page.extra == []

@@ -118,6 +118,7 @@ def open_sequence(folder: Path) -> Sequence:
     check_counted(depth)
     if not (folder / "masks").is_dir():
         raise BadInputError(f"{folder / 'masks'}: no such folder; a sequence keeps its masks here.")
+    _check_instances(folder / "masks")
     expected = f"JSON with {', '.join(_KEYS)} and depth_scale"
     raw = read_json(folder / "camera.json", expected, dict)
     size = read_depth_png(depth[0]).shape[::-1]
@@ -196,6 +197,20 @@ def _categories(path: Path) -> dict[int, str]:
     if wrong is not None:
         raise BadInputError(f"{path}: '{wrong}' is no instance number; write such as 1.")
     return {int(key): str(word) for key, word in raw.items()}
+
+
+def _check_instances(masks: Path) -> None:
+    """Refuse two folders of one instance, such as 3 and 03: one of the objects would be lost."""
+    named: dict[int, str] = {}
+    for folder in sorted(masks.iterdir()):
+        if not folder.is_dir() or not _INSTANCE.fullmatch(folder.name):
+            continue
+        other = named.setdefault(int(folder.name), folder.name)
+        if other != folder.name:
+            raise BadInputError(
+                f"{folder}: {other} beside it is of the same instance; give each object a number of"
+                " its own."
+            )
 
 
 def _number(folder: Path) -> int:

@@ -211,6 +211,8 @@ class DrivePage:
             for name in ("shapes", "boxes", "names"):
                 closely = name == "shapes" and number == self.chosen
                 node[name].visible = self.layers[name].value and not closely
+        for name, handle in zip(("shapes", "scan"), self.extra):
+            handle.visible = self.layers[name].value
 
     def _show_closely(self, number: int) -> None:
         """All of the vehicle's shape, and what its completed scans measured, at its place."""

@@ -104,6 +104,10 @@ class Page:
 
     def _work(self, number: int, turn: int) -> None:
         try:
+            with self.lock:
+                if turn != self.turn:
+                    return
+                self._clear()  # a track that cannot be read is not to leave another in its place
             track = self.source.track(number)
             with self.lock:
                 if turn != self.turn:
@@ -116,9 +120,12 @@ class Page:
             logging.getLogger(__name__).exception("the viewer cannot show this track")
             self._say(f"{type(error).__name__}: {error}", turn)
 
-    def _begin(self, stage: Stage) -> None:
+    def _clear(self) -> None:
         if self.stage is not None:
             self.stage.clear()
+        self.stage = None
+
+    def _begin(self, stage: Stage) -> None:
         self.stage = stage
         self.status = "completing ..."
         self.panel.fit(stage.track)

@@ -1,0 +1,43 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What stands on the viewer's page when another track is chosen."""
+
+import time
+from dataclasses import replace
+
+import pytest
+from tests.report.viewer.shown import source
+
+pytest.importorskip("viser", reason="did not run: viser is not installed (extra view)")
+from wildshape.errors import BadInputError
+from wildshape.report.viewer.page import serving
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")  # viser's
+_PATIENCE_S = 60.0
+
+
+def _wait(page, content):
+    deadline = time.monotonic() + _PATIENCE_S
+    while content not in page.panel.text.content:
+        assert time.monotonic() < deadline, page.panel.text.content
+        time.sleep(0.01)
+
+
+def test_a_track_that_cannot_be_read_does_not_leave_another_in_its_place():
+    good = source()
+
+    def track(number):
+        if number == 1:
+            raise BadInputError("two: holds no scan.")
+        return good.track(number)
+
+    with serving(replace(good, track=track)) as page:
+        page.opened = True  # nobody looks: nothing is waited for
+        _wait(page, "car &lt;b&gt;")
+        page.choose(1)
+        _wait(page, "two: holds no scan.")
+        assert "car" not in page.panel.text.content
+        assert page.stage is None
+        page.choose(0)
+        _wait(page, "car &lt;b&gt;")
+        assert page.stage is not None
