@@ -11,6 +11,12 @@ def test_one_and_many() -> None:
     assert counted(20_000, "point") == "20,000 points"
 
 
+def test_confidences_below_the_line_are_counted_only_where_there_are_some() -> None:
+    (none,), (one,) = of_confidences([0.5, 0.9], 0), of_confidences([0.4, 0.9], 0)
+    assert none.endswith("none is below 0.5.")
+    assert one.endswith("1 of them (50 %) are below 0.5: look at these first.")
+
+
 def test_readings_of_one_scan() -> None:
     said = [*of_confidences([0.5], 0), *of_errors([0.1], [3.0])]
     assert len(said) == 3

@@ -184,6 +184,14 @@ def test_two_folders_of_one_instance_are_refused(tmp_path):
     refused(tmp_path, "masks/1: 01 beside it is of the same instance")
 
 
+def test_an_image_of_all_instances_beside_folders_of_single_ones_is_refused(tmp_path):
+    """The folders were passed over, and their objects lost."""
+    write_sequence(tmp_path / "kitchen", apart=True)
+    masks = tmp_path / "kitchen" / "masks"
+    (masks / "000001.png").write_bytes(next(masks.glob("1/*.png")).read_bytes())
+    refused(tmp_path, r"masks/000001\.png: an image of all instances beside folders .* such as 1;")
+
+
 def test_missing_and_damaged_files_are_named(tmp_path):
     folder = tmp_path / "kitchen"
     refused(

@@ -200,7 +200,7 @@ def _categories(path: Path) -> dict[int, str]:
 
 
 def _check_instances(masks: Path) -> None:
-    """Refuse two folders of one instance, such as 3 and 03: one of the objects would be lost."""
+    """Refuse what would lose objects: two folders of one instance, or folders beside images."""
     named: dict[int, str] = {}
     for folder in sorted(masks.iterdir()):
         if not folder.is_dir() or not _INSTANCE.fullmatch(folder.name):
@@ -211,6 +211,12 @@ def _check_instances(masks: Path) -> None:
                 f"{folder}: {other} beside it is of the same instance; give each object a number of"
                 " its own."
             )
+    together = next(iter(sorted(masks.glob("*.png"))), None)
+    if named and together is not None:
+        raise BadInputError(
+            f"{together}: an image of all instances beside folders of single ones, such as"
+            f" {next(iter(named.values()))}; keep one of the two."
+        )
 
 
 def _number(folder: Path) -> int:

@@ -154,10 +154,11 @@ def of_confidences(confidences: Sequence[float], flagged: int) -> list[str]:
     if not confidences:
         return []
     unsure = sum(value < _SURE for value in confidences)
+    share = _percent(unsure / len(confidences))
+    first = f"{unsure:,} of them ({share}) are below {_SURE}: look at these first."
     lines = [
         f"{counted(len(confidences), 'scan')} completed: a median confidence of "
-        f"{float(np.median(confidences)):.2f}; {unsure:,} of them "
-        f"({_percent(unsure / len(confidences))}) are below {_SURE}: look at these first."
+        f"{float(np.median(confidences)):.2f}; {first if unsure else f'none is below {_SURE}.'}"
     ]
     if flagged:
         lines.append(
