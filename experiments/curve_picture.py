@@ -14,6 +14,7 @@ import numpy as np
 import tyro
 
 from wildshape.cli.main import in_a_sentence
+from wildshape.errors import BadInputError
 from wildshape.io.atomic import atomic_write
 from wildshape.report.page.curves import whole_entries
 
@@ -26,6 +27,9 @@ _TRUTH = {
 _LOSSES = {
     "observation": "observation",
     "projection": "projection",
+    "pose": "pose, taught",
+    "coverage": "coverage, taught",
+    "precision": "precision, taught",
     "validation/observation": "observation, held out",
     "validation/projection": "projection, held out",
 }
@@ -46,7 +50,16 @@ class Settings:
 
 
 def main(settings: Settings) -> None:
-    draw(settings.out, list(whole_entries(settings.run / "log.jsonl")))
+    """Draw.
+
+    Raises:
+        BadInputError: the log has none of the curves.
+    """
+    log = settings.run / "log.jsonl"
+    entries = list(whole_entries(log))
+    if not any(key in entry for key in _LOSSES for entry in entries):
+        raise BadInputError(f"{log}: holds no losses in metres; name a run that is not DPC's.")
+    draw(settings.out, entries)
 
 
 def series(entries: list[dict[str, Any]], key: str, of: int = 1) -> tuple[np.ndarray, np.ndarray]:
@@ -64,6 +77,8 @@ def draw(out: Path, entries: list[dict[str, Any]]) -> None:
 
     figure, panels = plt.subplots(1, 5, figsize=(13, 2.8), layout="constrained")
     for key, name in _LOSSES.items():
+        if not any(key in entry for entry in entries):
+            continue
         of = 1 if key.startswith("validation/") else _BATCHES
         panels[0].plot(*series(entries, key, of), lw=1, label=name)
     panels[0].set_title("terms of the loss, m")

@@ -18,7 +18,7 @@ from typing import Literal
 from experiments.tables import ablations, added, vehicle, views
 from experiments.tables.command import begin
 from experiments.tables.given import Given
-from experiments.tables.make import Making, chosen_rows, make
+from experiments.tables.make import Making, chosen_rows, make, refuse_unknown_rows
 from experiments.tables.measure import measure, seeds_of
 from experiments.tables.rows import ORACLE
 from experiments.tables.show import as_printed
@@ -121,14 +121,28 @@ class Job:
                     measure(shop, self.row, block, rotate, seed, self.given.size.max_scans)
 
 
-def tables(given: Given, seeds: int, words: tuple[str, ...] = ()) -> dict[str, Table]:
-    """The tables in the order of their worth; one oracle, the paper's."""
+def tables(
+    given: Given, seeds: int, words: tuple[str, ...] = (), only: str | None = None
+) -> dict[str, Table]:
+    """The tables in the order of their worth; one oracle, the paper's.
+
+    Args:
+        given: size and meshes.
+        seeds: trainings of each row.
+        words: only rows whose names hold one of these.
+        only: this table alone.
+
+    Raises:
+        BadInputError: a word is in no row's name.
+    """
     made = {
         "vehicle": _without(vehicle.table(given), ORACLE),
         "views": _without(views.table(given), ORACLE),
         "ablations": ablations.table(given),
         "added": added.table(given),
     }
+    made = {name: made[name] for name in made if only in (None, name)}
+    refuse_unknown_rows(made.values(), words)
     found = {name: _with_rows(table, words) for name, table in made.items()}
     return {name: replace(table, seeds=seeds) for name, table in found.items() if table}
 
@@ -193,13 +207,18 @@ def write_pages(shop: Workshop, given: Given, made: dict[str, Table], finished: 
 
 
 def run(settings: Settings, command: str) -> None:
-    """Work through the plan."""
+    """Work through the plan.
+
+    Raises:
+        BadInputError: settings that leave nothing to do.
+    """
+    if settings.seeds < 1:
+        raise BadInputError(f"--seeds {settings.seeds}: expected 1 or more.")
     size = changed(SIZES["small"], settings.share, settings.steps)
     given = Given(size, settings.cad and settings.cad.resolve())
     shop = Workshop(settings.out, settings.device, command)
     words = tuple(word.strip() for word in settings.rows.split(",") if word.strip())
-    made = tables(given, settings.seeds, words)
-    made = {name: made[name] for name in made if settings.table in (None, name)}
+    made = tables(given, settings.seeds, words, settings.table)
     planned, spent = jobs(made, given), _spent(settings.out / RECORD)
     for number, job in enumerate(planned, start=1):
         if settings.plan:

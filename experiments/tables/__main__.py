@@ -25,9 +25,17 @@ from experiments.tables import (
 )
 from experiments.tables.command import begin
 from experiments.tables.given import Given
-from experiments.tables.make import chosen_protocols, chosen_rows, draw, make
+from experiments.tables.make import (
+    chosen_protocols,
+    chosen_rows,
+    draw,
+    make,
+    refuse_unknown_rows,
+)
 from experiments.tables.size import SIZES, changed
 from experiments.tables.train import Workshop
+
+from wildshape.errors import BadInputError
 
 TABLES = {
     "views": views.table,
@@ -107,15 +115,22 @@ class Settings:
 
 def main(settings: Settings, command: str) -> None:
     """Make it and print the page."""
+    if settings.seeds < 0:
+        raise BadInputError(f"--seeds {settings.seeds}: expected 0 or more.")
     size = changed(SIZES[settings.size], steps=settings.steps)
     size = replace(size, seeds=settings.seeds) if settings.seeds > 0 else size
     given = Given(size, settings.cad, settings.kitti)
     shop = Workshop(settings.out, settings.device, command)
     name, results = f"{settings.table}-{size.name}", settings.results or settings.out
+    words = _words(settings.rows)
     if settings.table in FIGURES:
+        if words or settings.rotate:
+            raise BadInputError(f"{settings.table} is a figure: leave out --rows and --rotate.")
         print(draw(shop, given, FIGURES[settings.table], name, results))
         return
-    table = chosen_rows(TABLES[settings.table](given), _words(settings.rows))
+    whole = TABLES[settings.table](given)
+    refuse_unknown_rows([whole], words)
+    table = chosen_rows(whole, words)
     table = chosen_protocols(table, _words(settings.rotate))
     table = replace(table, seeds=settings.seeds) if settings.seeds > 0 else table
     print(make(shop, given, table, name, results))

@@ -22,6 +22,7 @@ from wildshape.records import Track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
 Split = Literal["train", "test"]
+_COLUMNS = ("category", "file", "split")
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,10 @@ def _meshes(folder: Path, cad: Cad) -> Path:
     if not manifest.is_file():
         raise BadInputError(f"{manifest}: no such file; --cad names a folder with a manifest.csv.")
     with manifest.open(encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["split"] == cad.split]
+        table = csv.DictReader(file)
+        if lacks := [name for name in _COLUMNS if name not in (table.fieldnames or ())]:
+            raise BadInputError(f"{manifest}: has no column {', '.join(lacks)}; add it.")
+        rows = [row for row in table if row["split"] == cad.split]
     files = [cad.folder / row["file"] for row in rows if row["category"] in cad.categories]
     into.mkdir(parents=True, exist_ok=True)
     for place, mesh in zip(np.random.default_rng(0).permutation(len(files)), files):

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Making a table: every row trained and measured, the seed selected without labels beside it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -96,6 +96,18 @@ def chosen_rows(table: Table, words: tuple[str, ...]) -> Table:
     return replace(table, blocks=kept, notes=(*table.notes, note))
 
 
+def refuse_unknown_rows(tables: Iterable[Table], words: tuple[str, ...]) -> None:
+    """Words are looked for in all tables together: each may choose rows of another.
+
+    Raises:
+        BadInputError: a word is in no row's name.
+    """
+    rows = [row for table in tables for block in table.blocks for row in block.rows]
+    for word in words:
+        if not any(_called(row, word) for row in rows):
+            raise BadInputError(f"--rows {word}: no row is called so.")
+
+
 def _called(row: Row, word: str) -> bool:
     return row.name.startswith(word[1:]) if word.startswith("^") else word in row.name
 
@@ -108,13 +120,14 @@ def chosen_protocols(table: Table, names: tuple[str, ...]) -> Table:
     """
     if not names:
         return table
+    known = {one for block in table.blocks for one in block.rotate}
+    if unknown := [name for name in names if name not in known]:
+        raise BadInputError(f"--rotate {','.join(unknown)}: this table has no such protocol.")
     blocks = [
         replace(block, rotate=tuple(one for one in block.rotate if one in names))
         for block in table.blocks
     ]
     kept = tuple(block for block in blocks if block.rotate)
-    if not kept:
-        raise BadInputError(f"--rotate {','.join(names)}: this table has no such protocol.")
     note = f"Only under {' and '.join(names)}."
     return replace(table, blocks=kept, notes=(*table.notes, note))
 

@@ -7,6 +7,7 @@ from typing import Literal
 
 from wildshape.baselines.dpc.objective import DpcRecipe
 from wildshape.baselines.dpc.objective import small as small_dpc
+from wildshape.errors import BadInputError
 from wildshape.training.config import OptimConfig, Recipe, stretched
 from wildshape.training.recipes import small, tiny
 
@@ -83,7 +84,15 @@ SIZES = {
 
 
 def changed(size: Size, share: float = 1.0, steps: int | None = None) -> Size:
-    """A size with a share of the tracks and steps, or other steps, under a name of its own."""
+    """A size with a share of the tracks and steps, or other steps, under a name of its own.
+
+    Raises:
+        BadInputError: no steps, or no tracks.
+    """
+    if share <= 0:
+        raise BadInputError(f"--share {share:g}: expected more than 0.")
+    if steps is not None and steps < 1:
+        raise BadInputError(f"--steps {steps}: expected 1 or more.")
     if steps is not None:
         size = replace(size, name=f"{size.name}-{steps}-steps", steps=steps)
     if share == 1:

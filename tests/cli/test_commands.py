@@ -173,6 +173,17 @@ def test_evaluate_models_as_seeds(wildshape, refused, store, trained, tmp_path):
     (selected,) = set(methods) - {"wildshape"}
     assert "selected" in selected
     assert methods[selected]["cd"] == methods["wildshape"]["cd"]
+    assert "trained with other" not in found.err
+
+
+def test_models_of_other_settings_are_no_seeds_of_one_method(wildshape, store, trained, tmp_path):
+    """A run of another length was pooled with the rest without a word."""
+    short = ("train", store, "--out", tmp_path / "short", "--preset", "tiny", "--steps", 1)
+    assert wildshape(*short).code == 0
+    measure = ("evaluate", store, "--out", tmp_path / "e", "--max-scans", 2, "--as-seeds")
+    found = wildshape(*measure, "--baselines", "none", "--model", trained, tmp_path / "short")
+    assert found.code == 0
+    assert f"short was trained with other settings than {trained.name}" in found.err
 
 
 def test_train_refuses_and_knows_what_is_finished(wildshape, refused, store, trained):

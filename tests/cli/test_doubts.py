@@ -107,6 +107,19 @@ def test_weights_of_another_sensor_are_doubted_in_a_comparison(wildshape, tmp_pa
     assert "trained on" not in done.err
 
 
+def test_figures_of_two_kinds_of_sensor_are_doubted(wildshape, tmp_path):
+    """The first track's sensor is that of the weights; the second's was mixed in without a word."""
+    (tmp_path / "tracks").mkdir()
+    for name, sensor in (("a", "hdl64"), ("b", "depth-camera")):
+        words = ("--tracks", "1", "--scans", "2", "--layout", "folders", "--sensor", sensor)
+        wildshape("simulate", tmp_path / name, *words)
+        (tmp_path / name / "000000").rename(tmp_path / "tracks" / name)
+    words = ("--baselines", "identity", "--raw", "--out")
+    done = wildshape("evaluate", tmp_path / "tracks", *words, tmp_path / "both")
+    assert done.code == 0, done.err
+    assert "holds camera and lidar scans, and each figure is of both together" in done.err
+
+
 def test_scans_out_of_order_are_doubted_by_convert(wildshape, tmp_path):
     for name in ("9", "10"):
         write_ply(

@@ -38,6 +38,8 @@ def test_train_and_evaluate(wildshape, refused, store, toy_sizes, tmp_path):
     other = tmp_path / "other.safetensors"
     other.write_bytes((run / "model.safetensors").read_bytes())
     assert "trained DPC" in refused(*again, other)
+    taught = ("train", store, "--out", tmp_path / "taught", "--preset", "tiny", "--teacher", run)
+    assert "for evaluate alone" in refused(*taught)
 
 
 def test_what_dpc_has_not_is_refused_and_leaves_nothing(refused, store, tmp_path):

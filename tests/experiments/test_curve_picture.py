@@ -5,7 +5,10 @@
 import json
 
 import numpy as np
+import pytest
 from experiments.curve_picture import Settings, main, series
+
+from wildshape.errors import BadInputError
 
 TRUTH = {"cd": 0.3, "acc30": 0.9, "rot_median_deg": 4.0, "trans_median_m": 0.1}
 
@@ -30,3 +33,21 @@ def test_a_log_becomes_a_picture_that_is_always_the_same(tmp_path):
         pictures.append((tmp_path / name).read_text(encoding="utf-8"))
     assert pictures[0] == pictures[1]
     assert "held out: CD, m" in pictures[0]
+
+
+def test_a_taught_run_shows_what_it_minimised(tmp_path):
+    lines = [
+        {"step": i, "pose": 1 / i, "coverage": 2 / i, "precision": 3 / i} for i in range(1, 31)
+    ]
+    (tmp_path / "log.jsonl").write_text("\n".join(map(json.dumps, lines)), encoding="utf-8")
+    main(Settings(tmp_path, tmp_path / "taught.svg"))
+    drawn = (tmp_path / "taught.svg").read_text(encoding="utf-8")
+    assert "coverage, taught" in drawn
+    assert "observation" not in drawn
+
+
+def test_a_run_of_dpc_is_refused(tmp_path):
+    line = json.dumps({"step": 25, "silhouette": 80.0, "depth": 0.0, "student": 0.7})
+    (tmp_path / "log.jsonl").write_text(line, encoding="utf-8")
+    with pytest.raises(BadInputError, match="DPC"):
+        main(Settings(tmp_path, tmp_path / "dpc.svg"))

@@ -23,6 +23,7 @@ from experiments.tables.size import SIZES  # pyright: ignore
 from experiments.tables.table import Trained  # pyright: ignore
 
 from experiments import paper_tables  # pyright: ignore
+from wildshape.errors import BadInputError
 
 
 @pytest.fixture(scope="module")
@@ -139,6 +140,22 @@ def test_each_part_that_we_add_is_left_out_alone(planned):
             assert sum(other) == 1
             assert less.data == full.data
         assert added[f"taught, w/o {removal.name}"].teacher.recipe == less.recipe
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"rows": "nothing"}, "--rows nothing"),
+        ({"rows": "identity,nothing"}, "--rows nothing"),
+        ({"rows": "mirror", "table": "vehicle"}, "--rows mirror"),
+        ({"seeds": 0}, "--seeds 0"),
+        ({"share": 0.0}, "--share 0"),
+    ],
+)
+def test_settings_that_leave_nothing_to_do_are_refused(tmp_path, changed, told):
+    """Zero seeds would be named as one, whose row would then be taken for done."""
+    with pytest.raises(BadInputError, match=told):
+        run(replace(Settings(tmp_path, plan=True), **changed), "the command")
 
 
 def test_a_share_has_a_name_of_its_own():

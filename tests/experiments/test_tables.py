@@ -129,6 +129,36 @@ def test_protocols_that_are_chosen_and_that_are_not_there():
         make.chosen_protocols(table, ("upside-down",))
 
 
+def test_a_protocol_that_is_not_there_is_not_passed_over_beside_one_that_is():
+    table = TABLES["vehicle"](Given(SIZES["tiny"]))
+    with pytest.raises(BadInputError, match="--rotate upside-down: this table"):
+        make.chosen_protocols(table, ("yaw", "upside-down"))
+
+
+@pytest.mark.parametrize(
+    ("table", "changed", "told"),
+    [
+        ("vehicle", {"rows": "identity,nothing"}, "--rows nothing"),
+        ("vehicle", {"steps": 0}, "--steps 0"),
+        ("vehicle", {"seeds": -1}, "--seeds -1"),
+        ("objects", {"rows": "identity"}, "leave out --rows"),
+        ("codes", {"rotate": "yaw"}, "--rotate"),
+    ],
+)
+def test_options_that_would_change_nothing_or_train_nothing_are_refused(
+    tmp_path, table, changed, told
+):
+    with pytest.raises(BadInputError, match=told):
+        main(replace(Settings(table, "test", tmp_path), **changed), "the command")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_manifest_without_its_columns_is_one_sentence(tmp_path):
+    (tmp_path / "manifest.csv").write_text("file,kind\na.ply,car\n", encoding="utf-8")
+    with pytest.raises(BadInputError, match="no column category, split"):
+        store_of(tmp_path / "out", Given(SIZES["test"], tmp_path).drives("test"))
+
+
 def test_size_keeps_what_is_minimised():
     recipe = paper_lidar()
     tiny = sized(recipe, SIZES["tiny"])

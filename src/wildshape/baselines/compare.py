@@ -131,6 +131,8 @@ def compare(
     identity = options.identity(data)
     output = begin(out, "evaluate", identity, FILES, overwrite=options.overwrite, progress=progress)
     pooled = options.as_seeds and len(models) > 1
+    for told in _unlike_trainings(models) if pooled else ():
+        progress.say(told)
     if pooled and options.seeds > 1:
         progress.say("--as-seeds: each model is measured once, under a seed of its own for turns")
     evaluated = (
@@ -145,7 +147,7 @@ def compare(
             for seed, rows in enumerate(evaluated)
         ]
         workers = helpers.worked
-    for told in source.doubts:
+    for told in (*source.doubts, *_of_two_kinds(source)):
         progress.say(told)
     if pooled:
         runs = _with_selected(runs, models)
@@ -215,6 +217,37 @@ def _with_selected(runs: list[Results], models: Mapping[str, Model]) -> list[Res
     return [
         replace(run, methods=(*run.methods, chosen)) if i == best else run
         for i, run in enumerate(runs)
+    ]
+
+
+def _unlike_trainings(models: Mapping[str, Model]) -> list[str]:
+    """A sentence where models were trained otherwise than as seeds of one method."""
+    known = {
+        name: model.settings.provenance["identity"]
+        for name, model in models.items()
+        if "identity" in model.settings.provenance
+    }
+    others = {
+        what: name
+        for what in ("settings", "data")
+        for name, made in known.items()
+        if made.get(what) != next(iter(known.values())).get(what)
+    }
+    return [
+        f"--as-seeds: {name} was trained with other {what} than {next(iter(known))}; mean and"
+        " deviation are not of seeds alone, and costs may not be comparable"
+        for what, name in others.items()
+    ]
+
+
+def _of_two_kinds(source: TrackSource) -> list[str]:
+    """A sentence where scans of LiDARs and of cameras went into the same figures."""
+    kinds = source.sensor_kinds
+    if len(kinds) < 2:
+        return []
+    return [
+        f"{source.path}: holds {' and '.join(kinds)} scans, and each figure is of both together;"
+        " evaluate those of one kind at a time"
     ]
 
 

@@ -30,7 +30,7 @@ from wildshape.io.tracks import (
     scan_files,
     track_of_files,
 )
-from wildshape.records import Sensor, Track, as_text
+from wildshape.records import Sensor, SensorKind, Track, as_text
 
 _NO_SCANS = ("poses.txt", "times.txt", "timestamps.txt", "shape.ply")  # beside scans, not scans
 _CURE = (
@@ -84,6 +84,12 @@ class TrackSource:
         self._skipped: dict[str, tuple[tuple[str, str], ...]] = {}  # by track
         self._dropped: dict[str, int] = {}
         self._out_of_order: dict[str, tuple[str, ...]] = {}
+        self._kinds: set[SensorKind] = set()
+
+    @property
+    def sensor_kinds(self) -> tuple[SensorKind, ...]:
+        """The kinds of sensor that took the tracks read until now, in the order of the alphabet."""
+        return tuple(sorted(self._kinds))
 
     @property
     def skipped(self) -> tuple[tuple[str, str], ...]:
@@ -146,6 +152,7 @@ class TrackSource:
             self._skipped[name] = error.skipped
             raise
         self._skipped[name] = found.skipped
+        self._kinds.add(found.track.sensor.kind)
         self._dropped |= {f"{name}/{scan}": count for scan, count in found.dropped_nonfinite}
         if found.out_of_order:
             self._out_of_order[name] = found.out_of_order

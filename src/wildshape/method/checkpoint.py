@@ -186,6 +186,5 @@ def _build(settings: ModelSettings) -> ShapePoseNet:
     return ShapePoseNet(settings.network)
 
 
-_FORMAT = Format(
-    FORMAT, VERSION, "give --model a file written by wildshape train", settings_from_dict, _build
-)
+_SOURCE = "name a file that wildshape train wrote (those of its dpc presets are for evaluate alone)"
+_FORMAT = Format(FORMAT, VERSION, _SOURCE, settings_from_dict, _build)
