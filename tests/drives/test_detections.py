@@ -121,6 +121,22 @@ def test_each_cluster_is_the_points_of_one_true_vehicle(street, write, tmp_path)
         assert full_vehicles(street, frame) <= set(whose)
 
 
+@pytest.mark.parametrize("write", [table, our_nuscenes])
+def test_boxes_of_a_drive_lie_on_corrected_scans_and_others_on_measured_ones(
+    street, write, tmp_path
+):
+    """Those of boxes.csv were laid on scans as measured: of a fast sensor, beside the vehicles."""
+    detections = find_detections(write(street, tmp_path), street.drive)
+    cutter = BoxCutter(street.drive, street.mounting, tmp_path, DriveConfig(), detections)
+    scan = street.scans[0].points
+    heights = height_above_ground(
+        street.mounting.level(scan), street.mounting.height_m, GroundConfig()
+    )
+    beside, expected = scan + np.float32([1.5, 0, 0]), cutter.cut(0, scan, heights, scan).rows
+    corrected, measured = (scan, beside) if write is table else (beside, scan)
+    assert np.array_equal(cutter.cut(0, corrected, heights, measured).rows, expected)
+
+
 @pytest.mark.parametrize("write", [kitti_objects, our_nuscenes, openpcdet, mmdetection3d])
 def test_scores_leave_out_what_the_detector_doubts(street, write, tmp_path):
     given = replace(write(street, tmp_path), least_score=0.45)  # of our writer's 0.5

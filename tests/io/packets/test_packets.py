@@ -294,6 +294,17 @@ def test_a_cut_recording_is_read_up_to_there(turns, tmp_path):
     )
 
 
+def test_packets_that_were_not_recorded_whole(turns, tmp_path):
+    """The file was said to end there."""
+    path = write_velodyne(tmp_path / "street.pcap", turns)
+
+    def cut(records):
+        for record in records:
+            record[1] = record[1][:96]
+
+    refused(open_drive, rewrite(path, cut), match="its packets are cut short; record whole ones")
+
+
 def test_what_holds_no_turn_is_refused(turns, tmp_path, monkeypatch):
     path = tmp_path / "street.pcap"
     path.write_bytes(b"nothing of the kind" * 100)

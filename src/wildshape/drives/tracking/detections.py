@@ -23,7 +23,12 @@ from wildshape.inference.folders.box_files import read_camera
 from wildshape.io.boxes.detections import frame_numbers, number_of, pose_of
 from wildshape.io.boxes.detector import DetectorBox
 from wildshape.io.boxes.kitti import camera_at_the_lidar
-from wildshape.io.boxes.read_detector import fingerprint, read_detector_boxes, takes_calibration
+from wildshape.io.boxes.read_detector import (
+    fingerprint,
+    is_box_table,
+    read_detector_boxes,
+    takes_calibration,
+)
 from wildshape.io.output import file_name
 from wildshape.records import Box, Points
 
@@ -98,12 +103,14 @@ class Detections:
         frames: the boxes in each of its frames.
         tracked: every box knows its track.
         warnings: what was left out, a sentence each.
+        corrected: the boxes lie on scans that were corrected for motion, as those of a drive do.
     """
 
     path: Path
     frames: tuple[tuple[DetectorBox, ...], ...]
     tracked: bool
     warnings: tuple[str, ...]
+    corrected: bool = False
 
     def noted(self, drive: Drive) -> Drive:
         """The drive, which says how its objects are cut out and what was left out."""
@@ -150,7 +157,9 @@ def find_detections(file: DetectionFile, drive: Drive) -> Detections:
     if not without:
         _check_tracks(file.path, frames)
     told = _untracked_told(without, placed)
-    return Detections(file.path, frames, not without, (*warnings, *told))
+    return Detections(
+        file.path, frames, not without, (*warnings, *told), corrected=is_box_table(file.path)
+    )
 
 
 def _is_vehicle(category: str) -> bool:
@@ -211,7 +220,8 @@ class BoxCutter(Cutter):
         self, frame: int, scan: Points, heights: Float[np.ndarray, "n"], as_measured: Points
     ) -> CutScan:
         """What is in the boxes of a frame; see `cut_boxes`."""
-        return cut_boxes(scan, self.detections.frames[frame], heights, self.config, as_measured)
+        seen = scan if self.detections.corrected else as_measured
+        return cut_boxes(scan, self.detections.frames[frame], heights, self.config, seen)
 
 
 def cut_boxes(
@@ -228,7 +238,7 @@ def cut_boxes(
         boxes: in it.
         heights: of its points above the ground.
         config: see there.
-        as_measured: the scan that the detector saw, if this one was corrected for motion.
+        as_measured: the scan on which the boxes lie, if this one was corrected for motion.
     """
     stands = np.nan_to_num(heights, nan=0.0) > config.clusters.lowest_m
     above = np.flatnonzero(stands)

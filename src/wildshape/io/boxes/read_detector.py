@@ -56,6 +56,11 @@ def _check_one_drive(folder: Path, found: dict[Path, list[DetectorBox]]) -> None
             )
 
 
+def is_box_table(path: Path) -> bool:
+    """Whether a file is a `boxes.csv`, the boxes that a drive found."""
+    return path.suffix.lower() == ".csv"
+
+
 def takes_calibration(path: Path) -> bool:
     """Whether a file, or one of a folder, is of KITTI, whose boxes are in a camera's frame.
 
@@ -94,7 +99,7 @@ def _read(path: Path, T_rect_sensor: SE3, scans: int) -> list[DetectorBox]:
         return read_kitti_file(path, T_rect_sensor)
     if kind == ".json":
         return read_results(path, scans)
-    if kind == ".csv":
+    if is_box_table(path):
         return _table(path)
     if kind in _PICKLES:
         raise BadInputError(

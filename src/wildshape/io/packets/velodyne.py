@@ -230,12 +230,19 @@ def _packets(file: IO[bytes], begin: int | None = None) -> Iterator[_Packet]:
         found, sender = _datagram(link(record))
         if found is not None and found.ulen == size + _UDP_HEADER:
             if len(found.data) < size:
-                raise EOFError("it ends in the middle of a packet")
+                raise EOFError(_cut_told(file))
             source = sender, found.dport
             if found.data != before.get(source):  # a switch's mirror sends packets twice
                 yield _Packet(begin, source, float(stamp), found.data)
             before[source] = found.data
         begin = file.tell()
+
+
+def _cut_told(file: IO[bytes]) -> str:
+    """Why a packet is not whole: the file is not, or no packet was recorded whole."""
+    if not file.read(1):
+        return "it ends in the middle of a packet"
+    return "its packets are cut short; record whole ones, with tcpdump's -s 0"
 
 
 def _link(kind: int) -> Any:
