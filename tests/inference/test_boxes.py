@@ -74,6 +74,8 @@ def test_an_end_that_scans_came_near_without_seeing_it_is_drawn_back(front):
         fitted = fit_to_scans(shape, [seen], mirror=True)
         end = float(fitted.centre[0]) * float(ends[0]) + float(fitted.size[0]) / 2
         assert end == pytest.approx(wanted, abs=0.02)
+        small = fit_to_scans(shape / 10, [seen / 10], mirror=True, unit=0.1)
+        torch.testing.assert_close(small.size, fitted.size / 10)
     whole = fit_to_scans(shape, [before], mirror=True, body=False)
     assert float(whole.size[0]) == pytest.approx(4.4, abs=0.03)
 

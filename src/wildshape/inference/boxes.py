@@ -39,12 +39,14 @@ def box_seen(
     *,
     mirror: bool,
     body: bool = True,
+    unit: float = 1.0,
     config: BoxConfig = _DEFAULT,
 ) -> Box:
     """The box of the shape of one scan; see `fit_to_scans`."""
     T = T_sensor_canonical.to(torch.float64)
     seen = T.inverse().apply(torch.from_numpy(scan).double())
-    return carried(fit_to_scans(shape, [seen], mirror=mirror, body=body, config=config), T)
+    fitted = fit_to_scans(shape, [seen], mirror=mirror, body=body, unit=unit, config=config)
+    return carried(fitted, T)
 
 
 def fit_to_scans(
@@ -53,6 +55,7 @@ def fit_to_scans(
     *,
     mirror: bool,
     body: bool = True,
+    unit: float = 1.0,
     config: BoxConfig = _DEFAULT,
 ) -> FittedBox:
     """The box around a shape and what scans saw of it, in the canonical frame.
@@ -67,6 +70,7 @@ def fit_to_scans(
         mirror: the object is symmetric in the plane y = 0.
         body: what little sticks out does not count, as of a vehicle; of an aeroplane wings do, and
             what was seen of one side, by an exact camera, is believed of the other.
+        unit: `unit_of` such objects, by which lengths of `config` shrink.
         config: what is not believed.
     """
     exact = shape.double()
@@ -92,7 +96,7 @@ def fit_to_scans(
     if rank < len(lows):
         first = torch.stack(lows).sort(0).values[rank]
         last = torch.stack(highs).sort(0).values[-1 - rank]
-        low[0], high[0] = _drawn_back(shown, (low[0], high[0]), (first[0], last[0]), config)
+        low[0], high[0] = _drawn_back(shown, (low[0], high[0]), (first[0], last[0]), unit, config)
         low, high = torch.minimum(low, first), torch.maximum(high, last)
     return FittedBox(axes @ ((low + high) / 2), high - low, axes)
 
@@ -176,6 +180,7 @@ def _drawn_back(
     rows: Float[Tensor, "3 n"],
     ends: tuple[Tensor, Tensor],
     seen: tuple[Tensor, Tensor],
+    unit: float,
     config: BoxConfig,
 ) -> tuple[Tensor, Tensor]:
     """Front and rear end of a shape, drawn back where the scans ended a little before.
@@ -184,15 +189,17 @@ def _drawn_back(
         rows: the shape's points along the box's axes.
         ends: lowest and highest x of the shape.
         seen: the same of the scans.
+        unit: see `fit_to_scans`.
         config: how far.
     """
     count = max(int(config.hidden_share * rows.shape[1]), config.strays)
     least, most = (end[0] for end in _without_outermost(rows[:1], count))
     (low, high), (first, last) = ends, seen
-    if first - low < config.unknown_m:
-        low = (first - config.near_m).clamp(low, least)
-    if high - last < config.unknown_m:
-        high = (last + config.near_m).clamp(most, high)
+    near, unknown = unit * config.near_m, unit * config.unknown_m
+    if first - low < unknown:
+        low = (first - near).clamp(low, least)
+    if high - last < unknown:
+        high = (last + near).clamp(most, high)
     return low, high
 
 
