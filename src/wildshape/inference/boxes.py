@@ -192,7 +192,8 @@ def _drawn_back(
         unit: see `fit_to_scans`.
         config: how far.
     """
-    count = max(int(config.hidden_share * rows.shape[1]), config.strays)
+    share = max(config.hidden_share, config.shape_share)
+    count = max(int(share * rows.shape[1]), config.strays)
     least, most = (end[0] for end in _without_outermost(rows[:1], count))
     (low, high), (first, last) = ends, seen
     near, unknown = unit * config.near_m, unit * config.unknown_m
