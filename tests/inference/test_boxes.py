@@ -96,6 +96,8 @@ def test_ground_left_around_the_wheels_is_no_end_or_side():
     scan = torch.cat((surface(600, seed=1), ring))
     fitted = fit_to_scans(surface(), [scan], mirror=True)
     torch.testing.assert_close(fitted.size, SIZE, atol=0.02, rtol=0)
+    nothing_else = fit_to_scans(surface(), [ring], mirror=True)
+    torch.testing.assert_close(nothing_else.size, fit_to_scans(surface(), [], mirror=True).size)
     whole = fit_to_scans(surface(), [scan], mirror=True, body=False)
     assert whole.size.tolist() == pytest.approx((4.48, 2.16, 1.5), abs=0.05)
 

@@ -6,8 +6,8 @@ Labels are of the body: mirrors, aerials and stray points stick out of it. They 
 shape and in a scan, and do not count at the ends and sides. A decoder draws towards what is usual:
 where more of a scan than that lies outside of the shape, the box ends where the scan does. Of a
 LiDAR this is of the side seen alone: reflected, it would count the mirror plane's error twice.
-At an end that scans came near without seeing it more points do not count: they are drawn where
-such ends may be.
+At an end that scans came near without seeing it more points do not count: a decoder spreads them
+over where such ends may be.
 Ground that was left around the wheels is no end or side.
 """
 
@@ -29,7 +29,7 @@ from wildshape.records import Box, Points
 _PART = 64
 _COARSE_DEG = 1.0
 _DEFAULT = BoxConfig()
-_WHOLE = {"shape_share": 0.0, "hidden_share": 0.0, "seen_share": 0.0, "ground_share": -math.inf}
+_WHOLE = {"shape_share": 0.0, "hidden_share": 0.0, "seen_share": 0.0}
 
 
 def box_seen(
@@ -80,7 +80,7 @@ def fit_to_scans(
     shown = _rows(exact, axes)
     low, high = _ends(shown, config)
     reach = config.reach * (high - low).norm()
-    floor = low[2] + config.ground_share * (high[2] - low[2])
+    floor = low[2] + config.ground_share * (high[2] - low[2]) if body else -math.inf
     lows, highs, scans = [], [], 0
     for points in seen:
         scans += 1
@@ -88,7 +88,7 @@ def fit_to_scans(
         if reflect:
             rows[1].abs_()
         near = rows[:, ((rows > (low - reach)[:, None]) & (rows < (high + reach)[:, None])).all(0)]
-        if near.shape[1]:
+        if (near[2] > floor).any():
             begins, ends = _seen_ends(near, floor, config)
             highs.append(ends)
             lows.append(_reflected(begins, ends) if reflect else begins)
@@ -165,13 +165,14 @@ def _ends(rows: Float[Tensor, "3 n"], config: BoxConfig) -> tuple[Tensor, Tensor
 
 
 def _seen_ends(
-    rows: Float[Tensor, "3 n"], floor: Tensor, config: BoxConfig
+    rows: Float[Tensor, "3 n"], floor: Tensor | float, config: BoxConfig
 ) -> tuple[Tensor, Tensor]:
-    """Where what a scan saw begins and ends; what lies below the floor is no end or side."""
+    """Where what a scan saw begins and ends; what lies below the floor is no end or side.
+
+    Some of it lies above.
+    """
     bottom, top = _without_outermost(rows[2:], config.strays)
     above = rows[:2, rows[2] > floor]
-    if above.shape[1] == 0:
-        above = rows[:2]
     low, high = _without_outermost(above, int(config.seen_share * above.shape[1]))
     return torch.cat((low, bottom)), torch.cat((high, top))
 
