@@ -324,7 +324,7 @@ def test_level_sensors_are_taken_at_their_word_unless_told_otherwise(tmp_path):
 
 def test_lengths_of_the_box_shrink_with_the_objects_trained_on(predictor):
     """A metre before an end was a metre, also of objects that are smaller than that."""
-    points = np.float32(0.3) * scan() + np.float32([5.0, 0.0, 0.0])
+    points = np.float32(0.3) * scan() + np.array([5.0, 0.0, 0.0], np.float32)
 
     def length(largest_m, **lengths):
         of = dataclasses.replace(SETTINGS, extent_m=(0.1, largest_m))
