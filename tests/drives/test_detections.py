@@ -132,7 +132,8 @@ def test_boxes_of_a_drive_lie_on_corrected_scans_and_others_on_measured_ones(
     heights = height_above_ground(
         street.mounting.level(scan), street.mounting.height_m, GroundConfig()
     )
-    beside, expected = scan + np.float32([1.5, 0, 0]), cutter.cut(0, scan, heights, scan).rows
+    beside = scan + np.array([1.5, 0, 0], np.float32)
+    expected = cutter.cut(0, scan, heights, scan).rows
     corrected, measured = (scan, beside) if write is table else (beside, scan)
     assert np.array_equal(cutter.cut(0, corrected, heights, measured).rows, expected)
 

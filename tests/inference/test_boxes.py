@@ -10,6 +10,7 @@ import torch
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.boxes import _nth_largest, box_seen, carried, fit_to_scans
+from wildshape.inference.config import BoxConfig
 
 SIZE = torch.tensor((4.0, 1.8, 1.5), dtype=torch.float64)
 
@@ -74,8 +75,19 @@ def test_an_end_that_scans_came_near_without_seeing_it_is_drawn_back(front):
         fitted = fit_to_scans(shape, [seen], mirror=True)
         end = float(fitted.centre[0]) * float(ends[0]) + float(fitted.size[0]) / 2
         assert end == pytest.approx(wanted, abs=0.02)
+        small = fit_to_scans(shape / 10, [seen / 10], mirror=True, unit=0.1)
+        torch.testing.assert_close(small.size, fitted.size / 10)
     whole = fit_to_scans(shape, [before], mirror=True, body=False)
     assert float(whole.size[0]) == pytest.approx(4.4, abs=0.03)
+
+
+def test_an_end_is_never_drawn_beyond_where_it_was():
+    """By a larger `shape_share` than `hidden_share` it was."""
+    config = BoxConfig(shape_share=0.3)
+    shape = torch.linspace(-2, 2, 3000, dtype=torch.float64)[:, None] * torch.ones(3).double()
+    alone = fit_to_scans(shape, [], mirror=True, config=config)
+    fitted = fit_to_scans(shape, [shape[shape[:, 0].abs() < 0.5]], mirror=True, config=config)
+    torch.testing.assert_close(fitted.size, alone.size)
 
 
 def test_ground_left_around_the_wheels_is_no_end_or_side():
@@ -84,6 +96,8 @@ def test_ground_left_around_the_wheels_is_no_end_or_side():
     scan = torch.cat((surface(600, seed=1), ring))
     fitted = fit_to_scans(surface(), [scan], mirror=True)
     torch.testing.assert_close(fitted.size, SIZE, atol=0.02, rtol=0)
+    nothing_else = fit_to_scans(surface(), [ring], mirror=True)
+    torch.testing.assert_close(nothing_else.size, fit_to_scans(surface(), [], mirror=True).size)
     whole = fit_to_scans(surface(), [scan], mirror=True, body=False)
     assert whole.size.tolist() == pytest.approx((4.48, 2.16, 1.5), abs=0.05)
 

@@ -16,6 +16,7 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.confidence import confidence_of
+from wildshape.inference.config import BoxConfig, InferenceConfig
 from wildshape.inference.point_inputs import check_sensor
 from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.registration import inlier_ratio
@@ -319,6 +320,20 @@ def test_level_sensors_are_taken_at_their_word_unless_told_otherwise(tmp_path):
     near = off[1] < 4
     assert int(near.sum()) >= 3
     assert float((off[0] / off[1])[near].mean()) < 0.9
+
+
+def test_lengths_of_the_box_shrink_with_the_objects_trained_on(predictor):
+    """A metre before an end was a metre, also of objects that are smaller than that."""
+    points = np.float32(0.3) * scan() + np.array([5.0, 0.0, 0.0], np.float32)
+
+    def length(largest_m, **lengths):
+        of = dataclasses.replace(SETTINGS, extent_m=(0.1, largest_m))
+        config = InferenceConfig(box=BoxConfig(hidden_share=0.3, **lengths))
+        return Predictor(predictor.network, of, config=config).complete(points).box.size[0]
+
+    small = length(0.5, near_m=0.1, unknown_m=1.0)
+    assert small == length(5.0, near_m=0.01, unknown_m=0.1)
+    assert small > 1.5 * length(5.0, near_m=0.1, unknown_m=1.0)
 
 
 def test_load(predictor, tmp_path):

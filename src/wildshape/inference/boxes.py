@@ -6,8 +6,8 @@ Labels are of the body: mirrors, aerials and stray points stick out of it. They 
 shape and in a scan, and do not count at the ends and sides. A decoder draws towards what is usual:
 where more of a scan than that lies outside of the shape, the box ends where the scan does. Of a
 LiDAR this is of the side seen alone: reflected, it would count the mirror plane's error twice.
-At an end that scans came near without seeing it more points do not count: they are drawn where
-such ends may be.
+At an end that scans came near without seeing it more points do not count: a decoder spreads them
+over where such ends may be.
 Ground that was left around the wheels is no end or side.
 """
 
@@ -29,7 +29,7 @@ from wildshape.records import Box, Points
 _PART = 64
 _COARSE_DEG = 1.0
 _DEFAULT = BoxConfig()
-_WHOLE = {"shape_share": 0.0, "hidden_share": 0.0, "seen_share": 0.0, "ground_share": -math.inf}
+_WHOLE = {"shape_share": 0.0, "hidden_share": 0.0, "seen_share": 0.0}
 
 
 def box_seen(
@@ -39,12 +39,14 @@ def box_seen(
     *,
     mirror: bool,
     body: bool = True,
+    unit: float = 1.0,
     config: BoxConfig = _DEFAULT,
 ) -> Box:
     """The box of the shape of one scan; see `fit_to_scans`."""
     T = T_sensor_canonical.to(torch.float64)
     seen = T.inverse().apply(torch.from_numpy(scan).double())
-    return carried(fit_to_scans(shape, [seen], mirror=mirror, body=body, config=config), T)
+    fitted = fit_to_scans(shape, [seen], mirror=mirror, body=body, unit=unit, config=config)
+    return carried(fitted, T)
 
 
 def fit_to_scans(
@@ -53,6 +55,7 @@ def fit_to_scans(
     *,
     mirror: bool,
     body: bool = True,
+    unit: float = 1.0,
     config: BoxConfig = _DEFAULT,
 ) -> FittedBox:
     """The box around a shape and what scans saw of it, in the canonical frame.
@@ -67,6 +70,7 @@ def fit_to_scans(
         mirror: the object is symmetric in the plane y = 0.
         body: what little sticks out does not count, as of a vehicle; of an aeroplane wings do, and
             what was seen of one side, by an exact camera, is believed of the other.
+        unit: `unit_of` such objects, by which lengths of `config` shrink.
         config: what is not believed.
     """
     exact = shape.double()
@@ -76,7 +80,7 @@ def fit_to_scans(
     shown = _rows(exact, axes)
     low, high = _ends(shown, config)
     reach = config.reach * (high - low).norm()
-    floor = low[2] + config.ground_share * (high[2] - low[2])
+    floor = low[2] + config.ground_share * (high[2] - low[2]) if body else -math.inf
     lows, highs, scans = [], [], 0
     for points in seen:
         scans += 1
@@ -84,7 +88,7 @@ def fit_to_scans(
         if reflect:
             rows[1].abs_()
         near = rows[:, ((rows > (low - reach)[:, None]) & (rows < (high + reach)[:, None])).all(0)]
-        if near.shape[1]:
+        if (near[2] > floor).any():
             begins, ends = _seen_ends(near, floor, config)
             highs.append(ends)
             lows.append(_reflected(begins, ends) if reflect else begins)
@@ -92,7 +96,7 @@ def fit_to_scans(
     if rank < len(lows):
         first = torch.stack(lows).sort(0).values[rank]
         last = torch.stack(highs).sort(0).values[-1 - rank]
-        low[0], high[0] = _drawn_back(shown, (low[0], high[0]), (first[0], last[0]), config)
+        low[0], high[0] = _drawn_back(shown, (low[0], high[0]), (first[0], last[0]), unit, config)
         low, high = torch.minimum(low, first), torch.maximum(high, last)
     return FittedBox(axes @ ((low + high) / 2), high - low, axes)
 
@@ -161,13 +165,14 @@ def _ends(rows: Float[Tensor, "3 n"], config: BoxConfig) -> tuple[Tensor, Tensor
 
 
 def _seen_ends(
-    rows: Float[Tensor, "3 n"], floor: Tensor, config: BoxConfig
+    rows: Float[Tensor, "3 n"], floor: Tensor | float, config: BoxConfig
 ) -> tuple[Tensor, Tensor]:
-    """Where what a scan saw begins and ends; what lies below the floor is no end or side."""
+    """Where what a scan saw begins and ends; what lies below the floor is no end or side.
+
+    Some of it lies above.
+    """
     bottom, top = _without_outermost(rows[2:], config.strays)
     above = rows[:2, rows[2] > floor]
-    if above.shape[1] == 0:
-        above = rows[:2]
     low, high = _without_outermost(above, int(config.seen_share * above.shape[1]))
     return torch.cat((low, bottom)), torch.cat((high, top))
 
@@ -176,6 +181,7 @@ def _drawn_back(
     rows: Float[Tensor, "3 n"],
     ends: tuple[Tensor, Tensor],
     seen: tuple[Tensor, Tensor],
+    unit: float,
     config: BoxConfig,
 ) -> tuple[Tensor, Tensor]:
     """Front and rear end of a shape, drawn back where the scans ended a little before.
@@ -184,15 +190,18 @@ def _drawn_back(
         rows: the shape's points along the box's axes.
         ends: lowest and highest x of the shape.
         seen: the same of the scans.
+        unit: see `fit_to_scans`.
         config: how far.
     """
-    count = max(int(config.hidden_share * rows.shape[1]), config.strays)
+    share = max(config.hidden_share, config.shape_share)
+    count = max(int(share * rows.shape[1]), config.strays)
     least, most = (end[0] for end in _without_outermost(rows[:1], count))
     (low, high), (first, last) = ends, seen
-    if first - low < config.unknown_m:
-        low = (first - config.near_m).clamp(low, least)
-    if high - last < config.unknown_m:
-        high = (last + config.near_m).clamp(most, high)
+    near, unknown = unit * config.near_m, unit * config.unknown_m
+    if first - low < unknown:
+        low = (first - near).clamp(low, least)
+    if high - last < unknown:
+        high = (last + near).clamp(most, high)
     return low, high
 
 

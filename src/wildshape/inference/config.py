@@ -3,8 +3,9 @@
 """The numbers that decide what comes out of a trained network, in frozen records.
 
 They are written into every result (`objects.json`) and can be set from Python:
-`wildshape.load(config=InferenceConfig(refine=RefineConfig(iterations=0)))`. Lengths of `refine`
-and `track` are for objects of five metres or more; for smaller ones they shrink with the object.
+`wildshape.load(config=InferenceConfig(refine=RefineConfig(iterations=0)))`. Lengths of `refine`,
+`track` and `box` are for objects of five metres or more; for smaller ones they shrink with the
+object.
 """
 
 from dataclasses import dataclass, field

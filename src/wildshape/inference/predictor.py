@@ -11,6 +11,7 @@ from pathlib import Path
 import torch
 
 from wildshape.errors import BadInputError
+from wildshape.geometry.box import unit_of
 from wildshape.geometry.ground import without_skirt
 from wildshape.geometry.sampling import sorted_points
 from wildshape.geometry.transforms.se3 import SE3, stack
@@ -340,7 +341,13 @@ class Predictor:
             points=with_scan(whole, len(shape), scan) if exact and self.refines else whole,
             pose=T_sensor_can.to(torch.float64).owned(),
             box=box_seen(
-                solid, T_sensor_can, seen, mirror=mirror, body=not exact, config=config.box
+                solid,
+                T_sensor_can,
+                seen,
+                mirror=mirror,
+                body=not exact,
+                unit=unit_of(self.settings.extent_m[1]),
+                config=config.box,
             ),
             confidence=said.confidence,
             branch=said.branch,

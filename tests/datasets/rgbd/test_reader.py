@@ -32,7 +32,8 @@ def tracks(root, **options):
 def test_points_land_back_on_the_chairs(tmp_path, apart, inside):
     """Masks together or apart; the root is the folder of sequences or the sequence itself."""
     T_camera_world = write_sequence(tmp_path / "kitchen", apart=apart)
-    (tmp_path / "kitchen" / "depth" / "._000000.png").write_bytes(b"left by macOS")
+    for images in ("depth", "masks"):
+        (tmp_path / "kitchen" / images / "._000000.png").write_bytes(b"left by macOS")
     found = tracks(tmp_path / "kitchen" if inside else tmp_path)
     assert set(found) == {"kitchen_00001", "kitchen_00002"}
     for number, T_world_object in THINGS.items():

@@ -24,7 +24,7 @@ from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.projection.visibility import FacingBins
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.confidence import ConfidenceFeatures, Glance
-from wildshape.inference.config import TrackConfig
+from wildshape.inference.config import BoxConfig, TrackConfig
 from wildshape.inference.tracks import complete_track as whole
 from wildshape.inference.tracks.heading_vote import half_turn
 from wildshape.inference.tracks.track_cost import network_inputs
@@ -180,7 +180,17 @@ def test_the_box_is_fitted_to_each_scan_where_it_lies_on_the_object(monkeypatch)
         return fit(shape, handed, **options)
 
     monkeypatch.setattr(whole, "fit_to_scans", kept)
-    whole._box(SHAPE, list(TRACK.scans), true, whole.BoxConfig(), mirror=True, body=True)
+    whole._box(SHAPE, list(TRACK.scans), true, SETTINGS, whole.BoxConfig())
     for cloud, pose, scan in zip(handed, true, TRACK.scans, strict=True):
         expected = pose.inverse().apply(torch.from_numpy(scan).double())
         torch.testing.assert_close(cloud, expected)
+
+
+def test_how_far_off_an_end_not_seen_may_be_shrinks_with_the_objects():
+    """A metre was a metre, also of objects that are smaller than that."""
+    config, before, lengths = BoxConfig(hidden_share=0.2), SHAPE[SHAPE[:, 0] < 0.5].numpy(), []
+    for size in (1.0, 0.5):
+        settings = replace(SETTINGS, extent_m=(0.0, 5.0 * size))
+        box = whole._box(size * SHAPE, [size * before], SE3.identity(1), settings, config)
+        lengths.append(float(box.size[0]) / size)
+    assert lengths == pytest.approx([4.2] * 2, abs=0.05)  # the scan ends 1.6 m before the shape

@@ -211,7 +211,7 @@ def _check_instances(masks: Path) -> None:
                 f"{folder}: {other} beside it is of the same instance; give each object a number of"
                 " its own."
             )
-    together = next(iter(sorted(masks.glob("*.png"))), None)
+    together = next(iter(sorted(masks.glob("[!.]*.png"))), None)
     if named and together is not None:
         raise BadInputError(
             f"{together}: an image of all instances beside folders of single ones, such as"

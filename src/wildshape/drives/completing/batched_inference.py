@@ -4,6 +4,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from wildshape.geometry.box import unit_of
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.boxes import box_seen
 from wildshape.inference.choose_hypothesis import Looked
@@ -29,6 +30,13 @@ def completed(
 def box_of(look: Looked, predictor: Predictor) -> Box:
     """The box of the network's own shape of one scan, not refined."""
     shapes, rotation, translation, *_ = look.found
-    mirror, body = predictor.settings.network.mirror, predictor.settings.sensor != "camera"
-    pose, config = SE3(rotation[0], translation[0]), predictor.config.box
-    return box_seen(shapes[0], pose, look.seen[0], mirror=mirror, body=body, config=config)
+    settings, pose = predictor.settings, SE3(rotation[0], translation[0])
+    return box_seen(
+        shapes[0],
+        pose,
+        look.seen[0],
+        mirror=settings.network.mirror,
+        body=settings.sensor != "camera",
+        unit=unit_of(settings.extent_m[1]),
+        config=predictor.config.box,
+    )

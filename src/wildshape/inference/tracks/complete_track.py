@@ -147,7 +147,7 @@ def complete_together(
     if any(one is not None for one in rays):
         sights = Sights(scans, rays, config.free_space)
         solid = without_free_space(shape, fit.T_sensor_object, sights)
-    fitted = _box(solid, scans, fit.T_sensor_object, config.box, mirror=mirror, body=body)
+    fitted = _box(solid, scans, fit.T_sensor_object, settings, config.box)
     whole = _denser(shape, config) if settings.facing else shape
     if settings.facing and not body:
         whole = _with_scans(whole, len(shape), scans, fit.T_sensor_object, config.track)
@@ -226,15 +226,15 @@ def _box(
     shape: Float[Tensor, "P 3"],
     scans: list[Points],
     T_sensor_object: SE3,
+    settings: ModelSettings,
     config: BoxConfig,
-    *,
-    mirror: bool,
-    body: bool,
 ) -> FittedBox:
     """One box for all scans of the track, object frame."""
     T_object_sensor = T_sensor_object.inverse()
     seen = (T_object_sensor[i].apply(torch.from_numpy(s).double()) for i, s in enumerate(scans))
-    return fit_to_scans(shape, seen, mirror=mirror, body=body, config=config)
+    mirror, unit = settings.network.mirror, unit_of(settings.extent_m[1])
+    body = settings.sensor == "lidar"
+    return fit_to_scans(shape, seen, mirror=mirror, body=body, unit=unit, config=config)
 
 
 def _voted(
