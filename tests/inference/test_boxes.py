@@ -70,12 +70,13 @@ def test_an_end_that_scans_came_near_without_seeing_it_is_drawn_back(front):
     scan = surface(3000, seed=1) * ends
     before, far_before = (scan[scan[:, 0] * ends[0] < x] for x in (1.6, 0.5))
     own, drawn_back = 2.4 - 0.4 * 30 / 90, 2.4 - 0.4 * 61 / 90
-    cases = (before, drawn_back), (scan, 2.2), (far_before, own), (scan[:0], own)
-    for seen, wanted in cases:
-        fitted = fit_to_scans(shape, [seen], mirror=True)
+    alone = ([before], drawn_back), ([scan], 2.2), ([far_before], own), ([scan[:0]], own)
+    one_of_four, two_of_four = [before, scan, before, before], [scan, before, before, scan]
+    for seen, wanted in (*alone, (one_of_four, drawn_back), (two_of_four, 2.2)):
+        fitted = fit_to_scans(shape, seen, mirror=True)
         end = float(fitted.centre[0]) * float(ends[0]) + float(fitted.size[0]) / 2
         assert end == pytest.approx(wanted, abs=0.02)
-        small = fit_to_scans(shape / 10, [seen / 10], mirror=True, unit=0.1)
+        small = fit_to_scans(shape / 10, [one / 10 for one in seen], mirror=True, unit=0.1)
         torch.testing.assert_close(small.size, fitted.size / 10)
     whole = fit_to_scans(shape, [before], mirror=True, body=False)
     assert float(whole.size[0]) == pytest.approx(4.4, abs=0.03)
