@@ -11,7 +11,6 @@ from pathlib import Path
 import torch
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.box import unit_of
 from wildshape.geometry.ground import without_skirt
 from wildshape.geometry.sampling import sorted_points
 from wildshape.geometry.transforms.se3 import SE3, stack
@@ -346,7 +345,7 @@ class Predictor:
                 seen,
                 mirror=mirror,
                 body=not exact,
-                unit=unit_of(self.settings.extent_m[1]),
+                unit=self.settings.unit,
                 config=config.box,
             ),
             confidence=said.confidence,

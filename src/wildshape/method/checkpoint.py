@@ -16,6 +16,7 @@ from typing import Any
 import torch
 
 from wildshape.errors import BadInputError
+from wildshape.geometry.box import unit_of
 from wildshape.geometry.projection.visibility import Projection
 from wildshape.io.atomic import atomic_write
 from wildshape.io.guard import record_of
@@ -100,6 +101,11 @@ class ModelSettings:
     trust: Trust | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
     metrics: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def unit(self) -> float:
+        """Metres of the unit in which such objects are as large as vehicles (`unit_of`)."""
+        return unit_of(self.extent_m[1])
 
 
 def weights_file(model: str | Path | None) -> Path:

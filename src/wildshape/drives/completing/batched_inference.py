@@ -4,7 +4,6 @@
 
 from collections.abc import Iterator, Sequence
 
-from wildshape.geometry.box import unit_of
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.boxes import box_seen
 from wildshape.inference.choose_hypothesis import Looked
@@ -37,6 +36,6 @@ def box_of(look: Looked, predictor: Predictor) -> Box:
         look.seen[0],
         mirror=settings.network.mirror,
         body=settings.sensor != "camera",
-        unit=unit_of(settings.extent_m[1]),
+        unit=settings.unit,
         config=predictor.config.box,
     )

@@ -14,7 +14,7 @@ import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
-from wildshape.geometry.box import FittedBox, unit_of
+from wildshape.geometry.box import FittedBox
 from wildshape.geometry.sampling import sorted_points, voxel_thin
 from wildshape.geometry.surface import mirrored
 from wildshape.geometry.transforms.se3 import SE3, stack
@@ -136,7 +136,7 @@ def complete_together(
     poses = stack([item.pose for item in gathered.said])
     inputs = network_inputs(scans, settings)
     voted = _voted(poses, shape, gathered, inputs, config.track)
-    mirror, unit = settings.network.mirror, unit_of(settings.extent_m[1])
+    mirror, unit = settings.network.mirror, settings.unit
     clouds, start = _in_units(scans, voted, unit)
     fit = refine_checked(clouds, start, gathered.weights, mirror=mirror, config=config.track)
     seen = _seen(clouds, fit.T_sensor_object, mirror, config.track)
@@ -232,7 +232,7 @@ def _box(
     """One box for all scans of the track, object frame."""
     T_object_sensor = T_sensor_object.inverse()
     seen = (T_object_sensor[i].apply(torch.from_numpy(s).double()) for i, s in enumerate(scans))
-    mirror, unit = settings.network.mirror, unit_of(settings.extent_m[1])
+    mirror, unit = settings.network.mirror, settings.unit
     body = settings.sensor == "lidar"
     return fit_to_scans(shape, seen, mirror=mirror, body=body, unit=unit, config=config)
 
@@ -258,7 +258,7 @@ def _voted(
     own, other = (
         track_cost(shape, poses, inputs, gathered.settings) for poses in (turned, between)
     )
-    unit = unit_of(gathered.settings.extent_m[1])
+    unit = gathered.settings.unit
     return between.where(other - own < unit * config.outliers.worse_m, turned)
 
 
@@ -275,7 +275,7 @@ def _votes(
     turned = T_sensor_can @ half_turn(middle)
     stands = track_cost(shape, T_sensor_can, inputs, settings)
     gain = track_cost(shape, turned, inputs, settings) - stands
-    unit = unit_of(settings.extent_m[1])
+    unit = settings.unit
     if settings.sensor == "lidar":
         links = nearness_of_next(T_sensor_can.inverse().translation, middle, config.vote)
     else:

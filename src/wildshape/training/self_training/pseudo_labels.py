@@ -24,7 +24,6 @@ from jaxtyping import Float, Float32, Int64
 from torch import Tensor
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.box import unit_of
 from wildshape.geometry.gravity import level_turn
 from wildshape.geometry.projection.field_of_view import slope, view_top
 from wildshape.geometry.transforms.se3 import SE3
@@ -170,7 +169,7 @@ class Teacher:
     @property
     def unit(self) -> float:
         """Metres of the unit in which the rules' lengths are meant."""
-        return unit_of(self.settings.extent_m[1])
+        return self.settings.unit
 
     def clouds(self, track: PosedTrack) -> list[Points]:
         """The scans of a track, in units."""
