@@ -116,13 +116,8 @@ class Tracks:
     varied: tuple[bool, ...] = (True, False, False, False)
 
 
-DATA = {
-    1: Tracks(),
-    2: Tracks(),
-    3: Tracks(count=4800),
-    4: Tracks(occlusion=0.5, rays=512),
-    5: Tracks(occlusion=0.5, rays=512),
-}
+DATA = {1: Tracks(), 2: Tracks(), 3: Tracks(count=4800), 4: Tracks(occlusion=0.5, rays=512)}
+DATA[5] = DATA[4]
 """By their seeds. What is learned carries over to unseen objects the better the more there were."""
 
 
