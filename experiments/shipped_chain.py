@@ -94,7 +94,7 @@ ROUNDS = {
     "second": Round(data=2, steps=12_000, teacher="taught", start="taught"),
     "main": Round(data=3, steps=30_000, teacher="second", start="second"),
     "rays": Round(data=4, steps=100_000, lr=8e-4, teacher="main", start="main", rays=True),
-    "fresh": Round(data=5, steps=14_000, lr=3e-4, teacher="rays", start="rays", rays=True),
+    "lorries": Round(data=5, steps=20_000, lr=3e-4, teacher="rays", start="rays", rays=True),
 }
 """In their order; the last one is shipped."""
 
