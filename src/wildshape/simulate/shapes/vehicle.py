@@ -49,7 +49,6 @@ _RANGES: dict[str, dict[str, tuple[float, float]]] = {
 KINDS = tuple(_RANGES)
 _SHARES = (0.34, 0.34, 0.14, 0.10, 0.08, 0.0)
 ROUNDEST_M = 0.12
-_PLATFORMS, _PLATFORM_M = 0.2, 1.5  # their share of the lorries, their top
 _VARIED_SHARES = (0.26, 0.34, 0.15, 0.09, 0.08, 0.08)
 
 
@@ -83,16 +82,14 @@ def vehicle(kind: str, rng: np.random.Generator, roundest_m: float | None = None
     Args:
         kind: of vehicle.
         rng: the only source of chance.
-        roundest_m: how far its corners, seen from above, stand back at most; None: as usual. With
-            it a lorry's cargo is of any height: what lies between a platform and a full box
-            lets headings be compared from one to the other.
+        roundest_m: how far its corners, seen from above, stand back at most; None: as usual.
     """
     body = _draw(kind, rng)
     if roundest_m is not None:
         body = replace(body, corner=float(rng.uniform(0.0, roundest_m)))
     parts = [_shell(body), *_wheels(body), *_mirrors(body)]
     if kind == "truck":
-        parts += _cargo(body, rng, of_any_height=roundest_m is not None)
+        parts += _cargo(body, rng)
     whole = union(parts, kind)
     low, high = whole.bounds
     middle = (low + high) / 2
@@ -251,16 +248,12 @@ def _mirrors(body: _Body) -> list[Solid]:
     return [ellipsoid((x, side * y, z), half) for side in (-1, 1)]
 
 
-def _cargo(body: _Body, rng: np.random.Generator, of_any_height: bool) -> list[Solid]:
+def _cargo(body: _Body, rng: np.random.Generator) -> list[Solid]:
     """The truck's box (or low platform) and the frame under it."""
     start = body.top[-1, 0] + float(rng.uniform(0.1, 0.3))
     half = body.width / 2
-    kind = rng.random()
-    top = _PLATFORM_M
-    if kind >= _PLATFORMS:
-        top = body.height * float(rng.uniform(0.97, 1.12))
-        if of_any_height:
-            top = _PLATFORM_M + (kind - _PLATFORMS) / (1 - _PLATFORMS) * (top - _PLATFORM_M)
+    platform = rng.random() < 0.2
+    top = 1.5 if platform else body.height * float(rng.uniform(0.97, 1.12))
     deck = 2 * body.wheel_radius + 0.1
     return [
         box((-body.length, -half, deck), (-start, half, min(top, 3.5))),
