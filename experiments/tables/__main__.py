@@ -119,7 +119,8 @@ def main(settings: Settings, command: str) -> None:
         raise BadInputError(f"--seeds {settings.seeds}: expected 0 or more.")
     size = changed(SIZES[settings.size], steps=settings.steps)
     size = replace(size, seeds=settings.seeds) if settings.seeds > 0 else size
-    given = Given(size, settings.cad, settings.kitti)
+    cad, kitti = (path and path.resolve() for path in (settings.cad, settings.kitti))
+    given = Given(size, cad, kitti)  # its data are found again from any folder
     shop = Workshop(settings.out, settings.device, command)
     name, results = f"{settings.table}-{size.name}", settings.results or settings.out
     words = _words(settings.rows)

@@ -38,7 +38,7 @@ _BAD_INPUT, _FAILED, _INTERRUPTED, _TERMINATED = 2, 1, 130, 143
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _NO_MEMORY = (
     "not enough memory; end other programs, raise the limit (ulimit -v) or hand in less at once;"
-    " what is finished stays valid, and the same command goes on from it."
+    " what is finished stays valid, and the same command goes on from it, `train` with --resume."
 )
 _RESERVED_BYTES = 1 << 20  # enough to say so, also after a small allocation has failed
 
