@@ -134,6 +134,14 @@ def test_every_preset_of_train_has_a_line_that_explains_it(wildshape):
         assert settings_of("train", "in", "--out", "x", "--preset", preset).preset == preset
 
 
+@pytest.mark.parametrize("command", ["complete", "drive"])
+def test_help_names_a_format_of_boxes_that_is_added(command):
+    added = "from wildshape.inference.folders import box_files as b; b.BOX_FORMATS += ('added',)"
+    shown = f"from wildshape.cli.main import main; main(['{command}', '--help'])"
+    words = python(f"{added}; {shown}").stdout.replace("│", " ").split()
+    assert ", added: also write all boxes so" in " ".join(words)
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
