@@ -257,6 +257,13 @@ def test_contributors_find_every_room():
     assert listed == here
 
 
+def test_rooms_say_where_to_start():
+    for room in (ROOT / "src/wildshape").rglob("__init__.py"):
+        first = re.search(r"Start with `([\w.]+)`", room.read_text(encoding="utf-8"))
+        path = first and first[1].removesuffix(".py").replace(".", "/")
+        assert not path or any((room.parent / at).exists() for at in (path, f"{path}.py")), room
+
+
 def is_room(path: Path) -> bool:
     """A folder with Python files, or a file that is a floor of its own."""
     return (path / "__init__.py").is_file() or (
