@@ -135,6 +135,10 @@ class SE3:
         with np.errstate(over="ignore"):
             return moved.numpy().astype(points.dtype)
 
+    def scaled(self, factor: float) -> "SE3":
+        """The same transforms where lengths are so many times as large."""
+        return type(self)(self.rotation, self.translation * factor)
+
     def angle(self) -> Float[Tensor, "*batch"]:
         """Rotation angle in radians."""
         return rotation_angle(self.rotation)
