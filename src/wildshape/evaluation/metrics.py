@@ -69,7 +69,7 @@ class RegistrationError:
 
 @dataclass(frozen=True)
 class RegistrationScore:
-    """One scan registered to its track's middle scan: its names, then `RegistrationError`."""
+    """One scan registered to its track's middle scan: its names, and `RegistrationError`."""
 
     track: str
     scan: str
