@@ -5,7 +5,8 @@
 python experiments/dataset_pictures.py kitti-raw docs/datasets/kitti-raw.webp
 
 Nobody's scans are drawn: the writers of the tests make the scene. To add a data set: one line in
-`WRITERS`, a function that writes a scene below a folder. `--root` draws a data set of yours.
+`WRITERS`, a function that writes a scene below a folder; tests read these scenes, too. `--root`
+draws a data set of yours.
 """
 
 import io

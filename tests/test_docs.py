@@ -257,6 +257,17 @@ def test_contributors_find_every_room():
     assert listed == here
 
 
+def test_rooms_say_where_to_start():
+    for room in (ROOT / "src/wildshape").rglob("__init__.py"):
+        text = room.read_text(encoding="utf-8")
+        first = re.search(r"Start\swith\s`([\w.]+)`", text)
+        if first is None:
+            assert "\nfrom " in text, room  # it holds code itself
+        else:
+            path = room.parent / first[1].removesuffix(".py").replace(".", "/")
+            assert path.exists() or path.with_suffix(".py").exists(), room
+
+
 def is_room(path: Path) -> bool:
     """A folder with Python files, or a file that is a floor of its own."""
     return (path / "__init__.py").is_file() or (

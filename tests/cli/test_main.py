@@ -7,7 +7,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 import pytest
 import tyro
@@ -15,6 +15,9 @@ import tyro
 from wildshape.baselines.dpc import objective as dpc
 from wildshape.cli.commands import module_of, train
 from wildshape.cli.main import COMMANDS
+from wildshape.cli.options import Format
+from wildshape.io.scans.points import SUFFIXES
+from wildshape.io.scans.writers import CLOUD_SUFFIXES
 from wildshape.training import recipes
 
 ROOT = Path(__file__).parents[2]
@@ -132,6 +135,21 @@ def test_every_preset_of_train_has_a_line_that_explains_it(wildshape):
     for preset in presets:
         assert f"{preset}: {train.PRESETS[preset]}" in said
         assert settings_of("train", "in", "--out", "x", "--preset", preset).preset == preset
+
+
+def test_every_format_of_clouds_is_offered(wildshape):
+    offered = {f".{kind}" for kind in get_args(get_args(Format)[0])} - {".auto"}
+    assert offered | {".txt"} == set(SUFFIXES)
+    said = wildshape("fuse", "--help").out.replace("│", " ").split()
+    assert " ".join(CLOUD_SUFFIXES) in " ".join(said)
+
+
+@pytest.mark.parametrize("command", ["complete", "drive"])
+def test_help_names_a_format_of_boxes_that_is_added(command):
+    added = "from wildshape.inference.folders import box_files as b; b.BOX_FORMATS += ('added',)"
+    shown = f"from wildshape.cli.main import main; main(['{command}', '--help'])"
+    words = python(f"{added}; {shown}").stdout.replace("│", " ").split()
+    assert ", added: also write all boxes so" in " ".join(words)
 
 
 @pytest.mark.parametrize(

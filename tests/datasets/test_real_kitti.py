@@ -12,7 +12,7 @@ from wildshape.baselines.identity import Identity, OneScan
 from wildshape.baselines.named import baseline
 from wildshape.datasets.kitti.raw import KittiRaw
 from wildshape.datasets.kitti.tracklets import read_tracklets
-from wildshape.datasets.tracks.labelled_boxes import Crop, points_in_box
+from wildshape.datasets.tracks.labelled_boxes import Crop, rows_in_box
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.datasets.tracks.source import all_tracks
 from wildshape.datasets.tracks.truth import fuse_by_truth, shape_mirrored
@@ -49,7 +49,7 @@ def test_cut_frames_hold_the_same_points_as_full_scans(tracks):
         full = read_velodyne(DRIVE / "velodyne_points" / "data" / f"{frame:010d}.bin")
         cut = read_velodyne(DRIVE / "velodyne_objects_xyz0" / f"{frame:010d}.bin")
         T = tracklet.T_velo_object[frame - tracklet.first_frame]
-        a, b = (points_in_box(cloud, T, tracklet.size, Crop()) for cloud in (full, cut))
+        a, b = (rows_in_box(cloud, T, tracklet.size, Crop()) for cloud in (full, cut))
         assert len(a) == pytest.approx(len(b), rel=0.02)
 
 

@@ -2,11 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Track folders and the packed store as sources."""
 
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
 import numpy as np
 import pytest
 from tests.cars import drive_by
+from tests.fuzz.drives import TARGETS
 
 from wildshape.datasets.kitti.raw import KittiRaw
+from wildshape.datasets.sources import SOURCES, open_source
 from wildshape.datasets.tracks.source import Source, all_tracks
 from wildshape.datasets.tracks.whole_tracks import Folder, Packed
 from wildshape.errors import BadInputError
@@ -50,3 +56,26 @@ def test_packed_gives_back_what_was_written(tmp_path):
 
 def test_readers_are_sources(tmp_path):
     assert all(isinstance(kind(tmp_path), Source) for kind in (Folder, Packed, KittiRaw))
+
+
+def test_every_data_set_is_fuzzed_and_listed():
+    page = Path(__file__).parents[2] / "docs" / "datasets" / "README.md"
+    listed = re.findall(r"^\|[^|]+\| `([\w-]+)` \|", page.read_text("utf-8"), re.MULTILINE)
+    assert set(listed) == set(SOURCES)
+    assert {target.name for target in TARGETS} == set(SOURCES) - {"folder", "packed"}
+
+
+@dataclass(frozen=True)
+class Own:
+    number: int = 1
+
+
+@dataclass
+class Added:
+    root: Path
+    own: Own = Own()
+
+
+def test_options_of_any_record_of_a_reader_are_set(tmp_path, monkeypatch):
+    monkeypatch.setitem(SOURCES, "added", f"{__name__}:Added")
+    assert open_source("added", tmp_path, {"number": 2}) == Added(tmp_path, Own(2))

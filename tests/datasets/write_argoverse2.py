@@ -59,7 +59,6 @@ def write_labels(folder, scene, category):
     columns |= {"category": [category] * len(boxes)}
     columns |= {f"{k}_m": [v] * len(boxes) for k, v in zip(("length", "width", "height"), SIZE)}
     columns |= pose_columns(matrices)
-    columns |= {"num_interior_pts": np.zeros(len(boxes), np.int64)}
     write_table(folder / "annotations.feather", columns)
 
 

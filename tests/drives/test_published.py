@@ -18,6 +18,7 @@ from tests.datasets.write_waymo import Thing as WaymoThing
 from tests.refusal import refused
 
 from wildshape.cli.main import main
+from wildshape.drives.recordings import recording_kinds
 from wildshape.drives.recordings.recording_kinds import find_drives, open_drive
 from wildshape.io.scans.points import write_ply
 
@@ -29,6 +30,14 @@ def in_world(drive, frame):
     scan = drive.scan(frame)
     assert scan.dtype == np.float32
     return drive.T_world_sensor[frame].apply_numpy(scan.astype(np.float64))
+
+
+def test_a_kind_above_folders_is_taken_for_scans_in_the_folder_itself(tmp_path, monkeypatch):
+    write_ply(tmp_path / "0.ply", np.zeros((9, 3), np.float32))
+    assert find_drives(tmp_path) == ("a folder of full scans", [tmp_path])
+    kind = recording_kinds._Layout("of a table", lambda path: [path], recording_kinds.open_folder)
+    monkeypatch.setattr(recording_kinds, "_LAYOUTS", (kind, *recording_kinds._LAYOUTS))
+    assert find_drives(tmp_path).what == "of a table"
 
 
 def test_argoverse2_logs(tmp_path):

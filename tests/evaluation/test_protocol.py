@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
 from collections import Counter
-from dataclasses import replace
+from dataclasses import fields, make_dataclass, replace
 
 import numpy as np
 import pytest
@@ -13,7 +13,9 @@ from wildshape.baselines.identity import Identity, OneScan
 from wildshape.baselines.pairs import Chained
 from wildshape.datasets.tracks.truth import TruthBuilder
 from wildshape.errors import BadInputError
+from wildshape.evaluation import protocol
 from wildshape.evaluation.cases import turn_track
+from wildshape.evaluation.metrics import RegistrationError, registration_error
 from wildshape.evaluation.protocol import Spoken, run
 from wildshape.evaluation.results import Limits, Skipped
 from wildshape.evaluation.summary import figures_of
@@ -310,3 +312,13 @@ def test_progress_and_seed_are_told():
     tracks = [drive_by(name, scans=2, points=30) for name in ("a", "b")]
     run({"scan": OneScan()}, iter(tracks), progress=lambda done, name: told.append((done, name)))
     assert told == [(1, "a"), (2, "b")]
+
+
+def test_figures_of_a_registration_go_by_name_not_by_place(monkeypatch):
+    tracks = [drive_by(scans=3, points=200)]
+    figures = figures_of(run({"identity": Identity()}, tracks)["identity"])
+    turned = make_dataclass("Turned", [one.name for one in reversed(fields(RegistrationError))])
+    monkeypatch.setattr(
+        protocol, "registration_error", lambda *poses: turned(**vars(registration_error(*poses)))
+    )
+    assert figures_of(run({"identity": Identity()}, tracks)["identity"]) == figures

@@ -41,7 +41,7 @@ from wildshape.drives.writing.files import DriveFiles, detections_of
 from wildshape.drives.writing.finished import read_finished
 from wildshape.evaluation.drives.labels import Counting, read_labels
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.folders.box_files import BoxFiles
+from wildshape.inference.folders.box_files import BOX_FORMATS, BoxFiles
 from wildshape.io.boxes.table import BoxRow, write_box_table
 from wildshape.io.poses import write_poses, write_tum
 from wildshape.io.scans.writers import write_ply
@@ -229,7 +229,7 @@ def _read_finished(folder: Path) -> Arrays:
         yield found.velocities(one)
         yield found.shape(one)
     list(detections_of(found))
-    DriveFiles(BoxFiles(("json", "nuscenes", "kitti", "argoverse2"))).write(folder)
+    DriveFiles(BoxFiles(BOX_FORMATS)).write(folder)
 
 
 TARGETS = (

@@ -9,6 +9,7 @@ from wildshape.geometry.sampling import (
     radius_inliers,
     sorted_points,
     statistical_inliers,
+    thin,
     voxel_thin,
 )
 
@@ -114,3 +115,11 @@ def test_quantiles_are_those_of_numpy(count):
     rows = np.random.default_rng(0).normal(size=(3, count))
     expected = np.quantile(rows, (0.0, 0.02, 0.5, 1.0), axis=1)
     assert quantiles(rows, (0.0, 0.02, 0.5, 1.0)) == pytest.approx(expected)
+
+
+def test_thinning_takes_a_subset_and_the_same_one_each_time():
+    points = np.arange(30_000, dtype=np.float32).reshape(-1, 3)
+    few = thin(points, 100)
+    assert len(few) == len(np.unique(few, axis=0)) == 100
+    np.testing.assert_array_equal(few, thin(points, 100))
+    assert np.isin(few[:, 0], points[:, 0]).all()

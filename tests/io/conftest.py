@@ -61,7 +61,7 @@ def full_formats(tmp_path_factory: pytest.TempPathFactory, full_scan) -> dict[st
 
 
 def _write_all(folder: Path, cloud: np.ndarray) -> dict[str, Path]:
-    write_ply(folder / "plain.ply", cloud, np.zeros(cloud.shape, np.uint8))
+    write_ply(folder / "plain.ply", cloud)
     for order, sign in (("binary_little_endian", "<"), ("binary_big_endian", ">")):
         (folder / f"{order}.ply").write_bytes(_ply_with_lists(order, sign, cloud))
     (folder / "ascii.ply").write_text(_ascii_ply_with_lists(cloud))

@@ -4,7 +4,7 @@ import numpy as np
 
 from wildshape.records import Box
 from wildshape.report.content import Cloud, ReportObject
-from wildshape.report.scene import box_segments, scene_of, thin, upright
+from wildshape.report.scene import box_segments, scene_of, upright
 
 
 def test_box_edges_have_the_box_s_lengths_and_lie_where_it_lies() -> None:
@@ -43,11 +43,3 @@ def test_arrow_points_to_the_sensor_from_outside_the_cloud() -> None:
 def test_no_arrow_where_the_sensor_is_inside() -> None:
     points = np.random.default_rng(0).normal(0, 1, (50, 3)).astype(np.float32)
     assert scene_of(ReportObject("a", clouds=(Cloud("truth", points),))).arrow is None
-
-
-def test_thinning_takes_a_subset_and_the_same_one_each_time() -> None:
-    points = np.arange(30_000, dtype=np.float32).reshape(-1, 3)
-    few = thin(points, 100)
-    assert len(few) == len(np.unique(few, axis=0)) == 100
-    np.testing.assert_array_equal(few, thin(points, 100))
-    assert np.isin(few[:, 0], points[:, 0]).all()

@@ -13,6 +13,7 @@ from tyro.conf import OmitArgPrefixes, Positional, arg
 from tyro.constructors import PrimitiveConstructorSpec
 
 from wildshape.errors import BadInputError
+from wildshape.inference.folders.box_files import BOX_FORMATS
 
 if TYPE_CHECKING:
     from wildshape.inference.folders.complete_folder import FolderOptions
@@ -121,6 +122,11 @@ Device = Annotated[
 Layout = Annotated[
     Literal["packed", "folders"],
     arg(help="one packed store, or track folders with a file a scan"),
+]
+Boxes = Annotated[
+    tuple[str, ...],
+    listed("A,B"),
+    option(help=f"{', '.join(BOX_FORMATS)}: also write all boxes so, below DIR/boxes"),
 ]
 Together = Annotated[
     bool, arg(name="track", help="use all scans of a track together: one shape, posed in each")

@@ -4,10 +4,11 @@
 
 To add a reader (see `datasets.tracks.source.Source`): one line in `SOURCES`, in the order in
 which the help is to list them. Its own options are fields of the command's `Settings`, with the
-names of the reader's fields; whoever passes one to a reader that lacks it is told so.
+names of fields of the reader or of its records; whoever passes one to a reader that lacks it is
+told so.
 """
 
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
@@ -33,8 +34,6 @@ SOURCES = {
 }
 """Name on the command line -> module and class; imported when it is asked for."""
 
-_NESTED = ("selection", "crop", "cut")
-
 
 def open_source(name: str, root: Path, options: dict[str, Any]) -> "Source":
     """The reader of a data set, with its own defaults where nothing else is wanted.
@@ -42,8 +41,8 @@ def open_source(name: str, root: Path, options: dict[str, Any]) -> "Source":
     Args:
         name: of `SOURCES`.
         root: where the data set lies.
-        options: values for the fields of `Selection`, of `Crop` or of the reader itself, as far as
-            the user gave them.
+        options: values for the fields of the reader or of its records (`Selection`, `Crop`), as
+            far as the user gave them.
 
     Raises:
         BadInputError: no such source, or an option that it does not have.
@@ -66,7 +65,7 @@ def _with(source: Any, name: str, option: str, value: object) -> Any:
         return replace(source, crop=replace(source.crop, ground=-source.crop.margin))
     if option in own:
         return replace(source, **{option: _checked(source, option, value)})
-    for group in own & set(_NESTED):
+    for group in own:
         record = getattr(source, group)
         if option in _settable(record):
             changed = replace(record, **{option: _checked(record, option, value)})
@@ -74,8 +73,8 @@ def _with(source: Any, name: str, option: str, value: object) -> Any:
     raise BadInputError(f"--{option.replace('_', '-')}: {name} has no such option; leave it out.")
 
 
-def _settable(record: Any) -> set[str]:
-    return {field.name for field in fields(record) if field.init}
+def _settable(record: Any) -> list[str]:
+    return [field.name for field in fields(record) if field.init] if is_dataclass(record) else []
 
 
 def _checked(record: Any, option: str, value: object) -> object:

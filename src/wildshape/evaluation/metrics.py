@@ -69,7 +69,7 @@ class RegistrationError:
 
 @dataclass(frozen=True)
 class RegistrationScore:
-    """One scan registered to its track's middle scan: its names, then `RegistrationError`."""
+    """One scan registered to its track's middle scan: its names, and `RegistrationError`."""
 
     track: str
     scan: str
@@ -175,8 +175,15 @@ def box_score(predicted: Box, truth: FittedBox, T_sensor_object: SE3) -> BoxScor
     places = (np.array((*one.centre.tolist(), turn)) for one, turn in ((found, yaw), (truth, 0.0)))
     place, true_place = places
     bev = footprint_iou(place, found.size.tolist(), true_place, truth.size.tolist())
-    off = (found.size - truth.size).tolist()
-    return BoxScore(box_iou(found, truth), abs(math.degrees(yaw)), bev, *off)
+    length, width, height = (found.size - truth.size).tolist()
+    return BoxScore(
+        iou=box_iou(found, truth),
+        heading_deg=abs(math.degrees(yaw)),
+        bev=bev,
+        length_off_m=length,
+        width_off_m=width,
+        height_off_m=height,
+    )
 
 
 def labelled_box(size_m: tuple[float, float, float]) -> FittedBox:

@@ -296,12 +296,16 @@ def _score_registration(method: Registrar, case: Case, ledger: _Ledger) -> None:
         case.T_sensor_object[torch.tensor(others)],
         case.T_sensor_object[middle],
     )
-    columns = tuple(getattr(error, part.name) for part in fields(error))
-    for i, values in zip(others, torch.stack(columns, dim=1).tolist(), strict=True):
+    names = [part.name for part in fields(error)]
+    columns = torch.stack([getattr(error, name) for name in names], dim=1).tolist()
+    for i, values in zip(others, columns, strict=True):
         if not np.isfinite(values).all():
             ledger.skip(case, i, f"registration: {NOT_FINITE}")
             continue
-        ledger.registrations.append(RegistrationScore(case.name, case.scan_names[i], *values))
+        figures = dict(zip(names, values))
+        ledger.registrations.append(
+            RegistrationScore(track=case.name, scan=case.scan_names[i], **figures)
+        )
 
 
 def _registered(method: Registrar, case: Case) -> tuple[Sequence[int], int, SE3 | None]:

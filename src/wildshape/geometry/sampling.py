@@ -42,6 +42,14 @@ def radius_inliers(
     return np.asarray(counts) - 1 >= neighbours
 
 
+def thin(points: Float[np.ndarray, "n 3"], count: int) -> Float[np.ndarray, "m 3"]:
+    """At most `count` points, drawn without replacement, the same ones every time."""
+    if len(points) <= count:
+        return points
+    keep = np.random.default_rng(0).choice(len(points), count, replace=False)
+    return points[np.sort(keep)]
+
+
 def voxel_thin(points: Float[np.ndarray, "n 3"], size: float) -> Float[np.ndarray, "m 3"]:
     """The mean of the points in each occupied cube of edge `size` metres, in a fixed order."""
     if len(points) == 0:

@@ -15,9 +15,10 @@ from typing import IO, Any
 import numpy as np
 
 from wildshape.errors import BadInputError
+from wildshape.geometry.sampling import thin
 from wildshape.io.atomic import atomic_write
 from wildshape.report.content import Cloud, ReportObject
-from wildshape.report.scene import Scene, scene_of, thin
+from wildshape.report.scene import Scene, scene_of
 
 _CARD, _TEXT = "#12171e", "#e9ecf0"
 _INK = "#16191d"

@@ -12,7 +12,8 @@ import numpy as np
 from jaxtyping import Float
 
 from wildshape.geometry.box import EDGES
-from wildshape.records import Box, Points, SensorKind
+from wildshape.geometry.sampling import thin
+from wildshape.records import Box, SensorKind
 from wildshape.report.content import Cloud, ReportObject
 
 MAX_POINTS = 4096
@@ -76,14 +77,6 @@ def upright(points: np.ndarray, sensor: SensorKind) -> np.ndarray:
 TRUTH_POINTS = 8192
 
 
-def thin(points: Points, count: int = MAX_POINTS) -> Float[np.ndarray, "m 3"]:
-    """At most `count` points, drawn without replacement, the same ones every time."""
-    if len(points) <= count:
-        return points
-    keep = np.random.default_rng(0).choice(len(points), count, replace=False)
-    return points[np.sort(keep)]
-
-
 def box_segments(box: Box | None, sensor: SensorKind = "lidar") -> Segments:
     """The twelve edges of a box and a mark from its front face forward, drawing frame."""
     if box is None:
@@ -97,7 +90,7 @@ def box_segments(box: Box | None, sensor: SensorKind = "lidar") -> Segments:
 
 def _prepared(cloud: Cloud, sensor: SensorKind) -> Cloud:
     finite = cloud.points[np.isfinite(cloud.points).all(axis=1)]
-    points = np.ascontiguousarray(upright(thin(finite), sensor), dtype=np.float32)
+    points = np.ascontiguousarray(upright(thin(finite, MAX_POINTS), sensor), dtype=np.float32)
     return Cloud(cloud.label, points, cloud.paint, cloud.size)
 
 

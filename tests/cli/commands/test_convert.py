@@ -8,7 +8,7 @@ import shutil
 import signal
 import sys
 import time
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from tests.datasets.write_argoverse2 import write_log
 from tests.datasets.write_kitti_raw import in_velo, write_drive
 
 from wildshape.cli.commands.convert import _OURS, _TRUTH, Settings, _options
-from wildshape.datasets.sources import _NESTED, SOURCES, open_source
+from wildshape.datasets.sources import SOURCES, open_source
 from wildshape.datasets.tracks.source import Source
 from wildshape.io.store.store import open_store
 from wildshape.io.tracks import read_track
@@ -51,8 +51,8 @@ def test_every_source_can_be_opened(tmp_path):
 
 def test_every_option_belongs_to_a_source(tmp_path):
     sources = [open_source(name, tmp_path, {}) for name in SOURCES]
-    records = [getattr(s, part, s) for s in sources for part in ("self", *_NESTED)]
-    known = {name for record in records for name in vars(record)}
+    records = [r for source in sources for r in (source, *vars(source).values())]
+    known = {name for record in records if is_dataclass(record) for name in vars(record)}
     asked = {field.name for field in fields(Settings)} - {*_OURS, *_TRUTH, "keep_ground"}
     assert asked <= known
 

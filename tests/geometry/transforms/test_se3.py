@@ -47,6 +47,12 @@ def test_rigid(T):
     torch.testing.assert_close((moved[:, None] - moved).norm(dim=-1), apart, atol=1e-10, rtol=0)
 
 
+@given(poses(), st.floats(0.01, 100))
+def test_scaled_carries_scaled_points_to_scaled_places(T, factor):
+    x = clouds(1, 6, 3, scale=5.0)
+    torch.testing.assert_close(T.scaled(factor).apply(x * factor), T.apply(x) * factor)
+
+
 @given(poses())
 def test_matrix_round_trip_and_homogeneous_product(T):
     assert_same(SE3.from_matrix(T.matrix), T, atol=0)

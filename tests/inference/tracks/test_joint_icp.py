@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 from tests.cars import drive_by, poses_of
-from tests.inference.tracks.spoilt import relative, spoilt
+from tests.inference.tracks.spoilt import spoilt
 
 from wildshape.inference.config import TrackConfig
 from wildshape.inference.tracks import joint_icp
@@ -60,11 +60,6 @@ def off(found, true):
     """Largest rotation in degrees, and largest way of the object's centre in metres."""
     error = true.inverse() @ found
     return float(torch.rad2deg(error.angle()).max()), float(error.translation.norm(dim=-1).max())
-
-
-def of_first(poses):
-    """The object's pose in the first scan, as every scan tells it."""
-    return relative(poses) @ TRUE
 
 
 @pytest.mark.parametrize("seed", [1, 2])

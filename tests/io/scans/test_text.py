@@ -4,14 +4,11 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from tests.io.limits import allowed, costs
 
 from wildshape.errors import BadInputError
 from wildshape.io.scans.points import Coordinates, read_points
-
-_NAN = np.nan
 
 
 def _read(path: Path, text: str, coordinates: Coordinates | None = None) -> list[list[float]]:

@@ -12,12 +12,12 @@ from wildshape.cli.commands import uncollected
 from wildshape.cli.options import (
     DEFAULT_SCANS,
     DEFAULT_WORK,
+    Boxes,
     Format,
     Scans,
     Work,
     check_mesh_format,
     is_pipe,
-    listed,
     option,
 )
 from wildshape.errors import BadInputError
@@ -55,8 +55,8 @@ class Settings:
 
     Writes DIR/TRACK/completed/SCAN.ply (the shape in that scan's sensor frame, metres), poses.txt
     (T_sensor_canonical) and objects.json (box, confidence); with --mesh a closed triangle mesh
-    DIR/TRACK/mesh/SCAN.ply, too; with --boxes json,kitti,nuscenes,argoverse2 all boxes in these
-    formats below DIR/boxes. An interrupted run goes on where it stopped when repeated.
+    DIR/TRACK/mesh/SCAN.ply, too; with --boxes all boxes in the formats of data sets, below
+    DIR/boxes. An interrupted run goes on where it stopped when repeated.
 
     In pipes, `wildshape complete - < scan.ply > shape.ply`: nothing but the shape (PLY or
     --cloud-format; with --mesh a mesh, with --json an object with box, pose and points) goes to
@@ -77,11 +77,7 @@ class Settings:
         Literal["none", "confidence"],
         arg(help="blue where the mesh was measured, orange where it was guessed"),
     ] = "none"
-    boxes: Annotated[
-        tuple[str, ...],
-        listed("A,B"),
-        option(help="json, kitti, nuscenes, argoverse2: also write all boxes so, below DIR/boxes"),
-    ] = ()
+    boxes: Boxes = ()
     calibration: Annotated[
         Path | None,
         option(metavar="FILE", help="of KITTI (.txt) or Argoverse 2 (.feather), for these boxes"),

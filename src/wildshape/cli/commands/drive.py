@@ -14,12 +14,12 @@ from wildshape.cli.options import (
     DEFAULT_NETWORK,
     DEFAULT_WORK,
     AsJson,
+    Boxes,
     Network,
     OutFolder,
     Overwrite,
     Work,
     check_mesh_format,
-    listed,
     option,
 )
 from wildshape.errors import BadInputError
@@ -76,11 +76,7 @@ class Settings:
     ] = None
     network: Network = DEFAULT_NETWORK
     work: Work = DEFAULT_WORK
-    boxes: Annotated[
-        tuple[str, ...],
-        listed("A,B"),
-        option(help="json, kitti, nuscenes, argoverse2: also write all boxes so, below DIR/boxes"),
-    ] = ()
+    boxes: Boxes = ()
     calibration: Annotated[
         Path | None,
         option(

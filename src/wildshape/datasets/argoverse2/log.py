@@ -38,7 +38,6 @@ class Boxes:
         categories: for example `REGULAR_VEHICLE`.
         sizes: full lengths along the box's own x (forward), y (left), z (up), metres.
         T_ego_object: origin at the box's centre, at the sweep's time.
-        interior: how many points of the sweep lie in the box, as the data set itself says.
     """
 
     timestamps: Int64[np.ndarray, " b"]
@@ -46,7 +45,6 @@ class Boxes:
     categories: np.ndarray
     sizes: Float[np.ndarray, "b 3"]
     T_ego_object: SE3
-    interior: Int64[np.ndarray, " b"]
 
 
 def read_boxes(log: Path) -> Boxes:
@@ -56,13 +54,13 @@ def read_boxes(log: Path) -> Boxes:
         BadInputError: the file is missing or corrupt.
     """
     path = log / LABELS
-    names = ("timestamp_ns", "track_uuid", "category", "num_interior_pts")
+    names = ("timestamp_ns", "track_uuid", "category")
     table = read_feather(path, (*names, *_SIZE, *POSE), _BRINGS)
     sizes = np.stack([table[name] for name in _SIZE], axis=-1)
     T_ego_object = poses(table, path)
     check_boxes(sizes, T_ego_object, str(path), _BRINGS)
-    stamps, tracks, categories, interior = (table[name] for name in names)
-    return Boxes(stamps, tracks, categories, sizes, T_ego_object, interior)
+    stamps, tracks, categories = (table[name] for name in names)
+    return Boxes(stamps, tracks, categories, sizes, T_ego_object)
 
 
 def read_sweep(path: Path) -> tuple[Points, UInt8[np.ndarray, " n"]]:

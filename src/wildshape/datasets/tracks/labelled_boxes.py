@@ -102,10 +102,10 @@ def described(data_set: str, size: tuple[float, float, float]) -> str:
     return f"{data_set}, labelled box {length:.2f} x {width:.2f} x {height:.2f} m"
 
 
-def points_in_box(
+def rows_in_box(
     cloud: Points, T_sensor_object: SE3, size: tuple[float, float, float], crop: Crop
-) -> Points:
-    """The points `(n, 3)` of a whole scan that belong to the box's object, in the same frame.
+) -> Int[np.ndarray, " n"]:
+    """Which points of a whole scan belong to a box's object, as rows of it in rising order.
 
     Args:
         cloud: `(s, 3)` sensor frame, metres.
@@ -113,13 +113,6 @@ def points_in_box(
         size: full lengths along the box's own x, y, z, metres.
         crop: see there.
     """
-    return cloud[rows_in_box(cloud, T_sensor_object, size, crop)]
-
-
-def rows_in_box(
-    cloud: Points, T_sensor_object: SE3, size: tuple[float, float, float], crop: Crop
-) -> Int[np.ndarray, " n"]:
-    """Which points of a whole scan `points_in_box` takes, as rows of it in rising order."""
     half = np.asarray(size) / 2
     centre = T_sensor_object.translation.numpy()
     # Cheap first, an axis at a time: a whole scan has 100,000 points and a box a few hundred.

@@ -42,27 +42,22 @@ def fuse_by_truth(track: Track) -> Points:
     return np.concatenate(moved) if moved else np.zeros((0, 3), np.float32)
 
 
-def shape_partial(track: Track, *, floor: float | None = None) -> Points:
+def shape_partial(track: Track) -> Points:
     """What the sensor saw of the object over the track: `(g, 3)` in the object frame, metres.
-
-    Args:
-        track: with poses, x forward along the object's heading.
-        floor: object-frame height under which points are ground; None where the reader has
-            already removed it.
 
     Raises:
         BadInputError: the track has no poses.
     """
-    return _thinned(_clean(track, floor))
+    return _thinned(_clean(track))
 
 
-def shape_mirrored(track: Track, *, floor: float | None = None) -> Points:
+def shape_mirrored(track: Track) -> Points:
     """`shape_partial` with its reflection at the object's own x-z plane (y -> -y) added.
 
     Raises:
         BadInputError: the track has no poses.
     """
-    return _thinned(_mirrored(_clean(track, floor)))
+    return _thinned(_mirrored(_clean(track)))
 
 
 def _thinned(points: Points) -> Points:
@@ -73,10 +68,8 @@ def _mirrored(points: Points) -> Points:
     return np.concatenate((points, points * np.asarray((1, -1, 1), points.dtype)))
 
 
-def _clean(track: Track, floor: float | None) -> Points:
+def _clean(track: Track) -> Points:
     points = fuse_by_truth(track)
-    if floor is not None:
-        points = points[points[:, 2] >= floor]
     return points[statistical_inliers(points)]
 
 

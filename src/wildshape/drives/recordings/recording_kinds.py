@@ -3,7 +3,8 @@
 """Which kind of recording lies at a path, and the drives in it.
 
 To read another kind: a module with a function that finds its drives and one that opens a drive, and
-a line in `_LAYOUTS`.
+a line in `_LAYOUTS`, where the first that finds a drive is taken: above `_FOLDER` if its scans lie
+in the folder itself.
 """
 
 from collections.abc import Callable
@@ -53,7 +54,11 @@ class _Layout(NamedTuple):
 
 
 _POSES = "its own poses are used in place of odometry, its labels are not"
+_FOLDER = _Layout(
+    "a folder of full scans", lambda path: [path] if holds_scans(path) else [], open_folder
+)
 _LAYOUTS = (
+    _FOLDER,
     _Layout("packets of Velodyne or Ouster", find_packets, open_packet_file),
     _Layout(f"Argoverse 2: {_POSES}", find_logs, open_log),
     _Layout(f"PandaSet: {_POSES}", find_pandaset, open_pandaset),
@@ -65,7 +70,6 @@ _LAYOUTS = (
     _Layout("folders of full scans", find_folders, open_folder),
 )
 _BAG = "a recording of ROS"
-_FOLDER = _Layout("a folder of full scans", lambda path: [path], open_folder)
 
 
 class Found(NamedTuple):
@@ -141,8 +145,6 @@ def open_drive(path: Path | str, topic: str | None = None) -> Drive:
 
 def _layout(path: Path) -> tuple[_Layout, list[Path]]:
     """The kind of a path and the drives in it."""
-    if holds_scans(path):
-        return _FOLDER, [path]
     for layout in _LAYOUTS:
         drives = layout.find(path)
         if drives:

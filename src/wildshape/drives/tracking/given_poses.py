@@ -105,7 +105,7 @@ def _otherwise(drive: Drive, T: SE3, mounting: Mounting, config: DriveConfig) ->
         source, target = (_standing(drive, at, mounting, config) for at in (start, end))
         if min(len(source), len(target)) >= _FEWEST_POINTS:
             given = T[end].inverse() @ T[start]
-            longer = [SE3(given.rotation, given.translation * times) for times in _TIMES]
+            longer = [given.scaled(times) for times in _TIMES]
             motions = (given, axes @ given @ axes, *longer)
             rows.append([float(_away(source, target, one).mean()) for one in motions])
     if not rows:

@@ -44,10 +44,10 @@ class SE3:
         )
 
     @classmethod
-    def identity(cls, *batch: int, dtype: torch.dtype = torch.float64) -> "SE3":
+    def identity(cls, *batch: int) -> "SE3":
         """Transforms that change nothing, of the given batch shape."""
-        eye = torch.eye(3, dtype=dtype, device="cpu").expand(*batch, 3, 3)
-        return cls(eye, torch.zeros(*batch, 3, dtype=dtype, device="cpu"))
+        eye = torch.eye(3, dtype=torch.float64, device="cpu").expand(*batch, 3, 3)
+        return cls(eye, torch.zeros(*batch, 3, dtype=torch.float64, device="cpu"))
 
     def where(self, chosen: Bool[Tensor, "*batch"], other: "SE3") -> "SE3":
         """These transforms where they are chosen, the other's elsewhere."""
@@ -134,6 +134,10 @@ class SE3:
         moved = self.apply(torch.from_numpy(np.array(points, np.float64)))
         with np.errstate(over="ignore"):
             return moved.numpy().astype(points.dtype)
+
+    def scaled(self, factor: float) -> "SE3":
+        """The same transforms where lengths are so many times as large."""
+        return type(self)(self.rotation, self.translation * factor)
 
     def angle(self) -> Float[Tensor, "*batch"]:
         """Rotation angle in radians."""

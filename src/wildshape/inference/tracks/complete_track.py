@@ -141,7 +141,7 @@ def complete_together(
     fit = refine_checked(clouds, start, gathered.weights, mirror=mirror, config=config.track)
     seen = _seen(clouds, fit.T_sensor_object, mirror, config.track)
     shape = unit * drawn_to(shape[None] / unit, padded([seen]), config.track)[0]
-    fit = fit._replace(T_sensor_object=_scaled(fit.T_sensor_object, unit))
+    fit = fit._replace(T_sensor_object=fit.T_sensor_object.scaled(unit))
     body = settings.sensor == "lidar"
     solid = shape
     if any(one is not None for one in rays):
@@ -215,11 +215,7 @@ def _in_units(scans: list[Points], T_sensor_object: SE3, unit: float) -> tuple[l
     """Both as if the object were as large as a vehicle (`unit_of`)."""
     if unit == 1.0:
         return scans, T_sensor_object
-    return [scan / np.float32(unit) for scan in scans], _scaled(T_sensor_object, 1 / unit)
-
-
-def _scaled(T_a_b: SE3, factor: float) -> SE3:
-    return SE3(T_a_b.rotation, T_a_b.translation * factor)
+    return [scan / np.float32(unit) for scan in scans], T_sensor_object.scaled(1 / unit)
 
 
 def _box(

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Literal, cast, get_args
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.other_libraries import las_cloud
@@ -27,24 +27,17 @@ CLOUD_FORMATS: tuple[CloudFormat, ...] = get_args(CloudFormat)
 """Of completed shapes."""
 MeshFormat = Literal["ply", "obj", "glb"]
 MESH_FORMATS: tuple[MeshFormat, ...] = get_args(MeshFormat)
-_COLOURS = ("red", "green", "blue")
 _AT_ONCE = 8  # files
 
 
-def ply_bytes(
-    points: Float[np.ndarray, "n 3"], colors: UInt8[np.ndarray, "n 3"] | None = None
-) -> bytes:
-    """A binary little-endian PLY file: float32 x y z (and uchar red green blue)."""
-    columns = dict(zip("xyz", np.asarray(points, "<f4").T))
-    if colors is not None:
-        columns |= dict(zip(_COLOURS, np.asarray(colors, "u1").T))
-    rows = np.empty(len(points), [(name, column.dtype) for name, column in columns.items()])
-    lines = []
-    for name, column in columns.items():
-        rows[name] = column
-        lines.append(f"property {'uchar' if name in _COLOURS else 'float'} {name}")
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}", *lines]
-    return ("\n".join([*header, "end_header"]) + "\n").encode() + rows.tobytes()
+def ply_bytes(points: Float[np.ndarray, "n 3"]) -> bytes:
+    """A binary little-endian PLY file: float32 x y z."""
+    header = (
+        "ply\nformat binary_little_endian 1.0\n"
+        f"element vertex {len(points)}\n"
+        "property float x\nproperty float y\nproperty float z\nend_header\n"
+    )
+    return header.encode() + np.asarray(points, "<f4").tobytes()
 
 
 def _pcd_bytes(points: Float[np.ndarray, "n 3"]) -> bytes:
@@ -61,20 +54,15 @@ def cloud_bytes(points: Float[np.ndarray, "n 3"], kind: CloudFormat) -> bytes:
     return ply_bytes(points) if kind == "ply" else _pcd_bytes(points)
 
 
-def write_ply(
-    path: Path | str,
-    points: Float[np.ndarray, "n 3"],
-    colors: UInt8[np.ndarray, "n 3"] | None = None,
-) -> None:
+def write_ply(path: Path | str, points: Float[np.ndarray, "n 3"]) -> None:
     """Write points as binary little-endian PLY, float32 x y z, atomically.
 
     Args:
         path: the file; its folder is made if needed.
         points: `(n, 3)`, metres.
-        colors: `(n, 3)` 0 to 255, kept as uchar red green blue.
     """
     with atomic_write(path) as file:
-        file.write(ply_bytes(points, colors))
+        file.write(ply_bytes(points))
 
 
 def _ply(file: BinaryIO, points: Float[np.ndarray, "n 3"]) -> None:

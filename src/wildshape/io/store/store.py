@@ -16,6 +16,7 @@ from jaxtyping import Float32, Int64
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import reading
+from wildshape.io.sensor_json import sensor_from_json
 from wildshape.io.store.checks import (
     check_file,
     check_file_once,
@@ -37,7 +38,6 @@ from wildshape.io.store.layout import (
 from wildshape.io.store.manifest import files_of, read_manifest
 from wildshape.io.store.rays import rays_of_rows
 from wildshape.io.store.writer import StoreWriter
-from wildshape.io.tracks import sensor_from_json
 from wildshape.records import Sensor, ShapeKind, SightLines, Track
 
 __all__ = ["Store", "StoreWriter", "is_store", "open_store"]

@@ -17,6 +17,7 @@ from jaxtyping import Float32
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import hold_folder, write_json
+from wildshape.io.sensor_json import sensor_to_json
 from wildshape.io.store.checks import cloud_crc, is_finite
 from wildshape.io.store.index import IndexWriter, file_record
 from wildshape.io.store.layout import (
@@ -34,7 +35,6 @@ from wildshape.io.store.layout import (
 )
 from wildshape.io.store.manifest import manifest_of
 from wildshape.io.store.rays import rows_of_rays
-from wildshape.io.tracks import sensor_to_json
 from wildshape.records import ShapeKind, SightLines, Track
 
 _SHARD_BYTES = 256 << 20

@@ -8,6 +8,7 @@ from wildshape.drives.result import REPORT
 from wildshape.drives.source import Drive
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle, read_finished
 from wildshape.drives.writing.playback.moments import readable_source
+from wildshape.geometry.sampling import thin
 from wildshape.inference.registration import fuse_scans, to_middle
 from wildshape.io.progress import counted, duration
 from wildshape.records import Points, as_text
@@ -23,7 +24,6 @@ from wildshape.report.results import (
     chances_in,
     read_result,
 )
-from wildshape.report.scene import thin
 
 MOST_OBJECTS = 150
 _POINTS = 2500  # of a panel

@@ -17,6 +17,7 @@ from jaxtyping import Float
 from wildshape.drives.source import Drive
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
 from wildshape.drives.writing.playback.moments import PALETTE
+from wildshape.geometry.sampling import thin
 from wildshape.io.atomic import atomic_write
 from wildshape.report.drive.scene import (
     NOBODY,
@@ -26,7 +27,6 @@ from wildshape.report.drive.scene import (
     owners_of,
     placed,
 )
-from wildshape.report.scene import thin
 
 _CARD, _TEXT, _SOFT = "#12171e", "#e9ecf0", "#a0a8b3"
 _DPI, _WIDE_IN = 110, 14.0

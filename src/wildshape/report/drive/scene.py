@@ -17,11 +17,11 @@ from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
 from wildshape.drives.writing.playback.moments import PALETTE
 from wildshape.geometry.box import box_axes
 from wildshape.geometry.footprint import upright_places
+from wildshape.geometry.sampling import thin
 from wildshape.ops.connected import first_of_cells
 from wildshape.records import Box, Points
 from wildshape.report.page.html import quantise
 from wildshape.report.results import chances_in
-from wildshape.report.scene import thin
 
 _AROUND_M, _FOOT_M = 0.15, 0.15  # a box that is a little small; the ground under it
 NOBODY = -1

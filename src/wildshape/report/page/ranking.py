@@ -12,6 +12,7 @@ import torch
 
 from wildshape.datasets.tracks.truth import whole_shape
 from wildshape.evaluation.metrics import completion_error, registration_error
+from wildshape.geometry.sampling import thin
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Track
 from wildshape.report.content import Cell, Table
@@ -24,7 +25,7 @@ from wildshape.report.results import (
     doubt_of,
     errors_of_scores,
 )
-from wildshape.report.scene import TRUTH_POINTS, thin
+from wildshape.report.scene import TRUTH_POINTS
 
 
 @dataclass(frozen=True)

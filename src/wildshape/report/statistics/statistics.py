@@ -17,8 +17,8 @@ from jaxtyping import Int
 
 from wildshape.errors import BadInputError
 from wildshape.io.inputs import TrackSource
+from wildshape.io.sensor_json import sensor_from_json
 from wildshape.io.store.store import Store
-from wildshape.io.tracks import sensor_from_json
 from wildshape.records import Sensor, Track
 from wildshape.report.statistics.distributions import RunningDistribution
 from wildshape.report.statistics.histogram import Tally

@@ -7,7 +7,8 @@ from html import escape
 import numpy as np
 
 from wildshape.evaluation.metrics import completion_error
-from wildshape.report.scene import TRUTH_POINTS, thin
+from wildshape.geometry.sampling import thin
+from wildshape.report.scene import TRUTH_POINTS
 from wildshape.report.viewer.colours import LEGENDS, css
 from wildshape.report.viewer.sources import CompletedScan
 from wildshape.report.viewer.stage import Stage, Wish

@@ -14,11 +14,12 @@ import numpy as np
 from wildshape.drives.source import Drive
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
 from wildshape.drives.writing.playback.moments import colour_of, readable_source
+from wildshape.geometry.sampling import thin
 from wildshape.io.boxes.detections import pose_of
 from wildshape.records import Box, Points
 from wildshape.report.drive.scene import NOBODY, SceneConfig, boxes_by_frame, thinned
 from wildshape.report.results import box_of, chances_in, read_result
-from wildshape.report.scene import box_segments, thin
+from wildshape.report.scene import box_segments
 from wildshape.report.viewer.details import row
 from wildshape.report.viewer.drawing_frame import as_node
 from wildshape.report.viewer.page import HOST, hosting

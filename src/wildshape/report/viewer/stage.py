@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 
+from wildshape.geometry.sampling import thin
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.registration import fuse_scans
 from wildshape.records import Box, Points, Track
 from wildshape.report.content import BLUE, GREEN, GREY, ORANGE
-from wildshape.report.scene import TRUTH_POINTS, box_segments, thin
+from wildshape.report.scene import TRUTH_POINTS, box_segments
 from wildshape.report.viewer.colours import PLAIN, WRONG, Rgb, by_height, completed_colours, rgb
 from wildshape.report.viewer.drawing_frame import (
     Hold,

@@ -66,9 +66,10 @@ class StreetConfig:
         Raises:
             BadInputError: a number is out of range, or the sensor is no LiDAR.
         """
-        if not isinstance(SENSORS.get(self.sensor), SpinningLidar):
+        lidars = [name for name, one in SENSORS.items() if isinstance(one, SpinningLidar)]
+        if self.sensor not in lidars:
             raise BadInputError(
-                f"sensor is {self.sensor!r}; a drive needs a LiDAR: hdl64, hdl32 or os1-128."
+                f"sensor is {self.sensor!r}; a drive needs a LiDAR: one of {', '.join(lidars)}."
             )
         if self.scans < 1:
             raise BadInputError(f"scans is {self.scans}, expected at least 1.")

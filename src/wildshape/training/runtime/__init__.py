@@ -2,5 +2,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a run needs of its machine: processes, CUDA graphs, logs, profiles.
 
-Start with `processes`.
+Start with `torchrun`.
 """

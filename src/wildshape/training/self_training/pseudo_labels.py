@@ -244,7 +244,7 @@ def heading_votes(teacher: Teacher, track: PosedTrack) -> Float[Tensor, "V"]:
         known = teacher.fronts[torch.from_numpy(track.scans)].to(looks.dtype)
         return torch.where((looks * known).sum(-1) < 0, -1.0, 1.0)
     if teacher.headings is not None:
-        in_units = _scaled(track.T_sensor_can, 1 / unit)
+        in_units = track.T_sensor_can.scaled(1 / unit)
         return transferred_signs(teacher.headings, teacher.clouds(track), in_units, config.transfer)
     return signs_within(
         teacher.asked,
@@ -261,11 +261,11 @@ def refined(teacher: Teacher, track: PosedTrack) -> PosedTrack:
     ordered, start = teacher.time_ordered, track.T_sensor_can
     if ordered:
         start = without_outliers(start, config.track)
-    start = _scaled(start, 1 / teacher.unit)
+    start = start.scaled(1 / teacher.unit)
     found = refine_jointly(clouds, start, mirror=teacher.mirror, config=config.track.coarse)
     if ordered:
         found = chained(clouds, found, config)
-    return track._replace(T_sensor_can=_scaled(found, teacher.unit))
+    return track._replace(T_sensor_can=found.scaled(teacher.unit))
 
 
 def chained(scans: list[Points], T_sensor_can: SE3, config: SelfTrainingConfig = _DEFAULT) -> SE3:
@@ -325,8 +325,3 @@ def view_top_of(views: ViewSampler, scans: Int64[np.ndarray, "V"]) -> float:
     """Where a LiDAR's view of a track ended above."""
     clouds = (torch.from_numpy(views.store.scan_points(int(scan))) for scan in scans)
     return view_top([float(slope(cloud).max()) for cloud in clouds])
-
-
-def _scaled(T_a_b: SE3, factor: float) -> SE3:
-    """The same transform where lengths are so many times as large."""
-    return SE3(T_a_b.rotation, T_a_b.translation * factor)

@@ -43,7 +43,7 @@ def targets_of(
     Args:
         sampler: of the tracks.
         tracks: posed, in the sampler's order.
-        shapes: of their objects, `(G, 3)` each, canonical frame, metres.
+        shapes: of their objects, `(G, 3)` each, G the same for all, canonical frame, metres.
         tops: slopes at which their views ended above.
         config: how many places of the sensors are kept.
         complete: whether the shapes are whole.

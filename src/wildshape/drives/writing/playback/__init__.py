@@ -2,5 +2,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """A finished drive as a recording for other viewers: MCAP for Foxglove, RRD for Rerun.
 
-What is where at which time says `moments.py`; a module a format. Start there.
+Start with `moments`: what is where at which time. A module a format.
 """

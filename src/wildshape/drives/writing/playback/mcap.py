@@ -27,10 +27,10 @@ from wildshape.drives.writing.playback.moments import (
     Moment,
     Present,
     moments,
-    thinned,
 )
 from wildshape.errors import load_library
 from wildshape.geometry.box import EDGES, SIGNS
+from wildshape.geometry.sampling import thin
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import atomic_write
@@ -61,7 +61,7 @@ def write_mcap(found: FinishedDrive, path: Path) -> None:
     from mcap_protobuf.writer import Writer
 
     zero = max(found.times[0], 0.0) if found.times else 0.0  # its clock knows no time before 0
-    shapes = {one.name: thinned(found.shape(one), SHAPE_POINTS) for one in found.vehicles}
+    shapes = {one.name: thin(found.shape(one), SHAPE_POINTS) for one in found.vehicles}
     with atomic_write(path) as file:
         writer = Writer(file)
         for moment in moments(found):

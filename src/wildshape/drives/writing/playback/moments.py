@@ -10,6 +10,7 @@ import numpy as np
 from wildshape.drives.source import Drive
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
 from wildshape.errors import BadInputError
+from wildshape.geometry.sampling import thin
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 
@@ -82,7 +83,7 @@ def moments(found: FinishedDrive) -> Iterator[Moment]:
             frame,
             seconds,
             found.T_level_sensor[frame],
-            none if drive is None else thinned(drive.scan(frame), SCAN_POINTS),
+            none if drive is None else thin(drive.scan(frame), SCAN_POINTS),
             tuple(there.get(frame, ())),
         )
 
@@ -93,14 +94,6 @@ def readable_source(found: FinishedDrive) -> Drive | None:
         return found.open_source()
     except BadInputError:
         return None
-
-
-def thinned(points: Points, count: int) -> Points:
-    """At most so many points, the same ones every time."""
-    if len(points) <= count:
-        return points
-    keep = np.random.default_rng(0).choice(len(points), count, replace=False)
-    return points[np.sort(keep)]
 
 
 def colour_of(number: int) -> tuple[int, int, int]:

@@ -25,9 +25,9 @@ from wildshape.drives.writing.playback.moments import (
     Moment,
     Present,
     moments,
-    thinned,
 )
 from wildshape.errors import load_library
+from wildshape.geometry.sampling import thin
 from wildshape.geometry.transforms.se3 import SE3
 
 _SCAN_DOT_M, _SHAPE_DOT_M, _LINE_M = 0.03, 0.035, 0.03
@@ -90,7 +90,7 @@ def _log_new(rr: Any, recording: Any, found: FinishedDrive, one: Present) -> Non
     box = rr.Boxes3D(
         half_sizes=[half], colors=[one.colour], radii=_LINE_M, labels=[known.name], show_labels=True
     )
-    points = thinned(found.shape(known), SHAPE_POINTS)
+    points = thin(found.shape(known), SHAPE_POINTS)
     shape = rr.Points3D(points, colors=[one.colour], radii=_SHAPE_DOT_M)
     recording.log([*_entity(known.name), "box"], box)
     recording.log([*_entity(known.name), "shape"], shape)
