@@ -90,7 +90,9 @@ def test_objects_to_look_at_come_first(tmp_path: Path) -> None:
     scans = report.objects[0].scans
     assert scans is not None
     assert scans.rows[0] == ("000000", 200, "0.75", "4.00 × 1.80 × 1.40")  # noqa: RUF001
-    assert any("true shape of 3 objects" in line for line in report.findings)
+    # Only the middle scans' shapes were moved: they are what is measured, and what is said.
+    assert any("true shape of 3 objects: their middle scans" in line for line in report.findings)
+    assert "CD: of the middle scan's shape" in table.caption
 
 
 def test_without_truth_the_least_confident_come_first(tmp_path: Path) -> None:

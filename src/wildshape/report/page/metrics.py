@@ -173,8 +173,8 @@ def of_errors(cds: Sequence[float], rotations: Sequence[float]) -> list[str]:
     lines = []
     if cds:
         lines.append(
-            f"Against the true shape of {counted(len(cds), 'object')}: a median Chamfer distance"
-            f" of {float(np.median(cds)):.3f} m, {max(cds):.3f} m at worst."
+            f"Against the true shape of {counted(len(cds), 'object')}: their middle scans have a"
+            f" median Chamfer distance of {float(np.median(cds)):.3f} m, {max(cds):.3f} m at worst."
         )
     if rotations:
         share = sum(value <= 30 for value in rotations) / len(rotations)
