@@ -322,3 +322,13 @@ def test_the_curve_of_the_loss_shows_the_terms_of_any_objective(tmp_path: Path) 
     (tmp_path / "log.jsonl").write_text(json.dumps(line) + "\n", encoding="utf-8")
     (curve,) = report_from_folder(tmp_path).curves
     assert [name for name, _, _ in curve.series] == ["loss", "silhouette", "student"]
+
+
+def test_the_floor_is_said_to_be_of_random_points(tmp_path: Path) -> None:
+    """It is no bound: evenly spread points have less, and a figure may stand below it."""
+    ours = {"cd": 0.011, "precision": 0.004, "coverage": 0.007, "cd_floor": 0.012}
+    metrics = {"rotate": "none", "methods": {"wildshape": ours}}
+    (tmp_path / "metrics.json").write_text(json.dumps(metrics), encoding="utf-8")
+    report = report_from_folder(tmp_path)
+    assert "as many of the true surface, at random, would have 0.012 m" in report.findings[0]
+    assert "drawn at random" in report.tables[0].caption
