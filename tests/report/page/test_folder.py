@@ -332,3 +332,20 @@ def test_the_floor_is_said_to_be_of_random_points(tmp_path: Path) -> None:
     report = report_from_folder(tmp_path)
     assert "as many of the true surface, at random, would have 0.012 m" in report.findings[0]
     assert "drawn at random" in report.tables[0].caption
+
+
+def test_each_of_several_evaluations_is_named(tmp_path: Path) -> None:
+    for name, cd in (("cars", 0.1), ("trucks", 0.3)):
+        (tmp_path / name).mkdir()
+        ours = {"cd": cd, "precision": cd / 2, "coverage": cd / 2}
+        metrics = {"rotate": "none", "methods": {"wildshape": ours}}
+        (tmp_path / name / "metrics.json").write_text(json.dumps(metrics), encoding="utf-8")
+        (tmp_path / name / "errors.png").write_bytes(b"")
+    report, alone = map(report_from_folder, (tmp_path, tmp_path / "cars"))
+    assert ["distance of 0.100" in line for line in report.findings] == [True, False]
+    for shown in (
+        report.findings,
+        *([x.title for x in f] for f in (report.tables, report.figures)),
+    ):
+        assert [text.partition(": ")[0] for text in shown] == ["cars", "trucks"]
+    assert (alone.tables[0].title, alone.figures[0].title) == ("Scans as recorded", "errors")
