@@ -3,25 +3,25 @@
 """Where the error lies: an evaluation of simulated drives, told apart by kind of vehicle.
 
 wildshape evaluate DATA --out EVALUATION
-python experiments/by_kind.py --data DATA --evaluation EVALUATION
+python -m experiments.by_kind --data DATA --evaluation EVALUATION
 """
 
 import json
-from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import tyro
+from experiments.tables.measure import as_results
 
 from wildshape.cli.main import in_a_sentence
-from wildshape.evaluation.tables import pipe_table
+from wildshape.errors import BadInputError
+from wildshape.evaluation.results import Limits, MethodScores, pooled
+from wildshape.evaluation.summary import FIGURES, figures_of
+from wildshape.evaluation.tables import cell, pipe_table
 from wildshape.io.store.store import open_store
 
-_COLUMNS = (
-    "kind", "scans", "CD, m", "precision", "coverage", "acc 30, %", "rot, deg", "trans, m"
-)  # fmt: skip
+_SHOWN = ("cd", "precision", "coverage", "acc30", "rot_median_deg", "trans_median_m")
+_COLUMNS = [figure for figure in FIGURES if figure.name in _SHOWN]
 
 
 @dataclass(frozen=True)
@@ -40,37 +40,44 @@ class Settings:
 
 
 def table(data: Path, evaluation: Path, method: str = "wildshape") -> str:
-    """A row a kind, as markdown.
+    """A row a kind, as markdown; each has the figures that the evaluation has of all.
 
     Args:
         data: simulated tracks, as a packed store.
         evaluation: folder that `wildshape evaluate` wrote for them.
         method: row to look at.
+
+    Raises:
+        BadInputError: the evaluation has no such row.
     """
     words = {track.name: track.source.split()[-1] for track in open_store(data)}
     kinds = {name: word.split("_")[0] for name, word in words.items()}  # of meshes, the category
-    runs = json.loads((evaluation / "scores.json").read_text("utf-8"))["runs"]
-    methods = [m for run in runs for m in run["methods"] if m["name"] == method]
-    completed = _by_kind(methods, kinds, "completions")
-    registered = _by_kind(methods, kinds, "registrations")
+    scores = _scores(evaluation / "scores.json", method)
+    parts = {kind: _of_kind(scores, kinds, kind) for kind in sorted({*kinds.values()})}
+    scans = {kind: sum(row.scans for row in part.completions) for kind, part in parts.items()}
     rows = []
-    for kind in sorted(completed, key=lambda kind: -len(completed[kind])):
-        errors = [row["error"] for row in completed[kind]]
-        precision, coverage = (np.mean([e[k] for e in errors]) for k in ("precision", "coverage"))
-        angle = np.asarray([row["rotation_deg"] for row in registered[kind]])
-        apart = np.median([row["translation_m"] for row in registered[kind]])
-        shares = (precision + coverage, precision, coverage)
-        pose = (f"{100 * np.mean(angle <= 30):.1f}", f"{np.median(angle):.2f}", f"{apart:.3f}")
-        rows.append([kind, str(len(errors)), *(f"{share:.3f}" for share in shares), *pose])
-    return pipe_table(_COLUMNS, rows)
+    for kind in sorted((kind for kind in parts if scans[kind]), key=lambda kind: -scans[kind]):
+        figures = figures_of(parts[kind])
+        cells = (cell(figures[column.name], None, column) for column in _COLUMNS)
+        rows.append([kind, str(scans[kind]), *cells])
+    return pipe_table(["kind", "scans", *(column.heading for column in _COLUMNS)], rows)
 
 
-def _by_kind(methods: list[Any], kinds: dict[str, str], what: str) -> dict[str, list[Any]]:
-    found: dict[str, list[Any]] = defaultdict(list)
-    for method in methods:
-        for row in method[what]:
-            found[kinds[row["track"]]].append(row)
-    return found
+def _scores(path: Path, method: str) -> MethodScores:
+    """One row, all seeds together."""
+    runs = json.loads(path.read_text("utf-8"))["runs"]
+    found = {row.name: row for row in pooled([as_results(run, Limits()) for run in runs]).methods}
+    if method not in found:
+        raise BadInputError(f"--method {method}: {path} has the rows {', '.join(found)}.")
+    return found[method]
+
+
+def _of_kind(scores: MethodScores, kinds: dict[str, str], kind: str) -> MethodScores:
+    return replace(
+        scores,
+        completions=tuple(row for row in scores.completions if kinds[row.track] == kind),
+        registrations=tuple(row for row in scores.registrations if kinds[row.track] == kind),
+    )
 
 
 if __name__ == "__main__":

@@ -30,5 +30,5 @@ def table(given: Given) -> Table:
         "The paper's rows are of SemanticKITTI, against partial truth.",
         "Fine-tuned: on the scans that are measured, without labels, as many steps again.",
     )
-    block = Block("Real cars of KITTI raw", real, rows, paper, PROTOCOLS, paper_partial=True)
+    block = Block("Real cars of KITTI raw", real, rows, paper, PROTOCOLS)
     return Table("Real cars (paper, tables 2b and 3b)", (block,), size.seeds, notes)

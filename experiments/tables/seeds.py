@@ -16,5 +16,8 @@ def table(given: Given) -> Table:
     block = Block(
         "Simulated drives past cars", given.drives("test"), rows, SEED_ROWS, ("none", "yaw")
     )
-    note = "The best seed by the truth is never printed; the paper's tables print the best of 5."
-    return Table("Seeds (paper, supplement)", (block,), size.seeds, (note,))
+    notes = (
+        "The best seed by the truth is never printed; the paper's tables print the best of 5.",
+        "The paper's CD on SemanticKITTI, 0.20 ± 0.09 m, is against partial truth.",
+    )
+    return Table("Seeds (paper, supplement)", (block,), size.seeds, notes)

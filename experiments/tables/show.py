@@ -19,6 +19,7 @@ from wildshape.evaluation.tables import (
     cell,
     cells_of,
     columns_of,
+    headed,
     notes,
     pipe_table,
 )
@@ -71,7 +72,7 @@ def _part(part: Part) -> str:
     columns = _columns(part.block, summaries)
     rows = [_ours(summary, columns) for summary in summaries]
     if part.rotate == "none":
-        rows += [_paper(row, columns, part.block) for row in part.block.paper]
+        rows += [_paper(row, columns) for row in part.block.paper]
     heading = ["method", "seeds", *(column.heading for column in columns), COUNTED]
     title = f"## {part.block.title}: {ROTATE[part.rotate]}"
     return "\n\n".join([title, pipe_table(heading, rows), notes(summaries)])
@@ -80,11 +81,11 @@ def _part(part: Part) -> str:
 def as_printed(part: Part) -> str:
     """The part with the paper's columns alone, its rows beneath ours."""
     summaries = part.summaries()
-    known = PaperRow.__dataclass_fields__
+    known = {*PaperRow.__dataclass_fields__} - {*_PARTIAL}
     columns = [one for one in _columns(part.block, summaries) if one.name in known]
     rows = [[summary.name, *cells_of(summary, columns)[:-1]] for summary in summaries]
     for row in part.block.paper:
-        name, _, *cells, _ = _paper(row, columns, part.block)
+        name, _, *cells, _ = _paper(row, columns)
         rows.append([name, *cells])
     heading = ["method", *(column.heading for column in columns)]
     return f"## {part.block.title}: {ROTATE[part.rotate]}\n\n{pipe_table(heading, rows)}\n"
@@ -93,11 +94,10 @@ def as_printed(part: Part) -> str:
 def _columns(block: Block, summaries: Sequence[Summary]) -> list[Figure]:
     """Those of an evaluation's own table, and both parts of the CD against partial truth."""
     columns = columns_of(summaries)
-    names = [figure.name for figure in columns]
+    names = {figure.name for figure in columns}
     if "cd_partial" in names:
-        after = names.index("cd_partial") + 1
-        parts = [figure for figure in FIGURES if figure.name in _PARTIAL]
-        columns[after:after] = [replace(f, heading=f.name.replace("_", " ")) for f in parts]
+        names |= {*_PARTIAL}
+        columns = [headed(figure) for figure in FIGURES if figure.name in names]
     return [_of_unit_size(figure) for figure in columns] if block.percent else columns
 
 
@@ -113,21 +113,13 @@ def _ours(summary: Summary, columns: Sequence[Figure]) -> list[str]:
     return [summary.name, str(len(summary.per_seed)), *cells_of(summary, columns)]
 
 
-def _paper(row: PaperRow, columns: Sequence[Figure], block: Block) -> list[str]:
+def _paper(row: PaperRow, columns: Sequence[Figure]) -> list[str]:
     """The paper prints CD of views times 100 already, as our columns do."""
     cells = []
     for figure in columns:
-        printed = _printed(figure.name, block)
         scale = replace(figure, factor=1) if figure.name in _LENGTHS else figure
-        cells.append(cell(getattr(row, printed, None), row.std.get(printed), scale))
+        cells.append(cell(getattr(row, figure.name, None), row.std.get(figure.name), scale))
     return [f"† {row.data}: {row.method}", "", *cells, ""]
-
-
-def _printed(name: str, block: Block) -> str:
-    """Which of the paper's figures belongs into a column; the empty name is none."""
-    if not block.paper_partial:
-        return name
-    return "" if name in _LENGTHS else name.removesuffix("_partial")
 
 
 def record(table: Table, parts: Sequence[Part], made: dict[str, Any]) -> dict[str, Any]:

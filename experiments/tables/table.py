@@ -72,7 +72,6 @@ class Block:
         paper: printed by the paper; shown under scans as recorded.
         rotate: input protocols.
         percent: objects are of unit size, and CD is printed times 100.
-        paper_partial: the paper's shapes were measured against partial truth.
         accumulated: truth is made of the track's scans, as the paper makes it, and not known.
     """
 
@@ -82,7 +81,6 @@ class Block:
     paper: tuple[PaperRow, ...] = ()
     rotate: tuple[Rotate, ...] = ("none",)
     percent: bool = False
-    paper_partial: bool = False
     accumulated: bool = False
 
 

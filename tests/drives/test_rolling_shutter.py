@@ -113,9 +113,15 @@ def test_one_that_passes_fast_is_where_the_beam_meets_it():
 
 
 @pytest.mark.parametrize("sense", [1, -1])
-@pytest.mark.parametrize(("own", "its", "aside", "start"), [(15, -15, 3.5, 45), (15, 5, -3.0, 15)])
+@pytest.mark.parametrize(
+    ("own", "its", "aside", "start"),
+    [(15, -15, 3.5, 45), (15, 5, -3.0, 15), (15, -15, 1.0, 30), (15, 14, 0.5, -10)],
+)
 def test_speeds_are_of_when_the_beam_meets_what_moves(sense, own, its, aside, start):
-    """Beside and behind the sensor, too: there a scan shows it half a turn early or late."""
+    """Beside and behind the sensor, too: there a scan shows it half a turn early or late.
+
+    What stays behind, having passed or following, is met where turns end and begin.
+    """
     count = 31
     time = 0.1 * np.arange(count)
     way = torch.from_numpy(np.column_stack((own * time, 0 * time, 0 * time)))

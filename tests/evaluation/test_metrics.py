@@ -155,6 +155,17 @@ def test_floor_is_the_mean_distance_to_random_points():
     assert measured == pytest.approx(distance_floor(1.0, 4000), rel=0.03)
 
 
+def test_evenly_spread_points_come_under_the_floor():
+    # Of a square lattice the mean distance is (sqrt 2 + asinh 1) / 6 = 0.383 of its step.
+    from scipy.spatial import KDTree
+
+    side = np.arange(64) / 64
+    lattice = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    places = np.random.default_rng(0).random((20_000, 2))
+    measured = KDTree(lattice, boxsize=1).query(places)[0].mean()
+    assert measured == pytest.approx(0.383 / 0.5 * distance_floor(1.0, 64 * 64), rel=0.02)
+
+
 def test_hull_area():
     corners = np.array(np.meshgrid([0, 4], [0, 2], [0, 1])).reshape(3, -1).T.astype(np.float32)
     assert hull_area(corners) == pytest.approx(2 * (8 + 4 + 2), rel=1e-6)

@@ -18,7 +18,7 @@ class Limits:
     Attributes:
         min_points: of a scan, finite ones; others are left out, and named.
         truth_points: at most; more are thinned by chance, the same ones every time. So many put a
-            floor of 0.03 m under the coverage of a car.
+            floor of 0.03 m under the precision of a car.
         max_scans: of a track, chosen evenly after the truth was accumulated from all; None: all.
     """
 
@@ -54,7 +54,7 @@ class CompletionScore:
         truth: `shape` or `mirrored`.
         points: of the prediction.
         truth_points: of the truth.
-        cd_floor: CD of perfect points as many as these, metres (METHOD 8).
+        cd_floor: CD of perfect points as many as these, drawn at random, metres (METHOD 8).
         partial_points: of the accumulation as it is; None where the shape is known.
         confidence: 0 to 1, as the method states it; None if it states none.
         box: of the object, if the method draws one.

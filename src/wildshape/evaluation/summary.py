@@ -133,6 +133,8 @@ FIGURES = (
     Figure("precision", _METRES, _scans(np.mean, "error.precision"), "precision"),
     Figure("coverage", _METRES, _scans(np.mean, "error.coverage"), "coverage"),
     Figure("cd_partial", _METRES, _scans(np.mean, "error_partial.cd"), "CD partial"),
+    Figure("precision_partial", _METRES, _scans(np.mean, "error_partial.precision")),
+    Figure("coverage_partial", _METRES, _scans(np.mean, "error_partial.coverage")),
     Figure("points", _COUNT, _scans(np.median, "points"), "points", 0),
     Figure("cd_floor", _METRES, _scans(np.mean, "cd_floor"), "CD floor"),
     Figure("acc30", _SHARE, _poses(_accurate, "rotation_deg"), "acc 30, %", 1, 100),
@@ -164,8 +166,6 @@ FIGURES = (
         100,
     ),
     Figure("heading_sym_median_deg", _DEGREES, _scans(np.median, "box.heading_sym_deg")),
-    Figure("precision_partial", _METRES, _scans(np.mean, "error_partial.precision")),
-    Figure("coverage_partial", _METRES, _scans(np.mean, "error_partial.coverage")),
     Figure("truth_points", _COUNT, _scans(np.median, "truth_points")),
     Figure("partial_points", _COUNT, _scans(np.median, "partial_points")),
     Figure(

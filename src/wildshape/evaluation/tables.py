@@ -3,6 +3,7 @@
 """The markdown that people read: our rows, what was left out, and the paper's rows apart."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from wildshape.evaluation.paper import LIDAR_ROWS, VIEW_ROWS, PaperRow
@@ -16,7 +17,6 @@ ROTATE: dict[str, str] = {
     "yaw": "each scan turned by its own random yaw",
     "so3": "each scan turned by its own random rotation",
 }
-PAPER = tuple(figure for figure in FIGURES if figure.name in PaperRow.__dataclass_fields__)
 
 
 def markdown(runs: Sequence[Results]) -> str:
@@ -36,9 +36,11 @@ def markdown(runs: Sequence[Results]) -> str:
 
 def paper_markdown(rows: Sequence[PaperRow] = LIDAR_ROWS) -> str:
     """The rows that the paper prints, under a heading that says that the data differ."""
-    heading = ["data", "method", *(column.heading for column in PAPER)]
+    known = {name for row in rows for name, printed in vars(row).items() if printed is not None}
+    columns = [headed(figure) for figure in FIGURES if figure.name in known]
+    heading = ["data", "method", *(column.heading for column in columns)]
     cells = [
-        [row.data, row.method, *(cell(getattr(row, f.name), None, f) for f in PAPER)]
+        [row.data, row.method, *(cell(getattr(row, f.name), None, f) for f in columns)]
         for row in rows
     ]
     title = "### The paper's printed figures: other data, so no common benchmark"
@@ -51,6 +53,11 @@ def write_table(folder: Path, runs: Sequence[Results], *, views: bool = False) -
     paper = paper_markdown(VIEW_ROWS if views else LIDAR_ROWS)
     write_text(path, f"{markdown(runs)}\n{paper}")
     return path
+
+
+def headed(figure: Figure) -> Figure:
+    """A figure that is a column only beside the paper's has its name for a heading."""
+    return replace(figure, heading=figure.heading or figure.name.replace("_", " "))
 
 
 def columns_of(summaries: Sequence[Summary]) -> list[Figure]:

@@ -53,6 +53,7 @@ def test_each_vehicle_s_scans_are_fused_where_it_is_completed(found):
     assert [shown.name for shown in report.objects] == list(CARS)
     assert [row[1] for row in report.index[0].rows] == ["standing", "moving"]
     assert [row[2:6] for row in report.index[0].rows] == [("0.90", "0.97", "0.94", "0.99")] * 2
+    assert "That of what is seen driving is raised" in report.index[0].caption
     assert "a strange thing" in report.notes
     assert dict(report.facts)["vehicles"] == str(len(CARS))
     assert all(re.match(r"\d", value) for _, value in report.facts)  # nothing that is not known

@@ -90,7 +90,9 @@ def test_objects_to_look_at_come_first(tmp_path: Path) -> None:
     scans = report.objects[0].scans
     assert scans is not None
     assert scans.rows[0] == ("000000", 200, "0.75", "4.00 × 1.80 × 1.40")  # noqa: RUF001
-    assert any("true shape of 3 objects" in line for line in report.findings)
+    # Only the middle scans' shapes were moved: they are what is measured, and what is said.
+    assert any("true shape of 3 objects: their middle scans" in line for line in report.findings)
+    assert "CD: of the middle scan's shape" in table.caption
 
 
 def test_without_truth_the_least_confident_come_first(tmp_path: Path) -> None:
@@ -320,3 +322,30 @@ def test_the_curve_of_the_loss_shows_the_terms_of_any_objective(tmp_path: Path) 
     (tmp_path / "log.jsonl").write_text(json.dumps(line) + "\n", encoding="utf-8")
     (curve,) = report_from_folder(tmp_path).curves
     assert [name for name, _, _ in curve.series] == ["loss", "silhouette", "student"]
+
+
+def test_the_floor_is_said_to_be_of_random_points(tmp_path: Path) -> None:
+    """It is no bound: evenly spread points have less, and a figure may stand below it."""
+    ours = {"cd": 0.011, "precision": 0.004, "coverage": 0.007, "cd_floor": 0.012}
+    metrics = {"rotate": "none", "methods": {"wildshape": ours}}
+    (tmp_path / "metrics.json").write_text(json.dumps(metrics), encoding="utf-8")
+    report = report_from_folder(tmp_path)
+    assert "as many of the true surface, at random, would have 0.012 m" in report.findings[0]
+    assert "drawn at random" in report.tables[0].caption
+
+
+def test_each_of_several_evaluations_is_named(tmp_path: Path) -> None:
+    for name, cd in (("cars", 0.1), ("trucks", 0.3)):
+        (tmp_path / name).mkdir()
+        ours = {"cd": cd, "precision": cd / 2, "coverage": cd / 2}
+        metrics = {"rotate": "none", "methods": {"wildshape": ours}}
+        (tmp_path / name / "metrics.json").write_text(json.dumps(metrics), encoding="utf-8")
+        (tmp_path / name / "errors.png").write_bytes(b"")
+    report, alone = map(report_from_folder, (tmp_path, tmp_path / "cars"))
+    assert ["distance of 0.100" in line for line in report.findings] == [True, False]
+    for shown in (
+        report.findings,
+        *([x.title for x in f] for f in (report.tables, report.figures)),
+    ):
+        assert [text.partition(": ")[0] for text in shown] == ["cars", "trucks"]
+    assert (alone.tables[0].title, alone.figures[0].title) == ("Scans as recorded", "errors")

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from wildshape.drives.completing.level_frame import boxes_in_scans, level_poses
 from wildshape.drives.completing.rolling_shutter import TURNS, Turns
@@ -46,6 +46,7 @@ from wildshape.records import Box, Points, as_text
 
 _LATEST_S = 9e9  # nanoseconds of it fit into 64 bits
 _BEHIND = 0.49  # of a turn before or after its middle: it may be the turn's end or its beginning
+_FAR_APART = 20.0  # half steps from scan to scan: ten turns, of which one is a tenth
 _FILES = (*STORAGES, *SUFFIXES)  # recordings that are one
 _PERIOD_S = 0.1  # of a scan, where no times are known
 
@@ -201,12 +202,27 @@ def _rates(
 ) -> Float[np.ndarray, "k 3"]:
     """Velocity at each time, from the sure places around it.
 
-    A beam may meet a thing at the end of a turn and again at once.
+    A beam may meet a thing at the end of a turn and again at once. Where no sure place follows, or
+    none came before, a turn more or less must not count: all places so far apart are asked.
     """
-    rows = np.flatnonzero(sure) if sure.sum() > 1 else np.arange(len(at))
+    apart = np.median(np.diff(np.sort(at))) / 2
+    rates = _across(places, at, np.arange(len(at)), _FAR_APART * apart)
+    rows = np.flatnonzero(sure)
+    if len(rows) > 1:
+        among = (at >= at[rows].min()) & (at <= at[rows].max())
+        rates[among] = _across(places, at, rows, apart)[among]
+    return rates
+
+
+def _across(
+    places: Float[np.ndarray, "k 3"],
+    at: Float[np.ndarray, "k"],
+    rows: Int[np.ndarray, "r"],
+    apart: float,
+) -> Float[np.ndarray, "k 3"]:
+    """Velocity at each time between places of some rows, before and after it by so much."""
     order = rows[np.argsort(at[rows])]
     rising = at[order]
-    apart = np.median(np.diff(rising)) / 2
     before = np.maximum(np.searchsorted(rising, at - apart, "right") - 1, 0)
     after = np.minimum(np.searchsorted(rising, at + apart, "left"), len(rising) - 1)
     since = (rising[after] - rising[before])[:, None]

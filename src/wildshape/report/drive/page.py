@@ -114,7 +114,8 @@ def _index(found: FinishedDrive) -> Table:
         title=counted(len(rows), "vehicle"),
         columns=_COLUMNS,
         rows=rows,
-        caption=f"Click a row for its complete shape and its scans. {MEANING}",
+        caption="Click a row for its complete shape and its scans."
+        f" {MEANING} That of what is seen driving is raised.",
         sortable=True,
         objects=tuple(i if i < MOST_OBJECTS else None for i in count),
     )

@@ -10,7 +10,7 @@ out.
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
@@ -52,7 +52,20 @@ from wildshape.report.results import (
 
 MAX_OBJECTS, MAX_JUDGED = 24, 1000
 _LABELS = {"seconds": "time", **PROBABILITIES}
-Metrics = list[tuple[Path, dict[str, Any]]]
+
+
+class Evaluation(NamedTuple):
+    """What an evaluation left.
+
+    Attributes:
+        path: of its metrics.json.
+        metrics: the content.
+        which: its place in the folder, to begin titles with; empty where it is the only one.
+    """
+
+    path: Path
+    metrics: dict[str, Any]
+    which: str
 
 
 def report_from_folder(folder: Path, inputs: Path | None = None) -> Report:
@@ -70,10 +83,10 @@ def report_from_folder(folder: Path, inputs: Path | None = None) -> Report:
     folder = Path(folder)
     if not folder.is_dir():
         raise BadInputError(f"{folder}: no such folder; name the --out of an earlier command.")
-    metrics = [(path, read_object(path)) for path in find(folder, METRICS)]
+    evaluations = _evaluations(folder)
     curves = [curve for log in find(folder, "log.jsonl") for curve in training_curves(log)]
     tracks = [path.parent for path in find(folder, OBJECTS)]
-    if not (metrics or curves or tracks):
+    if not (evaluations or curves or tracks):
         raise BadInputError(
             f"{folder}: holds no objects.json, metrics.json or log.jsonl to report; run complete, "
             "evaluate or train with --out first."
@@ -85,16 +98,26 @@ def report_from_folder(folder: Path, inputs: Path | None = None) -> Report:
     drawn = ranked[:MAX_OBJECTS]
     return Report(
         title=f"Wildshape report: {as_text(folder.resolve().name)}",
-        summary=_summary(folder, metrics, len(tracks), len(curves)),
-        findings=tuple(_findings(metrics, ranked)),
-        tables=tuple(_checked_table(*entry) for entry in metrics),
-        index=tuple(_index(ranked, len(drawn), metrics)),
+        summary=_summary(folder, evaluations, len(tracks), len(curves)),
+        findings=tuple(_findings(evaluations, ranked)),
+        tables=tuple(map(_checked_table, evaluations)),
+        index=tuple(_index(ranked, len(drawn), evaluations)),
         curves=tuple(curves),
         objects=tuple(_checked_object(one, where) for one in drawn),
         notes=tuple(_notes(len(tracks), len(drawn))),
-        provenance=_provenance(folder, metrics),
-        figures=tuple(_figure(file) for path, _ in metrics for file in _pictures(path)),
+        provenance=_provenance(folder, evaluations),
+        figures=tuple(_figure(one, file) for one in evaluations for file in _pictures(one.path)),
     )
+
+
+def _evaluations(folder: Path) -> list[Evaluation]:
+    paths = find(folder, METRICS)
+    places = {path: path.parent.relative_to(folder) for path in paths}
+    names = {
+        path: as_text(str(at) if at.parts else folder.resolve().name) for path, at in places.items()
+    }
+    several = len(paths) > 1
+    return [Evaluation(p, read_object(p), f"{names[p]}: " if several else "") for p in paths]
 
 
 def _judged(folder: Path, where: Inputs) -> Judged:
@@ -107,15 +130,15 @@ def _pictures(metrics: Path) -> list[Path]:
     return sorted(metrics.parent.glob("*.png"))
 
 
-def _figure(picture: Path) -> Figure:
-    return Figure(picture.stem.replace("_", " "), picture.read_bytes())
+def _figure(of: Evaluation, picture: Path) -> Figure:
+    return Figure(f"{of.which}{picture.stem.replace('_', ' ')}", picture.read_bytes())
 
 
-def _summary(folder: Path, metrics: Metrics, tracks: int, curves: int) -> str:
+def _summary(folder: Path, evaluations: list[Evaluation], tracks: int, curves: int) -> str:
     """What there is, and the commands that made it."""
-    counted = ((tracks, "track"), (len(metrics), "evaluation"), (curves, "training curve"))
+    counted = ((tracks, "track"), (len(evaluations), "evaluation"), (curves, "training curve"))
     parts = [f"{n} {what}{'s' if n > 1 else ''}" for n, what in counted if n]
-    records = [(path, read_object(path)) for path in find(folder, MARKER)] + metrics
+    records = _records(folder, evaluations)
     runs = dict.fromkeys(line for record in records if (line := _of_run(*record)))
     return "\n\n".join((f"Found here: {', '.join(parts)}.", *runs))
 
@@ -126,10 +149,16 @@ def _of_run(path: Path, record: dict[str, Any]) -> str:
         return of_run(record)
 
 
-def _findings(metrics: Metrics, ranked: Sequence[Judged]) -> Iterator[str]:
-    for path, found in metrics:
-        with reading(path, "what evaluate writes"):
-            yield from of_metrics(found)
+def _records(folder: Path, evaluations: list[Evaluation]) -> list[tuple[Path, dict[str, Any]]]:
+    """What each command's output says of itself."""
+    markers = [(path, read_object(path)) for path in find(folder, MARKER)]
+    return markers + [(one.path, one.metrics) for one in evaluations]
+
+
+def _findings(evaluations: list[Evaluation], ranked: Sequence[Judged]) -> Iterator[str]:
+    for one in evaluations:
+        with reading(one.path, "what evaluate writes"):
+            yield from (f"{one.which}{line}" for line in of_metrics(one.metrics))
     yield from of_errors(
         [one.cd for one in ranked if one.cd is not None],
         [one.rotation_deg for one in ranked if one.rotation_deg is not None],
@@ -139,15 +168,15 @@ def _findings(metrics: Metrics, ranked: Sequence[Judged]) -> Iterator[str]:
     yield from of_confidences(known, sum(bool(doubt_of(entry)) for entry in entries))
 
 
-def _index(ranked: Sequence[Judged], drawn: int, metrics: Metrics) -> Iterator[Table]:
+def _index(ranked: Sequence[Judged], drawn: int, evaluations: list[Evaluation]) -> Iterator[Table]:
     if ranked:
         yield index_of(ranked, drawn)
-    for path, found in metrics:
-        scores = path.with_name(SCORES)
-        ours = next((name for name in found.get("methods") or () if is_ours(name)), None)
+    for one in evaluations:
+        scores = one.path.with_name(SCORES)
+        ours = next((name for name in one.metrics.get("methods") or () if is_ours(name)), None)
         table = objects_of_scores(scores, ours) if ours and scores.is_file() else None
         if table is not None:
-            yield table
+            yield replace(table, title=f"{one.which}{table.title}")
 
 
 def _notes(tracks: int, drawn: int) -> Iterator[str]:
@@ -157,20 +186,20 @@ def _notes(tracks: int, drawn: int) -> Iterator[str]:
         yield f"Of {min(tracks, MAX_JUDGED)} objects the {drawn} to look at first are drawn."
 
 
-def _provenance(folder: Path, metrics: Metrics) -> dict[str, Any]:
+def _provenance(folder: Path, evaluations: list[Evaluation]) -> dict[str, Any]:
     """Of each command's output, under its place in the folder."""
-    outputs = [(path, read_object(path)) for path in find(folder, MARKER)] + metrics
     return {
         str(path.relative_to(folder)): found["provenance"]
-        for path, found in outputs
+        for path, found in _records(folder, evaluations)
         if found.get("provenance")
     }
 
 
-def _checked_table(path: Path, metrics: dict[str, Any]) -> Table:
+def _checked_table(one: Evaluation) -> Table:
     """`metrics_table`, a damaged metrics.json named."""
-    with reading(path, "what evaluate writes"):
-        return metrics_table(metrics)
+    with reading(one.path, "what evaluate writes"):
+        table = metrics_table(one.metrics)
+        return replace(table, title=f"{one.which}{table.title}")
 
 
 def _checked_object(judged: Judged, where: Inputs) -> ReportObject:

@@ -76,7 +76,8 @@ def _counts(counted: Mapping[str, int]) -> str:
 def _caption(skipped: int, seeds: int) -> str:
     parts = (
         "CD = precision + coverage, Euclidean, metres; rotation and translation are medians against"
-        " the middle scan; sym counts a half turn as right; CD floor is what so few points allow.",
+        " the middle scan; sym counts a half turn as right; CD floor is that of as many points of"
+        " the true surface, drawn at random.",
         f"Mean ± standard deviation of {seeds} seeds." if seeds > 1 else "",
         f"{counted(skipped, 'scan')} skipped by some method." if skipped else "",
     )
@@ -112,7 +113,9 @@ def _ours(
         )
     if _known(figures, "cd", "precision", "coverage"):
         floor = figures.get("cd_floor")
-        least = f"; so few points cannot get under {floor:.3f} m" if floor else ""
+        least = (
+            f"; as many of the true surface, at random, would have {floor:.3f} m" if floor else ""
+        )
         yield (
             f"Shape: a completed point of {name} lies {figures['precision']:.3f} m from the true "
             f"surface on average, a true point {figures['coverage']:.3f} m from the completed one: "
@@ -173,8 +176,8 @@ def of_errors(cds: Sequence[float], rotations: Sequence[float]) -> list[str]:
     lines = []
     if cds:
         lines.append(
-            f"Against the true shape of {counted(len(cds), 'object')}: a median Chamfer distance"
-            f" of {float(np.median(cds)):.3f} m, {max(cds):.3f} m at worst."
+            f"Against the true shape of {counted(len(cds), 'object')}: their middle scans have a"
+            f" median Chamfer distance of {float(np.median(cds)):.3f} m, {max(cds):.3f} m at worst."
         )
     if rotations:
         share = sum(value <= 30 for value in rotations) / len(rotations)

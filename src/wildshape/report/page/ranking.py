@@ -27,6 +27,8 @@ from wildshape.report.results import (
 )
 from wildshape.report.scene import TRUTH_POINTS
 
+_MEASURED = " CD: of the middle scan's shape; rotation: median of the others to the middle scan."
+
 
 @dataclass(frozen=True)
 class Judged:
@@ -98,7 +100,7 @@ def index_of(ranked: Sequence[Judged], drawn: int) -> Table:
         columns=columns,
         rows=rows,
         caption=f"Sorted by {by}; a heading sorts anew, a row leads to its pictures."
-        f"{_meaning(columns)}",
+        f"{_MEASURED if by == 'error' else ''}{_meaning(columns)}",
         sortable=True,
         objects=tuple(i if i < drawn else None for i in range(len(ranked))),
     )
