@@ -35,13 +35,15 @@ def measured(tmp_path):
 
 
 def test_a_fused_track_counts_as_often_as_it_has_scans(measured):
-    lines = table(*measured, "fuses").splitlines()
+    data, evaluation = measured
+    lines = table(data, evaluation, "fuses").splitlines()
     assert lines[2] == "| van | 4 | 0.250 | 0.250 | 0.000 | 50.0 | 20.00 | 0.200 |"
     assert lines[3].startswith("| truck | 2 | 0.200 |")
 
 
 def test_what_registers_nothing_has_no_pose(measured):
-    for line in table(*measured, "alone").splitlines()[2:]:
+    data, evaluation = measured
+    for line in table(data, evaluation, "alone").splitlines()[2:]:
         assert [cell.strip() for cell in line.split("|")][-4:-1] == ["\N{EN DASH}"] * 3
 
 
