@@ -131,9 +131,11 @@ class SE3:
 
         What this type cannot hold is infinite.
         """
-        moved = self.apply(torch.from_numpy(np.array(points, np.float64)))
+        rotation, translation = self.rotation.double().numpy(), self.translation.double().numpy()
+        moved = points.astype(np.float64) @ rotation.swapaxes(-1, -2)  # torch: 1.5 times as long
+        moved += translation[..., None, :]
         with np.errstate(over="ignore"):
-            return moved.numpy().astype(points.dtype)
+            return moved.astype(points.dtype)
 
     def scaled(self, factor: float) -> "SE3":
         """The same transforms where lengths are so many times as large."""
