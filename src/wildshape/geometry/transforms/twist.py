@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Float
 
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation
-from wildshape.geometry.transforms.se3 import SE3
+from wildshape.geometry.transforms.se3 import ROWS, SE3
 
 _SLOW = 1e-9  # radians a second: no turn that a scan shows
 
@@ -43,8 +43,8 @@ class Twist:
         cosine, *axis = quaternion_from_rotation(T_start_end.rotation).tolist()
         sine = math.hypot(*axis)
         turn = np.array(axis) * (2 * math.atan2(sine, cosine) / sine if sine else 2.0)
-        # Columns: where each axis would be carried.
-        carried = np.stack([_carried(turn, axis, np.ones(1))[0] for axis in np.eye(3)], axis=1)
+        origin = np.zeros((1, 3))  # columns: where it would be carried along each axis
+        carried = np.concatenate([_moved(origin, turn, a, np.ones(1)) for a in np.eye(3)]).T
         way = np.linalg.solve(carried, T_start_end.translation.numpy())
         (wx, wy, wz), (x, y, z) = (turn / seconds).tolist(), (way / seconds).tolist()
         return cls((wx, wy, wz), (x, y, z))
@@ -52,8 +52,8 @@ class Twist:
     def after(self, seconds: float) -> SE3:
         """`T_b_c`: where the frame is after some time, seen from where it was."""
         turn, linear = np.asarray(self.angular), np.asarray(self.linear)
-        axes = _turned(turn, np.eye(3), np.full(3, seconds))
-        (origin,) = _carried(turn, linear, np.full(1, seconds))
+        axes = _moved(np.eye(3), turn, np.zeros(3), np.full(3, seconds))
+        (origin,) = _moved(np.zeros((1, 3)), turn, linear, np.full(1, seconds))
         return SE3(torch.from_numpy(axes.T.copy()), torch.from_numpy(origin))
 
     def carry(
@@ -66,37 +66,32 @@ class Twist:
             seconds: that time.
         """
         turn, linear = np.asarray(self.angular), np.asarray(self.linear)
-        since = seconds.astype(np.float64)
-        moved = _turned(turn, points.astype(np.float64), since) + _carried(turn, linear, since)
-        return moved.astype(points.dtype)
+        moved = np.empty_like(points)
+        for start in range(0, len(points), ROWS):
+            part = slice(start, start + ROWS)
+            some, since = points[part].astype(np.float64), seconds[part].astype(np.float64)
+            moved[part] = _moved(some, turn, linear, since)
+        return moved
 
 
 STANDING = Twist((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
-def _turned(
-    turn: Float[np.ndarray, "3"],
+def _moved(
     points: Float[np.ndarray, "n 3"],
+    turn: Float[np.ndarray, "3"],
+    linear: Float[np.ndarray, "3"],
     seconds: Float[np.ndarray, "n"],
 ) -> Float[np.ndarray, "n 3"]:
-    """Rodrigues' formula, each point by its own angle."""
-    speed = float(np.linalg.norm(turn))
-    if speed < _SLOW:
-        return points
-    axis, angle = turn / speed, (speed * seconds)[:, None]
-    across = np.cross(axis, points)
-    along = (points @ axis)[:, None] * axis
-    return along + np.cos(angle) * (points - along) + np.sin(angle) * across
-
-
-def _carried(
-    turn: Float[np.ndarray, "3"], linear: Float[np.ndarray, "3"], seconds: Float[np.ndarray, "m"]
-) -> Float[np.ndarray, "m 3"]:
-    """How far the origin gets in each time: the integral of the turned velocity."""
+    """Rodrigues' formula, each point by its own angle, and the integral of the turned velocity."""
     speed, since = float(np.linalg.norm(turn)), seconds[:, None]
     if speed < _SLOW:
-        return since * linear
-    axis, angle = turn / speed, speed * since
-    along = (linear @ axis) * axis
-    circle = np.sin(angle) * (linear - along) + (1 - np.cos(angle)) * np.cross(axis, linear)
-    return since * along + circle / speed
+        return points + since * linear
+    axis = turn / speed
+    cosine, sine = np.cos(speed * since), np.sin(speed * since)
+    along = (points @ axis)[:, None] * axis
+    across = points @ np.cross(axis, np.eye(3))  # the axis times each point
+    turned = along + cosine * (points - along) + sine * across
+    ahead = (linear @ axis) * axis
+    circle = sine * (linear - ahead) + (1 - cosine) * np.cross(axis, linear)
+    return turned + since * ahead + circle / speed
