@@ -111,6 +111,13 @@ def test_a_table_that_needs_a_folder_says_so():
             TABLES[name](Given(SIZES["tiny"]))
 
 
+def test_trucks_are_measured_against_partial_truth_as_the_papers_are():
+    known, accumulated = TABLES["trucks"](Given(SIZES["tiny"], Path("cad"))).blocks
+    assert (known.accumulated, accumulated.accumulated) == (False, True)
+    (row,) = accumulated.paper
+    assert (row.cd, row.cd_partial) == (None, 0.2942)
+
+
 def test_rows_that_are_not_there():
     table = TABLES["seeds"](Given(SIZES["tiny"]))
     ablations = TABLES["ablations"](Given(SIZES["tiny"]))
