@@ -120,6 +120,12 @@ TIPPED = (
 )
 
 
+def test_a_sensor_of_another_kind_is_refused():
+    program = "import wildshape; wildshape.Sensor('LiDAR')"  # where no test checks types
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert "BadInputError: sensor 'LiDAR' is unknown; use 'lidar' or 'camera'." in found.stderr
+
+
 def test_corners_of_a_box_are_in_the_order_that_is_documented():
     corners = Box((10.0, 5.0, 1.0), (4.0, 2.0, 1.5), TURNED).corners
     rear_right_bottom, front_left_top = (11.0, 3.0, 0.25), (9.0, 7.0, 1.75)

@@ -10,12 +10,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 import torch
 from jaxtyping import Float
 
+from wildshape.errors import BadInputError
 from wildshape.geometry.box import SIGNS, box_axes
 from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.transforms.se3 import SE3
@@ -71,6 +72,11 @@ class Sensor:
     kind: SensorKind = "lidar"
     resolution_deg: tuple[float, float] | None = None
     intrinsics: Intrinsics | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a kind that there is not: `LiDAR` would be another sensor."""
+        if self.kind not in get_args(SensorKind):
+            raise BadInputError(f"sensor {self.kind!r} is unknown; use 'lidar' or 'camera'.")
 
     def __repr__(self) -> str:
         step, camera = self.resolution_deg, self.intrinsics
@@ -195,8 +201,7 @@ class Box:
         Corner `4 i + 2 j + k`: i is 0 at the rear (low x of the box), 1 in front; j is 0 on the
         right (low y), 1 on the left; k is 0 at the bottom, 1 on top.
         """
-        axes = box_axes(self.quaternion_wxyz)
-        return SIGNS * np.asarray(self.size) / 2 @ axes.T + np.asarray(self.centre)
+        return SIGNS * np.asarray(self.size) / 2 @ box_axes(self.quaternion_wxyz).T + self.centre
 
     @property
     def yaw(self) -> float:
@@ -267,11 +272,7 @@ class Completion:
         return embedded(self.points, self.box.corners, repr(self))
 
     def show(self) -> Path:
-        """Open points and box in the browser, in 3D.
-
-        Returns:
-            The page, a temporary file that needs no network.
-        """
+        """Open points and box in the browser, in 3D: a temporary page that needs no network."""
         from wildshape.geometry.figure import opened
 
         return opened(self.points, self.box.corners, repr(self))

@@ -1,5 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
+import subprocess
+import sys
 from collections import Counter
 from dataclasses import fields, make_dataclass, replace
 
@@ -7,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 from tests.cars import drive_by, known, poses_of
+from tests.refusal import refused
 
 from wildshape.baselines.icp import LocalIcp
 from wildshape.baselines.identity import Identity, OneScan
@@ -266,6 +269,38 @@ def test_what_is_left_out_is_counted_with_its_reason():
         Skipped("drive", "000003", "completion: refused by the method"),
         Skipped("drive", "000004", "completion: prediction empty or not finite"),
     ]
+
+
+@pytest.mark.parametrize("answered", [lambda p: p[:, :2], lambda p: p[None]])
+def test_an_answer_that_is_no_cloud_is_told(answered):
+    class Wrong:
+        """Answers another shape than it should."""
+
+        def complete(self, points, sensor):
+            return answered(points)
+
+    refused(run, {"wrong": Wrong()}, [drive_by(scans=3)], match=r"drive: .* must give \(m, 3\)")
+
+
+def test_what_is_no_method_and_no_protocol_is_refused_before_anything_is_measured():
+    program = (  # where no test checks types
+        "import sys\n"
+        "from wildshape.errors import BadInputError\n"
+        "from wildshape.evaluation.protocol import run\n"
+        "for methods, rotate in (({'mine': print}, 'yaw'), ({}, 'Yaw')):\n"
+        "    try: run(methods, [], rotate)\n"
+        "    except BadInputError as error: print(error)\n"
+    )
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert found.stdout.splitlines() == [
+        "mine: neither completes nor registers; `evaluation/method.py` says how.",
+        "rotate 'Yaw' is unknown; use one of none, yaw, so3.",
+    ]
+
+
+def test_a_row_that_there_is_not_is_no_end_of_an_iteration():
+    with pytest.raises(KeyError, match="nobody"):
+        _ = run({}, [])["nobody"]
 
 
 def test_truth_is_accumulated_where_no_shape_is_given():

@@ -10,7 +10,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wildshape.geometry.box import FittedBox, box_iou, shared_volume
+from wildshape.geometry.box import FittedBox, box_iou, fit_box, shared_volume
 from wildshape.geometry.footprint import footprint_iou, footprint_overlap, upright_places
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
 from wildshape.geometry.transforms.se3 import SE3
@@ -63,6 +63,14 @@ def monte_carlo(a, b, count=400_000):
 def test_hand_made_cases(other, expected):
     assert box_iou(box(), other) == pytest.approx(expected, abs=1e-9)
     assert box_iou(other, box()) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_box_of_float32_is_itself(seed):
+    points = torch.rand(200, 3, generator=torch.Generator().manual_seed(seed))
+    found = fit_box(points * torch.tensor((4.0, 2.0, 1.5)) @ yaw(9.0 * seed).float().mT)
+    assert found.rotation.dtype == torch.float32
+    assert box_iou(found, found) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_a_cube_standing_on_its_corner_in_another():

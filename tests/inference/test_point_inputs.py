@@ -9,7 +9,7 @@ import torch
 import trimesh
 
 from wildshape.errors import BadInputError
-from wildshape.inference.point_inputs import as_points, as_rays, each_of
+from wildshape.inference.point_inputs import as_points, as_rays, each_of, rays_of_each
 from wildshape.io.scans.points import read_scan
 
 RNG = np.random.default_rng(0)
@@ -130,3 +130,15 @@ def test_scans_may_be_handed_in_one_after_the_other():
     for wrong in ({"a": scans[0]}, "scan.ply", 3):
         with pytest.raises(BadInputError, match="expected a list of scans"):
             each_of(wrong)
+
+
+@pytest.mark.parametrize("given", [scan(), torch.from_numpy(scan())])
+def test_one_scan_alone_is_no_list_of_its_points(given):
+    with pytest.raises(BadInputError, match="found one array; put it in a list"):
+        each_of(given)
+
+
+@pytest.mark.parametrize("given", ["rays.npz", {"directions": np.eye(3), "ranges": np.ones(3)}])
+def test_what_is_no_list_of_rays_is_not_called_scans(given):
+    with pytest.raises(BadInputError, match="expected a list of sets of rays"):
+        rays_of_each(given, [scan()])

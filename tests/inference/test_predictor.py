@@ -15,7 +15,7 @@ from tests.strategies import rotation_about
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.confidence import confidence_of
+from wildshape.inference.confidence import confidence_of, features_of
 from wildshape.inference.config import BoxConfig, InferenceConfig
 from wildshape.inference.point_inputs import check_sensor
 from wildshape.inference.predictor import Predictor, load
@@ -65,6 +65,15 @@ def test_order_does_not_matter(predictor):
     points = scan()
     shuffled = points[np.random.default_rng(1).permutation(len(points))]
     assert_same(predictor.complete(shuffled), predictor.complete(points), atol=0)
+
+
+def test_the_range_of_many_points_is_that_of_their_mean_in_any_order():
+    points = np.repeat(scan(), 3000, axis=0)
+    expected = math.log(np.linalg.norm(points.astype(np.float64).mean(0)))
+    for given in (points, points[::-1], points[np.random.default_rng(1).permutation(len(points))]):
+        assert features_of(given, 0.1, torch.zeros(6)).log_range == pytest.approx(
+            expected, abs=1e-9
+        )
 
 
 def test_nan_rows_do_not_matter(predictor):

@@ -56,6 +56,21 @@ def test_a_packed_store_gives_each_place_once_as_a_folder_does(
             np.testing.assert_array_equal(scan, once)
 
 
+def test_what_is_done_to_a_track_of_a_store_changes_none_that_is_read_later(
+    track: Track, tmp_path: Path
+) -> None:
+    with StoreWriter(tmp_path / "store", {}) as writer:
+        writer.add(track)
+    source = open_tracks(tmp_path / "store")
+    found = source[0]
+    assert found.shape is not None
+    for points in (*found.scans, found.shape):
+        points[:] = 0.0
+    for again in (source[0], open_tracks(tmp_path / "store")[0]):
+        np.testing.assert_array_equal(again.scans[0], track.scans[0])
+        np.testing.assert_array_equal(again.shape, track.shape)
+
+
 def test_packed_store(track: Track, tmp_path: Path) -> None:
     with StoreWriter(tmp_path / "store", {}) as writer:
         writer.add(track)

@@ -10,7 +10,7 @@ import torch
 from wildshape.errors import BadInputError
 from wildshape.io.scans.points import Coordinates, write_ply
 from wildshape.io.tracks import NoUsableScanError, read_track, read_track_file, write_track
-from wildshape.records import Sensor, Track
+from wildshape.records import Sensor, SightLines, Track
 
 
 def test_round_trip(track: Track, tmp_path: Path) -> None:
@@ -140,6 +140,17 @@ def test_an_existing_track_is_not_mixed(track: Track, tmp_path: Path) -> None:
     write_track(tmp_path / "t", track)
     with pytest.raises(BadInputError, match="holds a track already"):
         write_track(tmp_path / "t", track)
+
+
+@pytest.mark.parametrize("cut", ["scans", "scan_names", "rays", "T_sensor_object"])
+def test_a_track_whose_parts_do_not_fit_is_refused_before_scans_are_lost(
+    cut: str, track: Track, tmp_path: Path
+) -> None:
+    ray = SightLines(np.eye(3), np.ones(3))
+    whole = replace(track, rays=(ray,) * len(track.scans))
+    with pytest.raises(BadInputError, match="do not fit together"):
+        write_track(tmp_path / "t", replace(whole, **{cut: getattr(whole, cut)[:2]}))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_names_that_would_not_sort_in_time_become_numbers(track: Track, tmp_path: Path) -> None:

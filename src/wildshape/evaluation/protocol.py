@@ -4,7 +4,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, get_args
 
 import numpy as np
 import torch
@@ -102,8 +102,10 @@ def run(
         helpers: who does the work.
 
     Raises:
-        BadInputError: a method answers of fewer or more scans than it took.
+        BadInputError: a method answers of fewer or more scans than it took, or no clouds of points,
+            or is none; a protocol that there is not.
     """
+    _check(methods, rotate)
     ledgers: dict[str, _Ledger] = {name: _Ledger() for name in methods}
     task = _TrackEvaluation(methods, rotate, seed, limits)
     for done, found in enumerate(helpers.in_order(task, tracks), start=1):
@@ -114,6 +116,18 @@ def run(
     about = {name: m.about for name, m in methods.items() if isinstance(m, Described)}
     rows = tuple(ledger.close(name, about.get(name, "")) for name, ledger in ledgers.items())
     return Results(rotate, seed, rows, limits)
+
+
+def _check(methods: Mapping[str, Method], rotate: Rotate) -> None:
+    if rotate not in get_args(Rotate):
+        raise BadInputError(
+            f"rotate {rotate!r} is unknown; use one of {', '.join(get_args(Rotate))}."
+        )
+    for name, method in methods.items():
+        if not isinstance(method, get_args(Method)):
+            raise BadInputError(
+                f"{name}: neither completes nor registers; `evaluation/method.py` says how."
+            )
 
 
 class _OfTrack(NamedTuple):
@@ -249,11 +263,15 @@ def _score_completion(
     if answer is None:
         ledger.skip(case, i, f"completion: {REFUSED}")
         return
-    predicted = answer.points
+    predicted = np.asarray(answer.points, dtype=np.float32)
     if len(predicted) == 0 or not np.isfinite(predicted).all():
         ledger.skip(case, i, f"completion: {NOT_FINITE}")
         return
-    local = T_sensor_object.inverse().apply_numpy(np.asarray(predicted, dtype=np.float32))
+    if predicted.ndim != 2 or predicted.shape[1] != 3:
+        raise BadInputError(
+            f"{case.name}: the method answers an array {predicted.shape}; it must give (m, 3)."
+        )
+    local = T_sensor_object.inverse().apply_numpy(predicted)
     partial = None if truth.partial is None else completion_error(local, truth.partial)
     floor = distance_floor(truth.area, len(local)) + distance_floor(truth.area, len(truth.shape))
     ledger.completions.append(

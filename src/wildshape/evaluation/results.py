@@ -108,7 +108,7 @@ class Results:
     limits: Limits = Limits()
 
     def __getitem__(self, name: str) -> MethodScores:
-        return next(scores for scores in self.methods if scores.name == name)
+        return {scores.name: scores for scores in self.methods}[name]
 
 
 def pooled(runs: Sequence[Results]) -> Results:

@@ -66,14 +66,22 @@ def as_points(scan: object, name: str = "scan") -> Points:
     return np.require(points, requirements="W")  # torch warns of what may not be written
 
 
-def each_of(scans: object) -> Sequence[object]:
+def each_of(scans: object, what: str = "scans") -> Sequence[object]:
     """Scans handed in from Python in whatever holds several, a generator, too.
+
+    Args:
+        scans: or what else there is one a scan of.
+        what: they are called, for the error.
 
     Raises:
         BadInputError: it holds none in an order.
     """
     if isinstance(scans, str | Path | Mapping) or not isinstance(scans, Iterable):
-        raise BadInputError(f"scans: expected a list of scans, found {type(scans).__name__}.")
+        raise BadInputError(f"{what}: expected a list of {what}, found {type(scans).__name__}.")
+    if getattr(scans, "ndim", 0) == 2:
+        raise BadInputError(
+            f"{what}: expected a list of {what}, found one array; put it in a list."
+        )
     return scans if isinstance(scans, Sequence) else list(scans)
 
 
@@ -148,7 +156,7 @@ def rays_of_each(rays: Iterable[object], scans: Sequence[object]) -> list[SightL
     Raises:
         BadInputError: another number of sets than of scans, or no rays.
     """
-    rays = each_of(rays)
+    rays = each_of(rays, "sets of rays")
     if len(rays) and len(rays) != len(scans):
         raise BadInputError(f"{len(rays)} sets of rays for {len(scans)} scans; give one a scan.")
     return [as_rays(one, f"rays {i}") for i, one in enumerate(rays)]

@@ -294,7 +294,7 @@ def _in_unit_of(source: TrackSource, coordinates: Coordinates) -> Coordinates:
 
 
 def _checked(track: Track) -> TrackFile:
-    """A track that was not read from scan files: without useless scans, each place once.
+    """A track of a packed store: without useless scans, each place once; copies, no views.
 
     Raises:
         NoUsableScanError: all of them.
@@ -310,10 +310,9 @@ def _checked(track: Track) -> TrackFile:
     if not kept:
         raise NoUsableScanError(Path(track.name), tuple(skipped))
     usable = track.part(kept) if skipped else track
-    scans = tuple(without_repeats(scan) for scan in usable.scans)
-    if any(once is not scan for once, scan in zip(scans, usable.scans)):
-        usable = replace(usable, scans=scans)
-    return TrackFile(usable, tuple(skipped))
+    scans = tuple(without_repeats(scan).copy() for scan in usable.scans)
+    shape = None if usable.shape is None else usable.shape.copy()
+    return TrackFile(replace(usable, scans=scans, shape=shape), tuple(skipped))
 
 
 def _single_scan(path: Path, coordinates: Coordinates) -> TrackSource:

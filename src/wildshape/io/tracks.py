@@ -258,9 +258,10 @@ def write_track(folder: Path | str, track: Track) -> None:
     """Write a track folder in metres; scans are numbered files if their names are no file names.
 
     Raises:
-        BadInputError: the folder has scans already.
+        BadInputError: the folder has scans already, or see `check_lengths`.
     """
     folder = Path(folder)
+    check_lengths(track)
     if (folder / "scans").exists():
         raise BadInputError(f"{folder}: holds a track already; choose another folder or remove it.")
     if track.T_sensor_object is not None:
@@ -277,6 +278,25 @@ def write_track(folder: Path | str, track: Track) -> None:
         if rays is not None:
             write_rays(folder / "rays" / f"{name}.npz", rays)
     _write_scans(folder, track)
+
+
+def check_lengths(track: Track) -> None:
+    """Refuse a track of which scans would be lost, or read with the poses of others.
+
+    Raises:
+        BadInputError: no scans; names, rays or poses that are not one a scan.
+    """
+    poses, posed = track.T_sensor_object, "no"
+    lengths = {len(track.scans), len(track.scan_names), len(track.rays or track.scans)}
+    if poses is not None:
+        batch = poses.translation.ndim == 2
+        lengths.add(len(poses) if batch else 0)
+        posed = str(len(poses)) if batch else "single"
+    if len(lengths) > 1 or not track.scans:
+        raise BadInputError(
+            f"track {track.name}: {len(track.scans)} scans, {len(track.scan_names)} names, "
+            f"{len(track.rays) or 'no'} rays and {posed} poses do not fit together."
+        )
 
 
 def is_placed(folder: Path) -> bool:

@@ -53,6 +53,32 @@ def test_scaled_carries_scaled_points_to_scaled_places(T, factor):
     torch.testing.assert_close(T.scaled(factor).apply(x * factor), T.apply(x) * factor)
 
 
+@pytest.mark.parametrize("held", [np.eye(4), torch.eye(4, dtype=torch.float64)])
+def test_a_matrix_changed_afterwards_changes_no_pose(held):
+    T = SE3.from_matrix(held)
+    held[:3, 3] = 5.0
+    assert_same(T, SE3.identity(), atol=0)
+
+
+def test_poses_of_a_batch_of_identities_are_each_its_own():
+    many = SE3.identity(3)
+    many.rotation[0, 0, 0] = 7.0
+    assert_same(many[1], SE3.identity(), atol=0)
+
+
+@pytest.mark.parametrize("kind", [">f8", np.float16, np.longdouble, object, int])
+def test_a_matrix_of_any_kind_of_numbers_backwards_and_read_only(kind):
+    matrix = np.eye(4).astype(kind)[::-1, ::-1]
+    matrix.setflags(write=False)
+    assert_same(SE3.from_matrix(matrix), SE3.identity(), atol=0)
+
+
+@pytest.mark.parametrize("matrix", [np.eye(4) * 1j, np.full((4, 4), "a")])
+def test_what_is_no_real_number_is_refused(matrix):
+    with pytest.raises(BadInputError, match="no array of numbers"):
+        SE3.from_matrix(matrix)
+
+
 @given(poses())
 def test_matrix_round_trip_and_homogeneous_product(T):
     assert_same(SE3.from_matrix(T.matrix), T, atol=0)

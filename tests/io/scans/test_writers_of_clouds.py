@@ -68,9 +68,17 @@ def test_points_of_a_map_keep_their_millimetres_or_are_refused(suffix, tmp_path)
 def test_what_are_no_points_is_refused(tmp_path):
     holed, endless = POINTS.copy(), POINTS.copy()
     holed[3, 1], endless[0, 0] = np.nan, np.inf
-    for wrong in (POINTS.astype(complex), POINTS[:0], np.zeros((0, 3)), holed, endless):
+    hidden = np.ma.masked_less(POINTS, 0)
+    for wrong in (POINTS.astype(complex), POINTS[:0], np.zeros((0, 3)), holed, endless, hidden):
         with pytest.raises(BadInputError, match=r"x\.npy: cannot save"):
             save(wrong, tmp_path / "x.npy")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("suffix", [".las", ".laz"])
+def test_a_cloud_wider_than_las_reaches_is_refused(suffix, tmp_path):
+    with pytest.raises(BadInputError, match=r"wide\.la.: .* 214 km .* write \.npy"):
+        save(np.array([[0.0, 0, 0], [215e3, 0, 0]]), tmp_path / f"wide{suffix}")
     assert list(tmp_path.iterdir()) == []
 
 

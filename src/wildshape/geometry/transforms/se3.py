@@ -48,7 +48,7 @@ class SE3:
     @classmethod
     def identity(cls, *batch: int) -> "SE3":
         """Transforms that change nothing, of the given batch shape."""
-        eye = torch.eye(3, dtype=torch.float64, device="cpu").expand(*batch, 3, 3)
+        eye = torch.eye(3, dtype=torch.float64, device="cpu").repeat(*batch, 1, 1)
         return cls(eye, torch.zeros(*batch, 3, dtype=torch.float64, device="cpu"))
 
     def where(self, chosen: Bool[Tensor, "*batch"], other: "SE3") -> "SE3":
@@ -60,14 +60,14 @@ class SE3:
 
     @classmethod
     def from_matrix(cls, matrix: Float[Tensor, "*batch rows 4"] | np.ndarray) -> "SE3":
-        """From 3x4 or 4x4 matrices, row-major, metres; kept in float64.
+        """From 3x4 or 4x4 matrices, row-major, metres; a copy in float64.
 
         Raises:
-            BadInputError: a matrix is of another shape, not finite, its left 3x3 block is no
-                rotation, or its last row is not 0 0 0 1 (as when it is column-major).
+            BadInputError: it is no array of real numbers, a matrix is of another shape, not
+                finite, its left 3x3 block is no rotation, or its last row is not 0 0 0 1 (as when
+                it is column-major).
         """
-        given = matrix if isinstance(matrix, Tensor) else torch.from_numpy(np.asarray(matrix))
-        m = given.to(torch.float64)
+        m = _copied(matrix)
         _check_layout(m)
         rotation, translation = m[..., :3, :3], m[..., :3, 3]
         residual = rotation @ rotation.mT - torch.eye(3, dtype=m.dtype, device=m.device)
@@ -157,6 +157,18 @@ class SE3:
         """A copy that autograd takes, too, wherever it was made (`torch.inference_mode`)."""
         with torch.inference_mode(mode=False):
             return type(self)(self.rotation.clone(), self.translation.clone())
+
+
+def _copied(matrix: Tensor | np.ndarray) -> Tensor:
+    if isinstance(matrix, Tensor):
+        return matrix.to(torch.float64, copy=True)
+    try:
+        numbers = np.asarray(matrix)
+        if numbers.dtype.kind == "c":
+            raise TypeError("its numbers are complex")
+        return torch.from_numpy(numbers.astype(np.float64, order="C"))
+    except (TypeError, ValueError) as error:
+        raise BadInputError(f"a pose is no array of numbers ({error}); give 3x4 or 4x4.") from error
 
 
 def _check_layout(m: Tensor) -> None:

@@ -119,14 +119,19 @@ def write_cloud(path: Path, points: Float[np.ndarray, "n 3"]) -> None:
         points: metres.
 
     Raises:
-        BadInputError: another suffix, or one of a format of float32 for points that it would move
-            by over a millimetre.
+        BadInputError: another suffix, one of a format of float32 for points that it would move by
+            over a millimetre, or LAS for a cloud wider than its whole numbers reach.
     """
     check_suffix(path)
     if path.suffix.lower() in _FLOAT32:
         _check_rounding(points, path)
-    with atomic_write(path) as file:
-        _WRITERS[path.suffix.lower()](cast("BinaryIO", file), points)
+    try:
+        with atomic_write(path) as file:
+            _WRITERS[path.suffix.lower()](cast("BinaryIO", file), points)
+    except OverflowError as error:
+        raise BadInputError(
+            f"{path}: a LAS file reaches 214 km at a tenth of a millimetre; write .npy or .xyz."
+        ) from error
 
 
 def _check_rounding(points: Float[np.ndarray, "n 3"], path: Path) -> None:
@@ -174,8 +179,8 @@ def save(shape: object, path: str | Path) -> None:
             .las and .laz a tenth of a millimetre.
 
     Raises:
-        BadInputError: another suffix; no array `(n, 3)` of finite real numbers, or one without
-            points; or points that a file of float32 would move by over a millimetre.
+        BadInputError: another suffix; no array `(n, 3)` of finite real numbers, none of them
+            masked, or one without points; or points that the format cannot hold (`write_cloud`).
     """
     points = _real_numbers(shape, path)
     if points.ndim != 2 or points.shape[1] != 3:
@@ -195,6 +200,8 @@ def _real_numbers(shape: object, path: str | Path) -> Float[np.ndarray, "..."]:
     """
     try:
         found = np.asarray(shape)
+        if np.ma.is_masked(shape):
+            raise TypeError("some is masked; save numpy.ma.compress_rows of it")
         if found.dtype.kind == "c":
             raise TypeError("complex numbers have no place in space")
         coarse = found.dtype.kind == "f" and found.dtype.itemsize <= np.float32().itemsize

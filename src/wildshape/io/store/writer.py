@@ -35,6 +35,7 @@ from wildshape.io.store.layout import (
 )
 from wildshape.io.store.manifest import manifest_of
 from wildshape.io.store.rays import rows_of_rays
+from wildshape.io.tracks import check_lengths
 from wildshape.records import ShapeKind, SightLines, Track
 
 _SHARD_BYTES = 256 << 20
@@ -175,17 +176,7 @@ class StoreWriter:
 
     def _check(self, track: Track) -> None:
         """Refuse what no reader would take: one such track and the store never opens again."""
-        poses, posed = track.T_sensor_object, "no"
-        lengths = {len(track.scans), len(track.scan_names), len(track.rays or track.scans)}
-        if poses is not None:
-            batch = poses.translation.ndim == 2
-            lengths.add(len(poses) if batch else 0)
-            posed = str(len(poses)) if batch else "single"
-        if len(lengths) > 1 or not track.scans:
-            raise BadInputError(
-                f"track {track.name}: {len(track.scans)} scans, {len(track.scan_names)} names, "
-                f"{len(track.rays) or 'no'} rays and {posed} poses do not fit together."
-            )
+        check_lengths(track)
         if track.name in self._names:
             raise BadInputError(f"two tracks are named '{track.name}'; rename one of them.")
         clouds = track.scans if track.shape is None else (*track.scans, track.shape)
