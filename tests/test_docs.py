@@ -25,6 +25,7 @@ import yaml
 import wildshape
 from wildshape.cli.commands import module_of
 from wildshape.cli.main import COMMANDS, main
+from wildshape.evaluation.metrics import distance_floor
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("docs/**/*.md"))
@@ -301,6 +302,28 @@ def test_the_changelog_knows_this_version():
     assert re.search(
         rf"^## \[({re.escape(wildshape.__version__)}|Unreleased)\]", text, re.MULTILINE
     )
+
+
+def test_pages_of_data_sets_say_what_was_checked():
+    pages = [page for page in PAGES if page.startswith("docs/datasets/")]
+    text = {page: (ROOT / page).read_text(encoding="utf-8") for page in pages}
+    said = {page for page in pages if re.search(r"^## Checked|\*\*Tested on", text[page], re.M)}
+    assert set(pages) - said == {"docs/datasets/README.md", "docs/datasets/folder.md"}
+
+
+def test_the_floor_that_evaluation_names_is_that_of_the_tables():
+    text = (ROOT / "docs/evaluation.md").read_text(encoding="utf-8")
+    (floor,) = re.findall(r"([\d.]+) m for a car of 25 m², 2,048 points and 8,192 true", text)
+    assert float(floor) == round(distance_floor(25.0, 2048) + distance_floor(25.0, 8192), 3)
+
+
+def test_benchmarks_that_are_left_out_are_named():
+    left_out = re.search(
+        r"^LEFT_OUT = {(.*?)}", (ROOT / "benchmarks/run.py").read_text("utf-8"), re.M | re.S
+    )
+    assert left_out
+    text = (ROOT / "docs/performance.md").read_text(encoding="utf-8")
+    assert all(name in text for name in re.findall(r"bench_\w+\.py", left_out[1]))
 
 
 def test_the_site_lists_every_page():
