@@ -14,6 +14,7 @@ from wildshape.drives.object_config import (
     CarveConfig,
     CompletionConfig,
     MergeConfig,
+    OwnVehicleConfig,
     SurroundingsConfig,
     TurnConfig,
     VehicleConfig,
@@ -241,6 +242,7 @@ class DriveConfig:
     completion: CompletionConfig = field(default_factory=CompletionConfig)
     turns: TurnConfig = field(default_factory=TurnConfig)
     vehicles: VehicleConfig = field(default_factory=VehicleConfig)
+    own_vehicle: OwnVehicleConfig = field(default_factory=OwnVehicleConfig)
     merging: MergeConfig = field(default_factory=MergeConfig)
     association: AssociationConfig = field(default_factory=AssociationConfig)
     surroundings: SurroundingsConfig = field(default_factory=SurroundingsConfig)
