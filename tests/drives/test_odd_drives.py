@@ -56,6 +56,21 @@ def test_a_sensor_that_stands_stays_where_it_is(scans):
     assert way.T_world_sensor.translation.abs().max() < 0.01
 
 
+def test_a_flat_ceiling_does_not_hold_the_sensor_back():
+    """Its rings lie around the sensor wherever it is: in a car park it stood still."""
+    up = np.deg2rad(np.arange(2.0, 22.5, 0.35))
+    around = np.deg2rad(np.arange(0, 360, 0.4))
+    e, a = (grid.ravel() for grid in np.meshgrid(up, around, indexing="ij"))
+    rays = np.column_stack((np.cos(a), np.sin(a), np.tan(e)))
+    noise = np.random.default_rng(0).normal(scale=0.01, size=(5, len(e), 1))
+    rings = (rays * (0.8 / np.tan(e)[:, None] + noise)).astype(np.float32)
+    low = [scan[scan[:, 2] < 0.8] for scan in street(frames=5).scans]
+    under = [np.concatenate(both) for both in zip(low, rings)]
+    way = find_trajectory(drive_of(under), LEVEL, DriveConfig())
+    found = way.T_world_sensor.translation[-1].numpy()
+    assert found == pytest.approx((4 * 0.7, 4 * 0.02, 0.0), abs=0.1)
+
+
 def test_poses_that_do_not_fit_the_scans_are_said():
     """Right ones, inverse ones, scans in the world, a camera's axes, other scales, none at all."""
     seen = street(frames=8)

@@ -14,6 +14,7 @@ from wildshape.drives.object_config import (
     CarveConfig,
     CompletionConfig,
     MergeConfig,
+    OwnVehicleConfig,
     SurroundingsConfig,
     TurnConfig,
     VehicleConfig,
@@ -68,6 +69,10 @@ class TrajectoryConfig:
         nearest_m: nearer ones are the vehicle that carries the sensor.
         ground_m: ground farther away is not used.
         standing_m: what is higher above the ground is.
+        overhead: what rises by more than this a metre of range may be a ceiling.
+        ceiling: it is one if heights vary by a smaller share of what they would if all of it were
+            equally far, as walls are: on real streets 0.9 and more, at a flat ceiling 0.01.
+        ceiling_m: what is so much below its height is it, too.
         voxel_m: size of the local map's cells.
         settled: a scan has found its place when a step moves it by less, metres and radians.
         fits_m: points this near to one of the scan before fit it.
@@ -84,6 +89,9 @@ class TrajectoryConfig:
     nearest_m: float = 2.0
     ground_m: float = 10.0
     standing_m: float = 0.2
+    overhead: float = 0.05
+    ceiling: float = 0.25
+    ceiling_m: float = 0.2
     voxel_m: float = 0.75
     settled: float = 1e-3
     fits_m: float = 1.0
@@ -241,6 +249,7 @@ class DriveConfig:
     completion: CompletionConfig = field(default_factory=CompletionConfig)
     turns: TurnConfig = field(default_factory=TurnConfig)
     vehicles: VehicleConfig = field(default_factory=VehicleConfig)
+    own_vehicle: OwnVehicleConfig = field(default_factory=OwnVehicleConfig)
     merging: MergeConfig = field(default_factory=MergeConfig)
     association: AssociationConfig = field(default_factory=AssociationConfig)
     surroundings: SurroundingsConfig = field(default_factory=SurroundingsConfig)

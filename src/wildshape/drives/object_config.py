@@ -110,6 +110,23 @@ class VehicleConfig:
 
 
 @dataclass(frozen=True)
+class OwnVehicleConfig:
+    """What is a part of the vehicle that carries the sensor (`own_vehicle.py`).
+
+    Attributes:
+        way_m: that the sensor goes meanwhile; less tells it from no standing neighbour.
+        near_m: it begins no farther beyond the nearest points that are kept: a ring or two.
+        stays_m: it stays so near to one place as the sensor sees it; who drives beside it does not.
+        most: share of the scans in which it does.
+    """
+
+    way_m: float = 5.0
+    near_m: float = 0.3
+    stays_m: float = 0.3
+    most: float = 0.8
+
+
+@dataclass(frozen=True)
 class MergeConfig:
     """Which tracks are one object by their complete shapes (`merging.py`).
 

@@ -22,8 +22,10 @@ from wildshape.drives.completing.level_frame import (
     read_completed,
 )
 from wildshape.drives.completing.merging import Places
+from wildshape.drives.completing.own_vehicle import carries_sensor
 from wildshape.drives.completing.rolling_shutter import TURNS, Turns, with_sense
 from wildshape.drives.completing.vehicles import (
+    Judged,
     judge,
     likely,
     refused,
@@ -262,7 +264,9 @@ class Pipeline:
                 surer_if_driving(one, turns, self.config.boxes, self.config.vehicles)
                 for one in self.completed(objects, turns)
             ]
-            said = judge(completed, places, self.config.vehicles)
+            own = {one.seen.name for one in completed if self.is_own(one, turns)}
+            others = [one for one in completed if one.seen.name not in own]
+            said = judge(others, places, self.config.vehicles)
             kept = {one.name: one.confidence for one in said if not one.reasons}
             found = [one for one in completed if one.seen.name in kept]
             parts, doubtful = {}, []
@@ -275,6 +279,7 @@ class Pipeline:
             known = found, doubtful, turns, self.config
             found, crowd = held_against(self.drive.scan, *known, self.helpers.in_order)
             said = refused(said, parts | dict.fromkeys(crowd, "crowded"))
+            said += [Judged(name, 0.0, ("own_vehicle",)) for name in own]
             write_judged(self.completing / "vehicles.json", objects, said)
             found = [on_ground(one, self.cuts, turns, self.config.boxes) for one in found]
             at(1)
@@ -282,6 +287,12 @@ class Pipeline:
                 Vehicle(one, smooth(one, turns, self.config.boxes), stated(one, kept))
                 for one in sorted(found, key=lambda one: one.seen.name)
             ]
+
+    def is_own(self, one: Completed, turns: Turns) -> bool:
+        """Whether it is of the vehicle that carries the sensor."""
+        nearest_m = self.config.ground.nearest_m
+        known = self.cuts, turns.T_level_sensor, nearest_m, self.config.own_vehicle
+        return carries_sensor(one.seen, *known)
 
     def write(self, vehicles: list[Vehicle], turns: Turns) -> int:
         """The user's files; how many boxes they hold."""

@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """When points were taken: counted from their scan's time, whichever clock they are on."""
 
+import struct
+
 import numpy as np
+import numpy.lib.recfunctions
 import pytest
 
 from wildshape.io.scans.point_times import seconds_since
@@ -44,3 +47,43 @@ def test_points_that_did_not_come_back_do_not_take_the_times_of_the_others(tmp_p
     assert turn.seconds is not None
     assert turn.seconds[1:] == pytest.approx(TURN, abs=1e-6)
     assert TURN[0] <= turn.seconds[0] <= TURN[-1]
+
+
+@pytest.mark.parametrize("kind", ["binary", "binary_compressed", "npy"])
+def test_times_are_read_from_packed_clouds_and_from_records_too(tmp_path, kind):
+    """They were left out of these without a word."""
+    rows = np.zeros(200, [("x", "<f8"), ("flags", "<u2", (3,)), ("y", "<f4"), ("z", "<f4")])
+    rows["x"], rows["y"] = np.arange(200) / 7, 5.0
+    whole = np.lib.recfunctions.append_fields(
+        rows, "t", np.rint(TURN * 1e9).astype("<u4"), usemask=False
+    )
+    path = tmp_path / ("scan.npy" if kind == "npy" else "scan.pcd")
+    write = {"npy": np.save, "binary": write_pcd, "binary_compressed": write_packed_pcd}
+    write[kind](path, whole)
+    turn = read_turn(path, 1.7e9)
+    assert turn.points[:, 0] == pytest.approx(np.arange(200) / 7)
+    assert turn.seconds == pytest.approx(TURN, abs=1e-6)
+
+
+def write_pcd(path, rows, data="binary", body=None):
+    """Rows of numbers, or what they were packed to."""
+    base = {name: rows.dtype[name].base for name in rows.dtype.names}
+    lines = {
+        "FIELDS": base,
+        "SIZE": [kind.itemsize for kind in base.values()],
+        "TYPE": [kind.kind.upper() for kind in base.values()],
+        "COUNT": [rows[name][0].size for name in base],
+        "POINTS": [len(rows)],
+        "DATA": [data],
+    }
+    head = "".join(f"{key} {' '.join(map(str, words))}\n" for key, words in lines.items())
+    path.write_bytes(head.encode() + (rows.tobytes() if body is None else body))
+
+
+def write_packed_pcd(path, rows):
+    """All of a field, then all of the next, packed by LZF."""
+    import lzf
+
+    whole = b"".join(rows[name].tobytes() for name in rows.dtype.names)
+    packed = lzf.compress(whole)
+    write_pcd(path, rows, "binary_compressed", struct.pack("<II", len(packed), len(whole)) + packed)

@@ -20,18 +20,15 @@ from wildshape.io.guard import reading
 from wildshape.io.order import check_counted
 from wildshape.io.packets.reader import SUFFIXES
 from wildshape.io.poses import read_poses
-from wildshape.io.scans.pcd import read_pcd_field
-from wildshape.io.scans.ply import read_ply_property
 from wildshape.io.scans.point_times import LIKE_TIMES, TIME_FIELDS, unusable_told
 from wildshape.io.scans.points import is_scan_file
-from wildshape.io.scans.turns import read_turn
+from wildshape.io.scans.turns import FIELDS, read_turn
 from wildshape.records import Turn
 
 _BESIDE = ("poses.txt", "times.txt", "timestamps.txt", "calib.txt")
 _RAW, _ODOMETRY = Path("velodyne_points") / "data", "velodyne"
 _TEXT = (".txt", ".csv")
 _RECORDINGS = (*STORAGES, *SUFFIXES)  # that are one file each
-_FIELDS = {".ply": read_ply_property, ".pcd": read_pcd_field}
 _FEWEST_POINTS = 1000  # of a whole scan
 _LONGEST_STEP_S = 20.0  # more are milliseconds, or smaller units
 _OBJECTS = "velodyne_objects_xyz0"  # a drive of KITTI raw cut down to its vehicles
@@ -153,7 +150,7 @@ def _unread_times_told(files: list[Path], times: list[float] | None) -> list[str
     """A sentence if some scans' points have times, and none of them tells when they were taken."""
     why = ""
     for at in sorted({0, len(files) // 2, len(files) - 1}):
-        field = _FIELDS.get(files[at].suffix.lower())
+        field = FIELDS.get(files[at].suffix.lower())
         if field is None:
             return []
         with suppress(BadInputError):  # it is damaged; the drive counts it

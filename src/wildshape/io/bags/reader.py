@@ -22,6 +22,7 @@ from wildshape.records import Turn
 
 _FEWEST_POINTS = 1000  # of a whole scan
 _SOME = 3  # scans that tell what a clock says
+_LONGEST_LAG_NS = 10e9  # of a recorder behind the stamps
 
 
 class _Scan(NamedTuple):
@@ -199,11 +200,12 @@ def _in_order(topic: str, scans: list[_Scan], told: tuple[str, ...]) -> Bag:
     """A bag of scans sorted in time, one an instant."""
     stamped = all(scan.stamped for scan in scans)
     recorded = sorted(scans, key=lambda scan: scan.logged)  # file 10 comes before file 2
-    if stamped and (back := _set_back(recorded)):
+    if stamped and (by := _clock_set(recorded)):
         stamped = False
         told += (
-            f"the stamps of {topic} fall by {back / 1e9:.2g} s between scans that were recorded one"
-            " after the other: a clock was set; the times of recording are used",
+            f"the stamps of {topic} {'rise' if by > 0 else 'fall'} by {abs(by) / 1e9:.2g} s between"
+            " scans that were recorded one after the other: a clock was set; the times of"
+            " recording are used",
         )
     taken = {scan.stamped if stamped else scan.logged: scan for scan in reversed(scans)}
     instants = sorted(taken)
@@ -216,18 +218,19 @@ def _in_order(topic: str, scans: list[_Scan], told: tuple[str, ...]) -> Bag:
     return Bag(topic, tuple(instant / 1e9 for instant in instants), told, kept)
 
 
-def _set_back(scans: list[_Scan]) -> float:
-    """By how many nanoseconds stamps fall for good while scans were recorded in order; 0: nowhere.
+def _clock_set(scans: list[_Scan]) -> float:
+    """By how many nanoseconds stamps leap for good while scans were recorded in order; 0: nowhere.
 
-    A scan that was recorded late falls back, too, but those after it do not.
+    A scan that was recorded late falls back, too, but those after it do not. Stamps that rise by
+    less than a recorder may lag behind are left to themselves.
     """
     stamps = np.array([scan.stamped for scan in scans], np.int64)
     logged = np.array([scan.logged for scan in scans], np.int64)
     if len(scans) < 2 * _SOME or not (np.diff(logged) > 0).all():
         return 0.0
     apart = (stamps - logged).astype(np.float64)
-    falls = np.flatnonzero(np.diff(stamps) < 0) + 1
-    falls = falls[(falls >= _SOME) & (falls <= len(scans) - _SOME)]
-    back = [float(np.median(apart[:at]) - np.median(apart[at:])) for at in falls]
+    leaps = np.flatnonzero((np.diff(stamps) < 0) | (np.diff(apart) > _LONGEST_LAG_NS)) + 1
+    leaps = leaps[(leaps >= _SOME) & (leaps <= len(scans) - _SOME)]
+    by = [float(np.median(apart[at:]) - np.median(apart[:at])) for at in leaps]
     step = float(np.median(np.diff(logged)))
-    return max((by for by in back if by > step), default=0.0)
+    return max((one for one in by if not -step <= one <= _LONGEST_LAG_NS), key=abs, default=0.0)

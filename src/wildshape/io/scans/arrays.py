@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Float32, Num
 
 from wildshape.errors import BadInputError
 from wildshape.io.guard import check_promise, check_unpacked, reading
@@ -82,6 +82,14 @@ def read_npy(path: Path) -> Float[np.ndarray, "n 3"]:
     check_promise(path, "bytes of header", length, length, path.stat().st_size - 10)
     # Mapping compares the promise with the file's size before anything is allocated.
     return _columns(np.load(path, mmap_mode="r", allow_pickle=False), path)
+
+
+def read_npy_field(path: Path, names: tuple[str, ...]) -> Num[np.ndarray, "n"] | None:
+    """The first of these fields of the records of a file that `read_npy` reads; None without."""
+    records = np.load(path, mmap_mode="r", allow_pickle=False)
+    kinds = {name: field[0].kind for name, field in (records.dtype.fields or {}).items()}
+    found = [name for name in names if kinds.get(name, "O") in "fiu"]
+    return np.array(records[found[0]]) if found else None
 
 
 def read_npz(path: Path) -> Float[np.ndarray, "n 3"]:

@@ -61,7 +61,9 @@ def read_pcd(path: Path) -> Float[np.ndarray, "n 3"]:
             check_promise(path, "points", header.points, header.points * header.row_bytes, present)
             points = _read_rows(file, header)
         else:
-            points = _read_compressed(file, header, present, path)
+            places = [header.fields.index(axis) for axis in _AXES]
+            columns = _columns(_unpacked(file, header, present, path), header, places)
+            points = np.stack(columns, -1).astype(np.float64)
     if len(points) != header.points:
         raise BadInputError(
             f"{path}: the header promises {header.points} points, the file holds {len(points)}: "
@@ -73,7 +75,7 @@ def read_pcd(path: Path) -> Float[np.ndarray, "n 3"]:
 def read_pcd_field(path: Path, names: tuple[str, ...]) -> Num[np.ndarray, "n"] | None:
     """The first of these fields of each point, as written.
 
-    None where there is none of them, and of text and compressed files.
+    None where there is none of them, and of text.
 
     Raises:
         BadInputError: as `read_pcd`.
@@ -81,11 +83,14 @@ def read_pcd_field(path: Path, names: tuple[str, ...]) -> Num[np.ndarray, "n"] |
     with path.open("rb") as file:
         header = _read_header(file, path)
         found = [name for name in names if name in header.fields]
-        if header.encoding != "binary" or not found:
+        if header.encoding == "ascii" or not found:
             return None
+        place = header.fields.index(found[0])
         present = path.stat().st_size - file.tell()
+        if header.encoding == "binary_compressed":
+            return _columns(_unpacked(file, header, present, path), header, [place])[0]
         check_promise(path, "points", header.points, header.points * header.row_bytes, present)
-        return _rows(file, header)[f"{header.fields.index(found[0])}"][:, 0]
+        return _rows(file, header)[f"{place}"][:, 0]
 
 
 def _read_header(file: IO[bytes], path: Path) -> _Header:
@@ -163,10 +168,8 @@ def _rows(file: IO[bytes], header: _Header) -> np.ndarray:
     return np.frombuffer(file.read(header.points * header.row_bytes), np.dtype(fields))
 
 
-def _read_compressed(
-    file: IO[bytes], header: _Header, present: int, path: Path
-) -> Float[np.ndarray, "n 3"]:
-    """All of x, then all of y and so on, packed by LZF."""
+def _unpacked(file: IO[bytes], header: _Header, present: int, path: Path) -> bytes:
+    """What LZF packed: all of x, then all of y and so on."""
     import lzf  # pypcd4 brings it  # pyright: ignore[reportMissingImports]
 
     need = header.points * header.row_bytes
@@ -186,10 +189,15 @@ def _read_compressed(
     body = lzf.decompress(file.read(packed), need) if header.points else b""
     if len(body or b"") != need:
         raise BadInputError(f"{path}: its compressed body is damaged; copy it again.")
+    return body or b""
+
+
+def _columns(body: bytes, header: _Header, places: list[int]) -> list[Num[np.ndarray, "n"]]:
+    """The first number of some fields, of each point."""
     starts = np.cumsum([0, *(size * n for size, n in zip(header.sizes, header.counts))])
-    places = [header.fields.index(axis) for axis in _AXES]
-    columns = [
-        np.frombuffer(body, header.kinds[i], header.points, int(starts[i]) * header.points)
+    return [
+        np.frombuffer(
+            body, header.kinds[i], header.points * header.counts[i], int(starts[i]) * header.points
+        )[:: header.counts[i]]
         for i in places
     ]
-    return np.stack(columns, -1).astype(np.float64)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wildshape.io.scans.arrays import read_npy_field
 from wildshape.io.scans.pcd import read_pcd_field
 from wildshape.io.scans.ply import read_ply_property
 from wildshape.io.scans.point_times import TIME_FIELDS, seconds_since
@@ -18,11 +19,12 @@ from wildshape.io.scans.points import (
 )
 from wildshape.records import Turn
 
-_CLOCKS = {".ply": read_ply_property, ".pcd": read_pcd_field}
+FIELDS = {".ply": read_ply_property, ".pcd": read_pcd_field, ".npy": read_npy_field}
+"""By suffix: what reads a field of each point."""
 
 
 def read_turn(path: Path, scan_time: float | None) -> Turn:
-    """A whole scan, and when its points were taken, if a binary PLY or PCD says so.
+    """A whole scan, and when its points were taken, if a PLY, PCD or .npy says so.
 
     Args:
         path: as of `read_points`.
@@ -33,7 +35,7 @@ def read_turn(path: Path, scan_time: float | None) -> Turn:
     """
     points = read_all(path, SENSOR_METRES)
     check_near(points, str(path))
-    read_clock = _CLOCKS.get(path.suffix.lower())
+    read_clock = FIELDS.get(path.suffix.lower())
     clock = None if read_clock is None else read_clock(path, TIME_FIELDS)
     if clock is None:
         return Turn(drop_nonfinite(points).points)
