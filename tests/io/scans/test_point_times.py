@@ -5,8 +5,8 @@
 import struct
 
 import numpy as np
-import numpy.lib.recfunctions
 import pytest
+from numpy.lib.recfunctions import append_fields
 
 from wildshape.io.scans.point_times import seconds_since
 from wildshape.io.scans.turns import read_turn
@@ -54,9 +54,7 @@ def test_times_are_read_from_packed_clouds_and_from_records_too(tmp_path, kind):
     """They were left out of these without a word."""
     rows = np.zeros(200, [("x", "<f8"), ("flags", "<u2", (3,)), ("y", "<f4"), ("z", "<f4")])
     rows["x"], rows["y"] = np.arange(200) / 7, 5.0
-    whole = np.lib.recfunctions.append_fields(
-        rows, "t", np.rint(TURN * 1e9).astype("<u4"), usemask=False
-    )
+    whole = append_fields(rows, "t", np.rint(TURN * 1e9).astype("<u4"), usemask=False)
     path = tmp_path / ("scan.npy" if kind == "npy" else "scan.pcd")
     write = {"npy": np.save, "binary": write_pcd, "binary_compressed": write_packed_pcd}
     write[kind](path, whole)

@@ -36,10 +36,10 @@ def carries_sensor(
     reach_m = nearest_m + config.near_m
     if _median_nearest(seen.part(some).clouds(cuts)) > reach_m:  # most objects: by a few scans
         return False
-    clouds = [cloud[:, :2] for cloud in seen.clouds(cuts)]
+    clouds = seen.clouds(cuts)
     if _median_nearest(clouds) > reach_m:
         return False
-    middles = np.array([(cloud.min(0) + cloud.max(0)) / 2 for cloud in clouds])
+    middles = np.array([(cloud.min(0) + cloud.max(0))[:2] / 2 for cloud in clouds])
     away = np.linalg.norm(middles - np.median(middles, axis=0), axis=1)
     return float(np.quantile(away, config.most)) < config.stays_m
 
