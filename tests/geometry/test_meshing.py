@@ -36,6 +36,17 @@ def test_open_below_is_filled():
     assert mesh.volume == pytest.approx(2 / 3 * np.pi, rel=0.1)
 
 
+@pytest.mark.parametrize("count", [300, 512, 1024, 8192])
+def test_few_points_are_no_hollow_shell(count):
+    """At 512 points, as small networks give, half of the volume was missing."""
+    rng = np.random.default_rng(0)
+    body = trimesh.creation.box((4.4, 1.8, 1.5))
+    mesh = closed_mesh(np.asarray(trimesh.sample.sample_surface(body, count, seed=rng)[0]))
+    assert mesh.is_watertight
+    assert mesh.body_count == 1
+    assert mesh.volume == pytest.approx(body.volume, rel=0.12)
+
+
 def test_scale_changes_nothing_else():
     points = ball(2000, np.random.default_rng(2))
     small, large = closed_mesh(points), closed_mesh(points * 8)

@@ -20,11 +20,12 @@ from jaxtyping import Bool, Float, UInt8
 
 from wildshape.errors import BadInputError, load_library
 from wildshape.geometry.box import extent, unit_of
-from wildshape.ops.nearest import nearest
+from wildshape.ops.nearest import nearest, nearest_k
 
 if TYPE_CHECKING:
     import trimesh
 
+_NEIGHBOUR, _MOST_TIMES = 4, 4.0  # a grid about a handful of points takes memory
 _MARGIN = 3  # cells around the swollen points
 _OFF_LEVEL = 1e-3  # of a cell: what keeps corners of the surface apart
 _ALIKE = 1e-3  # of the longest side: so near to a point its reflection is one, too
@@ -41,6 +42,8 @@ class MeshConfig:
         cells: of the grid along the longest side.
         reach: how far points are swollen, of the longest side: what lies closer than twice that is
             joined.
+        sparse_reach: of few points, so many times the distance that 95 % of them have to their
+            fourth neighbour, but no more than four times `reach`: a shell with holes has no inside.
         sides: from so many of six a place is hidden that lies inside: a LiDAR sees no underside.
         smallest_body: of all cells inside; smaller bodies are crumbs and left out.
         band: cells about the surface sought, in which depth is measured and not counted.
@@ -52,6 +55,7 @@ class MeshConfig:
 
     cells: int = 96
     reach: float = 0.05
+    sparse_reach: float = 1.6
     sides: int = 5
     smallest_body: float = 0.01
     band: int = 10
@@ -92,7 +96,7 @@ def closed_mesh(
     if not extent > 0:
         raise BadInputError("a shape whose points are all equal has no surface.")
     points = _on_both_sides(points, extent)
-    reach = config.reach * extent
+    reach = _reach(points, extent, config)
     grid = _grid_around(points, extent / config.cells, reach)
     depth = _depth(points, grid, reach, march, config)
     level = float(np.median(_interpolate(depth, grid, points)))
@@ -119,6 +123,15 @@ def _on_both_sides(points: np.ndarray, extent: float) -> np.ndarray:
     reflected = points * np.asarray((1, -1, 1), points.dtype)
     apart = np.quantile(_distance(reflected, points), 0.25)
     return np.concatenate((points, reflected)) if apart < _ALIKE * extent else points
+
+
+def _reach(points: Float[np.ndarray, "n 3"], extent: float, config: MeshConfig) -> float:
+    """How far points are swollen until they touch."""
+    cloud = torch.from_numpy(np.ascontiguousarray(points, np.float32))[None]
+    count = min(_NEIGHBOUR + 1, len(points))  # itself is one
+    apart = nearest_k(cloud, cloud, count).distance_squared[0, :, -1].sqrt().numpy()
+    least, sparse = config.reach * extent, config.sparse_reach * float(np.quantile(apart, 0.95))
+    return min(max(least, sparse), _MOST_TIMES * least)
 
 
 def _grid_around(points: np.ndarray, step: float, reach: float) -> _Grid:
