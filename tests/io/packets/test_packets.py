@@ -193,6 +193,28 @@ def test_a_clock_that_was_set_back(turns, tmp_path):
     assert "the clock of street.pcap was set back by 1 s; later turns" in drive.warnings[1]
 
 
+@pytest.mark.parametrize(("by", "step"), [(5e8 + 0.25, 2 * PERIOD), (0.0, 30.0 + 2 * PERIOD)])
+def test_a_clock_that_was_set_ahead_is_no_pause(turns, tmp_path, by, step):
+    """A robot that found the time on its way had lost years of scans; a true pause stays."""
+    path = write_velodyne(tmp_path / "street.pcap", [turns[0]] * 6)
+    pause = 0 if by else 30_000_000
+
+    def change(records):
+        for record in records[2 * PACKETS * 7 // 2 :]:
+            record[0] += by + pause / 1e6
+            data, end = record[1], len(record[1]) - 2
+            if len(data) > 1206:
+                micros = int.from_bytes(data[end - 4 : end], "little") + pause
+                record[1] = data[: end - 4] + (micros % 3_600_000_000).to_bytes(4, "little")
+                record[1] += data[end:]
+
+    drive = open_drive(rewrite(path, change))
+    assert drive.times is not None
+    assert np.diff(drive.times) == pytest.approx([PERIOD, PERIOD, step, PERIOD], abs=1e-3)
+    told = [one for one in drive.warnings if "was set ahead by 5e+08 s; later turns" in one]
+    assert len(told) == (1 if by else 0)
+
+
 def test_two_sensors_of_one_address_are_refused(turns, tmp_path):
     """Their packets were put together to hundreds of turns."""
     path = write_velodyne(tmp_path / "street.pcap", turns)

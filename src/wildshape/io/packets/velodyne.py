@@ -18,10 +18,12 @@ import numpy as np
 
 from wildshape.errors import BadInputError, load_library
 from wildshape.io.guard import first_line, reading
+from wildshape.io.packets.clock import gone_on
 from wildshape.records import Turn
 
 _INSTALL = "pip install 'wildshape[pcap]'"
 _AZIMUTH = slice(2, 4)  # of a packet's first block, hundredths of a degree, clockwise from ahead
+_MICROS = slice(1200, 1204)  # of the hour
 _BACK, _ROUND = 18000, 36000
 _UDP_HEADER = 8  # bytes
 _SHORTEST_S = 0.025  # of a turn: half of that at the highest speed
@@ -59,6 +61,7 @@ class _Turn:
     Attributes:
         began: when the first packet was recorded, seconds.
         stamp: when the last was.
+        micros: the sensor's own clock then, microseconds past its hour.
         turned: how far from behind the beam has come, hundredths of a degree.
     """
 
@@ -66,6 +69,7 @@ class _Turn:
     packets: int = 0
     began: float = 0.0
     stamp: float = 0.0
+    micros: int = 0
     turned: int = 0
 
 
@@ -140,28 +144,14 @@ def open_velodyne(path: Path) -> VelodyneTurns:
         damaged = models[source].total() - max(models[source].values())
         if damaged:
             warnings.append(f"{damaged} packets end in another model than most and are left out")
-    times, back_s = _rising([turn.stamp for turn in found])
-    if back_s:
+    times, by_s = gone_on([turn.stamp for turn in found], [turn.micros for turn in found])
+    if by_s:
         warnings.append(
-            f"the clock of {path.name} was set back by {back_s:.2g} s; later turns are taken to"
-            " have gone on at the usual pace"
+            f"the clock of {path.name} was set {'ahead' if by_s > 0 else 'back'} by"
+            f" {abs(by_s):.2g} s; later turns are taken to have gone on at the usual pace"
         )
     whole_times = tuple(compress(times, sound))
     return VelodyneTurns(path, whole_times, tuple(warnings), source, whole, described)
-
-
-def _rising(stamps: list[float]) -> tuple[tuple[float, ...], float]:
-    """Times that go on as usual where a clock was set back, and by how much it was in all, seconds.
-
-    Times that rise less often than not stay as they are.
-    """
-    steps = np.diff(stamps)
-    falls = steps <= 0
-    if not falls.any() or falls.mean() > 0.5:
-        return tuple(stamps), 0.0
-    back = np.where(falls, float(np.median(steps[~falls])) - steps, 0.0)
-    later = np.concatenate(([0.0], np.cumsum(back)))
-    return tuple((np.array(stamps) + later).tolist()), float(back.sum())
 
 
 def _check_pace(path: Path, turns: list[_Turn]) -> None:
@@ -186,6 +176,7 @@ def _count(packet: _Packet, turns: list[_Turn]) -> None:
         turns.append(_Turn(packet.begin, began=packet.stamp, turned=turned))
     turn = turns[-1]
     turn.packets, turn.stamp = turn.packets + 1, packet.stamp
+    turn.micros = int.from_bytes(packet.data[_MICROS], "little")
     turn.turned = turn.turned if _is_late(turn, turned) else turned
 
 

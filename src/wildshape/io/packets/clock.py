@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""The clock of what recorded a sensor's packets, where it was set amid the recording."""
+
+import numpy as np
+
+_HOUR_S, _NEAR_S = 3600.0, 1.0
+_SET_S = 10.0  # less is a pause of the network
+
+
+def gone_on(stamps: list[float], micros: list[int]) -> tuple[tuple[float, ...], float]:
+    """Times of turns that go on where a clock was set, and by how much it was in all, seconds.
+
+    A leap ahead is a pause of the recording unless the sensor's own clock, which counts within an
+    hour, does not show one. Times that rise less often than not stay as they are.
+
+    Args:
+        stamps: when each turn was recorded, seconds.
+        micros: the sensor's own clock then, microseconds past its hour.
+    """
+    steps = np.diff(stamps)
+    falls = steps <= 0
+    if not len(steps) or falls.mean() > 0.5:
+        return tuple(stamps), 0.0
+    own = np.diff(micros) / 1e6 % _HOUR_S
+    ahead = steps - own
+    whole_hours = np.abs(ahead - np.rint(ahead / _HOUR_S) * _HOUR_S) < _NEAR_S
+    leaps = (ahead > _SET_S) & (own > 0) & ~whole_hours
+    usual = float(np.median(steps[~falls & ~leaps])) if (~falls & ~leaps).any() else 0.0
+    by = np.where(falls, steps - usual, np.where(leaps, ahead, 0.0))
+    if not by.any():
+        return tuple(stamps), 0.0
+    later = np.concatenate(([0.0], np.cumsum(by)))
+    return tuple((np.array(stamps) - later).tolist()), float(by.sum())
