@@ -279,7 +279,7 @@ class Pipeline:
             known = found, doubtful, turns, self.config
             found, crowd = held_against(self.drive.scan, *known, self.helpers.in_order)
             said = refused(said, parts | dict.fromkeys(crowd, "crowded"))
-            said += [Judged(name, 0.0, ("own_vehicle",)) for name in own]
+            said += [Judged(name, 0.0, ("own_vehicle",)) for name in sorted(own)]
             write_judged(self.completing / "vehicles.json", objects, said)
             found = [on_ground(one, self.cuts, turns, self.config.boxes) for one in found]
             at(1)
