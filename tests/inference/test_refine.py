@@ -18,12 +18,9 @@ from wildshape.inference.predictor import load
 from wildshape.inference.refine import (
     Fit,
     _allowed,
-    denser,
     drawn_to,
     padded,
-    partners,
     refine,
-    with_scan,
 )
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
@@ -196,37 +193,6 @@ def test_only_what_was_seen_is_drawn(mirror):
         assert np.median(np.abs(drawn[right, 1] + 0.91)) < 0.02
     else:
         assert moved[right].max() < 1e-9
-
-
-def twice_as_many(points):
-    given = torch.from_numpy(points)[None]
-    return denser(given, partners(given))[0].numpy()
-
-
-def test_denser_fills_gaps_and_keeps_the_points():
-    dense = twice_as_many(SHAPE)
-    assert dense.shape == (2 * len(SHAPE), 3)
-    assert dense.dtype == SHAPE.dtype
-    np.testing.assert_array_equal(dense[: len(SHAPE)], SHAPE)
-    spacing = KDTree(SHAPE).query(SHAPE, k=6)[0][:, 5]
-    added = KDTree(SHAPE).query(dense[len(SHAPE) :])[0]
-    assert (added <= spacing / 2 + 1e-6).all()
-    assert len(np.unique(dense.round(6), axis=0)) > 1.8 * len(SHAPE)
-    other = car_surface(3000, seed=6)[0]
-    assert KDTree(dense).query(other)[0].mean() < 0.9 * KDTree(SHAPE).query(other)[0].mean()
-
-
-def test_an_exact_scan_takes_the_place_of_points_put_between():
-    """The network's own points stay first; what the scan saw is nearer, the rest is as it was."""
-    shape = SHAPE[::4] + np.array((0.0, 0.0, 0.04), dtype=np.float32)
-    seen = SHAPE[SHAPE[:, 0] > 0]
-    plain = twice_as_many(shape)
-    whole = with_scan(plain, len(shape), seen)
-    np.testing.assert_array_equal(whole[: len(shape)], shape)
-    truth = KDTree(whole)
-    assert truth.query(seen)[0].mean() < 0.7 * KDTree(plain).query(seen)[0].mean()
-    behind = plain[plain[:, 0] < -0.5]
-    assert truth.query(behind)[0].max() == 0
 
 
 def test_levelling_may_cost_a_trace_of_the_fit():

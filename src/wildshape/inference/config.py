@@ -49,6 +49,8 @@ class RefineConfig:
         partner: each point of a refined shape gets another, in the middle between it and this many
             neighbours away: those of a decoder lie unevenly, and middles with the nearest ones
             would fall where there are enough.
+        seen_voxel_m: points of a LiDAR's scans, thinned to this, stand in for as many middles.
+        seen_near_m: those that are farther from all of the network's points do not.
     """
 
     iterations: int = 6
@@ -69,6 +71,8 @@ class RefineConfig:
     drawn_by: int = 8
     voxel_m: float = 0.08
     partner: int = 5
+    seen_voxel_m: float = 0.07
+    seen_near_m: float = 0.15
 
 
 @dataclass(frozen=True)
@@ -171,6 +175,7 @@ class TrackConfig:
         within_m: fits that move a pose farther are not believed.
         within_rad: fits that turn a pose farther are not believed.
         most_points: of all scans, fused.
+        shown_points: of all scans, those that can stand in for middles (`RefineConfig`).
         voting_points: of each scan, where views are laid on each other.
         voxel_m: the fused scans are thinned to this.
         reach_m: how far around a point of the shape the fused scans are looked for.
@@ -188,6 +193,7 @@ class TrackConfig:
     within_m: float = 1.5
     within_rad: float = 0.6
     most_points: int = 4096
+    shown_points: int = 32_768
     voting_points: int = 192
     voxel_m: float = 0.08
     reach_m: float = 0.12

@@ -27,8 +27,9 @@ from wildshape.inference.choose_hypothesis import (
 from wildshape.inference.compiled import compiled
 from wildshape.inference.confidence import glance_of, judged
 from wildshape.inference.config import InferenceConfig
+from wildshape.inference.densify import denser, partners, with_its_scan
 from wildshape.inference.free_space import Rays, Sights, without_free_space
-from wildshape.inference.refine import Refined, denser, partners, refine, with_scan
+from wildshape.inference.refine import Refined, refine
 from wildshape.inference.registration import fuse_scans, registered, to_middle
 from wildshape.inference.tracks.complete_track import Gathered, complete_together
 from wildshape.inference.tracks.joint_icp import key_scans
@@ -331,13 +332,17 @@ class Predictor:
         said = glance_of(scan, sensor, *found.said(i), self.settings, config.reasons)
         shape, T_sensor_can, points = posed.shapes[i], posed.T_sensor_canonical[i], posed.points[i]
         exact = self.settings.sensor == "camera"
-        whole, solid, standing = points.numpy(), shape, None
+        solid, standing = shape, None
+        whole = shown = points.numpy()
+        if self.refines:
+            shows = scan if exact else seen
+            shown = with_its_scan(whole, shape, shows, T_sensor_can, self.settings, config.refine)
         if sights is not None:
             alone = sights.part([i])
             solid = without_free_space(shape, stack([T_sensor_can]), alone)
             standing = alone.of(whole, 0)
         done = Completion(
-            points=with_scan(whole, len(shape), scan) if exact and self.refines else whole,
+            points=shown,
             pose=T_sensor_can.to(torch.float64).owned(),
             box=box_seen(
                 solid,

@@ -30,7 +30,7 @@ from wildshape.inference.config import RefineConfig, TrackConfig
 from wildshape.ops.nearest import nearest, nearest_k
 from wildshape.records import Points
 
-_SMALLEST_M, _FAR = 1e-6, 2.5
+_FAR = 2.5
 _DEFAULT = RefineConfig()
 
 
@@ -149,39 +149,6 @@ def drawn_to(
     near = gathered(seen.points.to(shapes.dtype), found.index)
     total = weight.sum(-1, keepdim=True) + config.stiffness
     return ((weight[..., None] * near).sum(2) + config.stiffness * shapes) / total
-
-
-def partners(points: Float[Tensor, "B P 3"], count: int = _DEFAULT.partner) -> Tensor:
-    """`(B, P)`: the place of each point's `count`th neighbour."""
-    whole, size = points.float(), points.shape[1]
-    if not is_mirrored(points):
-        return nearest_k(whole, whole, count + 1).index[..., count]
-    found = nearest_k(whole[:, : size // 2], whole, count + 1).index[..., count]
-    return torch.cat((found, (found + size // 2) % size), dim=1)
-
-
-def denser(points: Float[Tensor, "B P 3"], partner: Int64[Tensor, "B P"]) -> Tensor:
-    """`(B, 2 P, 3)`: the points, then the middles between each one and its partner."""
-    return torch.cat((points, (points + gathered(points, partner)) / 2), dim=1)
-
-
-def with_scan(whole: Points, own: int, scan: Points) -> Points:
-    """A shape of which the scan's own points take the place of some: for scans without noise.
-
-    Where the scan, dense and exact as a depth camera's, saw something, its points, as far apart as
-    the shape's, stand in for those that were added (`denser`).
-
-    Args:
-        whole: sensor frame; the shape's own points, then those added.
-        own: how many are the shape's own.
-        scan: the same frame.
-    """
-    points = torch.from_numpy(whole)[None]
-    apart = nearest_k(points, points, 2).distance_squared[0, :, 1].sqrt()
-    gap = max(float(apart.median()), _SMALLEST_M)
-    to_scan = nearest(points[:, own:], torch.from_numpy(scan)[None]).distance_squared[0].sqrt()
-    unseen = whole[own:][(to_scan > gap).numpy()]
-    return np.concatenate((whole[:own], unseen, voxel_thin(scan, gap))).astype(whole.dtype)
 
 
 class Fit(NamedTuple):

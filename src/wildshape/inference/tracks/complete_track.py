@@ -28,8 +28,9 @@ from wildshape.inference.confidence import (
     reasons_of_track,
 )
 from wildshape.inference.config import BoxConfig, InferenceConfig, ReasonRule, TrackConfig
+from wildshape.inference.densify import denser, partners, with_scan, with_seen
 from wildshape.inference.free_space import Rays, Sights, without_free_space
-from wildshape.inference.refine import denser, drawn_to, padded, partners, with_scan
+from wildshape.inference.refine import drawn_to, padded
 from wildshape.inference.tracks.heading_vote import (
     followed_signs,
     half_turn,
@@ -149,7 +150,9 @@ def complete_together(
         solid = without_free_space(shape, fit.T_sensor_object, sights)
     fitted = _box(solid, scans, fit.T_sensor_object, settings, config.box)
     whole = _denser(shape, config) if settings.facing else shape
-    if settings.facing and not body:
+    if settings.facing and body:
+        whole = _with_seen(whole, shape, scans, fit.T_sensor_object, settings, config)
+    elif settings.facing:
         whole = _with_scans(whole, len(shape), scans, fit.T_sensor_object, config.track)
     cost = track_cost(shape, fit.T_sensor_object, inputs, settings)
     mean = float(np.mean([item.confidence for item in done]))
@@ -188,6 +191,22 @@ def _evidence(
 
 def _denser(shape: Float[Tensor, "P 3"], config: InferenceConfig) -> Float[Tensor, "Q 3"]:
     return denser(shape[None], partners(shape[None], config.refine.partner))[0]
+
+
+def _with_seen(
+    whole: Float[Tensor, "Q 3"],
+    shape: Float[Tensor, "P 3"],
+    scans: list[Points],
+    T_sensor_object: SE3,
+    settings: ModelSettings,
+    config: InferenceConfig,
+) -> Float[Tensor, "Q 3"]:
+    """A shape with points of all its scans, as one scan's has its own; object frame."""
+    mirror, unit = settings.network.mirror, settings.unit
+    seen = fused(scans, T_sensor_object, slice(None), config.track.shown_points).numpy()
+    middles, own = whole[len(shape) :].float().numpy(), shape.float().numpy()
+    added = with_seen(middles, own, seen, mirror=mirror, unit=unit, config=config.refine)
+    return torch.cat((whole[: len(shape)], torch.from_numpy(added).to(whole)))
 
 
 def _with_scans(

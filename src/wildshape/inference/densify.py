@@ -1,0 +1,135 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Twice as many points as a network gives: middles between its own, then what the scans saw.
+
+Beyond the paper. A decoder's points lie unevenly and miss what is small: mirrors, bumpers, the
+edges of roofs. The scans in hand have points there.
+"""
+
+import numpy as np
+import torch
+from jaxtyping import Float, Int64
+from torch import Tensor
+
+from wildshape.geometry.sampling import thin, voxel_thin
+from wildshape.geometry.surface import gathered, is_mirrored
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.config import RefineConfig
+from wildshape.method.checkpoint import ModelSettings
+from wildshape.ops.nearest import nearest, nearest_k
+from wildshape.records import Points
+
+_SMALLEST_M = 1e-6
+_DEFAULT = RefineConfig()
+_REFLECTED = np.array((1, -1, 1), np.float32)
+
+
+def partners(points: Float[Tensor, "B P 3"], count: int = _DEFAULT.partner) -> Tensor:
+    """`(B, P)`: the place of each point's `count`th neighbour."""
+    whole, size = points.float(), points.shape[1]
+    if not is_mirrored(points):
+        return nearest_k(whole, whole, count + 1).index[..., count]
+    found = nearest_k(whole[:, : size // 2], whole, count + 1).index[..., count]
+    return torch.cat((found, (found + size // 2) % size), dim=1)
+
+
+def denser(points: Float[Tensor, "B P 3"], partner: Int64[Tensor, "B P"]) -> Tensor:
+    """`(B, 2 P, 3)`: the points, then the middles between each one and its partner."""
+    return torch.cat((points, (points + gathered(points, partner)) / 2), dim=1)
+
+
+def with_its_scan(
+    whole: Points,
+    shape: Float[Tensor, "P 3"],
+    scan: Points,
+    T_sensor_canonical: SE3,
+    settings: ModelSettings,
+    config: RefineConfig = _DEFAULT,
+) -> Points:
+    """A shape with what its scan shows, sensor frame; as it was if it has no middles.
+
+    Args:
+        whole: sensor frame; the shape's own points, then middles (`denser`).
+        shape: its own, canonical frame.
+        scan: sensor frame.
+        T_sensor_canonical: the pose.
+        settings: of the weights.
+        config: how near, and how dense.
+    """
+    own = len(shape)
+    if settings.sensor == "camera":
+        return with_scan(whole, own, scan)
+    if len(whole) == own:
+        return whole
+    T_canonical_sensor = T_sensor_canonical.inverse()
+    middles, seen = (T_canonical_sensor.apply_numpy(part) for part in (whole[own:], scan))
+    mirror, unit = settings.network.mirror, settings.unit
+    added = with_seen(middles, shape.numpy(), seen, mirror=mirror, unit=unit, config=config)
+    return np.concatenate((whole[:own], T_sensor_canonical.apply_numpy(added)))
+
+
+def with_scan(whole: Points, own: int, scan: Points) -> Points:
+    """A shape of which the scan's own points take the place of some: for scans without noise.
+
+    Where the scan, dense and exact as a depth camera's, saw something, its points, as far apart as
+    the shape's, stand in for those that were added (`denser`).
+
+    Args:
+        whole: sensor frame; the shape's own points, then those added.
+        own: how many are the shape's own.
+        scan: the same frame.
+    """
+    points = torch.from_numpy(whole)[None]
+    apart = nearest_k(points, points, 2).distance_squared[0, :, 1].sqrt()
+    gap = max(float(apart.median()), _SMALLEST_M)
+    to_scan = nearest(points[:, own:], torch.from_numpy(scan)[None]).distance_squared[0].sqrt()
+    unseen = whole[own:][(to_scan > gap).numpy()]
+    return np.concatenate((whole[:own], unseen, voxel_thin(scan, gap))).astype(whole.dtype)
+
+
+def with_seen(
+    middles: Points,
+    shape: Points,
+    seen: Points,
+    *,
+    mirror: bool,
+    unit: float = 1.0,
+    config: RefineConfig = _DEFAULT,
+) -> Points:
+    """Middles of a shape, of which those nearest to what was seen make room for it.
+
+    For LiDARs: their scans have noise and gaps, so the shape's own points stay, and what lies far
+    from all of them is not believed. What was seen of one side of a symmetric shape is known of the
+    other.
+
+    Args:
+        middles: what `denser` added, canonical frame.
+        shape: the shape's own points, the same frame.
+        seen: points of its scans, the same frame.
+        mirror: the second half of the points is the first one's reflection in y = 0.
+        unit: the shape's (`unit_of`).
+        config: how near, and how dense.
+
+    Returns:
+        As many points as `middles`.
+    """
+    kept = middles[: len(middles) // 2] if mirror else middles
+    shown = voxel_thin(_one_side(seen) if mirror else seen, config.seen_voxel_m * unit)
+    shown = shown[_apart(shown, shape) < config.seen_near_m * unit]
+    shown = thin(shown, len(kept))
+    if not len(shown):
+        return middles
+    order = np.argsort(_apart(_one_side(kept) if mirror else kept, shown), kind="stable")
+    some = np.concatenate((kept[np.sort(order[len(shown) :])], shown))
+    return np.concatenate((some, some * _REFLECTED)) if mirror else some
+
+
+def _one_side(points: Points) -> Points:
+    """The points, those right of y = 0 reflected."""
+    return np.stack((points[:, 0], np.abs(points[:, 1]), points[:, 2]), axis=1)
+
+
+def _apart(points: Points, others: Points) -> Float[np.ndarray, "n"]:
+    """How far each point is from the nearest of the others."""
+    found = nearest(torch.from_numpy(points)[None], torch.from_numpy(others)[None])
+    return found.distance_squared[0].sqrt().numpy()
