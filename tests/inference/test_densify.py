@@ -10,7 +10,7 @@ from tests.cars import car_surface
 
 from wildshape.geometry.sampling import voxel_thin
 from wildshape.inference.config import RefineConfig
-from wildshape.inference.densify import denser, partners, with_scan, with_seen
+from wildshape.inference.densify import denser, partners, with_exact, with_seen
 
 SHAPE = car_surface(4000, seed=5)[0].astype(np.float32)
 OTHER_SIDE = np.array((1, -1, 1), np.float32)
@@ -34,21 +34,32 @@ def test_denser_fills_gaps_and_keeps_the_points():
     assert KDTree(dense).query(other)[0].mean() < 0.9 * KDTree(SHAPE).query(other)[0].mean()
 
 
+def symmetric(points):
+    return np.concatenate((points, points * OTHER_SIDE))
+
+
 def test_an_exact_scan_takes_the_place_of_points_put_between():
-    """The network's own points stay first; what the scan saw is nearer, the rest is as it was."""
+    """What the scan saw is nearer, the rest is as it was."""
     shape = SHAPE[::4] + np.array((0.0, 0.0, 0.04), dtype=np.float32)
     seen = SHAPE[SHAPE[:, 0] > 0]
     plain = twice_as_many(shape)
-    whole = with_scan(plain, len(shape), seen)
-    np.testing.assert_array_equal(whole[: len(shape)], shape)
-    truth = KDTree(whole)
+    added = with_exact(plain[len(shape) :], shape, seen, mirror=False)
+    truth = KDTree(np.concatenate((shape, added)))
     assert truth.query(seen)[0].mean() < 0.7 * KDTree(plain).query(seen)[0].mean()
     behind = plain[plain[:, 0] < -0.5]
     assert truth.query(behind)[0].max() == 0
 
 
-def symmetric(points):
-    return np.concatenate((points, points * OTHER_SIDE))
+def test_what_an_exact_scan_saw_of_one_side_is_on_both():
+    shape = symmetric(SHAPE[SHAPE[:, 1] > 0][::8]) + np.array((0.0, 0.0, 0.04), dtype=np.float32)
+    seen = SHAPE[SHAPE[:, 1] > 0.2]
+    middles = twice_as_many(shape)[len(shape) :]
+    apart = {}
+    for mirror in (True, False):
+        whole = KDTree(np.concatenate((shape, with_exact(middles, shape, seen, mirror=mirror))))
+        apart[mirror] = [whole.query(side)[0].mean() for side in (seen, seen * OTHER_SIDE)]
+    assert apart[True][1] == pytest.approx(apart[True][0], rel=0.02)
+    assert apart[True][1] < 0.7 * apart[False][1]
 
 
 def lidar_points(points, seen, mirror=True, **options):

@@ -56,35 +56,47 @@ def with_its_scan(
         settings: of the weights.
         config: how near, and how dense.
     """
-    own = len(shape)
-    if settings.sensor == "camera":
-        return with_scan(whole, own, scan)
-    if len(whole) == own:
+    if len(whole) == len(shape):
         return whole
     T_canonical_sensor = T_sensor_canonical.inverse()
-    middles, seen = (T_canonical_sensor.apply_numpy(part) for part in (whole[own:], scan))
-    mirror, unit = settings.network.mirror, settings.unit
-    added = with_seen(middles, shape.numpy(), seen, mirror=mirror, unit=unit, config=config)
-    return np.concatenate((whole[:own], T_sensor_canonical.apply_numpy(added)))
+    middles, seen = (T_canonical_sensor.apply_numpy(part) for part in (whole[len(shape) :], scan))
+    added = shown(middles, shape.numpy(), seen, settings, config)
+    return np.concatenate((whole[: len(shape)], T_sensor_canonical.apply_numpy(added)))
 
 
-def with_scan(whole: Points, own: int, scan: Points) -> Points:
-    """A shape of which the scan's own points take the place of some: for scans without noise.
+def shown(
+    middles: Points,
+    shape: Points,
+    seen: Points,
+    settings: ModelSettings,
+    config: RefineConfig = _DEFAULT,
+) -> Points:
+    """What is added to a shape's own points: middles, and what scans saw (`with_seen`)."""
+    mirror = settings.network.mirror
+    if settings.sensor == "camera":
+        return with_exact(middles, shape, seen, mirror=mirror)
+    return with_seen(middles, shape, seen, mirror=mirror, unit=settings.unit, config=config)
 
-    Where the scan, dense and exact as a depth camera's, saw something, its points, as far apart as
-    the shape's, stand in for those that were added (`denser`).
+
+def with_exact(middles: Points, shape: Points, seen: Points, *, mirror: bool) -> Points:
+    """Middles of a shape but where it was seen, and there what was: for scans without noise.
+
+    Where scans, dense and exact as a depth camera's, saw something, their points, as far apart as
+    the shape's, stand in for the middles. What was seen of one side of a symmetric shape is known
+    of the other.
 
     Args:
-        whole: sensor frame; the shape's own points, then those added.
-        own: how many are the shape's own.
-        scan: the same frame.
+        middles: what `denser` added, canonical frame.
+        shape: the shape's own points, the same frame.
+        seen: points of its scans, the same frame.
+        mirror: the shape is symmetric to y = 0.
     """
-    points = torch.from_numpy(whole)[None]
+    points = torch.from_numpy(np.concatenate((shape, middles)))[None]
     apart = nearest_k(points, points, 2).distance_squared[0, :, 1].sqrt()
     gap = max(float(apart.median()), _SMALLEST_M)
-    to_scan = nearest(points[:, own:], torch.from_numpy(scan)[None]).distance_squared[0].sqrt()
-    unseen = whole[own:][(to_scan > gap).numpy()]
-    return np.concatenate((whole[:own], unseen, voxel_thin(scan, gap))).astype(whole.dtype)
+    seen = np.concatenate((seen, seen * _REFLECTED)) if mirror else seen
+    unseen = middles[_apart(middles, seen) > gap]
+    return np.concatenate((unseen, voxel_thin(seen, gap))).astype(middles.dtype)
 
 
 def with_seen(

@@ -332,17 +332,14 @@ class Predictor:
         said = glance_of(scan, sensor, *found.said(i), self.settings, config.reasons)
         shape, T_sensor_can, points = posed.shapes[i], posed.T_sensor_canonical[i], posed.points[i]
         exact = self.settings.sensor == "camera"
-        solid, standing = shape, None
-        whole = shown = points.numpy()
-        if self.refines:
-            shows = scan if exact else seen
-            shown = with_its_scan(whole, shape, shows, T_sensor_can, self.settings, config.refine)
+        whole, solid, standing = points.numpy(), shape, None
+        shows = with_its_scan(whole, shape, seen, T_sensor_can, self.settings, config.refine)
         if sights is not None:
             alone = sights.part([i])
             solid = without_free_space(shape, stack([T_sensor_can]), alone)
             standing = alone.of(whole, 0)
         done = Completion(
-            points=shown,
+            points=shows,
             pose=T_sensor_can.to(torch.float64).owned(),
             box=box_seen(
                 solid,

@@ -28,7 +28,7 @@ from wildshape.inference.confidence import (
     reasons_of_track,
 )
 from wildshape.inference.config import BoxConfig, InferenceConfig, ReasonRule, TrackConfig
-from wildshape.inference.densify import denser, partners, with_scan, with_seen
+from wildshape.inference.densify import denser, partners, shown
 from wildshape.inference.free_space import Rays, Sights, without_free_space
 from wildshape.inference.refine import drawn_to, padded
 from wildshape.inference.tracks.heading_vote import (
@@ -150,10 +150,11 @@ def complete_together(
         solid = without_free_space(shape, fit.T_sensor_object, sights)
     fitted = _box(solid, scans, fit.T_sensor_object, settings, config.box)
     whole = _denser(shape, config) if settings.facing else shape
-    if settings.facing and body:
-        whole = _with_seen(whole, shape, scans, fit.T_sensor_object, settings, config)
-    elif settings.facing:
-        whole = _with_scans(whole, len(shape), scans, fit.T_sensor_object, config.track)
+    if settings.facing:
+        seen = _shown_by(scans, fit.T_sensor_object, whole, settings, config.track)
+        middles, own = whole[len(shape) :].float().numpy(), shape.float().numpy()
+        added = shown(middles, own, seen.numpy(), settings, config.refine)
+        whole = torch.cat((shape, torch.from_numpy(added).to(shape)))
     cost = track_cost(shape, fit.T_sensor_object, inputs, settings)
     mean = float(np.mean([item.confidence for item in done]))
     reasons = reasons_of_track(done, config.reasons) if body else ()
@@ -193,41 +194,26 @@ def _denser(shape: Float[Tensor, "P 3"], config: InferenceConfig) -> Float[Tenso
     return denser(shape[None], partners(shape[None], config.refine.partner))[0]
 
 
-def _with_seen(
-    whole: Float[Tensor, "Q 3"],
-    shape: Float[Tensor, "P 3"],
+def _shown_by(
     scans: list[Points],
     T_sensor_object: SE3,
+    whole: Float[Tensor, "Q 3"],
     settings: ModelSettings,
-    config: InferenceConfig,
-) -> Float[Tensor, "Q 3"]:
-    """A shape with points of all its scans, as one scan's has its own; object frame."""
-    mirror, unit = settings.network.mirror, settings.unit
-    seen = fused(scans, T_sensor_object, slice(None), config.track.shown_points).numpy()
-    middles, own = whole[len(shape) :].float().numpy(), shape.float().numpy()
-    added = with_seen(middles, own, seen, mirror=mirror, unit=unit, config=config.refine)
-    return torch.cat((whole[: len(shape)], torch.from_numpy(added).to(whole)))
-
-
-def _with_scans(
-    whole: Float[Tensor, "Q 3"],
-    own: int,
-    scans: list[Points],
-    T_sensor_object: SE3,
     config: TrackConfig,
-) -> Float[Tensor, "R 3"]:
-    """A shape with points of its scans, as one scan's has its own (`with_scan`); object frame.
+) -> Float[Tensor, "n 3"]:
+    """Points of the scans that can be shown in their object, object frame.
 
-    Scans that lie farther from it than twice the usual are left out: their poses may be wrong.
+    Depth views that lie farther from it than twice the usual are left out: their poses may be
+    wrong. Of a LiDAR's scans only points near it are shown.
     """
+    if settings.sensor == "lidar":
+        return fused(scans, T_sensor_object, slice(None), config.shown_points)
     each = max(1, config.most_points // len(scans))
     seen = [fused([s], T_sensor_object[i : i + 1], slice(None), each) for i, s in enumerate(scans)]
     target = whole.float()[None]
     off = [float(nearest(one[None], target).distance_squared.sqrt().mean()) for one in seen]
     usual = float(np.median(off))
-    near = torch.cat([one for one, apart in zip(seen, off) if apart <= _ASTRAY * usual])
-    points = with_scan(whole.float().numpy(), own, near.numpy())
-    return torch.from_numpy(points).to(whole)
+    return torch.cat([one for one, apart in zip(seen, off) if apart <= _ASTRAY * usual])
 
 
 def _in_units(scans: list[Points], T_sensor_object: SE3, unit: float) -> tuple[list[Points], SE3]:
