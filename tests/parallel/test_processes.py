@@ -186,6 +186,19 @@ def test_short_work_is_done_here(two, monkeypatch):
     assert two.worked == ALONE.worked == 1
 
 
+def test_helpers_told_of_long_work_help_at_once(tmp_path, monkeypatch):
+    """They have begun before it does, and short work, too, is worth it then."""
+    monkeypatch.setattr(processes, "_WORTH_S", 60.0)
+    with team(2, soon=Who) as both:
+        assert len(set(both.as_done(Who(tmp_path), range(20)))) == 2
+
+
+def test_what_cannot_be_told_to_helpers_beforehand_is_done_here(monkeypatch):
+    monkeypatch.setattr(processes, "_WORTH_S", 60.0)
+    with team(2, soon=lambda: None) as both:
+        assert list(both.in_order(str, range(3))) == ["0", "1", "2"]
+
+
 def test_what_a_killed_helper_held_is_done_again_and_once(two, tmp_path):
     assert list(two.in_order(KilledOnce(tmp_path), range(10))) == list(range(10))
     assert any(tmp_path.glob("killed at *"))

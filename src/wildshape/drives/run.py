@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from wildshape.drives.adapting.adapt import Adaptation
 
 _DEFAULT, _NO_FILES = DriveConfig(), DriveFiles()
+_LONG = 20  # scans take longer than a helper's start
 
 
 def drive(
@@ -81,7 +82,8 @@ def drive(
     done = None if overwrite else finished(out, "drive", settings, parts=(BOXES, FRAMES))
     if done is None:
         output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
-        with team(workers) as helpers, output.abandoned_if_refused():
+        soon = Pipeline if len(recording) >= _LONG else None
+        with team(workers, soon=soon) as helpers, output.abandoned_if_refused():
             found = replace(run, helpers=helpers).perform()
         output.finish(result={**asdict(found), "out": str(out)})
     else:

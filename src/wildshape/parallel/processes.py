@@ -39,6 +39,11 @@ class Processes:
         """How many processes have done some of the work until now."""
         return 1 + sum(one.helped for one in self._assistants)
 
+    def begin(self, task: Callable[[Any], Any]) -> None:
+        """Start the helpers, for work known to be long: they import what such a task needs."""
+        for one in self._assistants:
+            one.assist(task, None)
+
     def in_order(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
         """`task(item)` of all items, in order; few results are kept in memory.
 
@@ -78,6 +83,9 @@ class Processes:
             threads.restore()
 
 
+_Job = tuple[Callable[[Any], Any], Handout[Any, Any] | None]
+
+
 class _Assistant:
     """A thread that gives items to a helper, until `close`, or until Python ends (`_end_all`).
 
@@ -89,15 +97,13 @@ class _Assistant:
     def __init__(self) -> None:
         self.ready = self.helped = False
         self._helper = Helper()
-        self._jobs: SimpleQueue[tuple[Callable[[Any], Any], Handout[Any, Any]] | None] = (
-            SimpleQueue()
-        )
+        self._jobs: SimpleQueue[_Job | None] = SimpleQueue()
         self._handout: Handout[Any, Any] | None = None
         self._closed = False
         self._thread = Thread(target=self._run, daemon=True)
 
-    def assist(self, task: Callable[[Any], Any], handout: Handout[Any, Any]) -> None:
-        """Help with this, once the work before is done."""
+    def assist(self, task: Callable[[Any], Any], handout: Handout[Any, Any] | None) -> None:
+        """Help with this, once the work before is done; None: be ready for such a task."""
         if self._thread.ident is None:
             _STARTED.difference_update([one for one in tuple(_STARTED) if not one.is_alive()])
             self._thread.start()
@@ -128,15 +134,16 @@ class _Assistant:
             self._help(task, handout)
         self._handout = None
 
-    def _help(self, task: Callable[[Any], Any], handout: Handout[Any, Any]) -> None:
-        if not self.ready and handout.ends_within(_WORTH_S):
+    def _help(self, task: Callable[[Any], Any], handout: Handout[Any, Any] | None) -> None:
+        if not self.ready and handout is not None and handout.ends_within(_WORTH_S):
             return
         with suppress(UnknownTaskError, OSError):  # then it is done without help
             self._helper.learn(task)
-            self._serve(handout)
+            self.ready = True
+            if handout is not None:
+                self._serve(handout)
 
     def _serve(self, handout: Handout[Any, Any]) -> None:
-        self.ready = True
         while (taken := handout.take(lambda: self._closed)) is not None:
             number, item = taken
             try:

@@ -5,7 +5,7 @@
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Protocol, TypeVar, runtime_checkable
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from wildshape.errors import BadInputError
 from wildshape.parallel.processes import Processes
@@ -43,12 +43,15 @@ ALONE: Team = Processes(1)
 
 
 @contextmanager
-def team(workers: int | None = None, ray: str | None = None) -> Iterator[Team]:
+def team(
+    workers: int | None = None, ray: str | None = None, soon: Callable[..., Any] | None = None
+) -> Iterator[Team]:
     """The processes of this machine, or a cluster's; the end of the block ends them.
 
     Args:
         workers: how many; None: one a core.
         ray: address of a Ray cluster in place of this machine (`on_ray`).
+        soon: what long work will need; this machine's helpers import it at once.
 
     Raises:
         BadInputError: fewer than one worker; no cluster answers there.
@@ -61,6 +64,8 @@ def team(workers: int | None = None, ray: str | None = None) -> Iterator[Team]:
             yield cluster
         return
     found = Processes(cores() if workers is None else workers)
+    if soon is not None:
+        found.begin(soon)
     try:
         yield found
     finally:
