@@ -60,6 +60,19 @@ def test_crumbs_are_left_out():
     assert mesh.vertices[:, 0].max() < 1.2
 
 
+def test_seats_behind_glass_dent_no_window():
+    """A window has few points, and what is seen through it lies 0.2 m deeper."""
+    rng = np.random.default_rng(4)
+    body = trimesh.creation.box((4.4, 1.8, 1.5))
+    points = np.asarray(trimesh.sample.sample_surface(body, 8000, seed=rng)[0])
+    window = (np.abs(points[:, 0]) < 0.4) & (np.abs(points[:, 2]) < 0.3) & (points[:, 1] > 0.85)
+    glass = points[window]
+    seats = glass[::2] - np.array([0, 0.2, 0])
+    mesh = closed_mesh(np.concatenate((points[~window], glass[::4], seats)))
+    there = mesh.vertices[(np.abs(mesh.vertices[:, [0, 2]]) < 0.2).all(1)]
+    assert there[there[:, 1] > 0, 1].min() > 0.85
+
+
 def test_one_place_is_no_shape():
     with pytest.raises(BadInputError, match="all equal"):
         closed_mesh(np.ones((20, 3), np.float32))

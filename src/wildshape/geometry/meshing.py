@@ -51,6 +51,8 @@ class MeshConfig:
         around: of the longest side: the neighbourhood in whose mean the surface is centred.
         rounds: of centring.
         few: of the densest place: where there are fewer points, none are followed.
+        within: of the longest side: points so deep in the solid are not followed: seats behind
+            glass.
     """
 
     cells: int = 96
@@ -63,6 +65,7 @@ class MeshConfig:
     around: float = 0.021
     rounds: int = 3
     few: float = 0.1
+    within: float = 0.03
 
 
 class _Grid(NamedTuple):
@@ -168,7 +171,9 @@ def _centred(
     """The same with the points as deep as `level` in the mean of every neighbourhood."""
     from scipy.ndimage import gaussian_filter
 
-    width = config.around * float(np.ptp(points, axis=0).max()) / grid.step
+    extent = float(np.ptp(points, axis=0).max())
+    width = config.around * extent / grid.step
+    points = points[_interpolate(depth, grid, points) < level + config.within * extent]
     cells = tuple(np.rint((points - grid.start) / grid.step).astype(int).T)
     number = np.zeros(depth.shape)
     np.add.at(number, cells, 1.0)
