@@ -45,18 +45,19 @@ from wildshape.drives.tracking.sightings import Sightings, read_sightings, write
 from wildshape.drives.tracking.static_tracks import joined_where_they_stand
 from wildshape.drives.tracking.tracks import linked_clusters
 from wildshape.drives.tracking.trajectory import FIRST_SCANS, Breaks, find_trajectory, jumps
-from wildshape.drives.writing.folder import FRAMES, TRAJECTORY
+from wildshape.drives.writing.folder import BOXES, FRAMES, TRAJECTORY
 from wildshape.drives.writing.outputs import (
     RayWriter,
     Vehicle,
+    VehicleWriter,
     write_frames,
     write_trajectories,
-    write_vehicles,
 )
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import OBJECTS
 from wildshape.inference.predictor import Predictor
 from wildshape.io.atomic import write_json
+from wildshape.io.boxes.table import BoxRow, write_box_table
 from wildshape.io.guard import read_record
 from wildshape.io.poses import read_poses
 from wildshape.parallel.team import Team
@@ -299,9 +300,14 @@ class Pipeline:
         if self.config.rays:
             writer = RayWriter.of(self.results, vehicles, self.drive, self.cuts)
             self.spread("rays", writer, sorted(writer.files), len(writer.files))
+        folders, rows = self.completing / "objects", list[BoxRow]()
         with self.clock.stage("outputs", len(vehicles)) as at:
-            folders = self.completing / "objects"
-            return write_vehicles(self.results, vehicles, folders, self.cuts, self.drive, turns, at)
+            write = VehicleWriter(self.results, folders, self.cuts, self.drive, turns)
+            for number, found in enumerate(self.helpers.in_order(write, vehicles), 1):
+                rows += found
+                at(number)
+            write_box_table(self.results / BOXES, rows)
+        return len(rows)
 
     def warnings(self, T_world_sensor: SE3, mounting: Mounting) -> tuple[str, ...]:
         """What is odd about the drive; writes `frames.csv` on the way."""

@@ -5,7 +5,7 @@
 import csv
 import io
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,12 +19,12 @@ from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.rays import RayCutter
 from wildshape.drives.tracking.sightings import Sightings
-from wildshape.drives.writing.folder import BOXES, SHAPES, TRACKS, TRAJECTORY, TUM
+from wildshape.drives.writing.folder import SHAPES, TRACKS, TRAJECTORY, TUM
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import COMPLETED, OBJECTS
 from wildshape.io.atomic import write_text
 from wildshape.io.boxes.detections import detections_of, pose_of
-from wildshape.io.boxes.table import BoxRow, write_box_table
+from wildshape.io.boxes.table import BoxRow
 from wildshape.io.guard import read_json
 from wildshape.io.poses import write_poses, write_tum
 from wildshape.io.rays import rays_bytes
@@ -83,7 +83,7 @@ class RayWriter:
 
     @classmethod
     def of(cls, out: Path, vehicles: Sequence[Vehicle], drive: Drive, cuts: Path) -> "RayWriter":
-        """For the vehicles whose track folders are not there yet; arguments as `write_vehicle`."""
+        """For the vehicles whose track folders are not there yet; as `VehicleWriter`."""
         files: dict[int, list[tuple[Path, tuple[int, ...]]]] = {}
         for seen in (one.completed.seen for one in vehicles):
             track = out / TRACKS / seen.name
@@ -104,51 +104,31 @@ class RayWriter:
                 path.write_bytes(rays_bytes(rays))
 
 
-def write_vehicles(
-    out: Path,
-    vehicles: Sequence[Vehicle],
-    folders: Path,
-    cuts: Path,
-    drive: Drive,
-    turns: Turns,
-    at: Callable[[int], None],
-) -> int:
-    """`boxes.csv`, and of each vehicle what `write_vehicle` writes.
+@dataclass(frozen=True)
+class VehicleWriter:
+    """Writes a vehicle's track, completed object and shape, as far as they are not there yet.
 
-    Args:
+    Attributes:
         out: folder of the results.
-        vehicles: of the drive.
         folders: of the completed objects.
         cuts: folder of the clusters.
         drive: whose.
         turns: of its sensor.
-        at: told how many vehicles are done.
-
-    Returns:
-        Lines of `boxes.csv`.
     """
-    rows = []
-    for number, one in enumerate(vehicles, 1):
-        write_vehicle(out, one, folders / one.name, cuts, drive)
-        rows += rows_of(one, boxes_of(one, turns), drive)
-        at(number)
-    write_box_table(out / BOXES, rows)
-    return len(rows)
 
+    out: Path
+    folders: Path
+    cuts: Path
+    drive: Drive
+    turns: Turns
 
-def write_vehicle(out: Path, one: Vehicle, folder: Path, cuts: Path, drive: Drive) -> None:
-    """A vehicle's track, completed object and shape, as far as they are not there yet.
-
-    Args:
-        out: folder of the results.
-        one: of the drive.
-        folder: of its completed object.
-        cuts: folder of the clusters.
-        drive: whose.
-    """
-    write_vehicle_track(out / TRACKS, one.completed.seen, cuts, drive)
-    copy_object(folder, out / "objects" / one.name)
-    write_shape(out / SHAPES / f"{one.name}.ply", folder, one.completed)
+    def __call__(self, one: Vehicle) -> list[BoxRow]:
+        """The vehicle's lines of `boxes.csv`."""
+        folder = self.folders / one.name
+        write_vehicle_track(self.out / TRACKS, one.completed.seen, self.cuts, self.drive)
+        copy_object(folder, self.out / "objects" / one.name)
+        write_shape(self.out / SHAPES / f"{one.name}.ply", folder, one.completed)
+        return rows_of(one, boxes_of(one, self.turns), self.drive)
 
 
 def write_vehicle_track(out: Path, seen: Sightings, cuts: Path, drive: Drive) -> None:
