@@ -92,7 +92,7 @@ def test_what_a_lidar_saw_of_one_side_is_in_the_shape_on_both():
 
 
 def test_an_object_that_is_not_symmetric_gets_what_was_seen_where_it_was_seen():
-    seen = SHAPE[(SHAPE[:, 0] > 0) & (SHAPE[:, 1] > 0)] + np.float32((0, 0.1, 0))
+    seen = SHAPE[(SHAPE[:, 0] > 0) & (SHAPE[:, 1] > 0)] + np.array((0, 0.1, 0), np.float32)
     config = RefineConfig(seen_near_m=0.5)
     whole = lidar_points(SHAPE[::2], seen, mirror=False, config=config)
     thinned = voxel_thin(seen, config.seen_voxel_m)
