@@ -11,10 +11,12 @@ from pathlib import Path
 import torch
 
 from wildshape.errors import BadInputError
+from wildshape.geometry.densify import denser, partners
 from wildshape.geometry.ground import without_skirt
 from wildshape.geometry.sampling import sorted_points
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference import point_inputs
+from wildshape.inference.boxes import box_seen
 from wildshape.inference.choose_hypothesis import (
     Found,
     Looked,
@@ -24,18 +26,17 @@ from wildshape.inference.choose_hypothesis import (
     network_input,
 )
 from wildshape.inference.compiled import compiled
+from wildshape.inference.confidence import glance_of, judged
 from wildshape.inference.config import InferenceConfig
-from wildshape.inference.densify import denser, partners
-from wildshape.inference.free_space import Rays, Sights
-from wildshape.inference.one_scan import completion_of
-from wildshape.inference.refine import Refined, refine
+from wildshape.inference.free_space import Rays, Sights, without_free_space
+from wildshape.inference.refine import Refined, refine, with_its_scan
 from wildshape.inference.registration import fuse_scans, registered, to_middle
 from wildshape.inference.tracks.complete_track import Gathered, complete_together
 from wildshape.inference.tracks.joint_icp import key_scans
 from wildshape.io.scans.points import LEAST_POINTS
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint, weights_file
 from wildshape.method.network import ShapePoseNet
-from wildshape.method.trust_features import surfaces
+from wildshape.method.trust_features import scan_features, surfaces
 from wildshape.ops.device import choose_device, plain_torch
 from wildshape.records import Completion, Points, Registration, Sensor
 
@@ -289,9 +290,7 @@ class Predictor:
         """Each scan that was looked at on its own; `dense`: of twice as many points."""
         found, seen = looked.found, [sorted_points(one) for one in looked.seen]
         posed = self._refined(seen, found, dense) if self.refines else Posed.of(found)
-        told = sensor, self.settings, self.config
-        count = len(looked.scans)
-        return [completion_of(looked, i, posed, *told, refined=self.refines) for i in range(count)]
+        return [self._completion(looked, i, posed, sensor) for i in range(len(looked.scans))]
 
     def _found(self, scans: Sequence[Points], sights: Sights | None) -> Found:
         """What the network says of scans, on the host."""
@@ -323,6 +322,47 @@ class Predictor:
         looks = surfaces(seen, done.rotation) if self.settings.sensor == "lidar" else ()
         points = denser(posed, partners(found.shapes, config.partner)) if dense else posed
         return Posed(done.shapes, T_sensor_canonical, points, looks)
+
+    def _completion(
+        self, looked: Looked, i: int, posed: Posed, sensor: Sensor | None
+    ) -> Completion:
+        """Scan `i` of those looked at."""
+        scan, seen, found, sights = looked.scans[i], looked.seen[i], looked.found, looked.sights
+        mirror, config, trust = self.settings.network.mirror, self.config, self.settings.trust
+        said = glance_of(scan, sensor, *found.said(i), self.settings, config.reasons)
+        shape, T_sensor_can, points = posed.shapes[i], posed.T_sensor_canonical[i], posed.points[i]
+        exact = self.settings.sensor == "camera"
+        whole, solid, standing = points.numpy(), shape, None
+        shows = with_its_scan(whole, shape, seen, T_sensor_can, self.settings, config.refine)
+        if sights is not None:
+            alone = sights.part([i])
+            solid = without_free_space(shape, stack([T_sensor_can]), alone)
+            standing = alone.of(whole, 0)
+        done = Completion(
+            points=shows,
+            pose=T_sensor_can.to(torch.float64).owned(),
+            box=box_seen(
+                solid,
+                T_sensor_can,
+                seen,
+                mirror=mirror,
+                body=not exact,
+                unit=self.settings.unit,
+                config=config.box,
+            ),
+            confidence=said.confidence,
+            branch=said.branch,
+            cost=float(found.cost[i]),
+            refined=self.refines,
+            warning=said.warning,
+            reasons=said.reasons,
+            features=said.features,
+        )
+        if not self.refines or exact:
+            return judged(done, None, None, self.settings, config.reasons)
+        rival = float(found.features[i, -1])
+        evidence = scan_features(done, seen, posed.surfaces[i], rival, standing)
+        return judged(done, trust and trust.scan, evidence, self.settings, config.reasons)
 
     def _off_ground(self, scan: Points, shape: Points, T_sensor_canonical: SE3) -> Points:
         """The scan without the ground beside its object, for networks that do not complete it."""

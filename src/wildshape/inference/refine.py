@@ -23,10 +23,13 @@ from jaxtyping import Bool, Float, Int64
 from torch import Tensor
 
 from wildshape.geometry.box import unit_of
+from wildshape.geometry.densify import with_exact, with_seen
 from wildshape.geometry.sampling import voxel_thin
 from wildshape.geometry.surface import gathered, is_mirrored, mirrored, planes, reflected
 from wildshape.geometry.transforms.rotation import cross_matrix, rotation_from_vector
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import RefineConfig, TrackConfig
+from wildshape.method.checkpoint import ModelSettings
 from wildshape.ops.nearest import nearest, nearest_k
 from wildshape.records import Points
 
@@ -274,3 +277,44 @@ def _with_level(
     weighted = across.mT * (kernel / level**2)[:, None, None]
     held = torch.nn.functional.pad(weighted @ across, (0, 6, 0, 6))
     return A + held, b + torch.nn.functional.pad((weighted @ off[..., None])[..., 0], (0, 6))
+
+
+def with_its_scan(
+    whole: Points,
+    shape: Float[Tensor, "P 3"],
+    scan: Points,
+    T_sensor_canonical: SE3,
+    settings: ModelSettings,
+    config: RefineConfig = _DEFAULT,
+) -> Points:
+    """A shape with what its scan shows, sensor frame; as it was if it has no middles.
+
+    Args:
+        whole: sensor frame; the shape's own points, then middles (`denser`).
+        shape: its own, canonical frame.
+        scan: sensor frame.
+        T_sensor_canonical: the pose.
+        settings: of the weights.
+        config: how near, and how dense.
+    """
+    if len(whole) == len(shape):
+        return whole
+    T_canonical_sensor = T_sensor_canonical.inverse()
+    middles, seen = (T_canonical_sensor.apply_numpy(part) for part in (whole[len(shape) :], scan))
+    added = shown(middles, shape.numpy(), seen, settings, config)
+    return np.concatenate((whole[: len(shape)], T_sensor_canonical.apply_numpy(added)))
+
+
+def shown(
+    middles: Points,
+    shape: Points,
+    seen: Points,
+    settings: ModelSettings,
+    config: RefineConfig = _DEFAULT,
+) -> Points:
+    """What is added to a shape's own points: middles, and what scans saw (`with_seen`)."""
+    mirror = settings.network.mirror
+    if settings.sensor == "camera":
+        return with_exact(middles, shape, seen, mirror=mirror)
+    voxel, near = (length * settings.unit for length in (config.seen_voxel_m, config.seen_near_m))
+    return with_seen(middles, shape, seen, mirror=mirror, voxel=voxel, near=near)

@@ -15,6 +15,7 @@ from jaxtyping import Float, Int64
 from torch import Tensor
 
 from wildshape.geometry.box import FittedBox
+from wildshape.geometry.densify import denser, partners
 from wildshape.geometry.sampling import sorted_points, voxel_thin
 from wildshape.geometry.surface import mirrored
 from wildshape.geometry.transforms.se3 import SE3, stack
@@ -28,9 +29,8 @@ from wildshape.inference.confidence import (
     reasons_of_track,
 )
 from wildshape.inference.config import BoxConfig, InferenceConfig, ReasonRule, TrackConfig
-from wildshape.inference.densify import denser, partners, shown
 from wildshape.inference.free_space import Rays, Sights, without_free_space
-from wildshape.inference.refine import drawn_to, padded
+from wildshape.inference.refine import drawn_to, padded, shown
 from wildshape.inference.tracks.heading_vote import (
     followed_signs,
     half_turn,

@@ -8,17 +8,17 @@ import torch
 from scipy.spatial import KDTree
 from tests.cars import car_surface
 
+from wildshape.geometry.densify import denser, partners, with_exact, with_seen
 from wildshape.geometry.sampling import voxel_thin
-from wildshape.inference.config import RefineConfig
-from wildshape.inference.densify import denser, partners, with_exact, with_seen
 
 SHAPE = car_surface(4000, seed=5)[0].astype(np.float32)
+VOXEL, NEAR, PARTNER = 0.07, 0.15, 5
 OTHER_SIDE = np.array((1, -1, 1), np.float32)
 
 
 def twice_as_many(points):
     given = torch.from_numpy(points)[None]
-    return denser(given, partners(given))[0].numpy()
+    return denser(given, partners(given, PARTNER))[0].numpy()
 
 
 def test_denser_fills_gaps_and_keeps_the_points():
@@ -62,9 +62,10 @@ def test_what_an_exact_scan_saw_of_one_side_is_on_both():
     assert apart[True][1] < 0.7 * apart[False][1]
 
 
-def lidar_points(points, seen, mirror=True, **options):
+def lidar_points(points, seen, mirror=True, voxel=VOXEL, near=NEAR):
     """The shape's own points, and those that `with_seen` adds."""
-    added = with_seen(twice_as_many(points)[len(points) :], points, seen, mirror=mirror, **options)
+    middles = twice_as_many(points)[len(points) :]
+    added = with_seen(middles, points, seen, mirror=mirror, voxel=voxel, near=near)
     return np.concatenate((points, added))
 
 
@@ -93,9 +94,8 @@ def test_what_a_lidar_saw_of_one_side_is_in_the_shape_on_both():
 
 def test_an_object_that_is_not_symmetric_gets_what_was_seen_where_it_was_seen():
     seen = SHAPE[(SHAPE[:, 0] > 0) & (SHAPE[:, 1] > 0)] + np.array((0, 0.1, 0), np.float32)
-    config = RefineConfig(seen_near_m=0.5)
-    whole = lidar_points(SHAPE[::2], seen, mirror=False, config=config)
-    thinned = voxel_thin(seen, config.seen_voxel_m)
+    whole = lidar_points(SHAPE[::2], seen, mirror=False, near=0.5)
+    thinned = voxel_thin(seen, VOXEL)
     assert KDTree(whole).query(thinned)[0].max() == 0
     assert KDTree(whole).query(thinned * OTHER_SIDE)[0].mean() > 0.05
 
@@ -113,10 +113,9 @@ def test_what_lies_far_from_the_shape_is_not_in_it():
 def test_more_was_seen_than_there_are_middles():
     """All of them make room, and no more than they were."""
     shape = symmetric(SHAPE[SHAPE[:, 1] > 0][:60])
-    config = RefineConfig(seen_near_m=0.5)
-    whole = lidar_points(shape, SHAPE, config=config)
+    whole = lidar_points(shape, SHAPE, near=0.5)
     assert len(whole) == 2 * len(shape)
-    apart = KDTree(voxel_thin(SHAPE * np.sign(SHAPE[:, 1:2]) ** (0, 1, 0), config.seen_voxel_m))
+    apart = KDTree(voxel_thin(SHAPE * np.sign(SHAPE[:, 1:2]) ** (0, 1, 0), VOXEL))
     left = whole[len(shape) : len(shape) * 3 // 2]
     assert apart.query(left)[0].max() < 0.02
 
@@ -125,5 +124,5 @@ def test_more_was_seen_than_there_are_middles():
 def test_of_shapes_half_as_large_all_is_half_as_large(mirror):
     shape, seen = symmetric(SHAPE[SHAPE[:, 1] > 0][::2]), SHAPE[SHAPE[:, 0] > 0]
     large = lidar_points(shape, seen, mirror)
-    small = lidar_points(shape / 2, seen / 2, mirror, unit=0.5)
+    small = lidar_points(shape / 2, seen / 2, mirror, VOXEL / 2, NEAR / 2)
     np.testing.assert_allclose(small, large / 2, atol=1e-6)

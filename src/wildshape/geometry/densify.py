@@ -8,23 +8,19 @@ edges of roofs. The scans in hand have points there.
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int64
+from jaxtyping import Float, Float32, Int64
 from torch import Tensor
 
 from wildshape.geometry.sampling import thin, voxel_thin
 from wildshape.geometry.surface import gathered, is_mirrored
-from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.config import RefineConfig
-from wildshape.method.checkpoint import ModelSettings
 from wildshape.ops.nearest import nearest, nearest_k
-from wildshape.records import Points
 
 _SMALLEST_M = 1e-6
-_DEFAULT = RefineConfig()
+Points = Float32[np.ndarray, "_ 3"]
 _REFLECTED = np.array((1, -1, 1), np.float32)
 
 
-def partners(points: Float[Tensor, "B P 3"], count: int = _DEFAULT.partner) -> Tensor:
+def partners(points: Float[Tensor, "B P 3"], count: int) -> Tensor:
     """`(B, P)`: the place of each point's `count`th neighbour."""
     whole, size = points.float(), points.shape[1]
     if not is_mirrored(points):
@@ -36,46 +32,6 @@ def partners(points: Float[Tensor, "B P 3"], count: int = _DEFAULT.partner) -> T
 def denser(points: Float[Tensor, "B P 3"], partner: Int64[Tensor, "B P"]) -> Tensor:
     """`(B, 2 P, 3)`: the points, then the middles between each one and its partner."""
     return torch.cat((points, (points + gathered(points, partner)) / 2), dim=1)
-
-
-def with_its_scan(
-    whole: Points,
-    shape: Float[Tensor, "P 3"],
-    scan: Points,
-    T_sensor_canonical: SE3,
-    settings: ModelSettings,
-    config: RefineConfig = _DEFAULT,
-) -> Points:
-    """A shape with what its scan shows, sensor frame; as it was if it has no middles.
-
-    Args:
-        whole: sensor frame; the shape's own points, then middles (`denser`).
-        shape: its own, canonical frame.
-        scan: sensor frame.
-        T_sensor_canonical: the pose.
-        settings: of the weights.
-        config: how near, and how dense.
-    """
-    if len(whole) == len(shape):
-        return whole
-    T_canonical_sensor = T_sensor_canonical.inverse()
-    middles, seen = (T_canonical_sensor.apply_numpy(part) for part in (whole[len(shape) :], scan))
-    added = shown(middles, shape.numpy(), seen, settings, config)
-    return np.concatenate((whole[: len(shape)], T_sensor_canonical.apply_numpy(added)))
-
-
-def shown(
-    middles: Points,
-    shape: Points,
-    seen: Points,
-    settings: ModelSettings,
-    config: RefineConfig = _DEFAULT,
-) -> Points:
-    """What is added to a shape's own points: middles, and what scans saw (`with_seen`)."""
-    mirror = settings.network.mirror
-    if settings.sensor == "camera":
-        return with_exact(middles, shape, seen, mirror=mirror)
-    return with_seen(middles, shape, seen, mirror=mirror, unit=settings.unit, config=config)
 
 
 def with_exact(middles: Points, shape: Points, seen: Points, *, mirror: bool) -> Points:
@@ -105,8 +61,8 @@ def with_seen(
     seen: Points,
     *,
     mirror: bool,
-    unit: float = 1.0,
-    config: RefineConfig = _DEFAULT,
+    voxel: float,
+    near: float,
 ) -> Points:
     """Middles of a shape, of which those nearest to what was seen make room for it.
 
@@ -119,15 +75,15 @@ def with_seen(
         shape: the shape's own points, the same frame.
         seen: points of its scans, the same frame.
         mirror: the second half of the points is the first one's reflection in y = 0.
-        unit: the shape's (`unit_of`).
-        config: how near, and how dense.
+        voxel: what was seen is thinned to this.
+        near: what lies farther from the shape is not believed.
 
     Returns:
         As many points as `middles`.
     """
     kept = middles[: len(middles) // 2] if mirror else middles
-    shown = voxel_thin(_one_side(seen) if mirror else seen, config.seen_voxel_m * unit)
-    shown = shown[_apart(shown, shape) < config.seen_near_m * unit]
+    shown = voxel_thin(_one_side(seen) if mirror else seen, voxel)
+    shown = shown[_apart(shown, shape) < near]
     shown = thin(shown, len(kept))
     if not len(shown):
         return middles
