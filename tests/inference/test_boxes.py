@@ -145,6 +145,20 @@ def test_a_large_turn_that_gains_little_is_not_taken():
     assert abs(math.degrees(math.asin(float(fitted.rotation[0, 2])))) <= 4.0
 
 
+def test_a_fin_does_not_tip_the_box_of_an_aeroplane():
+    """The least rectangle around its side view lies along the slope from nose to fin."""
+    rng = torch.Generator().manual_seed(0)
+    hull = (torch.rand(3000, 3, generator=rng, dtype=torch.float64) - 0.5) * 2
+    hull = torch.nn.functional.normalize(hull, dim=-1) * torch.tensor((5.0, 0.6, 0.6))
+    fin = torch.rand(600, 3, generator=rng, dtype=torch.float64)
+    fin = torch.stack((fin[:, 0] - 5, 0.1 * (fin[:, 1] - 0.5), 0.5 + 1.5 * fin[:, 2]), dim=1)
+    shape = torch.cat((hull, fin))
+    shape = torch.cat((shape, shape * torch.tensor((1.0, -1.0, 1.0))))
+    fitted = fit_to_scans(shape, [], mirror=True, body=False)
+    torch.testing.assert_close(fitted.rotation, torch.eye(3, dtype=torch.float64))
+    assert float(fitted.size[2]) > 2.4
+
+
 def test_carried_to_the_sensor_with_the_pose():
     turn = rotation_from_quaternion(torch.tensor((0.8, 0.1, -0.2, 0.5), dtype=torch.float64))
     pose = SE3(turn, torch.tensor((9.0, -3.0, 1.0), dtype=torch.float64))

@@ -115,13 +115,16 @@ def _level(shape: Float[Tensor, "P 3"], config: BoxConfig, *, body: bool) -> Flo
 
     The canonical frame is level on average, not for each shape; a degree is 8 cm of a car's length.
     That of depth views need not be level at all: nothing says what is up. There a large turn is
-    taken where the rectangle becomes much smaller.
+    taken where the rectangle becomes much smaller, and none else: with their fins, aeroplanes are
+    not level where it is smallest.
     """
-    angle, area = _least_area(shape, config.level_deg, config.step_deg, config)
-    if not body:
+    if body:
+        angle, _ = _least_area(shape, config.level_deg, config.step_deg, config)
+    else:
+        level, area = _least_area(shape, 0.0, config.step_deg, config)
         far, _ = _least_area(shape, config.tipped_deg, _COARSE_DEG, config)
         far, less = _least_area(shape, _COARSE_DEG, config.step_deg, config, about=far)
-        angle = far if less < (1 - config.tipped_gain) * area else angle
+        angle = far if less < (1 - config.tipped_gain) * area else level
     c, s = angle.cos(), angle.sin()
     zero, one = torch.zeros_like(c), torch.ones_like(c)
     return torch.stack((c, zero, s, zero, one, zero, -s, zero, c)).view(3, 3)

@@ -220,12 +220,12 @@ class BoxConfig:
         reach: share of the box's diagonal by which a scan may reach beyond the shape and is
             believed.
         scans_a_witness: of so many scans the one that reaches furthest is not believed.
-        level_deg: largest turn about y that levels a shape in its frame.
+        level_deg: largest turn about y that levels a vehicle's shape in its frame.
         step_deg: of that turn.
         tipped_deg: the same of depth views, whose canonical frame may have any pitch: that of the
             shipped chairs has 23 degrees.
-        tipped_gain: a turn over `level_deg` makes the side view's rectangle smaller by this share:
-            of chairs it is 0.2 to 0.4, of airplanes and cars below 0.08.
+        tipped_gain: it makes their side view's rectangle smaller by this share at least: of chairs
+            by 0.2 to 0.5, of airplanes, for their fins, by up to 0.2 where nothing is tipped.
     """
 
     shape_share: float = 0.01
@@ -240,7 +240,7 @@ class BoxConfig:
     level_deg: float = 4.0
     step_deg: float = 0.25
     tipped_deg: float = 45.0
-    tipped_gain: float = 0.15
+    tipped_gain: float = 0.2
 
 
 @dataclass(frozen=True)
