@@ -222,8 +222,8 @@ class Completion:
     `np.asarray(done)` is its points; `wildshape.save(done, "shape.ply")` writes them.
 
     Attributes:
-        points: `(m, 3)` float32, the complete shape: the network's points, then as many that lie
-            between them or, where refined, were seen by scans or are the reflection of such.
+        points: `(m, 3)` float32, the complete shape: the network's points, then, where
+            refined, others that lie between them, were seen by scans or are reflections of such.
         pose: `T_sensor_canonical`.
         box: around the body that `points` and the scan show, without mirrors; x, the heading, is
             the canonical frame's.
