@@ -101,7 +101,7 @@ def _table(out: Path, seeds: list[str], everything: str, scans: int) -> str:
     lines = ["| " + " | ".join(_HEADING) + " |", "| --- |" + " ---: |" * (len(_HEADING) - 1)]
     lines += [_line(seed, row) for seed, row in zip(seeds, rows)]
     lines.append(_line("mean", np.nanmean(rows, axis=0)))
-    lines.append(_line("deviation", np.nanstd(rows, axis=0)))
+    lines.append(_line("deviation", np.nanstd(rows, axis=0, ddof=min(1, len(rows) - 1))))
     lines.append(_line("all as one", pooled[: _WAY - 1]))
     stages = {
         name: np.mean([of["seconds"].get(name, 0.0) for of in results])

@@ -3,9 +3,11 @@
 """Boxes hold the body that shape and scans show; mirrors and stray points are left outside."""
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
+from tests.method.small import settings
 
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
@@ -163,7 +165,9 @@ def test_carried_to_the_sensor_with_the_pose():
     turn = rotation_from_quaternion(torch.tensor((0.8, 0.1, -0.2, 0.5), dtype=torch.float64))
     pose = SE3(turn, torch.tensor((9.0, -3.0, 1.0), dtype=torch.float64))
     scan = pose.apply(surface(300, seed=2)).float().numpy()
-    box = box_seen(surface().float(), pose, scan, mirror=True)
+    network = replace(settings().network, mirror=True)
+    symmetric = replace(settings(), network=network)
+    box = box_seen(surface().float(), pose, scan, symmetric)
     assert box.centre == pytest.approx(pose.translation.tolist(), abs=0.02)
     assert box.size == pytest.approx(SIZE.tolist(), abs=0.02)
     quaternion = torch.tensor(box.quaternion_wxyz, dtype=torch.float64)

@@ -24,6 +24,7 @@ from wildshape.geometry.surface import is_mirrored
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import BoxConfig
+from wildshape.method.checkpoint import ModelSettings
 from wildshape.records import Box, Points
 
 _PART = 64
@@ -36,17 +37,24 @@ def box_seen(
     shape: Float[Tensor, "P 3"],
     T_sensor_canonical: SE3,
     scan: Points,
-    *,
-    mirror: bool,
-    body: bool = True,
-    unit: float = 1.0,
+    settings: ModelSettings,
     config: BoxConfig = _DEFAULT,
 ) -> Box:
     """The box of the shape of one scan; see `fit_to_scans`."""
     T = T_sensor_canonical.to(torch.float64)
     seen = T.inverse().apply(torch.from_numpy(scan).double())
-    fitted = fit_to_scans(shape, [seen], mirror=mirror, body=body, unit=unit, config=config)
-    return carried(fitted, T)
+    return carried(fit_for(settings, shape, [seen], config), T)
+
+
+def fit_for(
+    settings: ModelSettings,
+    shape: Float[Tensor, "P 3"],
+    seen: Iterable[Tensor],
+    config: BoxConfig = _DEFAULT,
+) -> FittedBox:
+    """`fit_to_scans` of what a network with these settings completes."""
+    mirror, body = settings.network.mirror, settings.sensor == "lidar"
+    return fit_to_scans(shape, seen, mirror=mirror, body=body, unit=settings.unit, config=config)
 
 
 def fit_to_scans(

@@ -40,8 +40,7 @@ from wildshape.method.trust_features import scan_features, surfaces
 from wildshape.ops.device import choose_device, plain_torch
 from wildshape.records import Completion, Points, Registration, Sensor
 
-BATCH = 32
-"""Scans that are completed at once."""
+BATCH = 32  # scans that are completed at once
 Each = Iterable[object]  # handed in from Python, one a scan
 _DEFAULT = InferenceConfig()
 
@@ -328,10 +327,9 @@ class Predictor:
     ) -> Completion:
         """Scan `i` of those looked at."""
         scan, seen, found, sights = looked.scans[i], looked.seen[i], looked.found, looked.sights
-        mirror, config, trust = self.settings.network.mirror, self.config, self.settings.trust
+        config, trust = self.config, self.settings.trust
         said = glance_of(scan, sensor, *found.said(i), self.settings, config.reasons)
         shape, T_sensor_can, points = posed.shapes[i], posed.T_sensor_canonical[i], posed.points[i]
-        exact = self.settings.sensor == "camera"
         whole, solid, standing = points.numpy(), shape, None
         shows = with_its_scan(whole, shape, seen, T_sensor_can, self.settings, config.refine)
         if sights is not None:
@@ -341,15 +339,7 @@ class Predictor:
         done = Completion(
             points=shows,
             pose=T_sensor_can.to(torch.float64).owned(),
-            box=box_seen(
-                solid,
-                T_sensor_can,
-                seen,
-                mirror=mirror,
-                body=not exact,
-                unit=self.settings.unit,
-                config=config.box,
-            ),
+            box=box_seen(solid, T_sensor_can, seen, self.settings, config.box),
             confidence=said.confidence,
             branch=said.branch,
             cost=float(found.cost[i]),
@@ -358,7 +348,7 @@ class Predictor:
             reasons=said.reasons,
             features=said.features,
         )
-        if not self.refines or exact:
+        if not self.refines or self.settings.sensor == "camera":
             return judged(done, None, None, self.settings, config.reasons)
         rival = float(found.features[i, -1])
         evidence = scan_features(done, seen, posed.surfaces[i], rival, standing)

@@ -173,13 +173,13 @@ def test_the_surface_seen_is_that_of_both_sides_of_a_symmetric_object():
 
 
 def test_the_box_is_fitted_to_each_scan_where_it_lies_on_the_object(monkeypatch):
-    handed, fit, true = [], whole.fit_to_scans, poses_of(TRACK)
+    handed, fit, true = [], whole.fit_for, poses_of(TRACK)
 
-    def kept(shape, seen, **options):
+    def kept(settings, shape, seen, config):
         handed.extend(seen)
-        return fit(shape, handed, **options)
+        return fit(settings, shape, handed, config)
 
-    monkeypatch.setattr(whole, "fit_to_scans", kept)
+    monkeypatch.setattr(whole, "fit_for", kept)
     whole._box(SHAPE, list(TRACK.scans), true, SETTINGS, whole.BoxConfig())
     for cloud, pose, scan in zip(handed, true, TRACK.scans, strict=True):
         expected = pose.inverse().apply(torch.from_numpy(scan).double())

@@ -29,13 +29,5 @@ def completed(
 def box_of(look: Looked, predictor: Predictor) -> Box:
     """The box of the network's own shape of one scan, not refined."""
     shapes, rotation, translation, *_ = look.found
-    settings, pose = predictor.settings, SE3(rotation[0], translation[0])
-    return box_seen(
-        shapes[0],
-        pose,
-        look.seen[0],
-        mirror=settings.network.mirror,
-        body=settings.sensor != "camera",
-        unit=settings.unit,
-        config=predictor.config.box,
-    )
+    pose = SE3(rotation[0], translation[0])
+    return box_seen(shapes[0], pose, look.seen[0], predictor.settings, predictor.config.box)

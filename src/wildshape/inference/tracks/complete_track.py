@@ -19,7 +19,7 @@ from wildshape.geometry.densify import denser, partners
 from wildshape.geometry.sampling import sorted_points, voxel_thin
 from wildshape.geometry.surface import mirrored
 from wildshape.geometry.transforms.se3 import SE3, stack
-from wildshape.inference.boxes import carried, fit_to_scans
+from wildshape.inference.boxes import carried, fit_for
 from wildshape.inference.choose_hypothesis import Looked, NetworkInput
 from wildshape.inference.confidence import (
     Glance,
@@ -233,9 +233,7 @@ def _box(
     """One box for all scans of the track, object frame."""
     T_object_sensor = T_sensor_object.inverse()
     seen = (T_object_sensor[i].apply(torch.from_numpy(s).double()) for i, s in enumerate(scans))
-    mirror, unit = settings.network.mirror, settings.unit
-    body = settings.sensor == "lidar"
-    return fit_to_scans(shape, seen, mirror=mirror, body=body, unit=unit, config=config)
+    return fit_for(settings, shape, seen, config)
 
 
 def _voted(
