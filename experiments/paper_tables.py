@@ -17,12 +17,12 @@ from typing import Literal
 
 from experiments.tables import ablations, added, vehicle, views
 from experiments.tables.command import begin
-from experiments.tables.given import Given
 from experiments.tables.make import Making, chosen_rows, make, refuse_unknown_rows
 from experiments.tables.measure import measure, seeds_of
 from experiments.tables.rows import ORACLE
 from experiments.tables.show import as_printed
 from experiments.tables.size import SIZES, changed
+from experiments.tables.sources import Sources
 from experiments.tables.table import Block, Row, Table, Trained
 from experiments.tables.train import Workshop
 
@@ -77,7 +77,7 @@ class Job:
         row: it.
         blocks: that have it.
         seeds: trainings.
-        given: size, and folder of meshes.
+        sources: size, and folder of meshes.
         known: a row before it is trained alike.
     """
 
@@ -85,14 +85,14 @@ class Job:
     row: Row
     blocks: tuple[Block, ...]
     seeds: int
-    given: Given
+    sources: Sources
     known: bool
 
     @property
     def name(self) -> str:
         """Of the row, of the first block that has it, and of all else that decides its figures."""
         seeds = f"{self.seeds} seeds" if self.seeds > 1 else "1 seed"
-        made = f"{seeds}, size {self.given.size.name}, CAD {self.given.cad or 'none'}"
+        made = f"{seeds}, size {self.sources.size.name}, CAD {self.sources.cad or 'none'}"
         return f"{self.table}, {self.blocks[0].title}: {self.row.name}, {made}"
 
     @property
@@ -118,16 +118,16 @@ class Job:
         for block in self.blocks:
             for rotate in block.rotate:
                 for seed in seeds_of(self.row, rotate, self.seeds):
-                    measure(shop, self.row, block, rotate, seed, self.given.size.max_scans)
+                    measure(shop, self.row, block, rotate, seed, self.sources.size.max_scans)
 
 
 def tables(
-    given: Given, seeds: int, words: tuple[str, ...] = (), only: str | None = None
+    sources: Sources, seeds: int, words: tuple[str, ...] = (), only: str | None = None
 ) -> dict[str, Table]:
     """The tables in the order of their worth; one oracle, the paper's.
 
     Args:
-        given: size and meshes.
+        sources: size and meshes.
         seeds: trainings of each row.
         words: only rows whose names hold one of these.
         only: this table alone.
@@ -136,10 +136,10 @@ def tables(
         BadInputError: a word is in no row's name.
     """
     made = {
-        "vehicle": _without(vehicle.table(given), ORACLE),
-        "views": _without(views.table(given), ORACLE),
-        "ablations": ablations.table(given),
-        "added": added.table(given),
+        "vehicle": _without(vehicle.table(sources), ORACLE),
+        "views": _without(views.table(sources), ORACLE),
+        "ablations": ablations.table(sources),
+        "added": added.table(sources),
     }
     made = {name: made[name] for name in made if only in (None, name)}
     refuse_unknown_rows(made.values(), words)
@@ -160,7 +160,7 @@ def _with_rows(table: Table, words: tuple[str, ...]) -> Table | None:
         return None
 
 
-def jobs(made: dict[str, Table], given: Given) -> list[Job]:
+def jobs(made: dict[str, Table], sources: Sources) -> list[Job]:
     """A job a row; rows that are trained alike in two blocks are one."""
     found: dict[object, Job] = {}
     trained: set[str] = set()
@@ -169,7 +169,7 @@ def jobs(made: dict[str, Table], given: Given) -> list[Job]:
             for row in block.rows:
                 of = row.key if isinstance(row, Trained) else str(block.test)
                 job = found.get((name, row.name, of)) or Job(
-                    name, row, (), table.seeds, given, of in trained
+                    name, row, (), table.seeds, sources, of in trained
                 )
                 found[name, row.name, of] = replace(job, blocks=(*job.blocks, block))
                 trained.add(of)
@@ -192,15 +192,17 @@ def only_finished(table: Table, name: str, finished: list[Job]) -> Table | None:
     return replace(table, blocks=blocks) if blocks else None
 
 
-def write_pages(shop: Workshop, given: Given, made: dict[str, Table], finished: list[Job]) -> None:
+def write_pages(
+    shop: Workshop, sources: Sources, made: dict[str, Table], finished: list[Job]
+) -> None:
     """Each table's page with the rows that are finished, and one with the paper's columns alone."""
     printed = []
     for name, whole in made.items():
         table = only_finished(whole, name, finished)
         if table is None:
             continue
-        make(shop, given, table, f"{name}-{given.size.name}", shop.folder)
-        parts = Making(shop, given, table).parts()
+        make(shop, sources, table, f"{name}-{sources.size.name}", shop.folder)
+        parts = Making(shop, sources, table).parts()
         printed += [as_printed(part) for part in parts if part.rotate == "none"]
     head = f"# The paper's tables, our rows above its own\n\n`{shop.command}`\n"
     write_text(shop.folder / PRINTED, "\n".join([head, *printed]))
@@ -215,11 +217,11 @@ def run(settings: Settings, command: str) -> None:
     if settings.seeds < 1:
         raise BadInputError(f"--seeds {settings.seeds}: expected 1 or more.")
     size = changed(SIZES["small"], settings.share, settings.steps)
-    given = Given(size, settings.cad and settings.cad.resolve())
+    sources = Sources(size, settings.cad and settings.cad.resolve())
     shop = Workshop(settings.out, settings.device, command)
     words = tuple(word.strip() for word in settings.rows.split(",") if word.strip())
-    made = tables(given, settings.seeds, words, settings.table)
-    planned, spent = jobs(made, given), _spent(settings.out / RECORD)
+    made = tables(sources, settings.seeds, words, settings.table)
+    planned, spent = jobs(made, sources), _spent(settings.out / RECORD)
     for number, job in enumerate(planned, start=1):
         if settings.plan:
             state = "done" if job.name in spent else f"about {duration(job.guess_s)}"
@@ -230,7 +232,7 @@ def run(settings: Settings, command: str) -> None:
         began = time.monotonic()
         job.work(shop)
         spent[job.name] = round(time.monotonic() - began, 1)
-        write_pages(shop, given, made, [one for one in planned if one.name in spent])
+        write_pages(shop, sources, made, [one for one in planned if one.name in spent])
         write_json(settings.out / RECORD, spent)  # after the pages: what it names is on them
         todo = [one for one in planned if one.name not in spent]
         left = duration(left_s(todo, spent, planned))
@@ -239,7 +241,7 @@ def run(settings: Settings, command: str) -> None:
         )
     whole = not (settings.table or settings.rows)
     if not settings.plan and (whole or not (settings.out / PRINTED).is_file()):
-        write_pages(shop, given, made, [job for job in planned if job.name in spent])
+        write_pages(shop, sources, made, [job for job in planned if job.name in spent])
     todo = [job for job in planned if job.name not in spent]
     print(f"{len(todo)} of {len(planned)} rows are left: {duration(left_s(todo, spent, planned))}")
 

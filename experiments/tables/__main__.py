@@ -24,7 +24,6 @@ from experiments.tables import (
     views,
 )
 from experiments.tables.command import begin
-from experiments.tables.given import Given
 from experiments.tables.make import (
     chosen_protocols,
     chosen_rows,
@@ -33,6 +32,7 @@ from experiments.tables.make import (
     refuse_unknown_rows,
 )
 from experiments.tables.size import SIZES, changed
+from experiments.tables.sources import Sources
 from experiments.tables.train import Workshop
 
 from wildshape.errors import BadInputError
@@ -120,21 +120,21 @@ def main(settings: Settings, command: str) -> None:
     size = changed(SIZES[settings.size], steps=settings.steps)
     size = replace(size, seeds=settings.seeds) if settings.seeds > 0 else size
     cad, kitti = (path and path.resolve() for path in (settings.cad, settings.kitti))
-    given = Given(size, cad, kitti)  # its data are found again from any folder
+    sources = Sources(size, cad, kitti)  # its data are found again from any folder
     shop = Workshop(settings.out, settings.device, command)
     name, results = f"{settings.table}-{size.name}", settings.results or settings.out
     words = _words(settings.rows)
     if settings.table in FIGURES:
         if words or settings.rotate:
             raise BadInputError(f"{settings.table} is a figure: leave out --rows and --rotate.")
-        print(draw(shop, given, FIGURES[settings.table], name, results))
+        print(draw(shop, sources, FIGURES[settings.table], name, results))
         return
-    whole = TABLES[settings.table](given)
+    whole = TABLES[settings.table](sources)
     refuse_unknown_rows([whole], words)
     table = chosen_rows(whole, words)
     table = chosen_protocols(table, _words(settings.rotate))
     table = replace(table, seeds=settings.seeds) if settings.seeds > 0 else table
-    print(make(shop, given, table, name, results))
+    print(make(shop, sources, table, name, results))
 
 
 def _words(text: str) -> tuple[str, ...]:

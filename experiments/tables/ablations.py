@@ -5,8 +5,8 @@
 from dataclasses import replace
 from typing import Any, Literal
 
-from experiments.tables.given import Given
 from experiments.tables.rows import flat, paper_form, views_form
+from experiments.tables.sources import Sources
 from experiments.tables.table import Block, Table, Trained
 
 from wildshape.evaluation.paper import ABLATION_ROWS, VIEW_COUNT_ROWS
@@ -17,15 +17,15 @@ Part = Literal["network", "loss", "views"]
 _TURNS: tuple[Rotate, ...] = ("none", "yaw")
 
 
-def table(given: Given) -> Table:
+def table(sources: Sources) -> Table:
     """On drives, and on depth views: of cars alone before size small."""
-    blocks = [_paper_drives(given)]
+    blocks = [_paper_drives(sources)]
     categories: tuple[Category, ...] = ("car",)
-    if given.size.steps is None or given.size.like == "small":
+    if sources.size.steps is None or sources.size.like == "small":
         categories = ("airplane", "car", "chair")
-    blocks += [_views(given, category) for category in categories]
+    blocks += [_views(sources, category) for category in categories]
     title = "Ablations (paper, supplement, tables 5 and 6)"
-    return Table(title, tuple(blocks), given.size.ablation_seeds)
+    return Table(title, tuple(blocks), sources.size.ablation_seeds)
 
 
 def changed(row: Trained, name: str, part: Part, **values: Any) -> Trained:
@@ -35,8 +35,8 @@ def changed(row: Trained, name: str, part: Part, **values: Any) -> Trained:
     return replace(row, name=name, recipe=replace(recipe, **{part: new}))
 
 
-def _paper_drives(given: Given) -> Block:
-    base = paper_form(given.size, given.drives("train"))
+def _paper_drives(sources: Sources) -> Block:
+    base = paper_form(sources.size, sources.drives("train"))
     rows = (
         replace(base, name="full: beta 0.05, K 4, 4 views"),
         changed(base, "w/o projection", "loss", beta=0.0),
@@ -50,11 +50,11 @@ def _paper_drives(given: Given) -> Block:
         changed(base, "8 views", "views", views=8),
     )
     title = "Simulated drives, the paper's form"
-    return Block(title, given.drives("test"), rows, VIEW_COUNT_ROWS, _TURNS)
+    return Block(title, sources.drives("test"), rows, VIEW_COUNT_ROWS, _TURNS)
 
 
-def _views(given: Given, category: Category) -> Block:
-    base = views_form(given.size, given.views(category, "train"))
+def _views(sources: Sources, category: Category) -> Block:
+    base = views_form(sources.size, sources.views(category, "train"))
     rows = (
         replace(base, name=f"{category}, full"),
         changed(base, f"{category}, w/o projection", "loss", beta=0.0),
@@ -63,4 +63,4 @@ def _views(given: Given, category: Category) -> Block:
     )
     paper = tuple(row for row in ABLATION_ROWS if f" {category}," in row.data)
     title = f"Depth views, {category}, the paper's form"
-    return Block(title, given.views(category, "test"), rows, paper, percent=True)
+    return Block(title, sources.views(category, "test"), rows, paper, percent=True)

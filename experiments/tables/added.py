@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from experiments.tables.ablations import Part, changed
-from experiments.tables.given import Given
 from experiments.tables.rows import small_form
+from experiments.tables.sources import Sources
 from experiments.tables.table import Block, Table, Trained
 
 from wildshape.evaluation.results import Rotate
@@ -32,7 +32,7 @@ REMOVED = (
 )
 
 
-def table(given: Given) -> Table:
+def table(sources: Sources) -> Table:
     """Two trainings, the second taught by the first: of all parts, and of all but one."""
     title = "What we add, each part left out"
     notes = (
@@ -40,11 +40,11 @@ def table(given: Given) -> Table:
         " same parts poses.",
         "Refined, and all scans of a track: the taught weights, asked otherwise.",
     )
-    return Table(title, (_drives(given), _occluded(given)), given.size.ablation_seeds, notes)
+    return Table(title, (_drives(sources), _occluded(sources)), sources.size.ablation_seeds, notes)
 
 
-def _drives(given: Given) -> Block:
-    first = small_form(given.size, given.drives("train"))
+def _drives(sources: Sources) -> Block:
+    first = small_form(sources.size, sources.drives("train"))
     taught = replace(first, teacher=first)
     rows = [
         replace(first, name="first round, full"),
@@ -57,18 +57,18 @@ def _drives(given: Given) -> Block:
         less = _without(first, "taught", removal)
         rows.append(replace(less, teacher=less))
     rows.append(replace(first, name="taught twice", teacher=taught))
-    return Block("Simulated drives, ours", given.drives("test"), tuple(rows), (), _TURNS)
+    return Block("Simulated drives, ours", sources.drives("test"), tuple(rows), (), _TURNS)
 
 
-def _occluded(given: Given) -> Block:
+def _occluded(sources: Sources) -> Block:
     """Drives past what stands in the way, with rays and without."""
-    first = small_form(given.size, given.occluded("train"))
+    first = small_form(sources.size, sources.occluded("train"))
     taught = replace(first, teacher=first)
     rows = (
         replace(taught, name="taught, scans alone"),
         changed(taught, "taught, with rays", "network", rays=RayConfig()),
     )
-    return Block("Simulated drives with occluders, ours", given.occluded("test"), rows)
+    return Block("Simulated drives with occluders, ours", sources.occluded("test"), rows)
 
 
 def _without(row: Trained, form: str, removal: Removal) -> Trained:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import torch
 from experiments.tables.data import store_of
-from experiments.tables.given import Given
 from experiments.tables.make import cost_of
 from experiments.tables.rows import default_form
+from experiments.tables.sources import Sources
 from experiments.tables.train import Workshop, model_of
 from experiments.tables.tsne import tsne
 
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 _MOST, _DRAWN, _WIDTH, _WIDEST = 200, 400, 0.07, 0.1
 
 
-def draw(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
+def draw(shop: Workshop, sources: Sources, path: Path) -> dict[str, object]:
     """Write the figure; returns what is drawn."""
-    row = default_form(given.size, given.drives("train"))
-    models = [model_of(shop, row, seed) for seed in range(given.size.seeds)]
+    row = default_form(sources.size, sources.drives("train"))
+    models = [model_of(shop, row, seed) for seed in range(sources.size.seeds)]
     chosen = min(models, key=cost_of)
-    store = open_store(store_of(shop.folder, given.drives("test")))
+    store = open_store(store_of(shop.folder, sources.drives("test")))
     count = min(len(store), _MOST)
     tracks = [store.track(index) for index in range(count)]
     codes = _codes(load(chosen.path), [track.scans[track.middle] for track in tracks])
@@ -50,8 +50,8 @@ def draw(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
 @torch.inference_mode()
 def _codes(model: Predictor, scans: list[np.ndarray]) -> np.ndarray:
     settings = model.settings
-    given = network_input(scans, settings.input_points, settings.sensor, settings.facing)
-    return model.network.encode(given.scans).double().numpy()
+    inputs = network_input(scans, settings.input_points, settings.sensor, settings.facing)
+    return model.network.encode(inputs.scans).double().numpy()
 
 
 def _picture(places: np.ndarray, shapes: list[np.ndarray]) -> Figure:

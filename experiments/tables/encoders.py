@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Any point network can be the encoder (paper, section 4.1): PCN's, PointNet++ and DGCNN."""
 
-from experiments.tables.given import Given
 from experiments.tables.rows import default_form
+from experiments.tables.sources import Sources
 from experiments.tables.table import Block, Table, Trained
 
 from wildshape.method.encoders.named import Backbone
@@ -12,16 +12,16 @@ from wildshape.training.recipes import with_encoder
 _NAMES: dict[Backbone, str] = {"pcn": "PCN", "pointnet2": "PointNet++", "dgcnn": "DGCNN"}
 
 
-def table(given: Given) -> Table:
+def table(sources: Sources) -> Table:
     """Each at the same widths."""
-    base = default_form(given.size, given.drives("train"))
+    base = default_form(sources.size, sources.drives("train"))
     rows = tuple(_with(base, backbone) for backbone in _NAMES)
-    block = Block("Simulated drives past cars", given.drives("test"), rows, (), ("none", "yaw"))
+    block = Block("Simulated drives past cars", sources.drives("test"), rows, (), ("none", "yaw"))
     note = (
         "Ours without batch normalisation, so that each scan is coded on its own; the paper prints"
         " PCN's alone."
     )
-    return Table("Encoders", (block,), given.size.ablation_seeds, (note,))
+    return Table("Encoders", (block,), sources.size.ablation_seeds, (note,))
 
 
 def _with(base: Trained, backbone: Backbone) -> Trained:

@@ -5,19 +5,19 @@
 Nothing is trained on them but the row that says so, and that row uses no label.
 """
 
-from experiments.tables.given import Given
 from experiments.tables.rows import REGISTERING, baselines, default_form, paper_form
+from experiments.tables.sources import Sources
 from experiments.tables.table import PROTOCOLS, Block, Shipped, Table, Trained
 
 from wildshape.evaluation.paper import KITTI, LIDAR_ROWS
 
 
-def table(given: Given) -> Table:
+def table(sources: Sources) -> Table:
     """Trained on simulated drives and measured on real cars; fine-tuned on them; shipped."""
-    size, real = given.size, given.real_cars()
-    ours = default_form(size, given.drives("train"))
+    size, real = sources.size, sources.real_cars()
+    ours = default_form(size, sources.drives("train"))
     rows = (
-        paper_form(size, given.drives("train")),
+        paper_form(size, sources.drives("train")),
         ours,
         Trained("ours, fine-tuned on these scans", ours.recipe, real, start=ours),
         Shipped(),

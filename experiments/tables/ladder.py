@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from experiments.tables.data import store_of
-from experiments.tables.given import Given
 from experiments.tables.make import selected
 from experiments.tables.measure import measure, method_of
 from experiments.tables.rows import baselines, oracle, paper_form, small_form
+from experiments.tables.sources import Sources
 from experiments.tables.table import Block, Table, Trained
 from experiments.tables.train import Workshop, model_of
 
@@ -28,22 +28,22 @@ from wildshape.training.recipes import small
 Part = Literal["network", "loss", "views"]
 
 
-def rungs(given: Given) -> tuple[Trained, ...]:
+def rungs(sources: Sources) -> tuple[Trained, ...]:
     """What is added, in order; each keeps what stands before it.
 
     Turned scans come with the bins, the window and the beta that were chosen for them.
     """
-    size, data = given.size, given.drives("train")
+    size, data = sources.size, sources.drives("train")
     base, goal = paper_form(size, data), small()
     if size.own_schedule:  # all rungs have one schedule
-        base = replace(base, recipe=replace(base.recipe, optim=_ours(given).recipe.optim))
+        base = replace(base, recipe=replace(base.recipe, optim=_ours(sources).recipe.optim))
     facing = _with(base, "views", turn="facing", window=goal.views.window)
     facing = _with(facing, "loss", projection=goal.loss.projection, beta=goal.loss.beta)
     mirror = _with(facing, "network", mirror=True)
     start = _with(mirror, "network", start=goal.network.start)
     loss = goal.loss
     headings = _with(start, "loss", time_ordered=loss.time_ordered, agree_at=loss.agree_at)
-    ours = _ours(given)
+    ours = _ours(sources)
     taught = replace(ours, teacher=ours)
     return (
         replace(base, name="1 paper's form"),
@@ -58,8 +58,8 @@ def rungs(given: Given) -> tuple[Trained, ...]:
     )
 
 
-def _ours(given: Given) -> Trained:
-    return small_form(given.size, given.drives("train"))
+def _ours(sources: Sources) -> Trained:
+    return small_form(sources.size, sources.drives("train"))
 
 
 def _with(row: Trained, part: Part, **values: Any) -> Trained:
@@ -68,27 +68,27 @@ def _with(row: Trained, part: Part, **values: Any) -> Trained:
     return replace(row, recipe=replace(row.recipe, **{part: new}))
 
 
-def table(given: Given) -> Table:
+def table(sources: Sources) -> Table:
     """The rungs, the oracle, and what needs no training."""
-    size, data = given.size, given.drives("train")
+    size, data = sources.size, sources.drives("train")
     top = replace(oracle(size, data), name="oracle of the paper's form")
-    plain = rungs(given)[4]
+    plain = rungs(sources)[4]
     plain = replace(plain, name="7 without the selector", teacher=plain)
-    student = replace(_with(_ours(given), "network", branches=1), teacher=_ours(given))
+    student = replace(_with(_ours(sources), "network", branches=1), teacher=_ours(sources))
     student = replace(student, name="7 by a student of one branch")
-    ours = replace(_ours(given), name="oracle of our form", teacher="truth")
+    ours = replace(_ours(sources), name="oracle of our form", teacher="truth")
     rest = baselines("identity", "one-scan", "local-icp")
-    rows = (*rungs(given), plain, student, top, ours, *rest)
-    block = Block("Simulated drives", given.drives("test"), rows, (), ("none", "yaw"))
+    rows = (*rungs(sources), plain, student, top, ours, *rest)
+    block = Block("Simulated drives", sources.drives("test"), rows, (), ("none", "yaw"))
     note = "Each rung keeps those before it; 8 and 9 are the weights of 7, asked otherwise."
     return Table("From the paper's method to ours", (block,), size.seeds, (note,))
 
 
-def draw(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
+def draw(shop: Workshop, sources: Sources, path: Path) -> dict[str, object]:
     """Three objects on every rung; they are the best, the median and the worst of the first."""
-    rows, test = rungs(given), given.drives("test")
+    rows, test = rungs(sources), sources.drives("test")
     block = Block("rungs", test, rows)
-    seeds, most = range(given.size.seeds), given.size.max_scans
+    seeds, most = range(sources.size.seeds), sources.size.max_scans
     tried = [[measure(shop, row, block, "none", seed, most) for seed in seeds] for row in rows]
     best = [selected(row.name, tuple(m for m in ms if m)) for row, ms in zip(rows, tried)]
     chosen = pick(best[0].results.methods[0])

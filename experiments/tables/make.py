@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from experiments.tables.data import as_values
-from experiments.tables.given import Given
 from experiments.tables.measure import Measured, measure, seeds_of
 from experiments.tables.show import Part, markdown, record
+from experiments.tables.sources import Sources
 from experiments.tables.table import Block, Row, Table, Trained
 from experiments.tables.train import Model, Workshop
 
@@ -21,7 +21,7 @@ from wildshape.method.checkpoint import load_checkpoint
 from wildshape.training.config import Recipe
 
 # Writes a picture to a path, and says what is on it.
-Figure = Callable[[Workshop, Given, Path], dict[str, object]]
+Figure = Callable[[Workshop, Sources, Path], dict[str, object]]
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Making:
     """One table being made."""
 
     shop: Workshop
-    given: Given
+    sources: Sources
     table: Table
 
     def parts(self) -> list[Part]:
@@ -48,7 +48,7 @@ class Making:
 
     def _measured(self, row: Row, block: Block, rotate: Rotate) -> tuple[Measured, ...]:
         seeds = seeds_of(row, rotate, self.table.seeds)
-        most = self.given.size.max_scans
+        most = self.sources.size.max_scans
         found = (measure(self.shop, row, block, rotate, seed, most) for seed in seeds)
         return tuple(one for one in found if one is not None)
 
@@ -132,22 +132,22 @@ def chosen_protocols(table: Table, names: tuple[str, ...]) -> Table:
     return replace(table, blocks=kept, notes=(*table.notes, note))
 
 
-def make(shop: Workshop, given: Given, table: Table, name: str, results: Path) -> str:
+def make(shop: Workshop, sources: Sources, table: Table, name: str, results: Path) -> str:
     """Make a table and write NAME.md and NAME.json; returns the markdown."""
-    parts = Making(shop, given, table).parts()
-    table = replace(table, notes=(given.size.said, *table.notes))
+    parts = Making(shop, sources, table).parts()
+    table = replace(table, notes=(sources.size.said, *table.notes))
     made = provenance(shop.command)
     text = markdown(table, parts, shop.command, made)
-    size = as_values(given.size)
+    size = as_values(sources.size)
     write_json(results / f"{name}.json", {"size": size, **record(table, parts, made)})
     write_text(results / f"{name}.md", text)
     return text
 
 
-def draw(shop: Workshop, given: Given, figure: Figure, name: str, results: Path) -> str:
+def draw(shop: Workshop, sources: Sources, figure: Figure, name: str, results: Path) -> str:
     """Make a figure and write NAME.webp and NAME.json; returns where it is."""
     picture = results / f"{name}.webp"
-    drawn = figure(shop, given, picture)
-    made = {"provenance": provenance(shop.command), "size": as_values(given.size)}
+    drawn = figure(shop, sources, picture)
+    made = {"provenance": provenance(shop.command), "size": as_values(sources.size)}
     write_json(results / f"{name}.json", {**made, **drawn})
     return f"see {picture}"

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import cast
 
 from experiments.tables.data import store_of
-from experiments.tables.given import Given
 from experiments.tables.make import Figure, selected
 from experiments.tables.measure import Measured, measure, method_of
 from experiments.tables.rows import default_form, dpc_drives, dpc_views, views_form
+from experiments.tables.sources import Sources
 from experiments.tables.table import Block, Row, Shipped, Trained
 from experiments.tables.train import Workshop, model_of
 
@@ -29,42 +29,42 @@ from wildshape.io.inputs import open_tracks
 from wildshape.simulate.config import Category
 
 
-def drives(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
+def drives(shop: Workshop, sources: Sources, path: Path) -> dict[str, object]:
     """Cars driven past, by the default form."""
-    row = default_form(given.size, given.drives("train"))
-    block = Block("objects", given.drives("test"), (row,))
-    return _draw(shop, given, row, block, given.size.seeds, path)
+    row = default_form(sources.size, sources.drives("train"))
+    block = Block("objects", sources.drives("test"), (row,))
+    return _draw(shop, sources, row, block, sources.size.seeds, path)
 
 
-def kitti(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
+def kitti(shop: Workshop, sources: Sources, path: Path) -> dict[str, object]:
     """Real cars, by the weights that the package carries."""
-    block = Block("objects", given.real_cars(), (Shipped(),))
-    return _draw(shop, given, Shipped(), block, 1, path)
+    block = Block("objects", sources.real_cars(), (Shipped(),))
+    return _draw(shop, sources, Shipped(), block, 1, path)
 
 
-def trucks(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
+def trucks(shop: Workshop, sources: Sources, path: Path) -> dict[str, object]:
     """Trucks, by the default form trained on cars and fine-tuned on the trucks without labels."""
-    cars, data = default_form(given.size, given.drives("train")), given.trucks()
+    cars, data = default_form(sources.size, sources.drives("train")), sources.trucks()
     row = Trained("ours, default form, fine-tuned", cars.recipe, data, start=cars)
     block = Block("objects", data, (row,))
-    return _draw(shop, given, row, block, given.size.side_seeds, path)
+    return _draw(shop, sources, row, block, sources.size.side_seeds, path)
 
 
 def views_of(category: Category) -> Figure:
     """Depth views of a category, by the paper's form."""
 
-    def views(shop: Workshop, given: Given, path: Path) -> dict[str, object]:
-        data = given.views(category, "train")
-        row, (rival, _) = views_form(given.size, data), dpc_views(given.size, data)
-        block = Block("objects", given.views(category, "test"), (row,))
-        return _draw(shop, given, row, block, given.size.side_seeds, path, rival)
+    def views(shop: Workshop, sources: Sources, path: Path) -> dict[str, object]:
+        data = sources.views(category, "train")
+        row, (rival, _) = views_form(sources.size, data), dpc_views(sources.size, data)
+        block = Block("objects", sources.views(category, "test"), (row,))
+        return _draw(shop, sources, row, block, sources.size.side_seeds, path, rival)
 
     return views
 
 
 def _draw(
     shop: Workshop,
-    given: Given,
+    sources: Sources,
     row: Row,
     block: Block,
     seeds: int,
@@ -75,17 +75,19 @@ def _draw(
 
     Args:
         shop: where everything is kept.
-        given: size and meshes.
+        sources: size and meshes.
         row: what is drawn.
         block: with the tested data.
         seeds: trainings of the row.
         path: of the figure.
         rival: DPC; by default the paper's for LiDAR, trained on cars driven past.
     """
-    most = given.size.max_scans
+    most = sources.size.max_scans
     tried = [measure(shop, row, block, "none", seed, most) for seed in range(seeds)]
     best = _selected(row.name, tuple(cast("list[Measured]", tried)))
-    examples = _examples(shop, block, best, rival or dpc_drives(given.size, given.drives("train")))
+    examples = _examples(
+        shop, block, best, rival or dpc_drives(sources.size, sources.drives("train"))
+    )
     with atomic_write(path) as file:
         draw_examples(examples).savefig(file, dpi=130, format="webp")
     drawn = {example.label: {"track": example.track, "cd_m": example.cd} for example in examples}

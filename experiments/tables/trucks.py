@@ -4,20 +4,20 @@
 
 from dataclasses import replace
 
-from experiments.tables.given import Given
 from experiments.tables.rows import baselines, default_form, paper_form
+from experiments.tables.sources import Sources
 from experiments.tables.table import Block, Table, Trained
 
 from wildshape.evaluation.paper import TRUCK_ROWS
 
 
-def table(given: Given) -> Table:
+def table(sources: Sources) -> Table:
     """A model of cars as it is, fine-tuned on the trucks it is measured on, and from nothing."""
-    size, trucks = given.size, given.trucks()
+    size, trucks = sources.size, sources.trucks()
     rows = []
     for cars in (
-        paper_form(size, given.drives("train")),
-        default_form(size, given.drives("train")),
+        paper_form(size, sources.drives("train")),
+        default_form(size, sources.drives("train")),
     ):
         rows += [
             Trained(f"{cars.name}, cars only", cars.recipe, cars.data),

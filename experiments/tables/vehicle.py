@@ -4,7 +4,6 @@
 
 from dataclasses import replace
 
-from experiments.tables.given import Given
 from experiments.tables.rows import (
     REGISTERING,
     baselines,
@@ -14,14 +13,15 @@ from experiments.tables.rows import (
     paper_form,
     paper_oracle,
 )
+from experiments.tables.sources import Sources
 from experiments.tables.table import PROTOCOLS, Block, Table
 
 from wildshape.evaluation.paper import LIDAR_ROWS, VEHICLE
 
 
-def table(given: Given) -> Table:
+def table(sources: Sources) -> Table:
     """Ours, the oracle and what registers, under three input protocols."""
-    size, data = given.size, given.drives("train")
+    size, data = sources.size, sources.drives("train")
     rows = (
         paper_form(size, data),
         default_form(size, data),
@@ -32,7 +32,7 @@ def table(given: Given) -> Table:
     )
     paper = tuple(row for row in LIDAR_ROWS if row.data == VEHICLE)
     title = "Simulated drives past cars"
-    block = Block(title, given.drives("test"), rows, paper, PROTOCOLS)
+    block = Block(title, sources.drives("test"), rows, paper, PROTOCOLS)
     fused = replace(block, title=f"{title}, truth accumulated", rotate=("none",), accumulated=True)
     note = (
         "Truth accumulated: the scans of a track by their true poses, mirrored (CD) and as they are"

@@ -18,8 +18,8 @@ from experiments.paper_tables import (  # pyright: ignore
     tables,
 )
 from experiments.tables.added import REMOVED  # pyright: ignore
-from experiments.tables.given import Given  # pyright: ignore
 from experiments.tables.size import SIZES  # pyright: ignore
+from experiments.tables.sources import Sources  # pyright: ignore
 from experiments.tables.table import Trained  # pyright: ignore
 
 from experiments import paper_tables  # pyright: ignore
@@ -28,8 +28,8 @@ from wildshape.errors import BadInputError
 
 @pytest.fixture(scope="module")
 def planned():
-    given = Given(SIZES["small"], Path("cad"))
-    return jobs(tables(given, 3), given)
+    sources = Sources(SIZES["small"], Path("cad"))
+    return jobs(tables(sources, 3), sources)
 
 
 def test_the_plan_has_every_row_that_the_claims_need(planned):
@@ -123,8 +123,8 @@ def test_a_folder_of_meshes_has_one_name(tmp_path, monkeypatch, capsys):
     ],
 )
 def test_what_gives_other_figures_is_another_job(planned, steps, share, cad, seeds):
-    given = Given(changed(SIZES["small"], share, steps), cad)
-    others = jobs(tables(given, seeds), given)
+    sources = Sources(changed(SIZES["small"], share, steps), cad)
+    others = jobs(tables(sources, seeds), sources)
     assert len(others) == len(planned)
     assert not {job.name for job in others} & {job.name for job in planned}
 

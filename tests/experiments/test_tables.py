@@ -11,10 +11,10 @@ import pytest
 from experiments.tables import data, make, train  # pyright: ignore
 from experiments.tables.__main__ import TABLES, Settings, main  # pyright: ignore
 from experiments.tables.data import Simulated, as_values, store_of  # pyright: ignore
-from experiments.tables.given import Given  # pyright: ignore
 from experiments.tables.measure import Measured, as_results  # pyright: ignore
 from experiments.tables.show import Part, record  # pyright: ignore
 from experiments.tables.size import SIZES, sized  # pyright: ignore
+from experiments.tables.sources import Sources  # pyright: ignore
 from experiments.tables.table import Trained  # pyright: ignore
 from experiments.tables.tsne import tsne  # pyright: ignore
 from PIL import Image
@@ -96,7 +96,7 @@ def test_figures_of_objects_and_codes(folder):
 @pytest.mark.parametrize("name", TABLES)
 def test_tables_as_declared(name, size):
     """No two rows of a table are called alike or trained alike; every size and table exists."""
-    table = TABLES[name](Given(size, Path("cad"), Path("kitti")))
+    table = TABLES[name](Sources(size, Path("cad"), Path("kitti")))
     for block in table.blocks:
         names = [row.name for row in block.rows]
         keys = [(r.key, r.answer) for r in block.rows if isinstance(r, Trained)]
@@ -108,19 +108,19 @@ def test_tables_as_declared(name, size):
 def test_a_table_that_needs_a_folder_says_so():
     for name, option in (("kitti", "--kitti"), ("trucks", "--cad")):
         with pytest.raises(BadInputError, match=option):
-            TABLES[name](Given(SIZES["tiny"]))
+            TABLES[name](Sources(SIZES["tiny"]))
 
 
 def test_trucks_are_measured_against_partial_truth_as_the_papers_are():
-    known, accumulated = TABLES["trucks"](Given(SIZES["tiny"], Path("cad"))).blocks
+    known, accumulated = TABLES["trucks"](Sources(SIZES["tiny"], Path("cad"))).blocks
     assert (known.accumulated, accumulated.accumulated) == (False, True)
     (row,) = accumulated.paper
     assert (row.cd, row.cd_partial) == (None, 0.2942)
 
 
 def test_rows_that_are_not_there():
-    table = TABLES["seeds"](Given(SIZES["tiny"]))
-    ablations = TABLES["ablations"](Given(SIZES["tiny"]))
+    table = TABLES["seeds"](Sources(SIZES["tiny"]))
+    ablations = TABLES["ablations"](Sources(SIZES["tiny"]))
     found = make.chosen_rows(ablations, ("^w/o projection",)).blocks
     assert [row.name for block in found for row in block.rows] == ["w/o projection"]
     with pytest.raises(BadInputError, match="no row"):
@@ -128,7 +128,7 @@ def test_rows_that_are_not_there():
 
 
 def test_protocols_that_are_chosen_and_that_are_not_there():
-    table = TABLES["vehicle"](Given(SIZES["tiny"]))
+    table = TABLES["vehicle"](Sources(SIZES["tiny"]))
     chosen = make.chosen_protocols(table, ("yaw",))
     assert [block.rotate for block in chosen.blocks] == [("yaw",)]
     assert make.chosen_protocols(table, ()) == table
@@ -137,7 +137,7 @@ def test_protocols_that_are_chosen_and_that_are_not_there():
 
 
 def test_a_protocol_that_is_not_there_is_not_passed_over_beside_one_that_is():
-    table = TABLES["vehicle"](Given(SIZES["tiny"]))
+    table = TABLES["vehicle"](Sources(SIZES["tiny"]))
     with pytest.raises(BadInputError, match="--rotate upside-down: this table"):
         make.chosen_protocols(table, ("yaw", "upside-down"))
 
@@ -163,7 +163,7 @@ def test_options_that_would_change_nothing_or_train_nothing_are_refused(
 def test_a_manifest_without_its_columns_is_one_sentence(tmp_path):
     (tmp_path / "manifest.csv").write_text("file,kind\na.ply,car\n", encoding="utf-8")
     with pytest.raises(BadInputError, match="no column category, split"):
-        store_of(tmp_path / "out", Given(SIZES["test"], tmp_path).drives("test"))
+        store_of(tmp_path / "out", Sources(SIZES["test"], tmp_path).drives("test"))
 
 
 def test_size_keeps_what_is_minimised():
@@ -203,7 +203,7 @@ def test_data_that_a_stop_left_half_made_are_made_again(tmp_path, monkeypatch):
 
 
 def test_rows_of_equal_names_in_other_blocks_are_all_recorded():
-    table = TABLES["views"](Given(SIZES["test"]))
+    table = TABLES["views"](Sources(SIZES["test"]))
     measured = (Measured(run({"m": OneScan()}, [drive_by(scans=2, points=60)]), {}, None),)
     parts = [Part(b, "none", tuple((row, measured) for row in b.rows), {}) for b in table.blocks]
     found = [

@@ -18,7 +18,7 @@ _OCCLUDED, _RAYS = 0.5, 512
 
 
 @dataclass(frozen=True)
-class Given:
+class Sources:
     """Size, and folders that are not part of the project.
 
     Attributes:
