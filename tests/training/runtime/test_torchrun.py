@@ -3,15 +3,19 @@
 """Two CPU processes under torchrun are one process with both batches."""
 
 import os
+import shlex
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 import torch
 from safetensors.torch import load_file
-from tests.training.worker import FEW_STEPS, SEED
+from tests.training.worker import SEED, SEEING
+from torch.distributed.run import get_args_parser
 
+from wildshape.cli.commands import train
 from wildshape.training.config import learning_rate
 from wildshape.training.loop import setup
 from wildshape.training.objectives import WeaklySupervised
@@ -38,9 +42,9 @@ def two(car_store, tmp_path_factory):
 
 def one_process(store, folder, ranks):
     """Plain gradient accumulation over the batches that the given processes would draw."""
-    run = setup(FEW_STEPS, store, folder, seed=SEED)
-    objective = WeaklySupervised(run.state.network, FEW_STEPS.loss)
-    optim = FEW_STEPS.optim
+    run = setup(SEEING, store, folder, seed=SEED)
+    objective = WeaklySupervised(run.state.network, SEEING.loss)
+    optim = SEEING.optim
     for step in range(optim.steps):
         run.state.optimiser.zero_grad()
         for rank in ranks:
@@ -74,3 +78,11 @@ def test_two_processes_are_one_with_both_batches(two, car_store, tmp_path):
 def test_only_the_leading_process_writes(two):
     assert (two / "model.safetensors").exists()
     assert len((two / "log.jsonl").read_text().splitlines()) == 2
+
+
+def test_torchrun_leaves_the_options_of_train_to_train():
+    (example,) = (line for line in train.EXAMPLES if line.startswith("torchrun"))
+    ours = [f"--{field.name}" for field in fields(train.Settings)]
+    found = get_args_parser().parse_args([*shlex.split(example)[1:], *ours])
+    assert found.training_script == "wildshape.cli"
+    assert found.training_script_args[-len(ours) :] == ours
