@@ -19,6 +19,7 @@ from wildshape.cli.commands import train
 from wildshape.training.config import learning_rate
 from wildshape.training.loop import setup
 from wildshape.training.objectives import WeaklySupervised
+from wildshape.training.runtime.torchrun import launched
 
 ROOT = Path(__file__).parents[3]
 
@@ -86,3 +87,17 @@ def test_torchrun_leaves_the_options_of_train_to_train():
     found = get_args_parser().parse_args([*shlex.split(example)[1:], *ours])
     assert found.training_script == "wildshape.cli"
     assert found.training_script_args[-len(ours) :] == ours
+
+
+def test_a_run_of_several_processes_is_gone_on_with_by_as_many(monkeypatch):
+    """Alone, `--resume` would refuse its state."""
+    typed = ["train", "a b.store", "--out", "run", "--start", "shipped"]
+    monkeypatch.setattr(sys, "argv", ["wildshape", *typed])
+    assert shlex.split(launched()) == ["wildshape", *typed]
+    for name in ("WORLD_SIZE", "LOCAL_WORLD_SIZE"):
+        monkeypatch.setenv(name, "2")
+    program, *said = shlex.split(launched())
+    found = get_args_parser().parse_args(said)
+    assert program == "torchrun"
+    assert (found.nproc_per_node, found.module) == ("2", True)
+    assert [found.training_script, *found.training_script_args] == ["wildshape.cli", *typed]
