@@ -19,6 +19,7 @@ from wildshape.drives.adapting import adapt, second_pass
 from wildshape.drives.adapting.adapt import adapt_to
 from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.adapting.examples import examples_of
+from wildshape.drives.adapting.fine_tuning import recipe_of
 from wildshape.drives.adapting.measures import Measures
 from wildshape.drives.result import DriveResult
 from wildshape.errors import BadInputError
@@ -26,6 +27,7 @@ from wildshape.inference.predictor import Predictor, load
 from wildshape.method.checkpoint import MODEL, load_checkpoint
 from wildshape.method.network import ShapePoseNet
 from wildshape.training import loop
+from wildshape.training.setup import split_tracks
 
 FEW = AdaptConfig(
     steps=3, fewest_held=1, fewest_trained=1, scans=3, fewest_scans=2, clear=0.0, save_every=2
@@ -78,6 +80,11 @@ def test_an_example_looks_where_its_boxes_look(out):
 def test_one_worse_measure_is_enough(after, said):
     assert after.worse_than(GOOD) == (said,)
     assert GOOD.worse_than(GOOD) == ()
+
+
+def test_all_tracks_that_are_not_held_out_are_fitted():
+    fitted, _ = split_tracks(200, recipe_of(SETTINGS, AdaptConfig()).held_out)
+    assert sorted(fitted) == list(range(200))
 
 
 def test_a_worse_model_is_refused(out, predictor, tmp_path, monkeypatch):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m wildshape.cli`, and `torchrun --nproc-per-node N -m wildshape.cli train ...`."""
+"""`python -m wildshape.cli`, and `torchrun --nproc-per-node N -m -- wildshape.cli train ...`."""
 
 from wildshape.cli.main import main
 

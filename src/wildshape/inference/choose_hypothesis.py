@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
-import numpy as np
 import torch
 from jaxtyping import Float, Int, Int64
 from torch import Tensor
@@ -21,7 +20,7 @@ from torch import Tensor
 from wildshape.geometry.centring import scan_centre
 from wildshape.geometry.projection.line_of_sight import face_each, roll, roll_angle
 from wildshape.geometry.projection.ray_points import KINDS
-from wildshape.geometry.projection.sight_lines import SightLines, seen_alike
+from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.projection.visibility import Projection
 from wildshape.geometry.sampling import drawn, sorted_points
 from wildshape.geometry.transforms.se3 import SE3
@@ -104,13 +103,9 @@ def _rays_seen(
     centre: Float[Tensor, "3"],
     config: RayConfig,
 ) -> Float[Tensor, "R 6"]:
-    """Rays of a sensor at the origin, or beside it: shipped weights have seen no others."""
     if rays is None:
         return centre.new_zeros(config.count, 3 + KINDS)
     found = rays.returned
-    middle = (centre @ turn).numpy()
-    alike = seen_alike(found.starts, np.zeros_like(middle), middle)
-    found = found if alike.all() else found.part(np.flatnonzero(alike))
     ends, starts = (torch.from_numpy(part) @ turn.T for part in (found.ends, found.starts))
     return config.seen(ends, starts, centre)
 

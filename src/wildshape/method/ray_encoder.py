@@ -8,12 +8,14 @@ no more. The rays of the frame know.
 
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn.functional import relu
 
 from wildshape.geometry.projection.ray_points import KINDS, ray_points
+from wildshape.geometry.projection.sight_lines import seen_alike
 
 _NEVER = -1e9
 
@@ -37,7 +39,12 @@ class RayConfig:
     def seen(
         self, ends: Float[Tensor, "m 3"], starts: Float[Tensor, "m 3"], centre: Float[Tensor, "3"]
     ) -> Float[Tensor, "R 6"]:
-        """The rays beside an object as the network sees them (`ray_points`)."""
+        """The rays beside an object as the network sees them (`ray_points`).
+
+        Merged sensors see from several sides; those of the sensor's own side are seen alone.
+        """
+        alike = seen_alike(starts.numpy(), np.zeros(3, np.float32), centre.numpy())
+        ends, starts = ends[alike], starts[alike]
         limits = {"depth_m": self.depth_m, "within_m": self.within_m}
         return ray_points(ends, centre, self.count, starts=starts, **limits)
 

@@ -272,6 +272,8 @@ def step_of(run: Run, meter: Meter) -> tuple[Step, Callable[[], None]]:
     encoding = _encoding(run)
     network = run.state.network
     if run.targets is None:
+        if network.rays is not None:
+            network.rays.requires_grad_(False)  # untaught, nothing is drawn for it to see
         objective = WeaklySupervised(network, run.recipe.loss, encoding)
     else:
         unit = unit_of(run.sampler.extent_range()[1])

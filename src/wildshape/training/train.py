@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from wildshape.errors import BadInputError
-from wildshape.io.output import command_line, provenance
+from wildshape.io.output import provenance
 from wildshape.io.progress import SILENT, Progress, counted, duration
 from wildshape.io.store.store import Store
 from wildshape.method.checkpoint import MODEL, load_checkpoint, weights_file
@@ -26,6 +26,7 @@ from wildshape.training.options import TrainingOptions
 from wildshape.training.recipes import recipe_for, with_encoder, with_rays
 from wildshape.training.run_folder import begun_run, finish_run, open_training_data
 from wildshape.training.runtime.profiler import PROFILE
+from wildshape.training.runtime.torchrun import launched
 
 Stopping = Callable[[], AbstractContextManager[Callable[[], bool]]]
 """Gives a context in which a training asks between two steps whether to stop."""
@@ -114,7 +115,7 @@ def train(
 
 def _resuming(options: TrainingOptions) -> str:
     """The command that goes on with a run."""
-    return command_line() if options.resume else f"{command_line()} --resume"
+    return launched() if options.resume else f"{launched()} --resume"
 
 
 @contextmanager
@@ -177,7 +178,7 @@ def _set_up(
             start=weights.start,
             teacher=weights.teacher,
             headings=weights.headings,
-            provenance={**provenance(command_line()), "data": str(data)},
+            provenance={**provenance(launched()), "data": str(data)},
             taught=lambda done, total: bar.at(done, total=total),
             say=progress.say,
         )

@@ -226,6 +226,24 @@ def test_rays_go_with_their_scans(car_store, cars, monkeypatch):
     assert float((apart < 1e-3).float().mean()) > 0.85
 
 
+def test_of_merged_sensors_only_those_of_the_scan_s_own_side_are_seen(car_store, cars, monkeypatch):
+    """Rays of a sensor on the object's other side are none, in training as when asked."""
+    where = {"here": 0.0, "beyond": 2.0}
+    plain = sampler_of(car_store, cars)
+    whole = OcclusionConfig(strip=0.0, side=0.0, top=0.0, feet=0.0, rings=0.0)
+    config = DrawConfig(without_rays=0.0, occlusion=whole)
+    seeing = RayConfig(count=32, depth_m=9.0, within_m=9.0)
+    for name, way in where.items():
+
+        def rays_of(scan, way=way):
+            points = car_store.scan_points(scan)[:64]
+            return SightLines.of_returns(points, np.zeros_like(points) + way * points.mean(0))
+
+        monkeypatch.setattr(car_store, "rays_of", rays_of)
+        rays = FusedSampler(plain.views, plain.targets, config, rays=seeing).draw(3).rays
+        assert bool(rays[..., 3:].any()) == (name == "here")
+
+
 def test_networks_that_see_no_rays_are_drawn_none(car_store, cars):
     assert sampler_of(car_store, cars).draw(1).rays.shape == (12, 0, 6)
 

@@ -3,18 +3,23 @@
 """Two CPU processes under torchrun are one process with both batches."""
 
 import os
+import shlex
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 import torch
 from safetensors.torch import load_file
-from tests.training.worker import FEW_STEPS, SEED
+from tests.training.worker import SEED, SEEING
+from torch.distributed.run import get_args_parser
 
+from wildshape.cli.commands import train
 from wildshape.training.config import learning_rate
 from wildshape.training.loop import setup
 from wildshape.training.objectives import WeaklySupervised
+from wildshape.training.runtime.torchrun import launched
 
 ROOT = Path(__file__).parents[3]
 
@@ -38,9 +43,9 @@ def two(car_store, tmp_path_factory):
 
 def one_process(store, folder, ranks):
     """Plain gradient accumulation over the batches that the given processes would draw."""
-    run = setup(FEW_STEPS, store, folder, seed=SEED)
-    objective = WeaklySupervised(run.state.network, FEW_STEPS.loss)
-    optim = FEW_STEPS.optim
+    run = setup(SEEING, store, folder, seed=SEED)
+    objective = WeaklySupervised(run.state.network, SEEING.loss)
+    optim = SEEING.optim
     for step in range(optim.steps):
         run.state.optimiser.zero_grad()
         for rank in ranks:
@@ -74,3 +79,25 @@ def test_two_processes_are_one_with_both_batches(two, car_store, tmp_path):
 def test_only_the_leading_process_writes(two):
     assert (two / "model.safetensors").exists()
     assert len((two / "log.jsonl").read_text().splitlines()) == 2
+
+
+def test_torchrun_leaves_the_options_of_train_to_train():
+    (example,) = (line for line in train.EXAMPLES if line.startswith("torchrun"))
+    ours = [f"--{field.name}" for field in fields(train.Settings)]
+    found = get_args_parser().parse_args([*shlex.split(example)[1:], *ours])
+    assert found.training_script == "wildshape.cli"
+    assert found.training_script_args[-len(ours) :] == ours
+
+
+def test_a_run_of_several_processes_is_gone_on_with_by_as_many(monkeypatch):
+    """Alone, `--resume` would refuse its state."""
+    typed = ["train", "a b.store", "--out", "run", "--start", "shipped"]
+    monkeypatch.setattr(sys, "argv", ["wildshape", *typed])
+    assert shlex.split(launched()) == ["wildshape", *typed]
+    for name in ("WORLD_SIZE", "LOCAL_WORLD_SIZE"):
+        monkeypatch.setenv(name, "2")
+    program, *said = shlex.split(launched())
+    found = get_args_parser().parse_args(said)
+    assert program == "torchrun"
+    assert (found.nproc_per_node, found.module) == ("2", True)
+    assert [found.training_script, *found.training_script_args] == ["wildshape.cli", *typed]

@@ -15,7 +15,7 @@ EXAMPLES = (
     "wildshape train cars.store --out runs/cars --preset small",
     "wildshape train cars.store --out runs/cars --preset small --resume",
     "wildshape train cars.store --out runs/taught --teacher runs/cars/model.safetensors",
-    "torchrun --nproc-per-node 2 -m wildshape.cli train cars.store --out runs/paper"
+    "torchrun --nproc-per-node 2 -m -- wildshape.cli train cars.store --out runs/paper"
     " --preset paper-lidar",
 )
 
@@ -54,8 +54,8 @@ class Settings:
     """Train a model on tracks, without labels; RUN/model.safetensors is the result.
 
     Ctrl-C and SIGTERM save the state; `--resume` then goes on to the same weights as a run that
-    was never stopped. Under `torchrun --nproc-per-node N -m wildshape.cli train ...` the
-    processes train together.
+    was never stopped. Under `torchrun --nproc-per-node N -m -- wildshape.cli train ...` the
+    processes train together; without the `--` torchrun takes `--start` for its own.
 
     Attributes:
         encoder: point network that reads a scan, at the preset's widths; by default PCN's.

@@ -6,6 +6,7 @@ Targets are fused from whole tracks. Each looks where the first pass says that i
 left to themselves, near-symmetric vehicles turn around.
 """
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -91,6 +92,7 @@ def recipe_of(settings: ModelSettings, config: AdaptConfig) -> Recipe:
         ),
         validate_every=config.save_every,
         validation=ValidationConfig(batches=1),
+        held_out=sys.maxsize,  # none of these: tracks are held out already
     )
 
 

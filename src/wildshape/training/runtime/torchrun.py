@@ -3,11 +3,15 @@
 """One process or several under torchrun: the only file that knows."""
 
 import os
+import shlex
+import sys
 from dataclasses import dataclass
 
 import torch
 from torch import distributed, nn
 from torch.nn.parallel import DistributedDataParallel
+
+from wildshape.io.output import command_line
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,16 @@ class Processes:
         """Close the group."""
         if self.count > 1:
             distributed.destroy_process_group()
+
+
+def launched() -> str:
+    """The command line, as a user would type it again on this machine."""
+    count = os.environ.get("LOCAL_WORLD_SIZE", "1")
+    if os.environ.get("WORLD_SIZE", "1") == "1":
+        return command_line()
+    # Behind the -- all is ours: torchrun would take --start for an option of its own.
+    torchrun = ("torchrun", "--nproc-per-node", count, "-m", "--", "wildshape.cli")
+    return shlex.join([*torchrun, *sys.argv[1:]])
 
 
 def join(device: str) -> Processes:
