@@ -105,6 +105,14 @@ def test_a_list_that_names_no_scans_has_one_for_each(tmp_path):
     assert len(read(written(path, named), 3)) == 2
 
 
+def test_a_list_that_holds_a_scan_twice_is_refused(tmp_path):
+    """Each of its vehicles was found twice."""
+    one = {"frame_id": "000003", "name": ["Car"], "boxes_lidar": [LEFT]}
+    path = written(tmp_path / "result.json", [one, {**one, "frame_id": "000004"}])
+    assert len(read(path)) == 2
+    refused(read, written(path, [one, one]), match=r"holds scan '000003' 2 times")
+
+
 def test_a_fingerprint_tells_names_and_contents(tmp_path):
     path = written(tmp_path / "000001.txt", LABEL.format(turn=0))
     one = fingerprint(tmp_path)

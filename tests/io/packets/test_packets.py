@@ -193,11 +193,19 @@ def test_a_clock_that_was_set_back(turns, tmp_path):
     assert "the clock of street.pcap was set back by 1 s; later turns" in drive.warnings[1]
 
 
-@pytest.mark.parametrize(("by", "step"), [(5e8 + 0.25, 2 * PERIOD), (0.0, 30.0 + 2 * PERIOD)])
+@pytest.mark.parametrize(
+    ("by", "step"),
+    [
+        (5e8 + 0.25, 2 * PERIOD),
+        (7200.0, 2 * PERIOD),  # to another time zone
+        (0.0, 30.0 + 2 * PERIOD),
+        (0.0, 7230.0 + 2 * PERIOD),
+    ],
+)
 def test_a_clock_that_was_set_ahead_is_no_pause(turns, tmp_path, by, step):
     """A robot that found the time on its way had lost years of scans; a true pause stays."""
     path = write_velodyne(tmp_path / "street.pcap", [turns[0]] * 6)
-    pause = 0 if by else 30_000_000
+    pause = 0 if by else round((step - 2 * PERIOD) * 1e6)
 
     def change(records):
         for record in records[2 * PACKETS * 7 // 2 :]:
@@ -211,7 +219,7 @@ def test_a_clock_that_was_set_ahead_is_no_pause(turns, tmp_path, by, step):
     drive = open_drive(rewrite(path, change))
     assert drive.times is not None
     assert np.diff(drive.times) == pytest.approx([PERIOD, PERIOD, step, PERIOD], abs=1e-3)
-    told = [one for one in drive.warnings if "was set ahead by 5e+08 s; later turns" in one]
+    told = [one for one in drive.warnings if f"was set ahead by {by:.2g} s; later turns" in one]
     assert len(told) == (1 if by else 0)
 
 
@@ -225,6 +233,17 @@ def test_two_sensors_of_one_address_are_refused(turns, tmp_path):
         records[:] = [[one[0], each[1]] for one, other in pairs for each in (one, other)]
 
     refused(open_drive, rewrite(path, mix), match="record each sensor alone")
+
+
+def test_packets_without_times_of_recording_are_refused_as_such(turns, tmp_path):
+    """Two sensors were blamed."""
+    path = write_velodyne(tmp_path / "street.pcap", turns)
+
+    def forget(records):
+        for record in records:
+            record[0] = 0.0
+
+    refused(open_drive, rewrite(path, forget), match="all its packets bear one time, 0 s")
 
 
 def test_a_file_of_the_next_generation_may_bear_the_old_suffix(turns, tmp_path):

@@ -32,6 +32,14 @@ def test_another_clock_begins_with_the_scan_and_no_turn_has_no_times():
     assert seconds_since(TURN * 10, 1.0) is None  # a share of the turn
 
 
+@pytest.mark.parametrize(("unit", "kind"), [(1.0, "f8"), (1e-6, "u4"), (1e-9, "u8")])
+def test_a_clock_that_counts_within_the_hour_goes_on_past_it(unit, kind):
+    """The turn amid which it began anew had no times."""
+    values = np.mod(3599.96 + TURN, 3600.0) / unit
+    values = values.astype(kind) if kind == "f8" else np.rint(values).astype(kind)
+    assert seconds_since(values, 1.7e9) == pytest.approx(TURN, abs=2e-6)
+
+
 def test_points_that_did_not_come_back_do_not_take_the_times_of_the_others(tmp_path):
     """Drivers fill their rows with zeros, the time too."""
     path, stamp = tmp_path / "scan.ply", 1.7e9

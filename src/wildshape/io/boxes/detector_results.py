@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Boxes given as JSON: results of nuScenes, OpenPCDet and mmdetection3d."""
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -37,10 +38,23 @@ def read_results(path: Path, scans: int) -> list[DetectorBox]:
                     f"{path}: a list of {len(said)} scans, and the drive has {scans}; name each by"
                     " its 'frame_id'."
                 )
+            _check_once(path, said)
             return [box for place, one in enumerate(said) for box in _scan(one, place)]
         if "bboxes_3d" in said:
             return list(_scan({"frame_id": path.stem, **said}, 0))
         return [_nuscenes(row, scan) for scan, rows in said["results"].items() for row in rows]
+
+
+def _check_once(path: Path, said: list[dict[str, Any]]) -> None:
+    """Refuse a list that holds a scan twice, as of a run that was repeated: so would its boxes be.
+
+    Raises:
+        BadInputError: it does.
+    """
+    counts = Counter(str(one["frame_id"]) for one in said if "frame_id" in one)
+    for scan, count in counts.most_common(1):
+        if count > 1:
+            raise BadInputError(f"{path}: holds scan '{scan}' {count} times; keep one of them.")
 
 
 def _nuscenes(row: dict[str, Any], scan: str) -> DetectorBox:

@@ -6,13 +6,15 @@ import numpy as np
 
 _HOUR_S, _NEAR_S = 3600.0, 1.0
 _SET_S = 10.0  # less is a pause of the network
+_GOES_ON = 5.0  # usual steps; a pause ends so soon after whole hours once in thousands
 
 
 def gone_on(stamps: list[float], micros: list[int]) -> tuple[tuple[float, ...], float]:
     """Times of turns that go on where a clock was set, and by how much it was in all, seconds.
 
     A leap ahead is a pause of the recording unless the sensor's own clock, which counts within an
-    hour, does not show one. Times that rise less often than not stay as they are.
+    hour, does not show one: it goes on at the usual pace, or tells of a shorter pause. Times that
+    rise less often than not stay as they are.
 
     Args:
         stamps: when each turn was recorded, seconds.
@@ -25,7 +27,8 @@ def gone_on(stamps: list[float], micros: list[int]) -> tuple[tuple[float, ...], 
     own = np.diff(micros) / 1e6 % _HOUR_S
     ahead = steps - own
     whole_hours = np.abs(ahead - np.rint(ahead / _HOUR_S) * _HOUR_S) < _NEAR_S
-    leaps = (ahead > _SET_S) & (own > 0) & ~whole_hours
+    goes_on = own < _GOES_ON * np.median(steps)
+    leaps = (ahead > _SET_S) & (own > 0) & (goes_on | ~whole_hours)
     usual = float(np.median(steps[~falls & ~leaps])) if (~falls & ~leaps).any() else 0.0
     by = np.where(falls, steps - usual, np.where(leaps, ahead, 0.0))
     if not by.any():

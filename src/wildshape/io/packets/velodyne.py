@@ -158,8 +158,13 @@ def _check_pace(path: Path, turns: list[_Turn]) -> None:
     """Refuse turns that are none: packets of two sensors, each of which looks elsewhere.
 
     Raises:
-        BadInputError: most are far shorter than a sensor's.
+        BadInputError: most are far shorter than a sensor's, or nothing tells when they were.
     """
+    if len(turns) > 2 and turns[0].began == turns[-1].stamp:
+        raise BadInputError(
+            f"{path}: all its packets bear one time, {turns[0].began:.10g} s: what wrote it lost"
+            " the times of recording; record or export it again."
+        )
     period = np.median(np.diff([turn.stamp for turn in turns])) if len(turns) > 2 else np.inf
     if abs(period) < _SHORTEST_S:
         raise BadInputError(

@@ -18,6 +18,7 @@ LIKE_TIMES = ("ts", "stamp", "dt", "delta_t", "Time", "Timestamp", "GpsTime", "t
 
 _UNITS = (1.0, 1e-3, 1e-6, 1e-9)
 _SHORTEST_TURN_S, _LONGEST_TURN_S = 0.005, 0.5
+_HOUR_S = 3600.0
 _FEWEST = 100
 
 
@@ -36,12 +37,26 @@ def seconds_since(
     """
     if len(values) < _FEWEST:
         return None
+    for unit in _UNITS:
+        values = _past_the_hour(values, unit)
     first, last = values.min(), values.max()
     span = float(last) - float(first)
     for unit in _UNITS:
         if _SHORTEST_TURN_S <= span * unit <= _LONGEST_TURN_S:
             return (values - first) * unit + _first_seconds(float(first) * unit, scan_time)
     return None
+
+
+def _past_the_hour(values: Num[np.ndarray, "n"], unit: float) -> Num[np.ndarray, "n"]:
+    """Times of a turn amid which a clock that counts within the hour began anew, going on."""
+    hour = round(_HOUR_S / unit)
+    early = values < hour / 2
+    late = values[~early]
+    if not early.any() or not len(late) or late.max() > hour:
+        return values
+    if float(values[early].max()) + hour - float(late.min()) > _LONGEST_TURN_S / unit:
+        return values
+    return values.astype(np.result_type(values, np.int64)) + np.where(early, hour, 0)
 
 
 def unusable_told(values: Num[np.ndarray, "n"] | None, like: str = "") -> str:
