@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Shaped
 
-from wildshape.datasets.rgbd.depth_image import read_depth_png
+from wildshape.datasets.rgbd.depth_image import measured, read_depth_png
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import read_json
@@ -61,7 +61,7 @@ class Sequence:
         """
         raw = read_depth_png(path)
         self.check_size(raw, path)
-        return raw / self.depth_scale
+        return measured(raw) / self.depth_scale
 
     def check_size(self, image: Shaped[np.ndarray, "h w"], path: Path) -> None:
         """Refuse an image of another size than the others.
