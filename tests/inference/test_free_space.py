@@ -21,6 +21,7 @@ from wildshape.io.rays import write_rays
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.records import SightLines, Track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+from wildshape.simulate.sensor import DepthCamera
 
 CONFIG = FreeSpaceConfig()
 
@@ -156,3 +157,53 @@ def test_rays_count_in_every_way_to_pose_a_track(track: Track) -> None:
     fused = model.fuse(scans, rays=rays)
     moved = model.register_track(scans, rays=rays)[0].apply_numpy(scans[0])
     np.testing.assert_allclose(fused[: len(scans[0])], moved, atol=1e-5)
+
+
+def test_small_objects_are_held_against_rays_as_large_ones_are(track: Track) -> None:
+    """A tenth of the size gives the same answer, for `unit` shrinks all lengths."""
+    assert track.shape is not None
+    assert track.T_sensor_object is not None
+    scan, rays = track.scans[0], track.rays[0]
+    assert rays is not None
+    shape = track.T_sensor_object[0].apply_numpy(track.shape * np.float32(1.1))
+    small = SightLines(rays.directions, rays.ranges / np.float32(10))
+    large_sights = Sights.of_objects([scan], [rays], CONFIG, 1.0)
+    small_sights = Sights.of_objects([scan / np.float32(10)], [small], CONFIG, 0.1)
+    large, tenth = large_sights.of(shape, 0), small_sights.of(shape / np.float32(10), 0)
+    assert large is not None
+    assert tenth is not None
+    assert large.free.any()
+    assert (large.free == tenth.free).mean() > 0.99  # but for rounding
+    assert (large.hidden == tenth.hidden).mean() > 0.99
+    chair = wildshape.load("chair")
+    sights = chair.look([scan], [rays]).sights
+    assert sights is not None
+    assert sights.config.within_m == pytest.approx(chair.settings.unit * CONFIG.within_m)
+    assert chair.settings.unit < 0.3
+
+
+def test_rays_do_not_take_the_confidence_of_a_depth_view() -> None:
+    """It was fitted without rays: what a shape pays in free space is no sign of a bad fit there."""
+    config = SimulationConfig(tracks=1, scans=4, sensor="depth-camera", category="chair")
+    (views,) = simulate_tracks(config, 3, workers=1)
+    model = wildshape.load("chair")
+    behind = [beside_view(scan) for scan in views.scans]
+    alone = list(model.complete_many(views.scans))
+    seen = list(model.complete_many(views.scans, rays=behind))
+    paid = model.look(views.scans, behind).found.cost.numpy() - [one.cost for one in seen]
+    assert (paid > 0.001).any()  # some of a shape stands where a ray passed
+    for plain, known in zip(alone, seen, strict=True):
+        assert known.cost == pytest.approx(plain.cost, rel=0.2)
+        assert known.confidence == pytest.approx(plain.confidence, abs=0.2)
+
+
+def beside_view(scan: np.ndarray, wall: float = 4.0) -> SightLines:
+    """The rays of the simulated camera's other pixels, to a wall behind the object."""
+    camera = DepthCamera()
+    at = np.floor(scan[:, :2] / scan[:, 2:] * camera.focal_px + camera.center_px).astype(int)
+    free = np.ones((camera.size, camera.size), bool)
+    free[at[:, 1].clip(0, camera.size - 1), at[:, 0].clip(0, camera.size - 1)] = False
+    v, u = np.nonzero(free)
+    away = (np.stack((u, v), 1) + 0.5 - camera.center_px) / camera.focal_px
+    ends = wall * np.concatenate((away, np.ones((len(u), 1))), 1)
+    return SightLines.of_returns(ends[:: len(ends) // 2048 + 1].astype(np.float32))

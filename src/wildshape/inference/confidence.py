@@ -110,6 +110,7 @@ class Glance(NamedTuple):
     pose: SE3
     confidence: float
     branch: int
+    cost: float
     warning: str
     reasons: tuple[str, ...]
     features: ConfidenceFeatures
@@ -126,13 +127,20 @@ def glance_of(
     settings: ModelSettings,
     rule: ReasonRule = _RULE,
 ) -> Glance:
-    """What is to be said of a scan, from what a look found (`Found.said`)."""
+    """What is to be said of a scan, from what a look found (`Found.said`).
+
+    What a shape pays for standing where rays passed chose among the hypotheses. Scans held out and
+    calibrated on had no rays, so it is no part of the cost that is compared with theirs.
+    """
     features = features_of(scan, cost, seen)
+    fit = min(cost, math.exp(seen[0]) + settings.beta * math.exp(seen[1]))
     warning = warning_of(scan, sensor, settings, rule)
+    of_fit = features_of(scan, fit, seen)
     return Glance(
         pose=pose,
-        confidence=0.0 if warning else confidence_of(features, settings),
+        confidence=0.0 if warning else confidence_of(of_fit, settings),
         branch=branch,
+        cost=fit,
         warning=warning,
         reasons=reasons_of_scan(scan, sensor, settings, rule),
         features=features,

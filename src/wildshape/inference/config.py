@@ -4,8 +4,8 @@
 
 They are written into every result (`objects.json`) and can be set from Python:
 `wildshape.load(config=InferenceConfig(refine=RefineConfig(iterations=0)))`. Lengths of `refine`,
-`track` and `box` are for objects of five metres or more; for smaller ones they shrink with the
-object.
+`track`, `box` and `free_space` are for objects of five metres or more; for smaller ones they shrink
+with the object.
 """
 
 from dataclasses import dataclass, field

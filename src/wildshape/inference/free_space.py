@@ -7,6 +7,7 @@ evidence for or against a shape.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ from wildshape.records import Points
 
 Rays = Sequence[SightLines | None]
 """One set a scan, None for a scan without; nothing at all where no scan has any."""
+_LENGTHS = ("within_m", "beyond_m", "free_m", "low_m")
 
 
 class Sights(NamedTuple):
@@ -38,6 +40,14 @@ class Sights(NamedTuple):
     scans: Sequence[Points]
     rays: Rays
     config: FreeSpaceConfig
+
+    @classmethod
+    def of_objects(
+        cls, scans: Sequence[Points], rays: Rays, config: FreeSpaceConfig, unit: float
+    ) -> "Sights":
+        """With the lengths of `config`, which are of vehicles, in metres of `unit` (`unit_of`)."""
+        lengths = {name: unit * getattr(config, name) for name in _LENGTHS}
+        return cls(scans, rays, replace(config, **lengths))
 
     def part(self, rows: Sequence[int]) -> "Sights":
         """Some of the scans."""

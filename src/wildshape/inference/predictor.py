@@ -270,7 +270,8 @@ class Predictor:
     def look(self, scans: Sequence[Points], rays: Rays = ()) -> Looked:
         """What the network says of scans, in one batch, before they are completed."""
         known = any(one is not None for one in rays)
-        sights = Sights(scans, rays, self.config.free_space) if known else None
+        config, unit = self.config.free_space, self.settings.unit
+        sights = Sights.of_objects(scans, rays, config, unit) if known else None
         found = self._found(scans, sights)
         seen = self._off_their_ground(scans, found)
         least = 1 - self.config.ground_share
@@ -342,7 +343,7 @@ class Predictor:
             box=box_seen(solid, T_sensor_can, seen, self.settings, config.box),
             confidence=said.confidence,
             branch=said.branch,
-            cost=float(found.cost[i]),
+            cost=said.cost,
             refined=self.refines,
             warning=said.warning,
             reasons=said.reasons,

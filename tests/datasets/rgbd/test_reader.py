@@ -177,6 +177,32 @@ def test_a_camera_of_images_of_another_size_is_doubted(tmp_path):
     assert re.search(r"camera\.json: cx 157\.4, cy 122\.4 .* 160 x 120 pixels", doubt)
 
 
+def test_the_largest_number_of_a_depth_image_is_no_depth(tmp_path):
+    """Cameras write it for nothing seen; taken for a depth it is 6.5 m away, a hole in a chair."""
+    write_sequence(tmp_path / "kitchen", count=1)
+    file = tmp_path / "kitchen" / "depth" / "000000.png"
+    masks = tmp_path / "kitchen" / "masks" / "000000.png"
+    with Image.open(file) as image, Image.open(masks) as ids:
+        depth, seen = np.array(image).astype(np.uint16), np.array(ids) == 1
+    rows = np.flatnonzero(seen.any(1))
+    depth[rows[len(rows) // 2] - 4 : rows[len(rows) // 2] + 4] = 0xFFFF
+    write_png(file, depth)
+    assert all(track.scans[0][:, 2].max() < 3.0 for track in tracks(tmp_path).values())
+
+
+@pytest.mark.parametrize("lens", [{"distortion": [0.1, -0.2, 0, 0, 0]}, {"k1": 0.1, "k2": 0}])
+def test_a_lens_that_bends_lines_is_refused(tmp_path, lens):
+    """Points are made as of a pinhole camera; coefficients of 0 say that this is right."""
+    write_sequence(tmp_path / "kitchen", count=1)
+    file = tmp_path / "kitchen" / "camera.json"
+    camera = json.loads(file.read_text())
+    none = {name: [0.0] * 5 if isinstance(value, list) else 0.0 for name, value in lens.items()}
+    file.write_text(json.dumps(camera | none))
+    assert len(tracks(tmp_path)) == 2
+    file.write_text(json.dumps(camera | lens))
+    refused(tmp_path, r"camera\.json: (distortion|k1) is not 0, .* undistort depth and masks")
+
+
 def test_two_folders_of_one_instance_are_refused(tmp_path):
     """3 and 03: one of the two objects was lost without a word."""
     write_sequence(tmp_path / "kitchen", apart=True)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from wildshape.datasets.rgbd.depth_image import read_depth_png
+from wildshape.datasets.rgbd.depth_image import measured, read_depth_png
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import read_json, reading
@@ -86,7 +86,7 @@ class Scene:
             BadInputError: missing or damaged.
         """
         path = self.folder / "depth" / f"{frame.stem}.png"
-        return read_depth_png(path) * frame.metres
+        return measured(read_depth_png(path)) * frame.metres
 
 
 def open_scene(folder: Path) -> Scene:

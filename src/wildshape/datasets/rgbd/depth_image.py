@@ -13,6 +13,7 @@ from wildshape.records import Intrinsics, Points
 
 _BYTES = {"I;16": 2, "I;16B": 2, "I": 4, "L": 1, "P": 1, "1": 1}  # a pixel, of one channel
 _FREE_BYTES, _RATIO = 1 << 24, 8
+_LARGEST = 0xFFFF
 
 
 def read_png(path: Path, what: str) -> Shaped[np.ndarray, "h w"]:
@@ -53,6 +54,11 @@ def read_depth_png(path: Path) -> Shaped[np.ndarray, "h w"]:
             " themselves, not a picture of them."
         )
     return raw
+
+
+def measured(raw: Shaped[np.ndarray, "h w"]) -> Shaped[np.ndarray, "h w"]:
+    """The numbers of a depth PNG, 0 where the camera wrote the largest: beyond what it can say."""
+    return np.where(raw < _LARGEST, raw, 0)
 
 
 def back_project(depth: Float[np.ndarray, "h w"], camera: Intrinsics) -> Points:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Shaped
 
-from wildshape.datasets.rgbd.depth_image import read_depth_png
+from wildshape.datasets.rgbd.depth_image import measured, read_depth_png
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import read_json
@@ -21,6 +21,7 @@ from wildshape.io.tracks import folder_name
 from wildshape.records import Intrinsics, Points
 
 _KEYS = ("fx", "fy", "cx", "cy")
+_BENT = ("distortion", "dist_coeffs", "coeffs", "k1", "k2", "p1", "p2", "k3")  # of a lens
 _DEPTH_SCALE = 1000.0
 _INSTANCE = re.compile(r"[0-9]{1,9}")
 _MOST, _LEAST = 1e9, 1e-6
@@ -60,7 +61,7 @@ class Sequence:
         """
         raw = read_depth_png(path)
         self.check_size(raw, path)
-        return raw / self.depth_scale
+        return measured(raw) / self.depth_scale
 
     def check_size(self, image: Shaped[np.ndarray, "h w"], path: Path) -> None:
         """Refuse an image of another size than the others.
@@ -155,6 +156,12 @@ def _camera(raw: dict[str, Any], size: tuple[int, int], path: Path) -> Intrinsic
     missing = [key for key in _KEYS if key not in raw]
     if missing:
         raise BadInputError(f"{path}: lacks {', '.join(missing)}; all are in pixels.")
+    bent = next((key for key in _BENT if _bends(raw.get(key))), None)
+    if bent is not None:
+        raise BadInputError(
+            f"{path}: {bent} is not 0, but points are made as of undistorted images; undistort"
+            f" depth and masks, and leave {bent} out."
+        )
     fx, fy = (_positive(raw[key], key, path) for key in ("fx", "fy"))
     # A calibration takes whole numbers for the pixels' centres (OpenCV, ROS, BOP).
     cx, cy = (_number_of(raw[key], key, path) + 0.5 for key in ("cx", "cy"))
@@ -163,6 +170,12 @@ def _camera(raw: dict[str, Any], size: tuple[int, int], path: Path) -> Intrinsic
 
 
 _SIZES = ("width", "height")
+
+
+def _bends(value: object) -> bool:
+    """Whether a coefficient, or one of a list of them, is not 0."""
+    numbers = value if isinstance(value, list) else [value]
+    return any(isinstance(number, int | float) and number != 0 for number in numbers)
 
 
 def _depth_scale(value: object, path: Path) -> float:

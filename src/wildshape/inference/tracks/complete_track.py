@@ -146,7 +146,7 @@ def complete_together(
     body = settings.sensor == "lidar"
     solid = shape
     if any(one is not None for one in rays):
-        sights = Sights(scans, rays, config.free_space)
+        sights = Sights.of_objects(scans, rays, config.free_space, unit)
         solid = without_free_space(shape, fit.T_sensor_object, sights)
     fitted = _box(solid, scans, fit.T_sensor_object, settings, config.box)
     whole = _denser(shape, config) if settings.facing else shape
