@@ -37,26 +37,24 @@ def seconds_since(
     """
     if len(values) < _FEWEST:
         return None
-    for unit in _UNITS:
-        values = _past_the_hour(values, unit)
-    first, last = values.min(), values.max()
-    span = float(last) - float(first)
-    for unit in _UNITS:
-        if _SHORTEST_TURN_S <= span * unit <= _LONGEST_TURN_S:
-            return (values - first) * unit + _first_seconds(float(first) * unit, scan_time)
-    return None
+    unit = _unit_of(values)
+    if unit is None:  # a clock that counts within the hour may have begun anew in this turn
+        for hour in (round(_HOUR_S / unit) for unit in _UNITS):
+            if values.min() >= 0 and hour / 2 < values.max() <= hour:
+                early = np.where(values < hour / 2, hour, 0)
+                values = values.astype(np.result_type(values, np.int64)) + early
+                unit = _unit_of(values)
+                break
+    if unit is None:
+        return None
+    first = values.min()
+    return (values - first) * unit + _first_seconds(float(first) * unit, scan_time)
 
 
-def _past_the_hour(values: Num[np.ndarray, "n"], unit: float) -> Num[np.ndarray, "n"]:
-    """Times of a turn amid which a clock that counts within the hour began anew, going on."""
-    hour = round(_HOUR_S / unit)
-    early = values < hour / 2
-    late = values[~early]
-    if not early.any() or not len(late) or late.max() > hour:
-        return values
-    if float(values[early].max()) + hour - float(late.min()) > _LONGEST_TURN_S / unit:
-        return values
-    return values.astype(np.result_type(values, np.int64)) + np.where(early, hour, 0)
+def _unit_of(values: Num[np.ndarray, "n"]) -> float | None:
+    """Seconds in one of the values of a turn; None where they tell of none."""
+    span = float(values.max()) - float(values.min())
+    return next((u for u in _UNITS if _SHORTEST_TURN_S <= span * u <= _LONGEST_TURN_S), None)
 
 
 def unusable_told(values: Num[np.ndarray, "n"] | None, like: str = "") -> str:
