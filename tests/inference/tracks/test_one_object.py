@@ -56,7 +56,6 @@ def test_the_box_is_laid_around_what_no_ray_passed(monkeypatch):
         return box(shape, *args, **options)
 
     monkeypatch.setattr(whole, "_box", around)
-    monkeypatch.setattr(whole, "Sights", lambda *_: None)
     monkeypatch.setattr(whole, "without_free_space", lambda shape, *_: shape[:500])
     done = completed(poses_of(TRACK))[:2]
     passed = SightLines.of_returns(TRACK.scans[1][:5])
@@ -138,7 +137,7 @@ def test_the_confidence_is_that_of_scans_that_were_completed():
         gathered.add(item, scan)
     said = gathered.said[3]
     features = ConfidenceFeatures(*[0.1] * len(ConfidenceFeatures._fields))
-    gathered.said[3] = Glance(said.pose, 0.99, 2, "", (), features)
+    gathered.said[3] = Glance(said.pose, 0.99, 2, 0.1, "", (), features)
     gathered._odds[3] = 0.0
     assert gathered.rows.tolist() == [0, 1, 2, 4, 5, 6]
     found = list(whole.complete_together(gathered))
