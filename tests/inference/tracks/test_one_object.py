@@ -56,7 +56,6 @@ def test_the_box_is_laid_around_what_no_ray_passed(monkeypatch):
         return box(shape, *args, **options)
 
     monkeypatch.setattr(whole, "_box", around)
-    monkeypatch.setattr(whole, "Sights", lambda *_: None)
     monkeypatch.setattr(whole, "without_free_space", lambda shape, *_: shape[:500])
     done = completed(poses_of(TRACK))[:2]
     passed = SightLines.of_returns(TRACK.scans[1][:5])
