@@ -86,6 +86,23 @@ def test_heights_are_above_the_ground_under_each_point():
     assert np.abs(heights[len(ground) :][high] - expected[high]).max() < 0.15
 
 
+@pytest.mark.parametrize("depth_m", [8.0, 12.0])
+def test_reflections_below_a_wet_road_are_no_ground(depth_m):
+    """One point in ten: the road lay 7 m below the sensor, or the ground far above itself."""
+    rng = np.random.default_rng(2)
+    ground = road(rng)
+    below = ground[:2000] - np.array((0, 0, depth_m), np.float32)
+    below[:, 2] += rng.normal(0, 1, len(below))
+    scan = np.concatenate((ground, below))
+    plane = ground_plane(scan, MountingConfig())
+    assert plane is not None
+    assert plane[3] == pytest.approx(1.7, abs=0.02)
+    heights = height_above_ground(scan, 1.7, GroundConfig())[: len(ground)]
+    near = (np.hypot(*ground[:, :2].T) > 3) & (np.hypot(*ground[:, :2].T) < 12)
+    assert np.median(heights[near]) == 0.0
+    assert (np.abs(heights[near]) < 0.1).mean() > 0.95
+
+
 def test_the_ground_stage_says_nothing_on_stdout(capfd):
     height_above_ground(road(np.random.default_rng(0)), 1.7, GroundConfig())
     assert capfd.readouterr().out == ""

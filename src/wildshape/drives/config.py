@@ -108,11 +108,15 @@ class GroundConfig:
         range_m: farther points are neither ground nor object.
         nearest_m: nearer points are the vehicle that carries the sensor.
         cell_m: the ground's height is kept in cells of this size: over more of it roads slope.
+        below_m: what lies lower than this under the ground at the sensor is a reflection.
+        steepest: it may lie lower by so much a metre of range; no road falls faster.
     """
 
     range_m: float = 80.0
     nearest_m: float = 2.0
     cell_m: float = 2.0
+    below_m: float = 1.0
+    steepest: float = 0.3
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ _STDOUT = 1
 def height_above_ground(
     points: Points, sensor_height_m: float, config: GroundConfig
 ) -> Float[np.ndarray, "n"]:
-    """Metres above the ground under each point; 0 for ground, NaN out of range.
+    """Metres above the ground under each point; 0 for ground, NaN out of range or far below.
 
     Args:
         points: of a whole scan, level frame (z vertical, the sensor at the origin).
@@ -37,7 +37,8 @@ def height_above_ground(
         MissingExtraError: Patchwork++ is not installed.
     """
     away = np.hypot(points[:, 0], points[:, 1])
-    seen = (away > config.nearest_m) & (away < config.range_m)
+    lowest = -sensor_height_m - config.below_m - config.steepest * away
+    seen = (away > config.nearest_m) & (away < config.range_m) & (points[:, 2] > lowest)
     heights = np.full(len(points), np.nan)
     if not seen.any():
         return heights

@@ -210,7 +210,11 @@ def ground_plane(points: Points, config: MountingConfig) -> Plane | None:
     on = (np.abs(heights) < config.thick_m).sum(0)
     below = (heights < -config.thick_m).mean(0)
     upright = normals[:, 2] > math.cos(math.radians(config.steepest_deg))
-    possible = upright & (depths > 0) & (below < config.below)
+    under = upright & (depths > 0)
+    possible = under & (below < config.below)
+    hardly = on[possible].max(initial=0) < _LEAST_GROUND * len(near)
+    if hardly:  # what many reflections leave; then the ground is what most points lie on
+        possible = under & (on > config.ground * len(near)) | possible
     if not possible.any():
         return None
     best = int(np.where(possible, on, -1).argmax())
