@@ -110,6 +110,7 @@ class GroundConfig:
         cell_m: the ground's height is kept in cells of this size: over more of it roads slope.
         below_m: what lies lower than this under the ground at the sensor is a reflection.
         steepest: it may lie lower by so much a metre of range; no road falls faster.
+        reflected: reflections are left out where they are more than this share of a scan's points.
     """
 
     range_m: float = 80.0
@@ -117,6 +118,7 @@ class GroundConfig:
     cell_m: float = 2.0
     below_m: float = 1.0
     steepest: float = 0.3
+    reflected: float = 0.001
 
 
 @dataclass(frozen=True)

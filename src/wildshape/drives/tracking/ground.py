@@ -26,7 +26,7 @@ _STDOUT = 1
 def height_above_ground(
     points: Points, sensor_height_m: float, config: GroundConfig
 ) -> Float[np.ndarray, "n"]:
-    """Metres above the ground under each point; 0 for ground, NaN out of range or far below.
+    """Metres above the ground under each point; 0 for ground, NaN out of range, or of reflections.
 
     Args:
         points: of a whole scan, level frame (z vertical, the sensor at the origin).
@@ -37,8 +37,10 @@ def height_above_ground(
         MissingExtraError: Patchwork++ is not installed.
     """
     away = np.hypot(points[:, 0], points[:, 1])
-    lowest = -sensor_height_m - config.below_m - config.steepest * away
-    seen = (away > config.nearest_m) & (away < config.range_m) & (points[:, 2] > lowest)
+    seen = (away > config.nearest_m) & (away < config.range_m)
+    far_below = points[:, 2] < -sensor_height_m - config.below_m - config.steepest * away
+    if far_below.sum() > config.reflected * len(points):
+        seen &= ~far_below
     heights = np.full(len(points), np.nan)
     if not seen.any():
         return heights
