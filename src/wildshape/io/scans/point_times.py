@@ -38,17 +38,23 @@ def seconds_since(
     if len(values) < _FEWEST:
         return None
     unit = _unit_of(values)
-    if unit is None:  # a clock that counts within the hour may have begun anew in this turn
-        for hour in (round(_HOUR_S / unit) for unit in _UNITS):
-            if values.min() >= 0 and hour / 2 < values.max() <= hour:
-                early = np.where(values < hour / 2, hour, 0)
-                values = values.astype(np.result_type(values, np.int64)) + early
-                unit = _unit_of(values)
-                break
+    if unit is None:
+        values = _past_the_hour(values)
+        unit = _unit_of(values)
     if unit is None:
         return None
     first = values.min()
     return (values - first) * unit + _first_seconds(float(first) * unit, scan_time)
+
+
+def _past_the_hour(values: Num[np.ndarray, "n"]) -> Num[np.ndarray, "n"]:
+    """Times that go on where a clock that counts within the hour began anew amid a turn."""
+    hours = (round(_HOUR_S / unit) for unit in _UNITS)
+    hour = next((hour for hour in hours if hour / 2 < values.max() <= hour), None)
+    if hour is None or values.min() < 0:
+        return values
+    early = np.where(values < hour / 2, hour, 0)
+    return values.astype(np.result_type(values, np.int64)) + early
 
 
 def _unit_of(values: Num[np.ndarray, "n"]) -> float | None:
