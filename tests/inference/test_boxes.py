@@ -3,7 +3,9 @@
 """Boxes hold the body that shape and scans show; mirrors and stray points are left outside."""
 
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import torch
@@ -183,3 +185,14 @@ def test_the_nth_largest_is_that_of_a_sort(size, count):
     """Equal values count as often as they are there."""
     rows = torch.randint(0, 40, (5, size), generator=torch.Generator().manual_seed(size)).float()
     assert torch.equal(_nth_largest(rows, count), rows.sort(descending=True).values[:, count - 1])
+
+
+def test_the_document_names_the_numbers_of_a_box():
+    page = (Path(__file__).parents[2] / "docs/boxes.md").read_text("utf-8")
+    made = page.partition("## How a box is made")[2].partition("## Formats")[0]
+    said = re.findall(r"(\d+(?:\.\d+)?) (?:degrees|%|to|m)(?!\w)", made)
+    rule = BoxConfig()
+    shares = (rule.shape_share, rule.hidden_share, rule.reach, rule.seen_share, rule.ground_share)
+    ours = {rule.level_deg, rule.tipped_deg, rule.near_m, rule.unknown_m}
+    ours |= {round(100 * share, 3) for share in (rule.tipped_gain, *shares)}
+    assert set(map(float, said)) == ours
