@@ -185,6 +185,22 @@ def test_links_lead_to_files_of_the_project(page):
 
 
 @pytest.mark.parametrize("page", SPOKEN)
+def test_links_lead_to_headings_that_there_are(page):
+    text = re.sub(r"^```.*?^```$", "", (ROOT / page).read_text("utf-8"), flags=re.S | re.M)
+    for target, anchor in re.findall(r"\]\(([^:)#\s]*)#([^)\s]+)\)", text):
+        goal = (ROOT / page).parent / target if target else ROOT / page
+        assert goal.suffix != ".md" or anchor in anchors(goal), f"{target}#{anchor}"
+
+
+@cache
+def anchors(page: Path) -> frozenset[str]:
+    """The names that GitHub and the site give to the headings of a page."""
+    heads = re.findall(r"^#+ (.+)$", page.read_text("utf-8"), re.MULTILINE)
+    words = (re.sub(r"[^\w\s-]", "", head.lower()).strip() for head in heads)
+    return frozenset(word.replace(" ", "-") for word in words)
+
+
+@pytest.mark.parametrize("page", SPOKEN)
 def test_paths_and_names_in_the_text_exist(page):
     assert not unknown((ROOT / page).read_text(encoding="utf-8"))
 
