@@ -37,7 +37,6 @@ _VEHICLES, _SCANS = ("car", "truck", "bus"), 12
 _SENSORS: tuple[Literal["hdl64", "hdl32"], ...] = ("hdl64", "hdl32")
 _SEED = 7100
 _RIDGES, _FOLDS = (1.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0), 10
-_FITTED_ON = "simulated {what} with their truth: procedural {kind}, CAD {kind} of split train"
 
 
 @dataclass(frozen=True)
@@ -64,6 +63,13 @@ class Settings:
     def meshes(self) -> tuple[str, ...]:
         """Categories of the manifest."""
         return _VEHICLES if self.category == "vehicle" else (self.category,)
+
+    @property
+    def fitted_on(self) -> str:
+        """What the weights say of it."""
+        what = "drives" if self.category == "vehicle" else "views"
+        cad = f", CAD {self.category}s of split train" if self.cad is not None else ""
+        return f"simulated {what} with their truth: procedural {self.category}s{cad}"
 
     @property
     def configs(self) -> list[SimulationConfig]:
@@ -166,10 +172,8 @@ def main(settings: Settings) -> None:
     """Fit, write."""
     model = weights_file(settings.model)
     found = measure(load(model), drives(settings))
-    what = "drives" if settings.category == "vehicle" else "views"
-    fitted_on = _FITTED_ON.format(what=what, kind=f"{settings.category}s")
     ridge = best_ridge(found)
-    calibration = fit_calibration(found.features, np.asarray(found.cd), fitted_on, ridge)
+    calibration = fit_calibration(found.features, np.asarray(found.cd), settings.fitted_on, ridge)
     print(f"ridge {ridge}: {calibration}")
     if settings.write is not None:
         rewrite(model, settings.write, calibration=calibration)
