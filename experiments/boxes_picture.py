@@ -8,7 +8,7 @@ python experiments/boxes_picture.py docs/boxes.webp
 import io
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import matplotlib as mpl
 import numpy as np
@@ -17,14 +17,11 @@ from PIL import Image
 
 from wildshape.cli.main import in_a_sentence
 from wildshape.evaluation.metrics import box_score, true_box
+from wildshape.geometry.box import EDGES
 from wildshape.inference.boxes import carried
 from wildshape.inference.predictor import load
-from wildshape.io.boxes.detections import pose_of
-from wildshape.records import Box
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
-_SIGNS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 2
-_EDGES = [(i, j) for i in range(8) for j in range(i) if abs(_SIGNS[i] - _SIGNS[j]).sum() == 1]
 _TRUTH, _ONE, _TRACK, _SCAN = "#009e73", "#d55e00", "#0072b2", "#8a8f98"
 
 
@@ -59,12 +56,11 @@ def main(settings: Settings) -> None:
     # Seen from above and from the side, along the axes of the true object.
     T = pose.inverse()
     clouds = [T.apply_numpy(cloud) for cloud in (track.scans[i], whole.points)]
-    draw(settings.out, clouds, [(name, corners(box, T), color) for name, box, color in boxes])
-
-
-def corners(box: Box, T_object_sensor: Any) -> np.ndarray:
-    pose = T_object_sensor @ pose_of(box)
-    return _SIGNS * np.asarray(box.size) @ pose.rotation.numpy().T + pose.translation.numpy()
+    draw(
+        settings.out,
+        clouds,
+        [(name, T.apply_numpy(box.corners), color) for name, box, color in boxes],
+    )
 
 
 def draw(out: Path, clouds: list[np.ndarray], boxes: list[tuple[str, np.ndarray, str]]) -> None:
@@ -76,7 +72,7 @@ def draw(out: Path, clouds: list[np.ndarray], boxes: list[tuple[str, np.ndarray,
         panel.scatter(*clouds[1][:, [a, b]].T, s=0.5, c="#d0d3d8", label="completed")
         panel.scatter(*clouds[0][:, [a, b]].T, s=1.5, c=_SCAN, label="scan")
         for name, box, color in boxes:
-            for k, (i, j) in enumerate(_EDGES):
+            for k, (i, j) in enumerate(EDGES):
                 ends = box[[i, j]][:, [a, b]].T
                 panel.plot(*ends, c=color, lw=1.6, label=None if k else name)
         panel.set(aspect="equal", title=title, xlabel="m", ylabel="m")

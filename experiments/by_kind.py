@@ -1,20 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where the error lies: an evaluation of simulated drives, told apart by kind of vehicle.
-
-wildshape evaluate DATA --out EVALUATION
-python -m experiments.by_kind --data DATA --evaluation EVALUATION
-"""
+"""Where the error lies: an evaluation of simulated drives, told apart by kind of vehicle."""
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
-import tyro
 from experiments.tables.measure import as_results
 
-from wildshape.cli.main import in_a_sentence
-from wildshape.errors import BadInputError
 from wildshape.evaluation.results import Limits, MethodScores, pooled
 from wildshape.evaluation.summary import FIGURES, figures_of
 from wildshape.evaluation.tables import cell, pipe_table
@@ -24,21 +17,6 @@ _SHOWN = ("cd", "precision", "coverage", "acc30", "rot_median_deg", "trans_media
 _COLUMNS = [figure for figure in FIGURES if figure.name in _SHOWN]
 
 
-@dataclass(frozen=True)
-class Settings:
-    """What to read.
-
-    Attributes:
-        data: simulated tracks, as a packed store.
-        evaluation: folder that `wildshape evaluate` wrote for them.
-        method: row to look at.
-    """
-
-    data: Path
-    evaluation: Path
-    method: str = "wildshape"
-
-
 def table(data: Path, evaluation: Path, method: str = "wildshape") -> str:
     """A row a kind, as markdown; each has the figures that the evaluation has of all.
 
@@ -46,9 +24,6 @@ def table(data: Path, evaluation: Path, method: str = "wildshape") -> str:
         data: simulated tracks, as a packed store.
         evaluation: folder that `wildshape evaluate` wrote for them.
         method: row to look at.
-
-    Raises:
-        BadInputError: the evaluation has no such row.
     """
     words = {track.name: track.source.split()[-1] for track in open_store(data)}
     kinds = {name: word.split("_")[0] for name, word in words.items()}  # of meshes, the category
@@ -66,10 +41,8 @@ def table(data: Path, evaluation: Path, method: str = "wildshape") -> str:
 def _scores(path: Path, method: str) -> MethodScores:
     """One row, all seeds together."""
     runs = json.loads(path.read_text("utf-8"))["runs"]
-    found = {row.name: row for row in pooled([as_results(run, Limits()) for run in runs]).methods}
-    if method not in found:
-        raise BadInputError(f"--method {method}: {path} has the rows {', '.join(found)}.")
-    return found[method]
+    methods = pooled([as_results(run, Limits()) for run in runs]).methods
+    return next(row for row in methods if row.name == method)
 
 
 def _of_kind(scores: MethodScores, kinds: dict[str, str], kind: str) -> MethodScores:
@@ -78,9 +51,3 @@ def _of_kind(scores: MethodScores, kinds: dict[str, str], kind: str) -> MethodSc
         completions=tuple(row for row in scores.completions if kinds[row.track] == kind),
         registrations=tuple(row for row in scores.registrations if kinds[row.track] == kind),
     )
-
-
-if __name__ == "__main__":
-    with in_a_sentence():
-        settings = tyro.cli(Settings)
-        print(table(settings.data, settings.evaluation, settings.method))

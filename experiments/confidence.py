@@ -1,15 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Calibrate the confidence of weights, and measure it on scans that it was not fitted to.
+"""Calibrate the confidence of weights, and write them with it.
 
     python -m experiments.confidence --cad CAD --out confidence --write calibrated.safetensors
     python -m experiments.confidence --cad CAD --out confidence --category chair --model chair ...
 
-Drives, or a depth camera's views of a category, are simulated twice: once of procedural shapes and
-CAD models of split `train`, which give the calibration, once with another seed and CAD models of
-split `test`, which give the figures. The truth of simulated data is used, which training never
-sees; that is said in the checkpoint. Writes OUT/confidence.json and .png and, with --write, the
-weights with their calibration.
+Drives, or a depth camera's views of a category, are simulated, of procedural shapes and CAD models
+of split `train`. Their truth is used, which training never sees; that is said in the checkpoint.
+`wildshape evaluate` says of other data what the confidence is worth.
 """
 
 from collections.abc import Iterator
@@ -27,11 +25,8 @@ from safetensors import safe_open
 from wildshape.cli.main import in_a_sentence
 from wildshape.evaluation.cases import turn_track
 from wildshape.evaluation.metrics import completion_error
-from wildshape.evaluation.risk_coverage import RiskCoverage, rank_correlation, risk_coverage
-from wildshape.geometry.transforms.se3 import stack
+from wildshape.evaluation.risk_coverage import rank_correlation
 from wildshape.inference.predictor import Predictor, load
-from wildshape.io.atomic import write_json
-from wildshape.io.output import provenance
 from wildshape.io.store.store import Store, is_finished_store, open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import SHIPPED, load_checkpoint, save_checkpoint, weights_file
@@ -40,9 +35,8 @@ from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
 _VEHICLES, _SCANS = ("car", "truck", "bus"), 12
 _SENSORS: tuple[Literal["hdl64", "hdl32"], ...] = ("hdl64", "hdl32")
-_SEEDS = {"train": 7100, "test": 9300}
+_SEED = 7100
 _RIDGES, _FOLDS = (1.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0), 10
-_FITTED_ON = "simulated {what} with their truth: procedural {kind}, CAD {kind} of split train"
 
 
 @dataclass(frozen=True)
@@ -71,6 +65,13 @@ class Settings:
         return _VEHICLES if self.category == "vehicle" else (self.category,)
 
     @property
+    def fitted_on(self) -> str:
+        """What the weights say of it."""
+        what = "drives" if self.category == "vehicle" else "views"
+        cad = f", CAD {self.category}s of split train" if self.cad is not None else ""
+        return f"simulated {what} with their truth: procedural {self.category}s{cad}"
+
+    @property
     def configs(self) -> list[SimulationConfig]:
         """What is simulated of procedural shapes, and of meshes as well."""
         if self.category == "vehicle":
@@ -86,38 +87,32 @@ class Measured(NamedTuple):
 
     Attributes:
         features: known without labels.
-        plain: confidence that falls with the label-free cost alone.
         cd: true Chamfer distance, metres.
-        rotation_deg: angle to the true pose, in the canonical frame that most scans agree on.
         track: number of each one's track.
     """
 
     features: list[ConfidenceFeatures]
-    plain: list[float]
     cd: list[float]
-    rotation_deg: list[float]
     track: list[int]
 
 
-def drives(settings: Settings, split: str) -> Store:
-    """The drives of a split, simulated once."""
-    path = settings.out / split
+def drives(settings: Settings) -> Store:
+    """What is fitted to, simulated once."""
+    path = settings.out / "train"
     if not is_finished_store(path):
         with TemporaryDirectory() as folder, StoreWriter(path, {}, overwrite=True) as store:
-            for config, seed in _sources(settings, split, Path(folder)):
+            for config, seed in _sources(settings, Path(folder)):
                 for track in simulate_tracks(config, seed, workers=1):
                     store.add(replace(track, name=f"{config.sensor}-{seed}-{track.name}"))
     return open_store(path)
 
 
-def _sources(
-    settings: Settings, split: str, folder: Path
-) -> Iterator[tuple[SimulationConfig, int]]:
+def _sources(settings: Settings, folder: Path) -> Iterator[tuple[SimulationConfig, int]]:
     """What is simulated, with its seed: procedural shapes, then meshes if there are some."""
-    seeded = [(config, _SEEDS[split] + 7 * i) for i, config in enumerate(settings.configs)]
+    seeded = [(config, _SEED + 7 * i) for i, config in enumerate(settings.configs)]
     yield from seeded
     if settings.cad is not None:
-        rows = [row for row in rows_of(settings.cad, split) if row["category"] in settings.meshes]
+        rows = [row for row in rows_of(settings.cad, "train") if row["category"] in settings.meshes]
         files = [settings.cad / row["file"] for row in rows]
         for config, seed in ((config, seed + 50) for config, seed in seeded):
             yield replace(config, meshes=_mixed(files, folder / str(seed), seed)), seed
@@ -133,7 +128,7 @@ def _mixed(files: list[Path], into: Path, seed: int) -> Path:
 
 def measure(predictor: Predictor, store: Store) -> Measured:
     """Complete all scans and hold them against their truth."""
-    found, gauges = Measured([], [], [], [], []), []
+    found = Measured([], [], [])
     for index in range(len(store)):
         track = store.track(index)
         if track.sensor.kind == "lidar":
@@ -141,24 +136,13 @@ def measure(predictor: Predictor, store: Store) -> Measured:
         truth, shape = track.T_sensor_object, track.shape
         assert truth is not None
         assert shape is not None
-        done = list(predictor.complete_many(track.scans, track.sensor))
-        for i, item in enumerate(done):
+        for i, item in enumerate(predictor.complete_many(track.scans, track.sensor)):
             local = truth[i].inverse().apply_numpy(item.points)
             found.features.append(ConfidenceFeatures(*item.features))
-            found.plain.append(1 / (1 + (item.cost / predictor.settings.cost_m[1]) ** 2))
             found.cd.append(completion_error(local, shape).cd)
             found.track.append(index)
-        gauges.append(truth.rotation.mT @ stack([item.pose for item in done]).rotation)
         print(f"{index + 1} of {len(store)}", flush=True)
-    found.rotation_deg.extend(_from_most(torch.cat(gauges)))
     return found
-
-
-def _from_most(R_object_canonical: torch.Tensor) -> list[float]:
-    """Angles to the one of them that the others are nearest to, degrees."""
-    trace = torch.einsum("aij,bij->ab", R_object_canonical, R_object_canonical)
-    angle = torch.rad2deg(torch.acos(((trace - 1) / 2).clamp(-1, 1)))
-    return angle[angle.median(1).values.argmin()].tolist()
 
 
 def best_ridge(found: Measured) -> float:
@@ -176,48 +160,6 @@ def best_ridge(found: Measured) -> float:
     return max(order, key=lambda ridge: order[ridge])
 
 
-def figures(confidence: list[float], found: Measured) -> dict[str, object]:
-    """Rank correlations, and the curve with its area."""
-    curve = risk_coverage(confidence, found.cd)
-    assert curve is not None
-    return {
-        "rank_correlation_cd": rank_correlation(confidence, found.cd),
-        "rank_correlation_rotation": rank_correlation(confidence, found.rotation_deg),
-        "risk_coverage_area_m": curve.area,
-        "best_area_m": curve.best_area,
-        "mean_cd_m": float(np.mean(found.cd)),
-        "coverage": curve.coverage,
-        "risk_m": curve.risk,
-    }
-
-
-def reliability(confidence: list[float], found: Measured, within: float) -> list[dict[str, float]]:
-    """Stated against true shares of good completions, in five parts of equal size."""
-    order = np.argsort(confidence)
-    good = np.asarray(found.cd) <= within
-    return [
-        {"stated": float(np.asarray(confidence)[part].mean()), "true": float(good[part].mean())}
-        for part in np.array_split(order, 5)
-    ]
-
-
-def draw(path: Path, curves: dict[str, RiskCoverage | None]) -> None:
-    """The risk-coverage curves."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(5.4, 3.8), layout="constrained")
-    ax = figure.subplots()
-    for name, curve in curves.items():
-        assert curve is not None
-        ax.plot(100 * np.asarray(curve.coverage), curve.risk, label=name)
-    ax.set_xlabel("scans kept, the surest first, %")
-    ax.set_ylabel("their mean Chamfer distance, m")
-    ax.set_ylim(bottom=0)
-    ax.grid(alpha=0.3)
-    ax.legend(frameon=False)
-    figure.savefig(path, dpi=130)
-
-
 def rewrite(model: Path, out: Path, **changes: Any) -> None:
     """The same weights, in the same precision, with some of their settings changed."""
     network, found = load_checkpoint(model)
@@ -227,40 +169,14 @@ def rewrite(model: Path, out: Path, **changes: Any) -> None:
 
 
 def main(settings: Settings) -> None:
-    """Fit, measure, write."""
+    """Fit, write."""
     model = weights_file(settings.model)
-    predictor = load(model)
-    seen = measure(predictor, drives(settings, "train"))
-    views = settings.category != "vehicle"
-    kind = f"{settings.category}s"
-    fitted_on = _FITTED_ON.format(what="views" if views else "drives", kind=kind)
-    ridge = best_ridge(seen)
-    calibration = fit_calibration(seen.features, np.asarray(seen.cd), fitted_on, ridge)
-    test = measure(predictor, drives(settings, "test"))
-    after = [calibration.confidence(features) for features in test.features]
-    report = {
-        "before": figures(test.plain, test),
-        "after": figures(after, test),
-        "each_fact_alone": {
-            name: rank_correlation([-features[i] for features in test.features], test.cd)
-            for i, name in enumerate(ConfidenceFeatures._fields)
-        },
-        "reliability": reliability(after, test, calibration.within_m),
-        "calibration": vars(calibration),
-        "ridge": ridge,
-        "scans": len(test.cd),
-        "provenance": provenance("python -m experiments.confidence --cad CAD --out OUT"),
-    }
-    write_json(settings.out / "confidence.json", report)
-    orders = {"cost alone": test.plain, "calibrated": after, "true error": [-c for c in test.cd]}
-    curves = {name: risk_coverage(order, test.cd) for name, order in orders.items()}
-    draw(settings.out / "confidence.png", curves)
+    found = measure(load(model), drives(settings))
+    ridge = best_ridge(found)
+    calibration = fit_calibration(found.features, np.asarray(found.cd), settings.fitted_on, ridge)
+    print(f"ridge {ridge}: {calibration}")
     if settings.write is not None:
         rewrite(model, settings.write, calibration=calibration)
-    for name in ("before", "after"):
-        found = report[name]
-        assert isinstance(found, dict)
-        print(name, {key: value for key, value in found.items() if isinstance(value, float)})
 
 
 if __name__ == "__main__":

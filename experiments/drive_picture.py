@@ -29,21 +29,16 @@ class Settings:
         out: .webp or .png.
         scans: of the drive, ten a second.
         seed: of the street.
-        found: a folder that `wildshape drive` wrote, in place of a simulated drive.
         shown: vehicles drawn below.
     """
 
     out: Annotated[Path, tyro.conf.Positional]
     scans: int = 100
     seed: int = 3
-    found: Path | None = None
     shown: int = 4
 
 
 def main(settings: Settings) -> None:
-    if settings.found is not None:
-        draw(settings, settings.found)
-        return
     with tempfile.TemporaryDirectory() as folder:
         street, out = Path(folder) / "street", Path(folder) / "found"
         write_drive(WholeDrive(StreetConfig(scans=settings.scans), settings.seed), street)

@@ -22,9 +22,9 @@ from wildshape.drives.completing.level_frame import level_poses
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.tracking.mounting import find_mounting
-from wildshape.drives.tracking.segmentation import Cutter, read_cuts
+from wildshape.drives.tracking.segmentation import Cutter
 from wildshape.drives.tracking.sightings import Sightings
-from wildshape.drives.tracking.tracks import Seen, link
+from wildshape.drives.tracking.tracks import linked_clusters
 from wildshape.drives.tracking.trajectory import find_trajectory
 from wildshape.evaluation.calibration import HEADING_DEG, LEAST_BEV
 from wildshape.evaluation.drives.labels import LabelledFrame, read_labels
@@ -151,18 +151,7 @@ def _linked(scans: Path, cuts: Path) -> list[Sightings]:
     for frame in cutter.missing():
         cutter(frame)
     T_level_sensor = level_poses(T_world_sensor, mounting)
-    cut = list(read_cuts(cuts, len(drive)))
-    seen = (
-        Seen.of(tick, [T_level_sensor[frame].apply_numpy(part) for part in cut[frame].clusters()])
-        for frame, tick in enumerate(drive.ticks)
-    )
-    counts = [one.counts for one in cut]
-    found = link(seen, config.tracks)
-    return [
-        Sightings.of(f"{number:04d}", one.frames, one.rows, counts)
-        for number, one in enumerate(found)
-        if len(one.frames) >= config.tracks.fewest_scans
-    ]
+    return linked_clusters(cuts, T_level_sensor, drive.ticks, config.tracks)
 
 
 def _case(seen: Sightings, cuts: Path, labels: Sequence[LabelledFrame]) -> _Case:

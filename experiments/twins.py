@@ -9,16 +9,14 @@ What differs then is the car's form and the sensor, not its size or place. Scans
 ones are. Prints statistics and the errors of boxes, and draws one car.
 """
 
-import io
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 import tyro
-from experiments.labelled_boxes import COLUMNS, errors, shown, upright_labels
+from experiments.labelled_boxes import COLUMNS, errors, shown, upright, upright_labels
 from experiments.mesh_credits import rows_of
 from scipy.spatial import KDTree
 
@@ -81,9 +79,7 @@ def main(settings: Settings) -> None:
         off = np.mean([errors(_boxes(model, track), track) for track in tracks], axis=0)
         cells = (f"{points:.0f}", f"{thick:.2f}", f"{near:.0f}", f"{deep:.0f}")
         print(f"| {name} | " + " | ".join((*cells, *map(shown, COLUMNS, off))) + " |", flush=True)
-    settings.out.write_bytes(
-        _picture({n: tracks[settings.car] for n, tracks in sets.items()}, model)
-    )
+    _draw(settings.out, {n: tracks[settings.car] for n, tracks in sets.items()}, model)
 
 
 def _makers(cad: Path | None) -> dict[str, Maker]:
@@ -148,15 +144,13 @@ def _statistics(track: Track) -> np.ndarray:
 
 def _boxes(model: Predictor, track: Track) -> list[UprightBox]:
     done = model.complete_many(track.scans, track.sensor)
-    return [UprightBox(*one.box.centre, *one.box.size, yaw=one.box.yaw) for one in done]
+    return [upright(one.box) for one in done]
 
 
-def _picture(tracks: dict[str, Track], model: Predictor) -> bytes:
+def _draw(out: Path, tracks: dict[str, Track], model: Predictor) -> None:
     """The last scan of one car and of its twins from above, with label and box."""
-    import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    mpl.rcParams["svg.hashsalt"] = "wildshape"
     figure = Figure(figsize=(3.2 * len(tracks), 2.4), layout="constrained", dpi=110)
     for ax, (name, track) in zip(figure.subplots(1, len(tracks), squeeze=False)[0], tracks.items()):
         label, found = upright_labels(track)[-1], _boxes(model, track)[-1]
@@ -168,7 +162,7 @@ def _picture(tracks: dict[str, Track], model: Predictor) -> bytes:
         ax.set_title(name, fontsize=9)
         ax.set_aspect("equal")
         ax.axis("off")
-    return _webp(figure)
+    figure.savefig(out, format="webp")
 
 
 def _outline(box: UprightBox, label: UprightBox, turn: np.ndarray) -> np.ndarray:
@@ -179,15 +173,6 @@ def _outline(box: UprightBox, label: UprightBox, turn: np.ndarray) -> np.ndarray
 
 def _turn(yaw: float) -> np.ndarray:
     return np.array(((np.cos(yaw), -np.sin(yaw)), (np.sin(yaw), np.cos(yaw))))
-
-
-def _webp(figure: Any) -> bytes:
-    from PIL import Image
-
-    drawn, small = io.BytesIO(), io.BytesIO()
-    figure.savefig(drawn, format="png")
-    Image.open(drawn).convert("RGB").save(small, "WEBP", quality=80)
-    return small.getvalue()
 
 
 if __name__ == "__main__":

@@ -45,7 +45,6 @@ class Settings:
         category: of the objects.
         steps: gradient steps of the first stage.
         taught_steps: of the second; 0 ends with the first.
-        rounds: how often the second is run, each time taught by the one before.
         taught_lr: learning rate that the second falls from.
         headings: checkpoint of LiDAR scans that the second stage asks which way the views look.
         seed: of data and training.
@@ -57,7 +56,6 @@ class Settings:
     category: Literal["airplane", "chair", "car"]
     steps: int = 3500
     taught_steps: int = 0
-    rounds: int = 1
     taught_lr: float = 7e-4
     headings: Path | None = None
     seed: int = 0
@@ -93,8 +91,8 @@ def main(settings: Settings) -> None:
     first = replace(recipe, optim=replace(recipe.optim, steps=settings.steps))
     model = train(settings, first, "first")
     optim = replace(recipe.optim, steps=settings.taught_steps, lr=settings.taught_lr)
-    for number in range(settings.rounds if settings.taught_steps else 0):
-        model = train(settings, replace(recipe, optim=optim), f"taught{number}", teacher=model)
+    if settings.taught_steps:
+        model = train(settings, replace(recipe, optim=optim), "taught0", teacher=model)
     ship(model, settings)
 
 
@@ -119,7 +117,6 @@ def ship(model: Path, settings: Settings) -> None:
     """The same checkpoint in half precision, as the package carries it."""
     network, found = load_checkpoint(model)
     stages = f"--steps {settings.steps} --taught-steps {settings.taught_steps}"
-    stages += f" --rounds {settings.rounds}" if settings.rounds > 1 else ""
     stages += " --headings DEFAULT" if settings.headings else ""
     stages += "" if settings.device == "cpu" else f" --device {settings.device}"
     what = f"--category {settings.category} --cad CAD --out RUN {stages} --seed {settings.seed}"

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The README's promises: its Python runs, its commands exist, its links lead somewhere."""
+"""The README's promises: its Python and its table of commands run; see also `test_docs.py`."""
 
 import re
 import shlex
@@ -28,14 +28,6 @@ def test_the_python_of_the_readme_does_what_it_says(monkeypatch, capsys):
     assert "(8192, 3)" in printed
     translation = names["model"].register(names["scan"], names["moved"]).T_target_source.translation
     assert np.linalg.norm(translation.numpy() - (1, 0, 0)) < 0.3
-
-
-@pytest.mark.parametrize("command", sorted(set(re.findall(r"`wildshape ([a-z][a-z-]*)", README))))
-def test_every_command_of_the_readme_has_help_with_an_example(command, capsys):
-    with pytest.raises(SystemExit) as stop:
-        main([command, "--help"])
-    assert stop.value.code in (0, None)
-    assert f"wildshape {command}" in capsys.readouterr().out
 
 
 def test_a_fresh_shell_finds_the_command_and_the_package_as_the_first_screen_says():
@@ -92,8 +84,3 @@ def test_the_readme_says_what_the_method_assumes_and_what_the_weights_learned_fr
     assert "roofs" in line
     assert "roofs" in needs
     assert "learned from simulated drives alone" in README
-
-
-def test_links_lead_to_files_of_the_project():
-    for target in re.findall(r"\]\(([^)#]+)\)", README):
-        assert target.startswith("https://") or (ROOT / target).is_file(), target

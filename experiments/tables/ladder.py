@@ -4,8 +4,9 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
+from experiments.tables.ablations import Part, changed
 from experiments.tables.data import store_of
 from experiments.tables.make import selected
 from experiments.tables.measure import measure, method_of
@@ -24,8 +25,6 @@ from wildshape.io.atomic import atomic_write
 from wildshape.io.inputs import open_tracks
 from wildshape.records import Points
 from wildshape.training.recipes import small
-
-Part = Literal["network", "loss", "views"]
 
 
 def rungs(sources: Sources) -> tuple[Trained, ...]:
@@ -63,9 +62,7 @@ def _ours(sources: Sources) -> Trained:
 
 
 def _with(row: Trained, part: Part, **values: Any) -> Trained:
-    """The row with other values in one part of its recipe."""
-    new = replace(getattr(row.recipe, part), **values)
-    return replace(row, recipe=replace(row.recipe, **{part: new}))
+    return changed(row, row.name, part, **values)
 
 
 def table(sources: Sources) -> Table:

@@ -9,18 +9,15 @@ _STEPS, _EXAGGERATED, _EXAGGERATION = 750, 150, 12.0
 _SMALLEST = 1e-12
 
 
-def tsne(
-    codes: Float[np.ndarray, "n z"], perplexity: float = 20.0, seed: int = 0
-) -> Float[np.ndarray, "n 2"]:
-    """Places in a plane that keep neighbours together; the same for the same seed.
+def tsne(codes: Float[np.ndarray, "n z"], perplexity: float = 20.0) -> Float[np.ndarray, "n 2"]:
+    """Places in a plane that keep neighbours together; the same every time.
 
     Args:
         codes: at least 4.
         perplexity: how many neighbours count; lowered to a quarter of the codes.
-        seed: of the places it starts from.
     """
     near = _joint(_squared_distances(codes), min(perplexity, len(codes) / 4))
-    places = np.random.default_rng(seed).normal(0, 1e-2, (len(codes), 2))
+    places = np.random.default_rng(0).normal(0, 1e-2, (len(codes), 2))
     speed, gain = np.zeros_like(places), np.ones_like(places)
     rate = max(len(codes) / _EXAGGERATION, 10.0)
     for step in range(_STEPS):

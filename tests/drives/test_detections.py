@@ -116,7 +116,8 @@ def test_each_cluster_is_the_points_of_one_true_vehicle(street, write, tmp_path)
     check_cut(detections, cuts)
     for frame, found in enumerate(cuts):
         assert found.scanned == len(street.scans[frame].points)
-        whose = [owner_of(street, frame, part) for part in found.clusters() if len(part) >= FULL]
+        parts = np.split(found.points, found.ends[:-1])
+        whose = [owner_of(street, frame, part) for part in parts if len(part) >= FULL]
         assert len(set(whose)) == len(whose)
         assert full_vehicles(street, frame) <= set(whose)
 
@@ -178,7 +179,7 @@ def test_given_tracks_are_kept(street, tmp_path):
     assert {one.name for one in objects} <= truth
     for one in objects:
         for frame, (row,), count in zip(one.frames, one.rows, one.points, strict=True):
-            points = cuts[frame].clusters()[row]
+            points = cuts[frame].cluster(row)
             assert len(points) == count
             assert count < FULL or owner_of(street, frame, points) == int(one.name)
     full = {str(track) for frame in range(SCANS) for track in full_vehicles(street, frame)}

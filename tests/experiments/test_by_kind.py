@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from experiments.by_kind import table
 from tests.evaluation.scores import completion
-from tests.refusal import refused
 
 from wildshape.evaluation.metrics import RegistrationScore
 from wildshape.evaluation.results import MethodScores, Results
@@ -45,7 +44,3 @@ def test_what_registers_nothing_has_no_pose(measured):
     data, evaluation = measured
     for line in table(data, evaluation, "alone").splitlines()[2:]:
         assert [cell.strip() for cell in line.split("|")][-4:-1] == ["\N{EN DASH}"] * 3
-
-
-def test_a_row_that_there_is_not_is_refused(measured):
-    refused(table, *measured, "wildshape", match="--method wildshape: .*rows fuses, alone")

@@ -31,7 +31,7 @@ def meshes(tmp_path, monkeypatch):
     monkeypatch.setattr(confidence, "simulate_tracks", made)
 
     def choice(out):
-        drives(Settings(tmp_path / out, cad=tmp_path), "test")
+        drives(Settings(tmp_path / out, cad=tmp_path))
         return dict(taken)
 
     return choice
@@ -49,5 +49,13 @@ def test_a_few_tracks_are_of_every_common_kind_and_each_sensor_sees_others(meshe
 
 
 def test_drives_that_a_stop_left_half_made_are_made_again(meshes, tmp_path, half_written):
-    half_written(tmp_path / "one" / "test")
+    half_written(tmp_path / "one" / "train")
     assert set(meshes("one")) == {"hdl64", "hdl32"}
+
+
+def test_weights_do_not_speak_of_meshes_that_were_not_there(tmp_path):
+    alone = "simulated views with their truth: procedural chairs"
+    assert Settings(tmp_path, category="chair").fitted_on == alone
+    assert Settings(tmp_path, cad=tmp_path, category="chair").fitted_on == (
+        f"{alone}, CAD chairs of split train"
+    )

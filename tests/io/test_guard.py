@@ -3,7 +3,6 @@
 """Damaged files of every format: a valid result or one sentence, and no memory for a lie."""
 
 import errno
-import resource
 from pathlib import Path
 
 import numpy as np
@@ -14,48 +13,6 @@ from wildshape.errors import BadInputError
 from wildshape.io import guard
 from wildshape.io.guard import reading
 from wildshape.io.scans.points import read_points
-
-_ALLOWED_GROWTH_KIB = 200_000
-
-
-def _survives(path: Path, data: bytes) -> None:
-    path.write_bytes(data)
-    try:
-        points = read_points(path)
-    except BadInputError as error:
-        assert str(error).startswith(str(path))  # noqa: PT017
-        assert "\n" not in str(error)  # noqa: PT017
-    else:
-        assert np.isfinite(points).all()
-
-
-def _damaged(data: bytes, rng: np.random.Generator) -> bytes:
-    """Up to three bytes or words changed, most of them in the header."""
-    broken = bytearray(data)
-    words = (b"\xff\xff\xff\xff", b"\x00\x00\x00\x00", b"\xff\xff\xff\x7f", b"\x00\x00\x00\x80")
-    for _ in range(rng.integers(1, 4)):
-        at = int(rng.integers(min(len(data), 600) if rng.random() < 0.7 else len(data)))
-        if rng.random() < 0.3:
-            broken[at : at + 4] = words[rng.integers(4)]
-        else:
-            broken[at] = rng.integers(256)
-    return bytes(broken)
-
-
-def test_truncated_and_flipped_files_never_surprise(
-    formats: dict[str, Path], tmp_path: Path
-) -> None:
-    rng = np.random.default_rng(0)
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    for path in formats.values():
-        data, copy = path.read_bytes(), tmp_path / path.name
-        cuts = {*rng.integers(0, len(data), 40).tolist(), 0, 1, len(data) - 1}
-        for cut in cuts:
-            _survives(copy, data[:cut])
-        for _ in range(60):
-            _survives(copy, _damaged(data, rng))
-    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-    assert grown < _ALLOWED_GROWTH_KIB
 
 
 @pytest.mark.parametrize("count", [61, 10**9, 10**15, 10**30, -1])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wildshape.ops.connected import connected_parts, connected_trees, first_of_cells, first_sorted
-from wildshape.ops.library import cells_kernel, connected_kernel
+from wildshape.ops.library import added_kernel
 
 
 def by_steps(points, reach):
@@ -33,7 +33,7 @@ def some_groups(seed=3):
 @pytest.fixture(params=[False, True], ids=["kernel", "trees"])
 def either(request, monkeypatch):
     if request.param:
-        monkeypatch.setattr("wildshape.ops.connected.connected_kernel", lambda: None)
+        monkeypatch.setattr("wildshape.ops.connected.added_kernel", lambda _: None)
 
 
 @pytest.mark.parametrize("reach", [0.05, 0.3, 1.0])
@@ -62,7 +62,7 @@ def test_steps_of_the_whole_reach_count_and_longer_ones_across_a_cube_do_not():
     assert connected_parts(corners, 1.0, 0.3).tolist() == [0, 1]
 
 
-@pytest.mark.skipif(connected_kernel() is None, reason="native library not built")
+@pytest.mark.skipif(added_kernel("parts") is None, reason="native library not built")
 @pytest.mark.parametrize("cell", [0.002, 0.1, 0.3])
 def test_many_points_as_trees_have_it(cell):
     rng = np.random.default_rng(0)
@@ -78,7 +78,7 @@ def test_none_and_one():
     assert connected_parts(np.zeros((1, 3), np.float32), 1.0, 0.1).tolist() == [0]
 
 
-@pytest.mark.skipif(cells_kernel() is None, reason="no kernels")
+@pytest.mark.skipif(added_kernel("cells") is None, reason="no kernels")
 @pytest.mark.parametrize("cell", [0.05, 0.4, 3.0])
 def test_the_first_point_of_each_cell_is_the_same_with_the_kernel_and_by_sorting(cell):
     points = some_groups()

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from wildshape.geometry.surface import planes_torch
-from wildshape.ops.library import planes_kernel, point_to_plane_kernel
+from wildshape.ops.library import added_kernel
 from wildshape.ops.planes import planes_native
 from wildshape.ops.point_to_plane import (
     point_to_plane,
@@ -16,7 +16,7 @@ from wildshape.ops.point_to_plane import (
 )
 
 COMPILED = pytest.mark.skipif(
-    planes_kernel() is None or point_to_plane_kernel() is None, reason="no kernels"
+    added_kernel("planes") is None or added_kernel("point_to_plane") is None, reason="no kernels"
 )
 
 

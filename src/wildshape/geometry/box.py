@@ -23,6 +23,8 @@ from wildshape.geometry.transforms.rotation import (
 # A box of edge 2 about the origin; its edges join corners that differ in one coordinate.
 SIGNS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
 EDGES = [(i, j) for i in range(8) for j in range(i) if np.abs(SIGNS[i] - SIGNS[j]).sum() == 2]
+_DIRECTIONS = 90  # tried within a quarter turn: one a degree
+_TRIM = 0.002  # share of the points left out at each side, for a few strays are far out
 _VEHICLE_M = 5.0  # the diagonal of a usual car, metres
 _MIRROR = 0.006  # share of the surface at either side that a mirror takes at most
 _INSIDE, _FLAT = 1e-9, 1e-12  # of a box's diagonal: rounding
@@ -58,19 +60,17 @@ def box_axes(quaternion_wxyz: tuple[float, ...]) -> Float[np.ndarray, "3 3"]:
     return rotation_from_quaternion(held).numpy()
 
 
-def fit_box(points: Float[Tensor, "n 3"], *, count: int = 90, trim: float = 0.002) -> FittedBox:
+def fit_box(points: Float[Tensor, "n 3"]) -> FittedBox:
     """The upright rectangle of least area around all but the outermost points at each side.
 
     Args:
         points: z up, metres.
-        count: of the directions tried within a quarter turn: one a degree.
-        trim: share of the points left out at each side, for a few strays are far out.
     """
-    angles = torch.arange(count, dtype=points.dtype) * (torch.pi / 2 / count)
-    low, high = _trimmed_range(_along_axes(points, angles), trim)
-    across = (high - low)[:-1].view(2, count)
+    angles = torch.arange(_DIRECTIONS, dtype=points.dtype) * (torch.pi / 2 / _DIRECTIONS)
+    low, high = _trimmed_range(_along_axes(points, angles))
+    across = (high - low)[:-1].view(2, _DIRECTIONS)
     best = int((across[0] * across[1]).argmin())
-    axes = torch.tensor((best, count + best, 2 * count))
+    axes = torch.tensor((best, _DIRECTIONS + best, 2 * _DIRECTIONS))
     angle, centre, size = angles[best], (low + high)[axes] / 2, (high - low)[axes]
     rotation = rotation_z(angle)
     position = rotation @ centre
@@ -90,8 +90,8 @@ def _along_axes(points: Float[Tensor, "n 3"], angles: Float[Tensor, "a"]) -> Ten
     return torch.cat((x * cos + y * sin, y * cos - x * sin, z[None]))
 
 
-def _trimmed_range(rows: Float[Tensor, "k n"], trim: float) -> tuple[Tensor, Tensor]:
-    outermost = int(trim * rows.shape[1]) + 1
+def _trimmed_range(rows: Float[Tensor, "k n"]) -> tuple[Tensor, Tensor]:
+    outermost = int(_TRIM * rows.shape[1]) + 1
     low = rows.topk(outermost, dim=1, largest=False).values[:, -1]
     return low, rows.topk(outermost, dim=1).values[:, -1]
 

@@ -12,24 +12,22 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+_TOGETHER = 0.9  # length of the mean of axes from which on they have a direction in common
+_MOST_DEG = 30.0  # a pitch over this is no tilt of the frame but a wrong pose
 
-def mean_up(
-    R_sensor_object: Float[Tensor, "V 3 3"], together: float = 0.9
-) -> Float[Tensor, "3"] | None:
+
+def mean_up(R_sensor_object: Float[Tensor, "V 3 3"]) -> Float[Tensor, "3"] | None:
     """The direction, object frame, that the sensors' z axes have in common; None if they do not.
 
     Args:
         R_sensor_object: of scans of one object, or of many in one canonical frame.
-        together: length of the mean of the axes from which on they have a direction in common.
     """
     mean = R_sensor_object[:, 2].mean(0)
     length = float(mean.norm())
-    return mean / length if length > together else None
+    return mean / length if length > _TOGETHER else None
 
 
-def level_turn(
-    R_sensor_object: Float[Tensor, "V 3 3"], most_deg: float = 30.0
-) -> Float[Tensor, "3 3"]:
+def level_turn(R_sensor_object: Float[Tensor, "V 3 3"]) -> Float[Tensor, "3 3"]:
     """`R_object_levelled`: a turn about the object's y axis after which its z axis points up.
 
     Scans of a track say nothing of the pitch of the frame that they are posed in: it is chosen. Of
@@ -37,11 +35,10 @@ def level_turn(
 
     Args:
         R_sensor_object: of the scans of one object.
-        most_deg: a pitch over this is no tilt of the frame but a wrong pose, degrees.
     """
     up = mean_up(R_sensor_object)
     pitch = 0.0 if up is None else math.atan2(float(up[0]), float(up[2]))
-    if abs(pitch) > math.radians(most_deg):
+    if abs(pitch) > math.radians(_MOST_DEG):
         pitch = 0.0
     c, s = math.cos(pitch), math.sin(pitch)
     return torch.tensor(((c, 0.0, s), (0.0, 1.0, 0.0), (-s, 0.0, c))).to(R_sensor_object)

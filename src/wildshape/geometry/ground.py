@@ -35,28 +35,28 @@ class SkirtRule:
     fewest: int = 50
 
 
+_RULE = SkirtRule()
+
+
 def skirt(
-    points: Float[np.ndarray, "n 3"],
-    shape: Float[np.ndarray, "m 3"] | None = None,
-    rule: SkirtRule = SkirtRule(),
+    points: Float[np.ndarray, "n 3"], shape: Float[np.ndarray, "m 3"] | None = None
 ) -> Bool[np.ndarray, "n"]:
     """The points that are low and beside everything higher of the vehicle.
 
     Args:
         points: canonical frame, z up, metres.
         shape: the vehicle, the same frame; by default what the points are of.
-        rule: see there.
     """
     whole = points if shape is None else shape
     height = whole[:, 2]
-    low = quantiles(height[None], (rule.ends,)).item()
-    body = whole[height > low + rule.above_m, :2].T
-    if body.shape[1] < rule.fewest:
+    low = quantiles(height[None], (_RULE.ends,)).item()
+    body = whole[height > low + _RULE.above_m, :2].T
+    if body.shape[1] < _RULE.fewest:
         return np.zeros(len(points), dtype=bool)
-    near, far = quantiles(body.copy(), (rule.ends, 1 - rule.ends))
-    found = points[:, 2] < low + rule.low_m
+    near, far = quantiles(body.copy(), (_RULE.ends, 1 - _RULE.ends))
+    found = points[:, 2] < low + _RULE.low_m
     lows = points[found, :2]
-    beside = (lows < near - rule.beyond_m) | (lows > far + rule.beyond_m)
+    beside = (lows < near - _RULE.beyond_m) | (lows > far + _RULE.beyond_m)
     found[found] = beside.any(axis=1)
     return found
 

@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
-from wildshape.ops.library import planes_kernel
+from wildshape.ops.library import added_kernel
 from wildshape.ops.planes import planes_native
 
 _TINY = 1e-30
@@ -45,7 +45,7 @@ def planes(
         points: clouds.
         around: places in the cloud of the k points of each neighbourhood.
     """
-    if points.device.type == "cpu" and not points.requires_grad and planes_kernel():
+    if points.device.type == "cpu" and not points.requires_grad and added_kernel("planes"):
         return planes_native(points, around)
     return planes_torch(points, around)
 

@@ -21,6 +21,7 @@ COVERED_M = 0.2
 SMALLEST_M = 1e-4
 """Lengths below this count as this where their logarithm is taken."""
 
+_RIDGE_OF_COST = 1e-3  # the cost orders errors well by itself
 _MOST = 700.0  # the logarithm of the largest float, nearly
 
 
@@ -88,7 +89,6 @@ def fit_calibration(
     cd: Float[np.ndarray, "n"],
     fitted_on: str = "",
     ridge: float = 1.0,
-    ridge_of_cost: float = 1e-3,
 ) -> Calibration:
     """Ridge regression of the logarithm of true Chamfer distances.
 
@@ -97,14 +97,13 @@ def fit_calibration(
         cd: their true Chamfer distances, metres.
         fitted_on: what they are, in words.
         ridge: what holds the weights of all features but the cost near zero.
-        ridge_of_cost: the same of the cost, which orders errors well by itself; at most `ridge`.
     """
     known = np.asarray(features, dtype=np.float64)
     target = np.log(np.maximum(cd, 1e-6))
     middle, width = known.mean(0), known.std(0) + 1e-6
     scaled = (known - middle) / width
     held = np.full(scaled.shape[1], ridge)
-    held[ConfidenceFeatures._fields.index("log_cost")] = min(ridge, ridge_of_cost)
+    held[ConfidenceFeatures._fields.index("log_cost")] = min(ridge, _RIDGE_OF_COST)
     normal = scaled.T @ scaled + np.diag(held)
     slope = np.linalg.solve(normal, scaled.T @ (target - target.mean()))
     left = target - target.mean() - scaled @ slope

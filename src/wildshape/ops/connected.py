@@ -5,7 +5,7 @@
 import numpy as np
 from jaxtyping import Float32, Int32, Int64
 
-from wildshape.ops.library import cells_kernel, connected_kernel
+from wildshape.ops.library import added_kernel
 
 _NO_PAIRS = np.empty((0, 2), np.int64)
 
@@ -29,7 +29,7 @@ def connected_parts(
     """
     if not len(points):
         return np.zeros(0, dtype=np.int64)
-    kernel = connected_kernel()
+    kernel = added_kernel("parts")
     if kernel is None:
         return connected_trees(points, reach, cell, pairs)
     part = np.empty(len(points), np.int64)
@@ -71,7 +71,7 @@ def first_of_cells(points: Float32[np.ndarray, "n 3"], cell: float) -> Int32[np.
     Raises:
         MemoryError: no room.
     """
-    kernel = cells_kernel()
+    kernel = added_kernel("cells")
     if kernel is None:
         return first_sorted(points, cell)
     dense, rows = np.ascontiguousarray(points, np.float32), np.empty(len(points), np.int32)

@@ -32,13 +32,15 @@ _SIGNATURES = {
     "wildshape_visible": ([_P, _P, _I64, _I64, _I64, _P, _INT], _INT),
 }
 
-_NEAREST_K = (_P, _P, _P, _P, _P, _P, _I64, _I64, _I64, _I64, _F32, _P, _P, _INT, _INT)
-
-_PARTS = (_P, _I64, _F32, _F32, _P, _I64, _P)
-_CELLS = (_P, _I64, _F32, _P)
-_SPANS = (_P, _I64, _P, _I64, _P, _P)
-_PLANES = (_P, _P, _I64, _I64, _P, _P)
-_POINT_TO_PLANE = (_P, _P, _I64, _I64, _P, _P, _P, _F64, _F64, _P, _P, _P)
+# Added to the others, so a library built before them lacks these; each returns an int.
+_ADDED: dict[str, tuple[Any, ...]] = {
+    "nearest_k": (_P, _P, _P, _P, _P, _P, _I64, _I64, _I64, _I64, _F32, _P, _P, _INT, _INT),
+    "parts": (_P, _I64, _F32, _F32, _P, _I64, _P),
+    "cells": (_P, _I64, _F32, _P),
+    "spans": (_P, _I64, _P, _I64, _P, _P),
+    "planes": (_P, _P, _I64, _I64, _P, _P),
+    "point_to_plane": (_P, _P, _I64, _I64, _P, _P, _P, _F64, _F64, _P, _P, _P),
+}
 
 
 @cache
@@ -60,42 +62,12 @@ def library() -> ctypes.CDLL | None:
     return loaded if loaded.wildshape_abi() == _ABI else None
 
 
-def nearest_k_kernel() -> Callable[..., int] | None:
-    """The k nearest neighbours; None where the library is absent or was built before them."""
-    return _added("wildshape_nearest_k", _NEAREST_K)
-
-
-def connected_kernel() -> Callable[..., int] | None:
-    """Points that hang together; None as above."""
-    return _added("wildshape_parts", _PARTS)
-
-
-def cells_kernel() -> Callable[..., int] | None:
-    """The first point of each cell; None as above."""
-    return _added("wildshape_cells", _CELLS)
-
-
-def spans_kernel() -> Callable[..., int] | None:
-    """How far points reach along directions; None as above."""
-    return _added("wildshape_spans", _SPANS)
-
-
-def planes_kernel() -> Callable[..., int] | None:
-    """Planes of neighbourhoods; None as above."""
-    return _added("wildshape_planes", _PLANES)
-
-
-def point_to_plane_kernel() -> Callable[..., int] | None:
-    """The equations of points moved onto planes; None as above."""
-    return _added("wildshape_point_to_plane", _POINT_TO_PLANE)
-
-
 @cache
-def _added(name: str, arguments: tuple[Any, ...]) -> Callable[..., int] | None:
-    """A kernel that was added to the others, which a library built before it lacks."""
-    kernel = getattr(library(), name, None)
+def added_kernel(name: str) -> Callable[..., int] | None:
+    """One of `_ADDED`; None where the library is absent or was built before it."""
+    kernel = getattr(library(), f"wildshape_{name}", None)
     if kernel is not None:
-        kernel.argtypes, kernel.restype = arguments, _INT
+        kernel.argtypes, kernel.restype = _ADDED[name], _INT
     return kernel
 
 

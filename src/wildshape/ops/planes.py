@@ -6,7 +6,7 @@ import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
-from wildshape.ops.library import planes_kernel
+from wildshape.ops.library import added_kernel
 
 
 def planes_native(
@@ -22,7 +22,7 @@ def planes_native(
         RuntimeError: the library is not built.
         IndexError: neighbourhoods of no points, or with places outside of the cloud.
     """
-    kernel = planes_kernel()
+    kernel = added_kernel("planes")
     if kernel is None:
         raise RuntimeError("the native library is not built; use the torch backend.")
     (clouds, count, size), most = around.shape, points.shape[1]

@@ -12,7 +12,7 @@ import torch
 from jaxtyping import Float, Float32, Int64
 from torch import Tensor
 
-from wildshape.ops.library import check_memory, point_to_plane_kernel
+from wildshape.ops.library import added_kernel, check_memory
 from wildshape.ops.planes import check_places
 
 
@@ -50,7 +50,8 @@ def point_to_plane(
         holding: how much a point is held along all three axes, of its normal's 1.
     """
     given = points, centre, onto, normals, counterpart, width, holding
-    if points.device.type == "cpu" and points.dtype == torch.float32 and point_to_plane_kernel():
+    fits = points.device.type == "cpu" and points.dtype == torch.float32
+    if fits and added_kernel("point_to_plane"):
         return point_to_plane_native(*given)
     return point_to_plane_torch(*given)
 
@@ -69,7 +70,7 @@ def point_to_plane_native(
     Raises:
         RuntimeError: the library is not built.
     """
-    kernel = point_to_plane_kernel()
+    kernel = added_kernel("point_to_plane")
     if kernel is None:
         raise RuntimeError("the native library is not built; use the torch backend.")
     check_places(counterpart, len(onto))

@@ -5,7 +5,7 @@
 import numpy as np
 from jaxtyping import Float, Float64
 
-from wildshape.ops.library import spans_kernel
+from wildshape.ops.library import added_kernel
 
 
 def spans(
@@ -17,7 +17,7 @@ def spans(
         points: at least one; taken as float32.
         directions: their x, then their y.
     """
-    kernel = spans_kernel()
+    kernel = added_kernel("spans")
     if kernel is None:
         return spans_numpy(points, directions)
     dense, level = np.ascontiguousarray(points, np.float32), np.ascontiguousarray(directions)

@@ -8,18 +8,16 @@ from wildshape.simulate.shapes.solid import Solid, box, cylinder
 from wildshape.simulate.shapes.vehicle import random_vehicle
 
 _TRIES = 8
+_ROW = 0.35  # of the vehicles stand in a row with the object
 
 
-def occluders(
-    target: Solid, sensors: np.ndarray, rng: np.random.Generator, row: float = 0.35
-) -> list[Solid]:
+def occluders(target: Solid, sensors: np.ndarray, rng: np.random.Generator) -> list[Solid]:
     """One to three things on the same ground as the object, in its frame.
 
     Args:
         target: the object, box centre at the origin.
         sensors: `(v, 3)` where the sensor will be, object frame, metres.
         rng: the only source of chance.
-        row: share of the vehicles that stand in a row with the object.
 
     Returns:
         Solids clear of the object and of the sensor's way; possibly none where there is no room.
@@ -28,7 +26,7 @@ def occluders(
     for _ in range(int(rng.integers(1, 4))):
         for _ in range(_TRIES):
             thing = _thing(rng)
-            in_row = bool(thing.kind) and rng.random() < row
+            in_row = bool(thing.kind) and rng.random() < _ROW
             at = _beside(target, thing, rng) if in_row else _between(sensors, rng)
             moved = _stand(thing, target, at, rng)
             if _clear(moved, target, sensors):

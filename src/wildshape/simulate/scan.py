@@ -282,12 +282,12 @@ _AROUND_M = 2.0  # wider than what is kept
 _PANE_M = 0.02
 
 
-def _box_edges(steps: int = 9) -> np.ndarray:
-    """`(12 steps, 3)` points along the edges of the cube from -1 to 1."""
-    t = np.linspace(-1, 1, steps)
+def _box_edges() -> np.ndarray:
+    """`(108, 3)` points along the edges of the cube from -1 to 1."""
+    t = np.linspace(-1, 1, 9)
     corners = np.array([(a, b) for a in (-1, 1) for b in (-1, 1)], float)
     edges = [
-        np.insert(np.repeat(corners, steps, 0), axis, np.tile(t, 4), axis=1) for axis in range(3)
+        np.insert(np.repeat(corners, len(t), 0), axis, np.tile(t, 4), axis=1) for axis in range(3)
     ]
     return np.concatenate(edges)
 

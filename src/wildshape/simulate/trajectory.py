@@ -15,12 +15,10 @@ class Drive:
         kind: `straight`, `bend` or `turn`.
         T_object_sensor: `(v, 4, 4)` in time order; the object's frame has its origin
             at its box centre, x forward, y left, z up.
-        speed: metres a second.
     """
 
     kind: str
     T_object_sensor: np.ndarray
-    speed: float
 
 
 def drive_by(
@@ -67,7 +65,7 @@ def drive_by(
     clear = bool((np.abs(at) - half[:2]).max(1).min() > clearance_m)
     distance = np.linalg.norm(at, axis=1)
     keep = (distance >= near) & (distance <= far) & clear
-    return Drive(kind, T_object_sensor[keep], speed)
+    return Drive(kind, T_object_sensor[keep])
 
 
 def _path(kind: str, s: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -8,14 +8,11 @@ from wildshape.errors import BadInputError
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.shapes.solid import Solid
 
+_LOOKS = 12  # directions from which each point is looked at
+
 
 def visible_surface(
-    solid: Solid,
-    scene: Scene,
-    count: int,
-    lowest_deg: float,
-    rng: np.random.Generator,
-    directions: int = 12,
+    solid: Solid, scene: Scene, count: int, lowest_deg: float, rng: np.random.Generator
 ) -> np.ndarray:
     """`(count, 3)` float32 points on the outer visible surface, uniform by area.
 
@@ -31,7 +28,6 @@ def visible_surface(
             road (a LiDAR, higher than a car's floor, never looks up at it), -90 for objects seen
             from everywhere.
         rng: the only source of chance.
-        directions: from which each point is looked at.
 
     Raises:
         BadInputError: nearly nothing of the surface can be seen from outside.
@@ -39,7 +35,7 @@ def visible_surface(
     found, have = [], 0
     for _ in range(12):
         points, normals = on_surface(solid, int(1.5 * (count - have)) + 64, rng)
-        seen = points[_seen(points, normals, solid, scene, lowest_deg, rng, directions)]
+        seen = points[_seen(points, normals, solid, scene, lowest_deg, rng)]
         found.append(seen)
         have += len(seen)
         if have >= count:
@@ -72,7 +68,6 @@ def _seen(
     scene: Scene,
     lowest_deg: float,
     rng: np.random.Generator,
-    directions: int,
 ) -> np.ndarray:
     """`(n,)` bool: the first thing met from far away in one of the directions."""
     low, high = solid.bounds
@@ -82,7 +77,7 @@ def _seen(
     side = normals if solid.closed else points - (low + high) / 2
     seen = np.zeros(len(points), bool)
     pool = _directions(2048, lowest_deg, rng)
-    for turn in range(directions):
+    for turn in range(_LOOKS):
         left = np.flatnonzero(~seen)
         toward = pool.take(rng.integers(0, len(pool), len(left)), axis=0)
         outward = side.take(left, axis=0)

@@ -161,13 +161,6 @@ def test_records_and_extra_columns_of_npy(tmp_path: Path) -> None:
     assert read_points(tmp_path / "b.npy").tolist() == [[1, 2, 3]]
 
 
-def test_extent_is_checked_in_metres(tmp_path: Path, cloud: np.ndarray) -> None:
-    np.save(tmp_path / "a.npy", cloud * 1000)
-    with pytest.raises(BadInputError, match="--unit mm"):
-        read_scan(tmp_path / "a.npy")
-    assert np.ptp(read_scan(tmp_path / "a.npy", Coordinates("mm")).points) < 10
-
-
 @pytest.mark.parametrize("name", ["a.npy", "a.npz"])
 def test_an_array_on_its_side_is_named_with_its_cure(name: str, tmp_path: Path, cloud) -> None:
     (np.save if name == "a.npy" else np.savez)(tmp_path / name, cloud.T)

@@ -13,6 +13,9 @@ from wildshape.geometry.sampling import radius_inliers, voxel_thin
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 
+_VOXEL_M, _RADIUS_M, _NEIGHBOURS = 0.05, 0.25, 5
+_FEWEST = 32  # a cloud of which fewer would be left stays as it is: it is thin all over
+
 
 @dataclass(frozen=True)
 class StationaryFrame:
@@ -51,26 +54,11 @@ def stand(scans: tuple[Points, ...], T_sensor_world: SE3) -> StationaryFrame:
     )
 
 
-def without_lonely(
-    points: Points,
-    *,
-    voxel: float = 0.05,
-    radius: float = 0.25,
-    neighbours: int = 5,
-    fewest: int = 32,
-) -> Points:
-    """Thinned, and without points that have too few others around them.
-
-    Args:
-        points: accumulated scans of one object, metres.
-        voxel: edge of the cubes that the cloud is thinned by, metres.
-        radius: within which a point needs `neighbours` others, metres.
-        neighbours: see `radius`.
-        fewest: a cloud of which fewer would be left stays as it is: it is thin all over.
-    """
-    thinned = voxel_thin(points, voxel)
-    kept = thinned[radius_inliers(thinned, radius, neighbours)]
-    return kept if len(kept) >= fewest else thinned
+def without_lonely(points: Points) -> Points:
+    """Accumulated scans thinned, and without points that have too few others around them."""
+    thinned = voxel_thin(points, _VOXEL_M)
+    kept = thinned[radius_inliers(thinned, _RADIUS_M, _NEIGHBOURS)]
+    return kept if len(kept) >= _FEWEST else thinned
 
 
 def _spread(moved: list[Points]) -> float:

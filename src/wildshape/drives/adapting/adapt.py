@@ -28,7 +28,6 @@ from wildshape.io.progress import counted, duration
 from wildshape.method.checkpoint import MODEL
 
 ADAPTED, SAID = "adapted", "adapted.json"
-FILES = (SAID, f"{ADAPTED}/**/*")
 _COMMAND, _SAYS = "drive --adapt", "what `wildshape drive` says of itself"
 
 

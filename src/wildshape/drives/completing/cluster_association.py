@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from wildshape.drives.completing.boxes import Way, expected
-from wildshape.drives.completing.level_frame import Completed
+from wildshape.drives.completing.level_frame import Completed, as_box_sees
 from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.tracking.segmentation import read_cuts
@@ -102,11 +102,8 @@ def in_box(
         size: length, width, height.
         around_m: metres.
     """
-    off = points - box[:3]
-    c, s = np.cos(box[3]), np.sin(box[3])
-    turned = np.stack((c * off[:, 0] + s * off[:, 1], c * off[:, 1] - s * off[:, 0], off[:, 2]))
-    reach = np.array(size)[:, None] / 2 + around_m
-    return np.all(np.abs(turned) <= reach, axis=0)
+    reach = np.array(size) / 2 + around_m
+    return np.all(np.abs(as_box_sees(points, box)) <= reach, axis=1)
 
 
 def _shared_out(

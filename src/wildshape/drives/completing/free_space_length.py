@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from wildshape.drives.completing.level_frame import Completed
+from wildshape.drives.completing.level_frame import Completed, as_box_sees
 from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.object_config import CarveConfig
 from wildshape.records import Points
@@ -92,8 +92,8 @@ def _counted(
 ) -> _Slabs:
     """What the rays of one scan that go towards a box say of it; all in the level world."""
     slabs = _Slabs.empty(config)
-    points = _in_box(scan, box)
-    origin = _in_box(sensor[None], box)[0]
+    points = as_box_sees(scan, box)
+    origin = as_box_sees(sensor[None], box)[0]
     floor = -size[2] / 2 + config.low_m
     inside = np.all(np.abs(points) < np.array(size) / 2, axis=1) & (points[:, 2] > floor)
     slabs.points += int(inside.sum())
@@ -167,11 +167,3 @@ def _cut(one: Completed, slabs: _Slabs, config: CarveConfig) -> Completed:
 def _until(flags: Bool[np.ndarray, "bins"]) -> int:
     """How many come before the first that is not so."""
     return int(np.argmin(np.append(flags, False)))
-
-
-def _in_box(points: Points, box: Box) -> Float[np.ndarray, "n 3"]:
-    """Points of the level world in the frame of a box: x ahead, y left, origin in its middle."""
-    off = points - box[:3]
-    c, s = np.cos(box[3]), np.sin(box[3])
-    turned = (c * off[:, 0] + s * off[:, 1], c * off[:, 1] - s * off[:, 0], off[:, 2])
-    return np.stack(turned, axis=1)

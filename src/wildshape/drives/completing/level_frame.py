@@ -24,7 +24,7 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import OBJECTS
 from wildshape.io.boxes.detections import detections_of, poses_of
 from wildshape.io.guard import read_json
-from wildshape.records import Box
+from wildshape.records import Box, Points
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,14 @@ class Completed:
 def level_poses(T_world_sensor: SE3, mounting: Mounting) -> SE3:
     """`T_level_sensor` of every frame: from its sensor frame to the level world."""
     return mounting.levelling() @ T_world_sensor
+
+
+def as_box_sees(points: Points, box: Float[np.ndarray, "4"]) -> Float[np.ndarray, "n 3"]:
+    """Points in the frame of an upright box: x ahead, y left, origin in its middle."""
+    off = points - box[:3]
+    c, s = np.cos(box[3]), np.sin(box[3])
+    turned = (c * off[:, 0] + s * off[:, 1], c * off[:, 1] - s * off[:, 0], off[:, 2])
+    return np.stack(turned).T
 
 
 def read_completed(seen: Sightings, folder: Path, drive: Drive, turns: Turns) -> Completed:

@@ -54,10 +54,6 @@ class CutScan:
         """Where each cluster ends."""
         return np.cumsum(self.counts).tolist()
 
-    def clusters(self) -> list[Points]:
-        """The points of each cluster."""
-        return [self.cluster(row) for row in range(len(self.counts))]
-
     def moved(self, T_target_sensor: SE3) -> list[Points]:
         """The points of each cluster in another frame."""
         points = T_target_sensor.apply_numpy(self.points)

@@ -13,13 +13,16 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+_SAME_DEG = 0.25  # scans that end within this of the highest end at the same place
+_FEWEST = 3  # of such scans that show the end of a view
+
 
 def slope(points: Float[Tensor, "... 3"]) -> Float[Tensor, "..."]:
     """Tangent of each point's elevation; z up, any unit."""
     return points[..., 2] / torch.hypot(points[..., 0], points[..., 1]).clamp_min(1e-9)
 
 
-def view_top(highest: Sequence[float], *, same_deg: float = 0.25, fewest: int = 3) -> float:
+def view_top(highest: Sequence[float]) -> float:
     """Slope at which the sensor's view ended on an object; infinite if it did not.
 
     The top of an object comes lower into view the farther away it is, the end of the view stays
@@ -29,14 +32,12 @@ def view_top(highest: Sequence[float], *, same_deg: float = 0.25, fewest: int = 
 
     Args:
         highest: `slope` of the highest point of each scan of a track, sensor frame.
-        same_deg: scans that end within this of the highest end at the same place, degrees.
-        fewest: of such scans that show the end of a view.
     """
     if len(highest) == 0:
         return math.inf
     top = max(highest)
-    alike = sum(value >= top - math.tan(math.radians(same_deg)) for value in highest)
-    return top if top > 0 and alike >= fewest else math.inf
+    alike = sum(value >= top - math.tan(math.radians(_SAME_DEG)) for value in highest)
+    return top if top > 0 and alike >= _FEWEST else math.inf
 
 
 def within_view(rays: Float[Tensor, "B P 3"], top: Float[Tensor, "B"]) -> Bool[Tensor, "B P"]:

@@ -21,6 +21,7 @@ from wildshape.geometry.projection.visibility import facing_rotation
 
 _AHEAD, _SMALLEST_M = (1.0, 0.0, 0.0), 1e-6
 _STEPS = 200
+_NEAR = 0.01  # of the extent: no sensor comes as near to the hull of what it sees
 # Axes x forward, y left, z up of a depth camera's own x right, y down, z forward.
 _CAMERA = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 
@@ -102,7 +103,7 @@ def roll_angle(R_facing_object: Float[Tensor, "B 3 3"]) -> Float[Tensor, "B"]:
     return torch.atan2(up[:, 1], up[:, 2])
 
 
-def surrounded(points: Float[np.ndarray, "n 3"], near: float = 0.01) -> bool:
+def surrounded(points: Float[np.ndarray, "n 3"]) -> bool:
     """Whether the points lie on all sides of the origin: in their convex hull, or as good as.
 
     Frank-Wolfe steps to the hull's point nearest to the origin. As soon as all points lie before
@@ -110,10 +111,9 @@ def surrounded(points: Float[np.ndarray, "n 3"], near: float = 0.01) -> bool:
 
     Args:
         points: of one object, sensor frame.
-        near: of the extent: no sensor comes as near to the hull of what it sees.
     """
     exact = points.astype(np.float64)
-    reach = near * extent(exact)
+    reach = _NEAR * extent(exact)
     place = exact.mean(0)
     for _ in range(_STEPS):
         if float(place @ place) <= reach**2:

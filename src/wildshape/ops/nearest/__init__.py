@@ -16,7 +16,7 @@ from jaxtyping import Float, Int, Int64
 from torch import Tensor
 
 from wildshape.errors import BadInputError
-from wildshape.ops.library import library, nearest_k_kernel
+from wildshape.ops.library import added_kernel, library
 from wildshape.ops.nearest.nearest_k import (
     check_k,
     nearest_k_native,
@@ -126,7 +126,7 @@ def nearest_k(
     query, target = _at_least_float32(query.detach()), _at_least_float32(target.detach())
     check_k(query, target, k, groups)
     given = (query, target, k, query_sizes, target_sizes)
-    if _backend_for(query, target) == "native" and nearest_k_kernel():
+    if _backend_for(query, target) == "native" and added_kernel("nearest_k"):
         return nearest_k_native(*given, groups, most)
     finite = bool(query.isfinite().all()) and bool(target.isfinite().all())
     if query.device.type == "cpu" and groups is None and finite:

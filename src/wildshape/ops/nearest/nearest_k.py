@@ -9,7 +9,7 @@ from jaxtyping import Float, Int, Int64
 from torch import Tensor
 
 from wildshape.errors import BadInputError
-from wildshape.ops.library import check_memory, nearest_k_kernel
+from wildshape.ops.library import added_kernel, check_memory
 from wildshape.ops.nearest.neighbours import Neighbourhoods, as_int64, check_clouds
 from wildshape.ops.threads import exact_threads
 
@@ -35,7 +35,7 @@ def nearest_k_native(
     check_clouds(query, target, query_sizes, target_sizes)
     check_memory("nearest_k", query, torch.float32)
     check_memory("nearest_k", target, torch.float32)
-    kernel = nearest_k_kernel()
+    kernel = added_kernel("nearest_k")
     if kernel is None:
         raise RuntimeError("the native library is not built; use another backend.")
     shape = (*query.shape[:2], k)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 SCANS = 3
 PANELS = SCANS + 1
 _POINTS = 2500
+_LONGEST = 12  # letters of a scan's name
 
 
 def draw_track(row: Sequence["Axes"], track: Track) -> None:
@@ -120,5 +121,5 @@ def _frame(axes: "Axes", bounds: tuple[float, float, float, float], label: str) 
     axes.set_xlabel(label, fontsize=7, color="#59616c", labelpad=1)
 
 
-def _tail(name: str, limit: int = 12) -> str:
-    return name if len(name) <= limit else "\N{HORIZONTAL ELLIPSIS}" + name[1 - limit :]
+def _tail(name: str) -> str:
+    return name if len(name) <= _LONGEST else "\N{HORIZONTAL ELLIPSIS}" + name[1 - _LONGEST :]

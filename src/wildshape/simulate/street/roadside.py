@@ -9,7 +9,7 @@ import numpy as np
 from wildshape.simulate.shapes.solid import Solid, box, cylinder, ellipsoid, union
 from wildshape.simulate.street.street import LEAD_M, Street
 
-_BEHIND_M, _CLEAR_M = 1.0, 0.3
+_CLEAR_M = 0.3
 Part = tuple[float, float, Solid]  # along the street, to the left of it, the solid at its origin
 
 

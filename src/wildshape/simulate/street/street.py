@@ -152,9 +152,9 @@ class Street:
         s = np.arange(low, high + 1.0)
         return [self._road(s), self._terrain(s)]
 
-    def is_straight(self, s: float, reach: float) -> bool:
-        """Whether the street keeps its direction within `reach` metres of a place."""
-        yaw = np.interp((s - reach, s + reach), self.path[:, 0], self.path[:, 3])
+    def is_straight(self, s: float) -> bool:
+        """Whether the street keeps its direction within 6 m of a place."""
+        yaw = np.interp((s - 6.0, s + 6.0), self.path[:, 0], self.path[:, 3])
         return bool(abs(yaw[1] - yaw[0]) < 0.01)
 
     def middle(self, low: float, high: float) -> np.ndarray:

@@ -71,7 +71,7 @@ def _parked(
     taken, street = float(rng.uniform(0.4, 0.85)), stretch.street
     s = stretch.low
     while s < stretch.high:
-        if rng.random() > taken or not street.is_straight(s + 3.0, 6.0):
+        if rng.random() > taken or not street.is_straight(s + 3.0):
             s += float(rng.uniform(4.0, 8.0))
             continue
         narrow = (one for one in islice(drawn, _TRIES) if one.size[1] < _WIDEST_PARKED_M)
@@ -94,7 +94,7 @@ def _on_plots(
     """Behind the pavement, across the street or along it, now and then."""
     street, s = stretch.street, stretch.low + float(rng.uniform(0.0, 30.0))
     while s < stretch.high:
-        if street.is_straight(s, 6.0):
+        if street.is_straight(s):
             actor = next(drawn)
             across = rng.random() < 0.7
             reach = actor.size[0 if across else 1] / 2
