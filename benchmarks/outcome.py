@@ -14,7 +14,8 @@ from statistics import median
 from typing import Any
 
 import torch
-from machine import Kind, p95, verdict
+from figure import draw
+from machine import Kind, header, p95, verdict
 from turns import clock_name
 
 from wildshape.io.atomic import write_json, write_text
@@ -77,7 +78,7 @@ class Outcome:
         self.bars.append(verdict(name, value, bar, least=least, kind=kind))
 
     def publish(self, folder: Path, *, small: bool) -> None:
-        """Print the bars; write NAME.csv and NAME.json (provenance)."""
+        """Print the bars; write NAME.csv, NAME.json (provenance) and NAME.svg."""
         print("\n" + "\n".join(self.bars) if self.bars else "", flush=True)
         columns = list(dict.fromkeys(column for row in self.rows for column in row))
         text = io.StringIO()
@@ -86,6 +87,12 @@ class Outcome:
         writer.writerows({k: rounded(v) for k, v in row.items()} for row in self.rows)
         write_text(folder / f"{self.name}.csv", text.getvalue())
         write_json(folder / f"{self.name}.json", self.record(small))
+        draw(
+            folder / f"{self.name}.svg",
+            self.rows,
+            self.unit,
+            f"{header(self.name)}; {clock_name()}",
+        )
 
     def record(self, small: bool) -> dict[str, Any]:
         """Where the numbers come from, and what they say of the bars."""

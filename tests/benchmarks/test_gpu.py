@@ -38,4 +38,4 @@ def test_every_path_of_it_runs_on_a_cpu(tmp_path):
     agreed = [line for line in printed.splitlines() if "losses of 6 steps off by" in line]
     assert len(agreed) == 2
     assert all(line.endswith(" met") for line in agreed)
-    assert {p.suffix for p in tmp_path.iterdir()} == {".csv", ".json"}
+    assert {p.suffix for p in tmp_path.iterdir()} == {".csv", ".json", ".svg"}

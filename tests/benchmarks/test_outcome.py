@@ -42,17 +42,18 @@ def test_bars_follow_from_the_medians(load, capsys):
     assert [row["off"] for row in made.rows] == [0.5, ""]
 
 
-def test_two_files(load, tmp_path):
+def test_three_files(load, tmp_path):
     made = load("outcome").Outcome("made")
     made.add("case", {"ours": [1.0], "theirs": [1234.0]})
     made.bar("enough", 1.0, 2.0)
     made.publish(tmp_path, small=True)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["made.csv", "made.json"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["made.csv", "made.json", "made.svg"]
     with (tmp_path / "made.csv").open() as file:
         assert [row["method"] for row in csv.DictReader(file)] == ["ours", "theirs"]
     said = json.loads((tmp_path / "made.json").read_text())
     assert said["form"] == "small"
     assert said["bars"] == ["bar: enough <= 2: 1 met"]
+    assert "1,234 (1,234 x)" in (tmp_path / "made.svg").read_text()
 
 
 def test_turns_leave_out_the_first_and_repeat_the_fast(load):
