@@ -12,11 +12,15 @@ from tests.cars import half_turned, poses_of
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
 
+def driven_past(tracks):
+    """Neighbouring scans as a 64-beam LiDAR takes them in passing, nothing in the way."""
+    config = SimulationConfig(tracks=tracks, scans=7, occlusion=0.0)
+    return list(simulate_tracks(config, seed=5, workers=1))
+
+
 @pytest.fixture(scope="module")
 def drives():
-    """Neighbouring scans as a 64-beam LiDAR takes them in passing, nothing in the way."""
-    config = SimulationConfig(tracks=3, scans=7, occlusion=0.0)
-    return list(simulate_tracks(config, seed=5, workers=1))
+    return driven_past(3)
 
 
 @pytest.mark.parametrize("name", ["local-icp", "global-icp"])
@@ -42,6 +46,9 @@ def test_local_icp_loses_a_scan_that_is_turned_around(drives):
     assert min(found_again(drives, "local-icp")) > 150
 
 
-def test_global_icp_finds_most_of_them(drives):
-    """Features do not care how a scan is turned, but now and then they are of the other end."""
-    assert sorted(found_again(drives, "global-icp"))[1] < 10
+def test_global_icp_finds_most_of_them():
+    """Features do not care how a scan is turned, but now and then they are of the other end.
+
+    Which scans these are differs from engine to engine: of three cars they may be two.
+    """
+    assert sorted(found_again(driven_past(12), "global-icp"))[6] < 10

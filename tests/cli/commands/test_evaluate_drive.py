@@ -69,6 +69,19 @@ def test_the_truth_is_right(wildshape, street, found, tmp_path):
     assert "AP BEV 0.5" in (out / "table.md").read_text()
 
 
+def test_a_place_that_cannot_be_written_is_refused_before_anything_is_measured(
+    refused, street, found, tmp_path
+):
+    """Measuring many drives takes minutes."""
+    none_counts = ("evaluate-drive", found, "--labels", street, "--points", "1000000")
+    taken, new = tmp_path / "taken", tmp_path / "new"
+    taken.mkdir()
+    (taken / "notes.txt").write_text("mine")
+    assert "taken: is not empty" in refused(*none_counts, "--out", taken)
+    assert "no label counts" in refused(*none_counts, "--out", new)
+    assert not new.exists()
+
+
 def test_half_a_drive_is_not_measured_against_all_labels(wildshape, street, found):
     poses = (found / "trajectory.txt").read_text().splitlines(keepends=True)
     (found / "trajectory.txt").write_text("".join(poses[:-1]))

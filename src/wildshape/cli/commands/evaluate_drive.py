@@ -2,13 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """`wildshape evaluate-drive`: boxes, tracks and trajectory of drives against labels."""
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, arg
 
 from wildshape.cli.options import AsJson, Overwrite, option
+
+if TYPE_CHECKING:
+    from wildshape.io.output import Output
 
 EXAMPLES = (
     "wildshape evaluate-drive found --labels street",
@@ -63,7 +67,7 @@ def run(settings: Settings) -> None:
     from wildshape.evaluation.drives.found import drives_of, read_found
     from wildshape.evaluation.drives.labels import Counting, read_labels
     from wildshape.evaluation.drives.protocol import evaluate_drives
-    from wildshape.evaluation.drives.results import as_json, markdown
+    from wildshape.evaluation.drives.results import as_json, markdown, write_results
     from wildshape.io.output import command_line, provenance
 
     _check(settings)
@@ -75,12 +79,15 @@ def run(settings: Settings) -> None:
             labelled.append(read_labels(path, counting))
             found.append(read_found(folder, len(labelled[-1].frames)))
             bar.at(len(found))
-        scores = evaluate_drives(found, labelled, lambda rows: bar.at(len(found) + rows))
+        output = _begin(settings)
+        with nullcontext() if output is None else output.abandoned_if_refused():
+            scores = evaluate_drives(found, labelled, lambda rows: bar.at(len(found) + rows))
     if settings.range != Counting.range_m and any(one.view is None for one in labelled):
         say(f"--range {settings.range:g} is no limit where labels are of all around, as these are")
     made = {**provenance(command_line()), "settings": _identity(settings)}
-    if settings.out is not None:
-        _write(settings, scores, counting, made)
+    if output is not None:
+        write_results(output.path, scores, counting, made)
+        output.finish()
     answer(markdown(scores, counting), as_json(scores, counting, made), as_json=settings.json)
 
 
@@ -93,17 +100,16 @@ def _check(settings: Settings) -> None:
         raise BadInputError(f"--range {settings.range}: expected more than 0 metres.")
 
 
-def _write(settings: Settings, scores: Any, counting: Any, made: dict[str, Any]) -> None:
-    from wildshape.evaluation.drives.results import FILES, write_results
+def _begin(settings: Settings) -> "Output | None":
+    """The folder to write, claimed before minutes are spent on measuring."""
+    from wildshape.evaluation.drives.results import FILES
     from wildshape.io.output import begin, keep_apart
 
-    assert settings.out is not None
+    if settings.out is None:
+        return None
     keep_apart(settings.out, settings.folder, settings.labels)
-    output = begin(
-        settings.out, "evaluate-drive", _identity(settings), FILES, overwrite=settings.overwrite
-    )
-    write_results(settings.out, scores, counting, made)
-    output.finish()
+    identity = _identity(settings)
+    return begin(settings.out, "evaluate-drive", identity, FILES, overwrite=settings.overwrite)
 
 
 def _identity(settings: Settings) -> dict[str, Any]:
