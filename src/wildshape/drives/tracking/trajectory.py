@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from wildshape.drives.config import DriveConfig, LinkConfig, TrajectoryConfig
 from wildshape.drives.source import Drive
+from wildshape.drives.tracking.ceiling import at_ceiling
 from wildshape.drives.tracking.given_poses import misfit
 from wildshape.drives.tracking.ground import height_above_ground
 from wildshape.drives.tracking.mounting import Mounting
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from kiss_icp.kiss_icp import KissICP
 
 _FEWEST_POINTS = 100
-_SWAY = 0.02  # a degree, of a sensor that is held level
 FIRST_SCANS = 3  # tell the motion at the beginning, and whether points have times
 
 
@@ -279,29 +279,11 @@ def landmarks(
     level = mounting.level(turn.points)
     away = np.hypot(level[:, 0], level[:, 1])
     used = (away < config.trajectory.ground_m) | (heights > config.trajectory.standing_m)
-    kept = np.flatnonzero(used & ~_at_ceiling(level, away, config.trajectory))
+    kept = np.flatnonzero(used & ~at_ceiling(level, away, config.trajectory))
     some = turn.points.take(kept, axis=0)
     first = first_of_cells(some, config.trajectory.voxel_m / 2)
     kept = kept[first]
     return Turn(some.take(first, axis=0), None if turn.seconds is None else turn.seconds[kept])
-
-
-def _at_ceiling(
-    level: Points, away: Float[np.ndarray, "n"], config: TrajectoryConfig
-) -> Bool[np.ndarray, "n"]:
-    """Which points lie at a ceiling or above it, if what is overhead nearby has one height."""
-    overhead = (away < config.ground_m) & (level[:, 2] > config.overhead * away)
-    if overhead.sum() < _FEWEST_POINTS:
-        return np.zeros(len(level), bool)
-    height, far = level[overhead, 2], away[overhead]
-    if _middle_half(height) >= config.ceiling * np.median(far) * _middle_half(height / far):
-        return np.zeros(len(level), bool)
-    return level[:, 2] > np.median(height) - config.ceiling_m - _SWAY * away
-
-
-def _middle_half(values: Float[np.ndarray, "n"]) -> float:
-    """From the lower to the upper quartile."""
-    return float(np.subtract(*np.percentile(values, (75, 25))))
 
 
 def _landmarks_of(turn: Turn, mounting: Mounting, config: DriveConfig) -> Turn:
