@@ -8,18 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.drives.street import street
+from tests.drives.street import HEIGHT, scan, street
 from tests.refusal import refused
 
 import wildshape
 from wildshape.drives.config import DriveConfig, LinkConfig, MountingConfig
 from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.source import Drive
+from wildshape.drives.tracking.given_poses import held_back
 from wildshape.drives.tracking.mounting import Mounting, find_mounting
 from wildshape.drives.tracking.trajectory import Breaks, find_trajectory
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Turn
+from wildshape.simulate.shapes.solid import box, cylinder
 from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
 
 pytest.importorskip("kiss_icp")
@@ -54,6 +56,38 @@ def test_a_sensor_that_stands_stays_where_it_is(scans):
     way = find_trajectory(drive_of([scans[0]] * 3), LEVEL, DriveConfig())
     assert (way.breaks.frames, way.breaks.told()) == ((), [])
     assert way.T_world_sensor.translation.abs().max() < 0.01
+
+
+def test_a_sensor_that_may_drive_though_it_seems_to_stand_is_said(scans):
+    """Between plain walls, in traffic as fast as itself, the odometry went 0 of 14 m."""
+    road = box((-80.0, -80.0, -HEIGHT - 0.5), (120.0, 80.0, -HEIGHT))
+    walls = [box((-80.0, y, -HEIGHT), (120.0, y + 1.0, 5.0)) for y in (7.0, -8.0)]
+    poles = [
+        cylinder(np.array((x, y, -HEIGHT)), np.array((x, y, 3.0)), (0.12, 0.12), 8)
+        for x in range(-60, 100, 12)
+        for y in (5.0, -5.0)
+    ]
+    seen = []
+    for frame in range(8):
+        at = 2.0 * frame
+        places = ((8.0, -0.9), (-12.0, -0.9), (3.0, -4.4), (-7.0, 2.6), (15.0, 2.6))
+        cars = [box((at + x, y, -HEIGHT), (at + x + 4.3, y + 1.8, 1.5 - HEIGHT)) for x, y in places]
+        seen.append(scan([road, *walls, *poles, *cars], (at, 0.0), frame))
+    (told,) = find_trajectory(drive_of(seen), LEVEL, DriveConfig()).breaks.told()
+    assert "taken to stand, but its first scans also fit a way ahead" in told
+    assert find_trajectory(drive_of([scans[0]] * 8), LEVEL, DriveConfig()).breaks.told() == []
+
+
+def test_an_odometry_that_was_held_back_is_said():
+    seen = street(frames=8)
+    for scans, told in (
+        (seen.scans, "first scans do not lie on the last"),
+        ([seen.scans[0]] * 8, ""),
+    ):
+        found = held_back(drive_of(scans), SE3.identity(8), LEVEL, DriveConfig())
+        assert told in found
+        assert bool(found) == bool(told)
+    assert held_back(drive_of(seen.scans), path_of(seen.places), LEVEL, DriveConfig()) == ""
 
 
 def test_a_flat_ceiling_does_not_hold_the_sensor_back():

@@ -10,18 +10,22 @@ import torch
 
 from wildshape.drives.config import (
     ClusterConfig,
+    DriveConfig,
     GroundConfig,
     LinkConfig,
     MountingConfig,
     TrajectoryConfig,
 )
+from wildshape.drives.source import Drive
 from wildshape.drives.tracking.clusters import extents, find_clusters
 from wildshape.drives.tracking.ground import height_above_ground
 from wildshape.drives.tracking.mounting import Mounting, ground_plane
+from wildshape.drives.tracking.segmentation import Cutter
 from wildshape.drives.tracking.sightings import Sightings, merged
 from wildshape.drives.tracking.tracks import Seen, link
 from wildshape.drives.tracking.trajectory import jumps
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.records import Turn
 
 
 def road(rng, count=20000, reach=30.0):
@@ -156,6 +160,19 @@ def test_what_is_no_vehicle_by_size_or_place_is_no_cluster():
         block(10, 0, count=20),
     ):
         assert find_clusters(wrong, wrong[:, 2] + 1.7, config) == []
+
+
+def test_a_low_ceiling_is_no_part_of_what_stands_under_it(tmp_path):
+    """In a car park cars hung together through the ceiling: half of them were lost."""
+    rng = np.random.default_rng(0)
+    x, y = rng.uniform(-9, 9, (2, 40000))
+    ceiling = np.column_stack((x, y, rng.normal(0.2, 0.01, len(x)))).astype(np.float32)
+    cars = np.concatenate([block(6.0, aside, seed=2) for aside in (-4.0, 0.0, 4.0)])
+    scan = np.concatenate((road(rng), cars, ceiling))
+    heights = np.concatenate((np.zeros(20000), cars[:, 2] + 1.7, ceiling[:, 2] + 1.7))
+    drive = Drive.of("deck", ["0"], lambda _: Turn(scan))
+    cutter = Cutter(drive, Mounting(1.7, 0.0, (0.0, 0.0, 1.0)), tmp_path, DriveConfig())
+    assert cutter.cut(0, scan, heights, scan).counts.tolist() == [600] * 3
 
 
 def test_extents_are_those_of_the_turned_rectangle():

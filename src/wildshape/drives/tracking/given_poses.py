@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether poses that came with a drive fit its scans: inverse ones, or another frame's, do not."""
+"""Whether poses that came with a drive fit its scans: inverse ones, or another frame's, do not.
+
+Nor do those of an odometry that was held back.
+"""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -39,6 +42,10 @@ _STILL = (
 _WRONG = (
     "the poses do not fit the scans: a wrong scale, order or frame; give T_world_sensor in metres,"
     " a line a scan"
+)
+_HELD = (
+    "odometry hardly moves the sensor, but the first scans do not lie on the last: the way found is"
+    " wrong, and so are speeds; give a poses.txt"
 )
 _JUMP = "the poses jump at frame {}, where the scans do not: mend T_world_sensor"
 _TIMES_WRONG = (
@@ -94,6 +101,20 @@ def misfit(drive: Drive, mounting: Mounting, config: DriveConfig) -> str:
     if given < least:
         return _WRONG
     return _jump(drive, T, mounting, config) or _otherwise(drive, T, mounting, config)
+
+
+def held_back(drive: Drive, T: SE3, mounting: Mounting, config: DriveConfig) -> str:
+    """A sentence if a way found by odometry stays in one place, and the scans do not.
+
+    Long plain walls do so to a slow sensor: their rings look alike wherever it stands.
+    """
+    if len(T) < 2 or _reach_m(T) >= _LEAST_M:
+        return ""
+    shares = []
+    for start, end in _first_and_last(len(T)):
+        motion = T[end].inverse() @ T[start]
+        shares += _shares(drive, mounting, config, (start, end), (motion,))
+    return _HELD if shares and np.median(shares) < _STANDS else ""
 
 
 def _otherwise(drive: Drive, T: SE3, mounting: Mounting, config: DriveConfig) -> str:

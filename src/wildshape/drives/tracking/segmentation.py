@@ -13,6 +13,7 @@ from jaxtyping import Float, Int
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.frame_cache import FrameCache
 from wildshape.drives.source import Drive
+from wildshape.drives.tracking.ceiling import at_ceiling
 from wildshape.drives.tracking.clusters import find_clusters
 from wildshape.drives.tracking.ground import height_above_ground
 from wildshape.drives.tracking.mounting import Mounting
@@ -120,7 +121,9 @@ class Cutter:
             as_measured: the same points before they were corrected for motion.
         """
         del frame, as_measured
-        parts = find_clusters(self.mounting.level(scan), heights, self.config.clusters)
+        level = self.mounting.level(scan)
+        ceiling = at_ceiling(level, np.hypot(level[:, 0], level[:, 1]), self.config.trajectory)
+        parts = find_clusters(level, np.where(ceiling, np.nan, heights), self.config.clusters)
         rows = np.concatenate(parts) if parts else np.empty(0, np.int64)
         counts = np.array([len(part) for part in parts], np.int64)
         return CutScan(scan.take(rows, axis=0), rows.astype(np.int32), counts, len(scan))

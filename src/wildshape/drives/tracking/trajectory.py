@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from wildshape.drives.config import DriveConfig, LinkConfig, TrajectoryConfig
 from wildshape.drives.source import Drive
-from wildshape.drives.tracking.given_poses import misfit
+from wildshape.drives.tracking.ceiling import at_ceiling
+from wildshape.drives.tracking.given_poses import held_back, misfit
 from wildshape.drives.tracking.ground import height_above_ground
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.errors import MissingExtraError
@@ -35,8 +36,9 @@ if TYPE_CHECKING:
     from kiss_icp.kiss_icp import KissICP
 
 _FEWEST_POINTS = 100
-_SWAY = 0.02  # a degree, of a sensor that is held level
 FIRST_SCANS = 3  # tell the motion at the beginning, and whether points have times
+_TRIED_SCANS, _TRIED_M = 8, 2.0  # by so many a sensor that seems to stand is tried as a driving one
+_GOES_M = 0.5  # a scan; from such a start those that stand came to 0.05 in eight scans
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class Breaks:
 
     Attributes:
         frames: whose place could not be told from the frame before.
-        misfit: what seems to be wrong with poses that came with the drive.
+        misfit: what seems to be wrong with poses that came with the drive, or with the way found.
         untimed: frames whose points have no times that can be used, where others have some.
     """
 
@@ -126,14 +128,44 @@ def find_trajectory(
     if turns is None:
         turns = (_landmarks_of(drive.turn(frame), mounting, config) for frame in range(len(drive)))
     rest = iter(turns)
-    first = list(islice(rest, FIRST_SCANS))
+    begin = list(islice(rest, _TRIED_SCANS))
+    first = begin[:FIRST_SCANS]
     motion = STANDING
     if any(turn.seconds is not None for turn in first):  # the first scan may be empty
         motion = _follow(drive, first, config, motion)[1].motion
-    poses, odometry = _follow(drive, chain(first, rest), config, motion, at)
+    poses, odometry = _follow(drive, chain(begin, rest), config, motion, at)
     T_world_sensor = SE3.from_matrix(np.linalg.inv(poses[0]) @ np.stack(poses))
     untimed = tuple(odometry.untimed) if odometry.timed else ()
-    return Way(T_world_sensor, Breaks(tuple(odometry.lost), untimed=untimed))
+    wrong = ""
+    if not odometry.lost:
+        wrong = held_back(drive, T_world_sensor, mounting, config)
+        if not wrong and _far(poses[: len(begin)]) < _GOES_M:
+            wrong = _may_drive(drive, begin, config)
+    return Way(T_world_sensor, Breaks(tuple(odometry.lost), wrong, untimed))
+
+
+def _may_drive(drive: Drive, turns: list[Turn], config: DriveConfig) -> str:
+    """A sentence if a sensor that is taken to stand goes on if it is taken to drive.
+
+    What goes along with it, and walls that look alike all along, fit where it stands.
+    """
+    if len(turns) < 2 or min(len(turn.points) for turn in turns) < _FEWEST_POINTS:
+        return ""
+    ahead = torch.tensor((_TRIED_M, 0.0, 0.0), dtype=torch.float64)
+    step = SE3(torch.eye(3, dtype=torch.float64), ahead)
+    driving = Twist.between(SE3.identity(), step, _seconds(drive, 1))
+    poses, odometry = _follow(drive, turns, config, driving)
+    if odometry.lost or _far(poses[-2:]) < _GOES_M:
+        return ""
+    return (
+        "the sensor is taken to stand, but its first scans also fit a way ahead, as where all"
+        " around goes along or walls are plain: if it drives, give a poses.txt"
+    )
+
+
+def _far(poses: "list[Float[np.ndarray, '4 4']]") -> float:
+    """From the first to the last, metres."""
+    return float(np.linalg.norm(poses[-1][:3, 3] - poses[0][:3, 3]))
 
 
 def _follow(
@@ -279,29 +311,11 @@ def landmarks(
     level = mounting.level(turn.points)
     away = np.hypot(level[:, 0], level[:, 1])
     used = (away < config.trajectory.ground_m) | (heights > config.trajectory.standing_m)
-    kept = np.flatnonzero(used & ~_at_ceiling(level, away, config.trajectory))
+    kept = np.flatnonzero(used & ~at_ceiling(level, away, config.trajectory))
     some = turn.points.take(kept, axis=0)
     first = first_of_cells(some, config.trajectory.voxel_m / 2)
     kept = kept[first]
     return Turn(some.take(first, axis=0), None if turn.seconds is None else turn.seconds[kept])
-
-
-def _at_ceiling(
-    level: Points, away: Float[np.ndarray, "n"], config: TrajectoryConfig
-) -> Bool[np.ndarray, "n"]:
-    """Which points lie at a ceiling or above it, if what is overhead nearby has one height."""
-    overhead = (away < config.ground_m) & (level[:, 2] > config.overhead * away)
-    if overhead.sum() < _FEWEST_POINTS:
-        return np.zeros(len(level), bool)
-    height, far = level[overhead, 2], away[overhead]
-    if _middle_half(height) >= config.ceiling * np.median(far) * _middle_half(height / far):
-        return np.zeros(len(level), bool)
-    return level[:, 2] > np.median(height) - config.ceiling_m - _SWAY * away
-
-
-def _middle_half(values: Float[np.ndarray, "n"]) -> float:
-    """From the lower to the upper quartile."""
-    return float(np.subtract(*np.percentile(values, (75, 25))))
 
 
 def _landmarks_of(turn: Turn, mounting: Mounting, config: DriveConfig) -> Turn:
