@@ -18,8 +18,10 @@ from wildshape.drives.source import Drive
 from wildshape.drives.tracking.given_poses import held_back
 from wildshape.drives.tracking.mounting import Mounting, find_mounting
 from wildshape.drives.tracking.trajectory import Breaks, find_trajectory
+from wildshape.drives.writing.files import DriveFiles
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.folders.box_files import BoxFiles
 from wildshape.records import Turn
 from wildshape.simulate.shapes.solid import box, cylinder
 from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
@@ -228,3 +230,16 @@ def test_the_scans_beside_a_pause_are_corrected_by_the_motion_on_their_own_side(
     motion = drive.moved_by(path).motion
     assert motion is not None
     assert [twist.linear[0] for twist in motion] == pytest.approx([10.0] * 6)
+
+
+def test_a_drive_without_vehicles_has_an_empty_file_of_labels(tmp_path):
+    """Evaluations of KITTI tracking ask for a file of each drive."""
+    road = box((-60.0, -60.0, -HEIGHT - 0.5), (60.0, 60.0, -HEIGHT))
+    kerbs = [box((-60.0, y, -HEIGHT), (60.0, y + 0.5, 0.5)) for y in (9.0, -9.5)]
+    (tmp_path / "bare").mkdir()
+    for frame in range(4):
+        np.save(tmp_path / "bare" / f"{frame}.npy", scan([road, *kerbs], (0.0, 0.0), frame))
+    files = DriveFiles(BoxFiles(("kitti",)))
+    found = wildshape.drive(tmp_path / "bare", tmp_path / "out", files=files)
+    assert found.vehicles == ()
+    assert (found.out / "boxes" / "kitti" / "bare.txt").read_bytes() == b""

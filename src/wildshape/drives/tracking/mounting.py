@@ -69,7 +69,7 @@ class Mounting:
         told = []
         if self.height_m <= _LOWEST_M:
             told.append(
-                f"the ground lies {self.height_m:.2f} m below the origin: give scans as the sensor"
+                f"the ground lies {self.height_m:z.2f} m below the origin: give scans as the sensor"
                 " saw them, not in a vehicle's or a map's frame"
             )
         if self.height_m > _HIGHEST_M:

@@ -59,7 +59,7 @@ class DriveFiles:
             return
         found = read_finished(out)
         if self.boxes is not None:
-            self.boxes.write_detections(found.out, list(detections_of(found)))
+            self.boxes.write_detections(found.out, list(detections_of(found)), found.name)
         if self.mesh is not None:
             for one in found.vehicles:
                 _write_mesh(found, one, self.mesh)

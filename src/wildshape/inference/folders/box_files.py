@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wildshape.errors import BadInputError
+from wildshape.io.atomic import write_text
 
 if TYPE_CHECKING:
     from wildshape.geometry.transforms.se3 import SE3
@@ -81,11 +82,19 @@ class BoxFiles:
 
         return self.write_detections(out, read_detections(out))
 
-    def write_detections(self, out: Path, detections: "Sequence[Detection]") -> list[str]:
-        """Write these below `out`; returns as `write` does."""
+    def write_detections(
+        self, out: Path, detections: "Sequence[Detection]", sequence: str = ""
+    ) -> list[str]:
+        """Write these below `out`; returns as `write` does.
+
+        `sequence` is the drive that they are of, if it is one: evaluations of KITTI tracking want
+        its file of labels although nothing was found.
+        """
         for kind in self.formats:
             made = _FORMATS[kind]
             made.write(out / _FOLDER / made.file, detections, self._calibration(kind))
+        if sequence and not detections and "kitti" in self.formats:
+            write_text((out / _FOLDER / _FORMATS["kitti"].file).with_name(f"{sequence}.txt"), "")
         bare = [_FORMATS[kind].bare for kind in self.formats if not self._calibrates(kind)]
         if any(one.sensor == "camera" for one in detections):
             return [_OF_CAMERAS] if set(self.formats) & {"nuscenes", "argoverse2"} else []
