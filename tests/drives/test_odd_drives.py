@@ -60,6 +60,21 @@ def test_a_sensor_that_stands_stays_where_it_is(scans):
     assert way.T_world_sensor.translation.abs().max() < 0.01
 
 
+@pytest.mark.parametrize("looks_deg", [0, 135])
+def test_a_recording_that_begins_at_speed_is_followed(looks_deg):
+    """At 33 m/s a step is 3.3 m: from where the sensor stood before nothing near fits."""
+    drive = WholeDrive(StreetConfig(scans=4, sensor="hdl32", speed=33.0, compensated=True), seed=1)
+    made = [drive.scan(frame) for frame in range(4)]
+    turn = rotation_z(torch.tensor(math.radians(looks_deg), dtype=torch.float64))
+    T_looking_sensor = SE3(turn, torch.zeros(3, dtype=torch.float64))
+    scans = [T_looking_sensor.apply_numpy(scan.points) for scan in made]
+    way = find_trajectory(drive_of(scans), replace(LEVEL, height_m=1.84), DriveConfig())
+    places = np.stack([scan.T_world_sensor[:3, 3] for scan in made])
+    found = np.linalg.norm(np.diff(way.T_world_sensor.translation.numpy(), axis=0), axis=1)
+    assert found == pytest.approx(np.linalg.norm(np.diff(places, axis=0), axis=1), abs=0.3)
+    assert way.breaks.frames == ()
+
+
 def test_a_sensor_that_may_drive_though_it_seems_to_stand_is_said(scans):
     """Between plain walls, in traffic as fast as itself, the odometry went 0 of 14 m."""
     road = box((-80.0, -80.0, -HEIGHT - 0.5), (120.0, 80.0, -HEIGHT))

@@ -9,7 +9,7 @@ do those of a flat ceiling, of which nothing is used.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain, islice
+from itertools import chain, islice, product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from kiss_icp.kiss_icp import KissICP
 
 _FEWEST_POINTS = 100
+_STEPS_M = (2.0, 4.0, 6.0, 8.0)  # from 2 m off a scan finds its place
+_STEPS_DEG = range(0, 360, 45)  # of the sensor's x
 FIRST_SCANS = 3  # tell the motion at the beginning, and whether points have times
 _TRIED_SCANS, _TRIED_M = 8, 2.0  # by so many a sensor that seems to stand is tried as a driving one
 _GOES_M = 0.5  # a scan; from such a start those that stand came to 0.05 in eight scans
@@ -109,8 +111,9 @@ def find_trajectory(
 
     Poses that came with the drive are taken as they are, and looked at. Scans whose points have
     times are corrected by the motion just before them, the first ones by that of a first try. A
-    scan of hardly any points goes on as the one before it went, and so does one that does not fit
-    the one before.
+    scan that fits the one before badly is tried from longer steps to all sides: a recording may
+    begin at speed. A scan of hardly any points goes on as the one before it went, and so does one
+    that does not fit the one before.
 
     Args:
         drive: its scans are read one by one.
@@ -217,6 +220,7 @@ class _Odometry:
         self.lost: list[int] = []
         self.timed, self.untimed = 0, list[int]()
         self._before: Float[np.ndarray, "n 3"] | None = None
+        self._scan_before: Points = np.empty((0, 3), np.float32)
 
     def count(self, turn: Turn, frame: int) -> None:
         """Whether its points have times."""
@@ -240,25 +244,43 @@ class _Odometry:
         if len(scan) < _FEWEST_POINTS:
             self.kiss.last_pose = pose @ step
             return
-        there = self._register(scan)
-        if self._before is not None and self._fit(there) < self.config.least_fit:
+        there = _registered(self.kiss, scan)
+        fit = 1.0 if self._before is None else self._fit(there)
+        if fit < self.config.good_fit and (found := self._from_afar(scan, pose)) is not None:
+            self.kiss, there = found
+        elif fit < self.config.least_fit:
             self.lost.append(frame)
             self.kiss = _kiss_icp(self.config)
             self.kiss.last_pose, self.kiss.last_delta = pose, step
-            there = self._register(scan)
-        self._before = there
+            there = _registered(self.kiss, scan)
+        self._before, self._scan_before = there, scan
 
-    def _register(self, scan: Points) -> Float[np.ndarray, "n 3"]:
-        """Some of the scan's points, in the world."""
-        _, some = self.kiss.register_frame(scan.astype(np.float64), np.zeros(len(scan)))
-        T = self.kiss.last_pose
-        return some @ T[:3, :3].T + T[:3, 3]
+    def _from_afar(
+        self, scan: Points, pose: Float[np.ndarray, "4 4"]
+    ) -> "tuple[KissICP, Float[np.ndarray, 'n 3']] | None":
+        """Where a scan fits best after a long step from the one before, if it fits well."""
+        found = []
+        for far, turn in product(_STEPS_M, np.deg2rad(_STEPS_DEG)):
+            kiss = _kiss_icp(self.config)
+            kiss.last_pose = pose
+            _registered(kiss, self._scan_before)
+            kiss.last_delta[:2, 3] = far * np.cos(turn), far * np.sin(turn)
+            found.append((kiss, _registered(kiss, scan)))
+        best = max(found, key=lambda one: self._fit(one[1]))
+        return best if self._fit(best[1]) >= self.config.good_fit else None
 
     def _fit(self, there: Float[np.ndarray, "n 3"]) -> float:
         """The share of a scan that lies on the one before."""
         clouds = (torch.from_numpy(points).float()[None] for points in (there, self._before))
         away = nearest(*clouds).distance_squared
         return float((away < self.config.fits_m**2).float().mean())
+
+
+def _registered(kiss: "KissICP", scan: Points) -> Float[np.ndarray, "n 3"]:
+    """Go one scan on; some of its points, in the world."""
+    _, some = kiss.register_frame(scan.astype(np.float64), np.zeros(len(scan)))
+    T = kiss.last_pose
+    return some @ T[:3, :3].T + T[:3, 3]
 
 
 def _seconds(drive: Drive, frame: int) -> float:
