@@ -2,16 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The way of the sensor through a drive, by LiDAR odometry.
 
-KISS-ICP: Vizzo et al., RA-L 2023. Rings of a level sensor on a flat road look the same wherever it
+Rings of a level sensor on a flat road look the same wherever it
 stands and hold the odometry back, so ground is used near the sensor alone, for height and tilt. So
 do those of a flat ceiling, of which nothing is used.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain, islice, product
+from itertools import chain, islice
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -23,21 +22,14 @@ from wildshape.drives.tracking.ceiling import at_ceiling
 from wildshape.drives.tracking.given_poses import held_back, misfit
 from wildshape.drives.tracking.ground import height_above_ground
 from wildshape.drives.tracking.mounting import Mounting
-from wildshape.errors import MissingExtraError
+from wildshape.drives.tracking.odometry import FEWEST_POINTS, Odometry
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import STANDING, Twist
 from wildshape.io.guard import read_json, record_of
 from wildshape.io.progress import counted
 from wildshape.ops.connected import first_of_cells
-from wildshape.ops.nearest import nearest
-from wildshape.records import Points, Turn
+from wildshape.records import Turn
 
-if TYPE_CHECKING:
-    from kiss_icp.kiss_icp import KissICP
-
-_FEWEST_POINTS = 100
-_STEPS_M = (2.0, 4.0, 6.0, 8.0)  # from 2 m off a scan finds its place
-_STEPS_DEG = range(0, 360, 45)  # of the sensor's x
 FIRST_SCANS = 3  # tell the motion at the beginning, and whether points have times
 _TRIED_SCANS, _TRIED_M = 8, 2.0  # by so many a sensor that seems to stand is tried as a driving one
 _GOES_M = 0.5  # a scan; from such a start those that stand came to 0.05 in eight scans
@@ -152,7 +144,7 @@ def _may_drive(drive: Drive, turns: list[Turn], config: DriveConfig) -> str:
 
     What goes along with it, and walls that look alike all along, fit where it stands.
     """
-    if len(turns) < 2 or min(len(turn.points) for turn in turns) < _FEWEST_POINTS:
+    if len(turns) < 2 or min(len(turn.points) for turn in turns) < FEWEST_POINTS:
         return ""
     ahead = torch.tensor((_TRIED_M, 0.0, 0.0), dtype=torch.float64)
     step = SE3(torch.eye(3, dtype=torch.float64), ahead)
@@ -177,18 +169,18 @@ def _follow(
     config: DriveConfig,
     motion: Twist,
     at: Callable[[int], None] = lambda _: None,
-) -> "tuple[list[Float[np.ndarray, '4 4']], _Odometry]":
+) -> "tuple[list[Float[np.ndarray, '4 4']], Odometry]":
     """Poses of the first frames, and the odometry after them; `motion`: before them.
 
     A turn is followed at its own middle, wherever in it the scan's stamp lies. About its first
     point, an error of the speed would come back in the next step as large, and turned round. A
     step takes half of what a turn lasts at least: stamps may be late.
     """
-    odometry = _Odometry(config.trajectory, motion)
+    odometry = Odometry(config.trajectory, motion)
     poses, middle = [], 0.0
     for frame, turn in enumerate(turns):
         before = middle
-        if len(turn.points) >= _FEWEST_POINTS:
+        if len(turn.points) >= FEWEST_POINTS:
             middle = _middle(turn)
             odometry.count(turn, frame)
         since = _seconds(drive, frame) + middle - before if frame else 0.0
@@ -202,85 +194,6 @@ def _follow(
         poses.append(pose @ odometry.motion.after(-middle).matrix.numpy() if middle else pose)
         at(frame + 1)
     return poses, odometry
-
-
-class _Odometry:
-    """KISS-ICP, begun anew where a scan does not fit the one before.
-
-    Attributes:
-        motion: of the sensor, after the last scan.
-        lost: frames that did not fit.
-        timed: how many scans had times of their points.
-        untimed: the other frames.
-    """
-
-    def __init__(self, config: TrajectoryConfig, motion: Twist) -> None:
-        self.config, self.motion = config, motion
-        self.kiss = _kiss_icp(config)
-        self.lost: list[int] = []
-        self.timed, self.untimed = 0, list[int]()
-        self._before: Float[np.ndarray, "n 3"] | None = None
-        self._scan_before: Points = np.empty((0, 3), np.float32)
-
-    def count(self, turn: Turn, frame: int) -> None:
-        """Whether its points have times."""
-        if turn.seconds is None:
-            self.untimed.append(frame)
-        else:
-            self.timed += 1
-
-    def expect(self, seconds: float) -> None:
-        """Guess the next step from the motion."""
-        self.kiss.last_delta = self.motion.after(seconds).matrix.numpy()
-
-    def learn(self, seconds: float) -> None:
-        """Take the motion from the last step."""
-        step = SE3.from_matrix(self.kiss.last_delta)
-        self.motion = Twist.between(SE3.identity(), step, seconds)
-
-    def follow(self, scan: Points, frame: int) -> None:
-        """Go one scan on."""
-        pose, step = self.kiss.last_pose, self.kiss.last_delta
-        if len(scan) < _FEWEST_POINTS:
-            self.kiss.last_pose = pose @ step
-            return
-        there = _registered(self.kiss, scan)
-        fit = 1.0 if self._before is None else self._fit(there)
-        if fit < self.config.good_fit and (found := self._from_afar(scan, pose)) is not None:
-            self.kiss, there = found
-        elif fit < self.config.least_fit:
-            self.lost.append(frame)
-            self.kiss = _kiss_icp(self.config)
-            self.kiss.last_pose, self.kiss.last_delta = pose, step
-            there = _registered(self.kiss, scan)
-        self._before, self._scan_before = there, scan
-
-    def _from_afar(
-        self, scan: Points, pose: Float[np.ndarray, "4 4"]
-    ) -> "tuple[KissICP, Float[np.ndarray, 'n 3']] | None":
-        """Where a scan fits best after a long step from the one before, if it fits well."""
-        found = []
-        for far, turn in product(_STEPS_M, np.deg2rad(_STEPS_DEG)):
-            kiss = _kiss_icp(self.config)
-            kiss.last_pose = pose
-            _registered(kiss, self._scan_before)
-            kiss.last_delta[:2, 3] = far * np.cos(turn), far * np.sin(turn)
-            found.append((kiss, _registered(kiss, scan)))
-        best = max(found, key=lambda one: self._fit(one[1]))
-        return best if self._fit(best[1]) >= self.config.good_fit else None
-
-    def _fit(self, there: Float[np.ndarray, "n 3"]) -> float:
-        """The share of a scan that lies on the one before."""
-        clouds = (torch.from_numpy(points).float()[None] for points in (there, self._before))
-        away = nearest(*clouds).distance_squared
-        return float((away < self.config.fits_m**2).float().mean())
-
-
-def _registered(kiss: "KissICP", scan: Points) -> Float[np.ndarray, "n 3"]:
-    """Go one scan on; some of its points, in the world."""
-    _, some = kiss.register_frame(scan.astype(np.float64), np.zeros(len(scan)))
-    T = kiss.last_pose
-    return some @ T[:3, :3].T + T[:3, 3]
 
 
 def _seconds(drive: Drive, frame: int) -> float:
@@ -350,21 +263,3 @@ def jumps(T_world_sensor: SE3, ticks: tuple[int, ...], config: TrajectoryConfig)
     steps = np.diff(T_world_sensor.translation.numpy(), axis=0) / np.diff(ticks)[:, None]
     changes = np.linalg.norm(np.diff(steps, axis=0), axis=1)
     yield from (np.flatnonzero(changes > config.jump_m) + 2).tolist()
-
-
-def _kiss_icp(config: TrajectoryConfig) -> "KissICP":
-    try:
-        from kiss_icp.config import load_config
-        from kiss_icp.kiss_icp import KissICP
-    except ImportError as error:
-        raise MissingExtraError(
-            "the sensor's way is found by KISS-ICP, which is not installed: pip install kiss-icp,"
-            " or give a poses.txt beside the scans."
-        ) from error
-    settings = load_config(None)
-    settings.registration.max_num_threads = 1  # the same scans give the same way to the last bit
-    settings.data.deskew = False  # done before, as for all other stages
-    settings.data.min_range, settings.data.max_range = config.nearest_m, config.range_m
-    settings.registration.convergence_criterion = config.settled
-    settings.mapping.voxel_size = config.voxel_m
-    return KissICP(settings)

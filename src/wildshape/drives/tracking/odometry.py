@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""From scan to scan by KISS-ICP (Vizzo et al., RA-L 2023); what is done where one does not fit."""
+
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from wildshape.drives.config import TrajectoryConfig
+from wildshape.errors import MissingExtraError
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.geometry.transforms.twist import Twist
+from wildshape.ops.nearest import nearest
+from wildshape.records import Points, Turn
+
+if TYPE_CHECKING:
+    from kiss_icp.kiss_icp import KissICP
+
+FEWEST_POINTS = 100  # of a scan that is followed
+_STEPS_M = (2.0, 4.0, 6.0, 8.0)  # from 2 m off a scan finds its place
+_STEPS_DEG = range(0, 360, 45)  # of the sensor's x
+
+
+class Odometry:
+    """KISS-ICP, begun anew where a scan does not fit the one before.
+
+    Attributes:
+        motion: of the sensor, after the last scan.
+        lost: frames that did not fit.
+        timed: how many scans had times of their points.
+        untimed: the other frames.
+    """
+
+    def __init__(self, config: TrajectoryConfig, motion: Twist) -> None:
+        self.config, self.motion = config, motion
+        self.kiss = _kiss_icp(config)
+        self.lost: list[int] = []
+        self.timed, self.untimed = 0, list[int]()
+        self._before: Float[np.ndarray, "n 3"] | None = None
+        self._scan_before: Points = np.empty((0, 3), np.float32)
+
+    def count(self, turn: Turn, frame: int) -> None:
+        """Whether its points have times."""
+        if turn.seconds is None:
+            self.untimed.append(frame)
+        else:
+            self.timed += 1
+
+    def expect(self, seconds: float) -> None:
+        """Guess the next step from the motion."""
+        self.kiss.last_delta = self.motion.after(seconds).matrix.numpy()
+
+    def learn(self, seconds: float) -> None:
+        """Take the motion from the last step."""
+        step = SE3.from_matrix(self.kiss.last_delta)
+        self.motion = Twist.between(SE3.identity(), step, seconds)
+
+    def follow(self, scan: Points, frame: int) -> None:
+        """Go one scan on."""
+        pose, step = self.kiss.last_pose, self.kiss.last_delta
+        if len(scan) < FEWEST_POINTS:
+            self.kiss.last_pose = pose @ step
+            return
+        there = _registered(self.kiss, scan)
+        fit = 1.0 if self._before is None else self._fit(there)
+        if fit < self.config.good_fit and (found := self._from_afar(scan, pose)) is not None:
+            self.kiss, there = found
+        elif fit < self.config.least_fit:
+            self.lost.append(frame)
+            self.kiss = _kiss_icp(self.config)
+            self.kiss.last_pose, self.kiss.last_delta = pose, step
+            there = _registered(self.kiss, scan)
+        self._before, self._scan_before = there, scan
+
+    def _from_afar(
+        self, scan: Points, pose: Float[np.ndarray, "4 4"]
+    ) -> "tuple[KissICP, Float[np.ndarray, 'n 3']] | None":
+        """Where a scan fits best after a long step from the one before, if it fits well."""
+        found = []
+        for far, turn in product(_STEPS_M, np.deg2rad(_STEPS_DEG)):
+            kiss = _kiss_icp(self.config)
+            kiss.last_pose = pose
+            _registered(kiss, self._scan_before)
+            kiss.last_delta[:2, 3] = far * np.cos(turn), far * np.sin(turn)
+            found.append((kiss, _registered(kiss, scan)))
+        best = max(found, key=lambda one: self._fit(one[1]))
+        return best if self._fit(best[1]) >= self.config.good_fit else None
+
+    def _fit(self, there: Float[np.ndarray, "n 3"]) -> float:
+        """The share of a scan that lies on the one before."""
+        clouds = (torch.from_numpy(points).float()[None] for points in (there, self._before))
+        away = nearest(*clouds).distance_squared
+        return float((away < self.config.fits_m**2).float().mean())
+
+
+def _registered(kiss: "KissICP", scan: Points) -> Float[np.ndarray, "n 3"]:
+    """Go one scan on; some of its points, in the world."""
+    _, some = kiss.register_frame(scan.astype(np.float64), np.zeros(len(scan)))
+    T = kiss.last_pose
+    return some @ T[:3, :3].T + T[:3, 3]
+
+
+def _kiss_icp(config: TrajectoryConfig) -> "KissICP":
+    try:
+        from kiss_icp.config import load_config
+        from kiss_icp.kiss_icp import KissICP
+    except ImportError as error:
+        raise MissingExtraError(
+            "the sensor's way is found by KISS-ICP, which is not installed: pip install kiss-icp,"
+            " or give a poses.txt beside the scans."
+        ) from error
+    settings = load_config(None)
+    settings.registration.max_num_threads = 1  # the same scans give the same way to the last bit
+    settings.data.deskew = False  # done before, as for all other stages
+    settings.data.min_range, settings.data.max_range = config.nearest_m, config.range_m
+    settings.registration.convergence_criterion = config.settled
+    settings.mapping.voxel_size = config.voxel_m
+    return KissICP(settings)
