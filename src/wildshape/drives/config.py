@@ -6,7 +6,7 @@ They are written into `wildshape.json` of every result and can be set from Pytho
 `wildshape.drive("recording", "found", DriveConfig(clusters=ClusterConfig(range_m=40.0)))`.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from wildshape.drives.object_config import (
     AssociationConfig,
@@ -21,15 +21,13 @@ from wildshape.drives.object_config import (
 )
 from wildshape.inference.config import InferenceConfig, JointIcpConfig, TrackConfig
 
+_FEW = JointIcpConfig(rounds=6, normal_points=16, normal_rounds=6)
 INFERENCE = InferenceConfig(
     track=TrackConfig(
-        coarse=JointIcpConfig(rounds=8, normal_of=512, normal_points=16),
-        fine=JointIcpConfig(
-            rounds=8, points=256, most=4096, normal_of=512, normal_points=16, holding=0.02
-        ),
+        coarse=_FEW, fine=replace(_FEW, points=256, most=4096, widest_m=0.2, holding=0.02)
     )
 )
-"""How `drive` completes objects: tracks in fewer rounds, of fewer points; boxes are as good."""
+"""How `drive` completes objects: tracks in fewer rounds; boxes are as good."""
 
 
 @dataclass(frozen=True)

@@ -88,26 +88,28 @@ class JointIcpConfig:
         narrowest_m: at last.
         normal_of: points of all scans together that normals are taken from.
         normal_points: of them, around each point.
+        normal_rounds: after so many rounds normals are taken anew.
         holding: how much a point is held in every direction, against sliding; of its normal's 1.
         step: share of a Gauss-Newton step that is taken.
         ridge: damping of a step, a share of the points' weight; a scan of few sides is not moved
             along what it does not see.
     """
 
-    rounds: int = 10
+    rounds: int = 7
     points: int = 128
     most: int = 16_384
     widest_m: float = 0.5
-    narrower: float = 0.75
+    narrower: float = 0.65
     narrowest_m: float = 0.06
     normal_of: int = 1024
-    normal_points: int = 32
+    normal_points: int = 24
+    normal_rounds: int = 4
     holding: float = 0.1
     step: float = 0.8
     ridge: float = 1e-3
 
 
-_FINE = JointIcpConfig(rounds=15, points=512, most=4096, holding=0.02)
+_FINE = JointIcpConfig(rounds=8, points=512, most=4096, widest_m=0.2, holding=0.02)
 _ONTO = JointIcpConfig(points=256)
 
 

@@ -27,7 +27,7 @@ from wildshape.inference.tracks.joint_icp import (
 BOXY = drive_by(scans=9, step=2.0, heading=0.3, side=5.0)
 BODY, CABIN, SHIFT = np.array((2.1, 0.9, 0.7)), np.array((1.0, 0.75, 0.6)), (-0.4, 0.0, 0.6)
 FINE = TrackConfig().fine
-LONG = replace(FINE, rounds=30)
+LONG = replace(FINE, rounds=30, widest_m=0.5)  # from poses that are off by decimetres
 
 
 def round_car(count, rng):

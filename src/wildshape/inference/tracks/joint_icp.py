@@ -145,10 +145,9 @@ def refine_jointly(
     T_object_sensor = start
     onto = torch.arange(len(scans)) if onto is None else onto
     normals = torch.zeros_like(points[onto])
-    rounds = config.rounds
-    for step in range(rounds):
+    for step in range(config.rounds):
         moved = T_object_sensor.apply(points)
-        if step % 3 == 0 or step >= rounds - 2:
+        if step % config.normal_rounds == 0:
             normals = surface_normals(moved[onto].flatten(0, 1), config).view_as(normals)
         found = _counterparts(moved, Surface(moved[onto], normals), onto, mirror)
         T_object_sensor = _moved(T_object_sensor, moved, *found, _width(step, config), config)
