@@ -116,13 +116,13 @@ def without_free_space(
         T_sensor_canonical: one pose a scan.
         sights: scans and rays.
     """
-    free = np.zeros(len(shape), bool)
+    free, asked = np.zeros(len(shape), bool), ~_low(shape, sights.config)
+    high = shape.numpy()[asked]
     for i in range(len(sights.scans)):
         if sights.rays[i] is not None:
-            posed = T_sensor_canonical[i].to(torch.float64).apply_numpy(shape.numpy())
-            found = sights.of(posed, i)
-            free |= False if found is None else found.free
-    kept = torch.from_numpy(~free | _low(shape, sights.config))
+            found = sights.of(T_sensor_canonical[i].to(torch.float64).apply_numpy(high), i)
+            free[asked] |= False if found is None else found.free
+    kept = torch.from_numpy(~free)
     return shape[kept] if kept.float().mean() > sights.config.least_kept else shape
 
 

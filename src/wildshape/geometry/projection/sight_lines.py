@@ -164,12 +164,13 @@ def standing(
         nearest: how many rays must agree, as far as so many pass near.
     """
     free, hidden = np.zeros(len(points), bool), np.zeros(len(points), bool)
-    places = _by_origin(rays.returned)
+    returned = rays.returned
+    places = _by_origin(returned)
     apart = _are_apart(np.array([origin for origin, _ in places]), scan)
     for origin, rows in places:
         seen = scan - origin.astype(scan.dtype)
         own = SightLines.of_returns(seen[seen.any(axis=1)])  # a point at the sensor is no return
-        others = rays.returned.part(rows)
+        others = returned if rays.origins is None else returned.part(rows)
         directions = np.concatenate((own.directions, others.directions))
         ranges = np.concatenate((own.ranges, others.ranges))
         ray, beyond = _nearest(points - origin, directions, ranges, within_m, nearest)
