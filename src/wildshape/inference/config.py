@@ -109,7 +109,7 @@ class JointIcpConfig:
     ridge: float = 1e-3
 
 
-_FINE = JointIcpConfig(rounds=8, points=512, most=4096, widest_m=0.2, holding=0.02)
+_FINE = JointIcpConfig(rounds=12, points=512, most=4096, widest_m=0.2, holding=0.02)
 _ONTO = JointIcpConfig(points=256)
 
 
