@@ -62,6 +62,8 @@ from wildshape.io.guard import read_record
 from wildshape.io.poses import read_poses
 from wildshape.parallel.team import Team
 
+SECONDS, SECOND = "seconds.json", "second "
+
 
 @dataclass(frozen=True)
 class Pipeline:
@@ -111,7 +113,8 @@ class Pipeline:
         """A second pass with an adapted model; its results take the place of the first's."""
         second_pass.begin_second(self.out, model)
         adapted = second_pass.like(self.predictor, Path(model))
-        clock = Clock(self.clock.watch, "second ", dict(first.seconds))
+        once = {n: s for n, s in first.seconds.items() if not n.startswith(SECOND)}
+        clock = self.clock.going_on(second_pass.stages_of(self.out) / SECONDS, SECOND, once)
         found = replace(self, predictor=adapted, clock=clock, second=True).perform()
         return second_pass.conclude(self.out, found, model)
 
