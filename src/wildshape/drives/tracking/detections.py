@@ -159,9 +159,7 @@ def find_detections(file: DetectionFile, drive: Drive) -> Detections:
             f"{file.path}: its scans, for example '{vehicles[0].scan}', are none of {drive.name}'s,"
             f" for example '{drive.scan_names[0]}'; name them alike."
         )
-    warnings = []
-    if file.calibration is not None and not takes_calibration(file.path):
-        warnings.append(f"{file.calibration.name} is not used: only KITTI's boxes need it")
+    warnings = _calibration_told(file)
     if len(boxes) < len(given):
         left = len(given) - len(boxes)
         warnings.append(f"{left} detections score less than {file.least_score:g} and are left out")
@@ -177,6 +175,18 @@ def find_detections(file: DetectionFile, drive: Drive) -> Detections:
     return Detections(
         file.path, frames, not without, (*warnings, *told), corrected=is_box_table(file.path)
     )
+
+
+def _calibration_told(file: DetectionFile) -> list[str]:
+    """A sentence if a calibration is given and not needed, or needed and not given."""
+    if takes_calibration(file.path) == (file.calibration is not None):
+        return []
+    if file.calibration is not None:
+        return [f"{file.calibration.name} is not used: only KITTI's boxes need it"]
+    return [
+        f"{file.path.name} is taken to be of a camera at the LiDAR's own place that looks along x;"
+        " pass the calibration of the real one"
+    ]
 
 
 def _is_vehicle(category: str) -> bool:
@@ -216,7 +226,10 @@ def _untracked_told(without: int, placed: int) -> list[str]:
 def _check_tracks(path: Path, frames: Iterable[tuple[DetectorBox, ...]]) -> None:
     for frame, row in enumerate(frames):
         for track, count in Counter(box.track or "" for box in row).items():
-            file_name(track)
+            try:
+                file_name(track)
+            except BadInputError as error:
+                raise BadInputError(f"{path}: {error}") from error
             if count > 1:
                 raise BadInputError(
                     f"{path}: {count} boxes of track '{track}' in frame {frame}; a track has one."
