@@ -13,11 +13,11 @@ import onnxruntime
 
 
 def prepare(points: np.ndarray, count: int) -> dict[str, np.ndarray]:
-    """Finite points in a fixed order, and which `count` of them the network sees."""
+    """Finite points, each place once, in a fixed order; which `count` of them the network sees."""
     points = np.asarray(points, np.float32)
-    points = points[np.isfinite(points).all(axis=1)]
+    points = np.unique(points[np.isfinite(points).all(axis=1)], axis=0)
     if len(points) < 16:
-        raise SystemExit(f"{len(points)} finite points; at least 16 are needed")
+        raise SystemExit(f"{len(points)} different finite points; at least 16 are needed")
     drawn = np.arange(count) % len(points)
     if len(points) > count:
         drawn = np.random.default_rng(0).choice(len(points), count, replace=False)

@@ -94,6 +94,18 @@ def test_masked_rows_are_dropped():
     np.testing.assert_array_equal(as_points(points), np.delete(points.data, [2, 5], axis=0))
 
 
+@pytest.mark.parametrize("order", ["xyz", "zyx"])
+def test_records_are_read_by_the_names_of_their_fields(order):
+    """As `sensor_msgs_py` hands out a message of ROS."""
+    points = scan()
+    rows = np.zeros(len(points), [("intensity", "f4"), *((axis, "<f8") for axis in order)])
+    for axis, values in zip("xyz", points.T):
+        rows[axis] = values
+    np.testing.assert_array_equal(as_points(rows), points)
+    with pytest.raises(BadInputError, match="no array of numbers"):
+        as_points(rows[["x", "y"]])
+
+
 def test_rays_may_be_learned_of_and_have_one_range_each():
     directions, ranges = torch.eye(3).requires_grad_(), torch.ones(3).requires_grad_()
     found = as_rays((directions, ranges))

@@ -172,10 +172,12 @@ class DetectionConfig:
     Attributes:
         around_m: points so far around a box are taken, too: detectors' boxes are a little off.
         fewest_points: of a box; 16 are the least that can be completed.
+        shared: of boxes without tracks one goes if surer ones hold more of its points than this.
     """
 
     around_m: float = 0.2
     fewest_points: int = 16
+    shared: float = 0.5
 
 
 @dataclass(frozen=True)

@@ -62,6 +62,8 @@ from wildshape.io.guard import read_record
 from wildshape.io.poses import read_poses
 from wildshape.parallel.team import Team
 
+SECONDS, SECOND = "seconds.json", "second "
+
 
 @dataclass(frozen=True)
 class Pipeline:
@@ -111,7 +113,8 @@ class Pipeline:
         """A second pass with an adapted model; its results take the place of the first's."""
         second_pass.begin_second(self.out, model)
         adapted = second_pass.like(self.predictor, Path(model))
-        clock = Clock(self.clock.watch, "second ", dict(first.seconds))
+        once = {n: s for n, s in first.seconds.items() if not n.startswith(SECOND)}
+        clock = self.clock.going_on(second_pass.stages_of(self.out) / SECONDS, SECOND, once)
         found = replace(self, predictor=adapted, clock=clock, second=True).perform()
         return second_pass.conclude(self.out, found, model)
 
@@ -207,10 +210,19 @@ class Pipeline:
         if self.tracked:
             return given_tracks(read_cuts(self.cuts, len(self.drive)))
         config = self.config.tracks
+        if self.detections is not None:
+            config = replace(config, longest_gap=config.longest_gap * self.detections.every)
         ticks = self.breaks.ticks(self.drive.ticks, config)
         known = self.cuts, T_level_sensor
-        found = linked_clusters(*known, ticks, config, config.wider(self.drive.scan_s))
+        found = linked_clusters(*known, ticks, config, config.wider(self.seen_s))
         return joined_where_they_stand(found, *known, self.config.standing, self.breaks.frames)
+
+    @property
+    def seen_s(self) -> float | None:
+        """From a scan that is looked at to the next, seconds, if known: not all have detections."""
+        if self.detections is None or self.detections.every == 1:
+            return self.drive.scan_s
+        return (self.drive.scan_s or self.config.tracks.usual_s) * self.detections.every
 
     def folder(self, seen: Sightings) -> Path:
         """Of a completed object."""
@@ -311,7 +323,8 @@ class Pipeline:
 
     def warnings(self, T_world_sensor: SE3, mounting: Mounting) -> tuple[str, ...]:
         """What is odd about the drive; writes `frames.csv` on the way."""
-        points = [cut.scanned for cut in read_cuts(self.cuts, len(self.drive))]
+        cuts = [(cut.scanned, len(cut.counts)) for cut in read_cuts(self.cuts, len(self.drive))]
+        points, kept = [scanned for scanned, _ in cuts], sum(count for _, count in cuts)
         write_frames(self.out / FRAMES, self.drive, points)
         found = [*self.drive.warnings, *mounting.told()]
         if empty := points.count(0):
@@ -320,7 +333,9 @@ class Pipeline:
         found += clock_told(self.drive)
         found += count_told(len(points) - points.count(0))
         if not self.tracked:
-            found += rate_told(self.drive, self.config.tracks)
+            found += rate_told(self.seen_s, self.config.tracks)
+        if self.detections is not None:
+            found += self.detections.told(kept)
         if leaps := list(jumps(T_world_sensor, self.drive.ticks, self.config.trajectory)):
             found.append(f"jumps of the sensor: {len(leaps)}, the first at frame {leaps[0]}")
         return tuple(found)

@@ -66,8 +66,8 @@ class DriveResult:
         boxes: lines of `boxes.csv`.
         moving: vehicles that move.
         warnings: what is odd about the drive, a sentence each.
-        seconds: by stage, of the run that found them.
-        workers: how many did the work of that run.
+        seconds: by stage, of all runs that it took, were some interrupted.
+        workers: how many did the work of the last of them.
     """
 
     out: Path

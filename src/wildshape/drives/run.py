@@ -10,7 +10,7 @@ from wildshape.drives.adapting import second_pass
 from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.clock import Clock, Watch, silent
 from wildshape.drives.config import INFERENCE, DriveConfig
-from wildshape.drives.pipeline import Pipeline
+from wildshape.drives.pipeline import SECONDS, Pipeline
 from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.result import FILES, DriveResult, earlier_result, line_of, settings_of
 from wildshape.drives.tracking.detections import DetectionFile, find_detections
@@ -84,7 +84,8 @@ def drive(
         output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
         soon = Pipeline if len(recording) >= _LONG else None
         with team(workers, soon=soon) as helpers, output.abandoned_if_refused():
-            found = replace(run, helpers=helpers).perform()
+            clock = run.clock.going_on(run.stages / SECONDS)
+            found = replace(run, helpers=helpers, clock=clock).perform()
         output.finish(result={**asdict(found), "out": str(out)})
     else:
         remove_leftovers(out)  # of a second pass, or of the files asked for

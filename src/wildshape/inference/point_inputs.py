@@ -22,6 +22,7 @@ from wildshape.io.scans.points import (
 )
 from wildshape.records import Points, Sensor, SightLines
 
+_AXES = ("x", "y", "z")
 _RAYS = ("directions", "ranges", "origins")
 _OPEN3D_TENSOR = "point.positions"
 _PLACES = ("xyz", "vertices", _OPEN3D_TENSOR, "points")
@@ -31,8 +32,9 @@ def as_points(scan: object, name: str = "scan") -> Points:
     """A scan handed in from Python as `(n, 3)` float32, finite and each place once.
 
     Args:
-        scan: an array or tensor, a path of a scan file, or an object that holds points: of laspy
-            (`.xyz`), trimesh (`.vertices`), Open3D (`.points`, `.point.positions`), a `Completion`.
+        scan: an array or tensor, records with x, y, z, a path of a scan file, or an object that
+            holds points: of laspy (`.xyz`), trimesh (`.vertices`), Open3D (`.points`,
+            `.point.positions`), a `Completion`.
         name: for the error.
 
     Raises:
@@ -109,7 +111,10 @@ def _host(values: object) -> object:
 
 
 def _unmasked(points: object) -> np.ndarray:
-    """An array, NaN where it is masked."""
+    """An array, NaN where it is masked; of records, as ROS hands them out, their x, y and z."""
+    names = getattr(getattr(points, "dtype", None), "names", None) or ()
+    if isinstance(points, np.ndarray) and set(_AXES) <= set(names):
+        return np.stack([_unmasked(points[axis]) for axis in _AXES], axis=-1)
     if isinstance(points, np.ma.MaskedArray):
         return np.ma.filled(points.astype(np.float64), np.nan)
     return np.asarray(points)

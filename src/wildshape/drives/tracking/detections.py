@@ -112,6 +112,23 @@ class Detections:
     warnings: tuple[str, ...]
     corrected: bool = False
 
+    @property
+    def every(self) -> int:
+        """The usual step from a frame with boxes to the next: detectors may see keyframes alone."""
+        steps = np.diff([frame for frame, row in enumerate(self.frames) if row])
+        return max(round(float(np.median(steps))), 1) if len(steps) else 1
+
+    def told(self, kept: int) -> list[str]:
+        """What of them led to nothing, a sentence each; `kept`: boxes that were cut out."""
+        placed, empty = sum(map(len, self.frames)), sum(not row for row in self.frames)
+        found = [f"{empty} of {len(self.frames)} scans have no detections"] if empty else []
+        if kept < placed:
+            found.append(
+                f"{placed - kept} of {placed} detections are left out: they hold too few points or"
+                " those of another"
+            )
+        return found
+
     def noted(self, drive: Drive) -> Drive:
         """The drive, which says how its objects are cut out and what was left out."""
         cut_by = f"by the boxes of {self.path.name}"
@@ -142,9 +159,7 @@ def find_detections(file: DetectionFile, drive: Drive) -> Detections:
             f"{file.path}: its scans, for example '{vehicles[0].scan}', are none of {drive.name}'s,"
             f" for example '{drive.scan_names[0]}'; name them alike."
         )
-    warnings = []
-    if file.calibration is not None and not takes_calibration(file.path):
-        warnings.append(f"{file.calibration.name} is not used: only KITTI's boxes need it")
+    warnings = _calibration_told(file)
     if len(boxes) < len(given):
         left = len(given) - len(boxes)
         warnings.append(f"{left} detections score less than {file.least_score:g} and are left out")
@@ -160,6 +175,18 @@ def find_detections(file: DetectionFile, drive: Drive) -> Detections:
     return Detections(
         file.path, frames, not without, (*warnings, *told), corrected=is_box_table(file.path)
     )
+
+
+def _calibration_told(file: DetectionFile) -> list[str]:
+    """A sentence if a calibration is given and not needed, or needed and not given."""
+    if takes_calibration(file.path) == (file.calibration is not None):
+        return []
+    if file.calibration is not None:
+        return [f"{file.calibration.name} is not used: only KITTI's boxes need it"]
+    return [
+        f"{file.path.name} is taken to be of a camera at the LiDAR's own place that looks along x;"
+        " pass the calibration of the real one"
+    ]
 
 
 def _is_vehicle(category: str) -> bool:
@@ -199,7 +226,10 @@ def _untracked_told(without: int, placed: int) -> list[str]:
 def _check_tracks(path: Path, frames: Iterable[tuple[DetectorBox, ...]]) -> None:
     for frame, row in enumerate(frames):
         for track, count in Counter(box.track or "" for box in row).items():
-            file_name(track)
+            try:
+                file_name(track)
+            except BadInputError as error:
+                raise BadInputError(f"{path}: {error}") from error
             if count > 1:
                 raise BadInputError(
                     f"{path}: {count} boxes of track '{track}' in frame {frame}; a track has one."
@@ -220,8 +250,10 @@ class BoxCutter(Cutter):
         self, frame: int, scan: Points, heights: Float[np.ndarray, "n"], as_measured: Points
     ) -> CutScan:
         """What is in the boxes of a frame; see `cut_boxes`."""
-        seen = scan if self.detections.corrected else as_measured
-        return cut_boxes(scan, self.detections.frames[frame], heights, self.config, seen)
+        given = self.detections
+        seen = scan if given.corrected else as_measured
+        known = given.frames[frame], heights, self.config, seen
+        return cut_boxes(scan, *known, tracked=given.tracked)
 
 
 def cut_boxes(
@@ -230,6 +262,8 @@ def cut_boxes(
     heights: Float[np.ndarray, "n"],
     config: DriveConfig,
     as_measured: Points,
+    *,
+    tracked: bool,
 ) -> CutScan:
     """The points in each box that are not ground.
 
@@ -239,10 +273,13 @@ def cut_boxes(
         heights: of its points above the ground.
         config: see there.
         as_measured: the scan on which the boxes lie, if this one was corrected for motion.
+        tracked: every box knows its track; else no point is of two.
     """
     stands = np.nan_to_num(heights, nan=0.0) > config.clusters.lowest_m
     above = np.flatnonzero(stands)
     inside = points_in_boxes(as_measured[above], [one.box for one in boxes], config.detections)
+    if not tracked:
+        inside = _told_apart(inside, boxes, config.detections)
     found = [(one, above[own]) for one, own in zip(boxes, inside)]
     full = [(one, own) for one, own in found if len(own) >= config.detections.fewest_points]
     rows = np.concatenate([above[:0], *(own for _, own in full)])
@@ -272,6 +309,23 @@ def points_in_boxes(
     reach = config.around_m
     around = np.array([(a <= h + reach).all(-1) for a, h in zip(apart, halves)], bool)
     return inside | (around.reshape(shape) & ~inside.any(0))
+
+
+def _told_apart(
+    inside: Bool[np.ndarray, "k n"], boxes: tuple[DetectorBox, ...], config: DetectionConfig
+) -> Bool[np.ndarray, "k n"]:
+    """Each point given to the surest of its boxes; a box that then has hardly any has none.
+
+    A detector may find one vehicle twice, for example as car and as truck.
+    """
+    free = np.ones(inside.shape[1], bool)
+    found = np.zeros_like(inside)
+    for row in sorted(range(len(boxes)), key=lambda row: -(boxes[row].score or 0.0)):
+        own = inside[row] & free
+        if own.sum() >= (1 - config.shared) * inside[row].sum():
+            found[row] = own
+            free &= ~own
+    return found
 
 
 def check_cut(detections: Detections, cuts: Iterable[CutScan]) -> None:

@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""Detections of keyframes alone, and detections that hold the same points."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wildshape
+from wildshape.drives.clock import Clock, silent
+from wildshape.drives.config import DriveConfig
+from wildshape.drives.pipeline import Pipeline
+from wildshape.drives.source import Drive
+from wildshape.drives.tracking.detections import (
+    DetectionFile,
+    Detections,
+    cut_boxes,
+    find_detections,
+)
+from wildshape.drives.tracking.segmentation import cut_file
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.boxes.detector import DetectorBox, upright_box
+from wildshape.parallel.team import ALONE
+
+SIZE = (4.0, 2.0, 1.5)
+
+
+def box(x, score=None, category="Car"):
+    return DetectorBox(0, category, None, upright_box((x, 0.0, 0.0), SIZE, 0.0), score)
+
+
+def points_of(x, count=40):
+    random = np.random.default_rng(int(10 * x))
+    return (np.array((x, 0, 0)) + random.uniform(-0.5, 0.5, (count, 3)) * SIZE).astype(np.float32)
+
+
+def cut(boxes, scan, *, tracked):
+    heights = np.ones(len(scan))
+    return cut_boxes(scan, boxes, heights, DriveConfig(), scan, tracked=tracked)
+
+
+def test_a_vehicle_found_as_car_and_as_truck_has_each_of_its_points_once():
+    """They were two tracks in one place, put together with every point twice."""
+    scan = np.concatenate((points_of(0.0), points_of(10.0)))
+    boxes = box(0.1, 0.6, "Truck"), box(0.0, 0.9), box(10.0), box(10.0)
+    found = cut(boxes, scan, tracked=False)
+    assert found.counts.tolist() == [40, 40]
+    assert sorted(found.rows.tolist()) == list(range(80))
+    assert sorted(found.rows[:40].tolist()) == list(range(40))
+    assert cut(boxes, scan, tracked=True).counts.tolist()[1:] == [40, 40, 40]
+
+
+def test_a_point_in_the_boxes_of_two_neighbours_is_the_surer_one_s():
+    scan = np.concatenate((points_of(0.0, 400), points_of(3.5, 400)))
+    found = cut((box(0.0, 0.5), box(3.5, 0.8)), scan, tracked=False)
+    assert len(found.counts) == 2
+    assert len(np.unique(found.rows)) == len(found.rows) == 800
+    assert (scan[found.rows[: found.counts[0]], 0] <= 1.5).all()
+
+
+@pytest.mark.parametrize("step", [1, 5])
+def test_a_vehicle_detected_in_keyframes_alone_is_followed(tmp_path: Path, step):
+    """At a tenth of a second: with every fifth scan all tracks broke off, without a word."""
+    scans, speed = 31, 0.8
+    frames = tuple((box(speed * f),) if f % step == 0 else () for f in range(scans))
+    known = Detections(Path("boxes.json"), frames, tracked=False, warnings=())
+    assert known.every == step
+    for frame, row in enumerate(frames):
+        points = points_of(0.0) + np.float32([speed * frame, 0, 0]) if row else np.empty((0, 3))
+        path = cut_file(tmp_path / "stages" / "clusters", frame)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        np.savez(
+            path,
+            points=points.astype(np.float32),
+            rows=np.arange(len(points), dtype=np.int32),
+            counts=np.array([len(points)] * len(row), np.int64),
+            scanned=np.array(100),
+            tracks=np.array((), np.str_),
+            grounds=np.zeros((len(row), 3)),
+        )
+    names = [f"{frame:06d}" for frame in range(scans)]
+    drive = Drive.of("street", names, lambda _: None, [0.1 * f for f in range(scans)])
+    predictor = wildshape.load()  # nothing is completed
+    run = Pipeline(drive, tmp_path, DriveConfig(), predictor, ALONE, known, Clock(silent))
+    (found,) = run.linked(SE3.identity(scans))
+    assert found.frames == tuple(range(0, scans, step))
+
+
+def test_boxes_that_led_to_nothing_and_scans_without_are_counted():
+    frames = (box(0.0), box(10.0)), (), (box(0.0),)
+    known = Detections(Path("boxes.json"), frames, tracked=False, warnings=())
+    assert known.told(3) == ["1 of 3 scans have no detections"]
+    assert known.told(1)[1:] == [
+        "2 of 3 detections are left out: they hold too few points or those of another"
+    ]
+    assert Detections(Path("boxes.json"), frames[:1], tracked=True, warnings=()).told(2) == []
+
+
+def test_labels_of_kitti_without_a_calibration_say_which_camera_is_assumed(tmp_path: Path):
+    """Of KITTI's own sensors boxes then lie 27 cm off; that was not said."""
+    path = tmp_path / "0001.txt"
+    path.write_text("0 1 Car 0 0 0 -1 -1 -1 -1 1.5 2 4 0 1 10 0\n")
+    calibration = tmp_path / "calib.txt"
+    calibration.write_text(
+        "R0_rect: 1 0 0 0 1 0 0 0 1\nTr_velo_to_cam: 0 -1 0 0 0 0 -1 0 1 0 0 0\n"
+    )
+    drive = Drive.of("street", ["000000"], lambda _: None)
+    (said,) = find_detections(DetectionFile(path), drive).warnings
+    assert said.startswith("0001.txt is taken to be of a camera at the LiDAR's own place")
+    assert find_detections(DetectionFile(path, calibration), drive).warnings == ()
