@@ -92,6 +92,30 @@ def test_who_stands_most_of_the_time_has_moved_and_one_jump_is_no_motion():
     assert not moves(ticks, boxes, BoxConfig())
 
 
+def test_one_that_stands_may_jump_once_in_few_scans():
+    """As where a parked car is passed: its far end is seen at last."""
+    ticks = np.array((0.0, 4.0, 7.0, 13.0, 14.0))
+    boxes = np.zeros((5, 4))
+    boxes[:, 3] = np.arctan2(0.6, 1.2)
+    boxes[ticks > 10, :2] = 1.2, 0.6
+    assert not moves(ticks, boxes, BoxConfig())
+    assert not moves(ticks[2:], boxes[2:], BoxConfig())
+    boxes[:, :2] = np.outer(ticks, (0.12, 0.06))
+    assert moves(ticks, boxes, BoxConfig())
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.02])
+def test_a_vehicle_drives_ahead_or_back_and_never_aside(bend):
+    """What stands in a row slips aside, to its neighbour, where little of it is seen."""
+    ticks = np.arange(0.0, 40.0, 4.0)
+    course = bend * ticks
+    steps = np.column_stack((np.cos(course), np.sin(course), 0 * ticks, 0 * ticks))
+    places = 0.3 * np.cumsum(steps, axis=0)
+    for off, driven in ((0.0, True), (math.pi, True), (math.pi / 2, False), (-math.pi / 2, False)):
+        looking = np.outer(course + off, (0.0, 0.0, 0.0, 1.0))
+        assert moves(ticks, places + looking, BoxConfig()) == driven
+
+
 def test_boxes_follow_a_vehicle_that_brakes_between_scans_a_second_apart():
     frames = tuple(range(0, 91, 10))
     boxes = [(float(stop_and_go(np.array(f))), 0.0, 0.0, 0.0) for f in frames]

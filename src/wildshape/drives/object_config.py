@@ -235,7 +235,8 @@ class BoxConfig:
     """How boxes are smoothed in time (`boxes.py`).
 
     Attributes:
-        moving_m: an object that gets farther than this through its track may be moving.
+        moving_m: an object that gets farther ahead or back than this through its track may be
+            moving.
         moving_m_per_tick: and it must be as fast as this: 0.5 m/s at 10 Hz.
         moving_scans: or through so many successive ones of its completed scans.
         heading_m_per_tick: only scans in which an object is as fast as this tell which end is its
