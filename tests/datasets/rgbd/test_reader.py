@@ -219,6 +219,13 @@ def test_an_image_of_all_instances_beside_folders_of_single_ones_is_refused(tmp_
     refused(tmp_path, r"masks/000001\.png: an image of all instances beside folders .* such as 1;")
 
 
+def test_a_damaged_first_image_loses_its_frame_alone(tmp_path):
+    write_sequence(tmp_path / "kitchen", count=3)
+    (tmp_path / "kitchen" / "depth" / "000000.png").write_bytes(b"\x89PNG")
+    for track in passed_over(Rgbd(tmp_path), r"depth/000000\.png: "):
+        assert track.scan_names == ("000001", "000002")
+
+
 def test_missing_and_damaged_files_are_named(tmp_path):
     folder = tmp_path / "kitchen"
     refused(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Shaped
 
-from wildshape.datasets.rgbd.depth_image import measured, read_depth_png
+from wildshape.datasets.rgbd.depth_image import first_size, measured, read_depth_png
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import read_json
@@ -122,12 +122,11 @@ def open_sequence(folder: Path) -> Sequence:
     _check_instances(folder / "masks")
     expected = f"JSON with {', '.join(_KEYS)} and depth_scale"
     raw = read_json(folder / "camera.json", expected, dict)
-    size = read_depth_png(depth[0]).shape[::-1]
     poses = folder / "poses.txt"
     return Sequence(
         folder,
         depth,
-        _camera(raw, (int(size[0]), int(size[1])), folder / "camera.json"),
+        _camera(raw, first_size(depth), folder / "camera.json"),
         _depth_scale(raw.get("depth_scale", _DEPTH_SCALE), folder / "camera.json"),
         _categories(folder / "objects.json"),
         read_poses(poses, len(depth)) if poses.exists() else None,
