@@ -192,6 +192,15 @@ def test_one_scan_of_a_track_has_its_unit_and_sensor(dataset: Path) -> None:
     np.testing.assert_allclose(after.scans[0], before.scans[0] / 100, rtol=1e-5)
 
 
+def test_scans_beside_tracks_are_not_passed_over(dataset: Path) -> None:
+    (dataset / "notes" / "splits.txt").write_text("a b")
+    assert open_tracks(dataset).names == ("a", "b")
+    (dataset / "b" / "scans").rename(dataset / "c")
+    (dataset / "b").rename(dataset / ".b")
+    with pytest.raises(BadInputError, match=r"c: has points, but no scans/; move its scans there"):
+        open_tracks(dataset)
+
+
 def test_hidden_folders_are_no_tracks(dataset: Path) -> None:
     (dataset / "a").rename(dataset / ".a")
     assert open_tracks(dataset).names == ("b",)

@@ -342,6 +342,9 @@ def _folder(path: Path, coordinates: Coordinates) -> TrackSource:
     if (path / "boxes.csv").is_file() and (path / "tracks").is_dir():
         raise BadInputError(f"{path}: holds what `drive` found; name {path / 'tracks'}.")
     if folders:
+        for other in (entry for entry in shown if entry.is_dir() and entry not in folders):
+            if any(is_scan_file(f) and f.suffix not in (".txt", ".csv") for f in other.iterdir()):
+                raise BadInputError(f"{other}: has points, but no scans/; move its scans there.")
         names = tuple(as_text(folder.name) for folder in folders)
         return TrackSource(path, names, lambda index: read_track_file(folders[index], coordinates))
     files = [f for f in entries if is_scan_file(f) and f.name not in _NO_SCANS]

@@ -3,6 +3,7 @@
 """Scenes written here in nuScenes' own layout, with known objects."""
 
 import json
+import math
 import os
 import pickle
 import shutil
@@ -246,6 +247,16 @@ def test_tables_that_do_not_fit_are_named(own, tmp_path, table, key, value, matc
     lidar = [i for i, row in enumerate(rows) if "LIDAR_TOP" in row.get("filename", "LIDAR_TOP")]
     edit(own, table, key, value, lidar[0])
     refused(own, cache=tmp_path, match=rf"{table}\.json: {match}")
+
+
+@pytest.mark.parametrize("table", ["sample_annotation", "ego_pose"])
+def test_quaternions_in_another_order_are_told_by_their_lean(own, tmp_path, table):
+    path = own / "v1.0-mini" / f"{table}.json"
+    rows = json.loads(path.read_text())
+    for i, row in enumerate(rows):
+        row["rotation"] = [0.0, 0.0, math.sin(0.6 + i), math.cos(0.6 + i)]  # x y z w of a yaw
+    path.write_text(json.dumps(rows))
+    refused(own, cache=tmp_path, match=rf"{table}\.json: .* lean .* as w x y z")
 
 
 def test_missing_calibration_tables_and_sweeps_are_named(own, tmp_path):

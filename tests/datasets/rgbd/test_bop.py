@@ -122,4 +122,7 @@ def test_missing_and_damaged_files_are_named(tmp_path):
     (scene / "mask_visib" / "000001_000001.png").unlink()
     passed_over(Bop(tmp_path), r"000001_000001\.png: no such file")
     (scene / "depth" / "000000.png").write_bytes(b"\x89PNG")
+    (track,) = passed_over(Bop(tmp_path), r"depth/000000\.png: ")
+    assert track.scan_names == ("000001",)
+    (scene / "depth" / "000001.png").unlink()
     refused(tmp_path, r"depth/000000\.png: ")

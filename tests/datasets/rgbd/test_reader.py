@@ -155,7 +155,9 @@ def test_a_picture_of_depths_is_no_depth_image(tmp_path):
     refused(tmp_path, r"000000\.png: holds 8 bits a pixel, expected a 16-bit depth PNG")
 
 
-@pytest.mark.parametrize("change", [{"depth_scale": 10}, {"fx": 0.9, "fy": 0.9}])
+@pytest.mark.parametrize(
+    "change", [{"depth_scale": 10}, {"depth_scale": 1000, "fx": 0.9, "fy": 0.9}]
+)
 def test_objects_as_large_as_a_town_are_left_out(tmp_path, change):
     """A wrong depth_scale (the images have 10,000 a metre); focal lengths in image widths."""
     write_sequence(tmp_path / "kitchen", count=2)
@@ -170,7 +172,7 @@ def test_a_camera_of_images_of_another_size_is_doubted(tmp_path):
     source = Rgbd(tmp_path)
     assert list(all_tracks(source))
     assert source.doubts == ()
-    twice = {name: 2 * CAMERA[name] for name in ("fx", "fy", "cx", "cy")}
+    twice = {name: 2 * CAMERA[name] for name in ("fx", "fy", "cx", "cy")} | {"depth_scale": 1000}
     (tmp_path / "kitchen" / "camera.json").write_text(json.dumps(CAMERA | twice))
     assert list(all_tracks(source))
     (doubt,) = source.doubts
@@ -219,6 +221,13 @@ def test_an_image_of_all_instances_beside_folders_of_single_ones_is_refused(tmp_
     refused(tmp_path, r"masks/000001\.png: an image of all instances beside folders .* such as 1;")
 
 
+def test_a_damaged_first_image_loses_its_frame_alone(tmp_path):
+    write_sequence(tmp_path / "kitchen", count=3)
+    (tmp_path / "kitchen" / "depth" / "000000.png").write_bytes(b"\x89PNG")
+    for track in passed_over(Rgbd(tmp_path), r"depth/000000\.png: "):
+        assert track.scan_names == ("000001", "000002")
+
+
 def test_missing_and_damaged_files_are_named(tmp_path):
     folder = tmp_path / "kitchen"
     refused(
@@ -234,11 +243,13 @@ def test_missing_and_damaged_files_are_named(tmp_path):
     refused(tmp_path, r"camera\.json: expected JSON with fx")
     camera.write_text(json.dumps({"fx": 1, "fy": 1}))
     refused(tmp_path, r"camera\.json: lacks cx, cy")
+    camera.write_text(json.dumps(CAMERA))
+    refused(tmp_path, r"camera\.json: lacks depth_scale; .* units in a metre")
     camera.write_text(json.dumps(CAMERA | {"depth_scale": 0}))
     refused(tmp_path, r"camera\.json: depth_scale is 0, expected a number above 0")
     camera.write_text(json.dumps(CAMERA | {"depth_scale": 0.001}))
     refused(tmp_path, r"camera\.json: depth_scale is 0\.001, .* metres in a unit, write 1000\.$")
-    camera.write_text(json.dumps(CAMERA | {"width": 320}))
+    camera.write_text(json.dumps(CAMERA | {"depth_scale": 1000, "width": 320}))
     refused(tmp_path, r"160 x 120 pixels, expected 320 x 120")
     camera.write_text(good[0])
     write_png(mask, np.zeros((24, 32), np.uint8))

@@ -169,6 +169,17 @@ def test_truth_is_built_where_poses_are(tmp_path):
     assert bare.shape is None
 
 
+def test_poses_the_wrong_way_round_are_doubted(tmp_path):
+    class Inverted(Posed):
+        def tracks_of(self, part):
+            for track in (drive_by(name, scans=5) for name in ("a", "b")):
+                yield replace(track, T_sensor_object=track.T_sensor_object.inverse())
+
+    (said,) = convert_part(Inverted(), "part", tmp_path / "0").doubts  # of the first alone
+    assert "check unit, frame and direction of its poses" in said
+    assert convert_part(Posed(), "part", tmp_path / "1").doubts == []
+
+
 def stray_and_ground(track):
     """A track whose first scan also saw a bird, and ground beside the car's wheels."""
     poses = track.T_sensor_object

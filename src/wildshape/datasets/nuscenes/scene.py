@@ -14,6 +14,8 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3, between
 
+_LEAST_UP, _FEW_LEANING = 0.866, 0.1  # cosine of 30 degrees; a share
+
 
 @dataclass(frozen=True)
 class Frame:
@@ -107,7 +109,9 @@ def _read_frames(db: sqlite3.Connection, scene: int, *, sweeps: bool) -> tuple[F
     ).fetchall()
     if not rows:
         return ()
-    T_global_sensor = _poses([row[4:11] for row in rows]) @ _poses([row[11:] for row in rows])
+    T_global_ego = _poses([row[4:11] for row in rows])
+    _check_level(T_global_ego, "ego_pose.json")
+    T_global_sensor = T_global_ego @ _poses([row[11:] for row in rows])
     return tuple(
         Frame(file, sample, bool(is_key), time, T_global_sensor[i])
         for i, (file, sample, is_key, time, *_) in enumerate(rows)
@@ -124,6 +128,8 @@ def _read_boxes(
     ).fetchall()
     boxes: dict[int, dict[str, Labelled]] = {}
     poses = _poses([row[6:] for row in rows]) if rows else None
+    if poses is not None:
+        _check_level(poses, "sample_annotation.json")
     for i, (sample, token, _, width, length, height, *_) in enumerate(rows):
         if poses is not None:
             boxes.setdefault(sample, {})[token] = Labelled((length, width, height), poses[i])
@@ -134,6 +140,16 @@ def _poses(rows: list[tuple[float, ...]]) -> SE3:
     """One pose a row of x y z qw qx qy qz."""
     numbers = torch.as_tensor(np.asarray(rows, np.float64))
     return SE3(rotation_from_quaternion(numbers[:, 3:]), numbers[:, :3])
+
+
+def _check_level(poses: SE3, table: str) -> None:
+    """Refuse vehicles that lean as none does: numbers in another order are quaternions, too."""
+    leaning = int((poses.rotation[:, 2, 2] < _LEAST_UP).sum())
+    if leaning > _FEW_LEANING * len(poses):
+        raise BadInputError(
+            f"{table}: {leaning} of {len(poses)} rotations of a scene lean by more than 30 degrees;"
+            " write them as w x y z, in a frame whose z looks up."
+        )
 
 
 def _between(start: Labelled, end: Labelled, share: float) -> Labelled:

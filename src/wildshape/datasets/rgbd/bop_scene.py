@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from wildshape.datasets.rgbd.depth_image import measured, read_depth_png
+from wildshape.datasets.rgbd.depth_image import first_size, measured, read_depth_png
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import read_json, reading
@@ -97,17 +97,17 @@ def open_scene(folder: Path) -> Scene:
     """
     cameras = _json(folder / "scene_camera.json", "cam_K and depth_scale of each image")
     truth = _json(folder / "scene_gt.json", "a list of objects of each image")
-    first = min(truth, key=int, default=None)
-    if first is None:
+    keys = sorted(truth, key=int)
+    if not keys:
         raise BadInputError(f"{folder / 'scene_gt.json'}: holds no image; take another scene.")
-    size = read_depth_png(folder / "depth" / f"{int(first):06d}.png").shape
+    size = first_size(folder / "depth" / f"{int(key):06d}.png" for key in keys)
     frames = []
-    for key in sorted(truth, key=int):
+    for key in keys:
         if key not in cameras:
             raise BadInputError(
                 f"{folder / 'scene_camera.json'}: lacks image {key}; copy it again."
             )
-        frames.append(_checked_frame(folder, key, cameras[key], truth[key], (size[1], size[0])))
+        frames.append(_checked_frame(folder, key, cameras[key], truth[key], size))
     return Scene(folder, tuple(frames), frames[0].camera)
 
 

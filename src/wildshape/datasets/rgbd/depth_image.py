@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Depth images and masks as they lie on disk, and the points behind their pixels."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +55,23 @@ def read_depth_png(path: Path) -> Shaped[np.ndarray, "h w"]:
             " themselves, not a picture of them."
         )
     return raw
+
+
+def first_size(paths: Iterable[Path]) -> tuple[int, int]:
+    """Width and height, in pixels, of the first depth image that can be read; paths: one or more.
+
+    Raises:
+        BadInputError: none can be; what is wrong with the first.
+    """
+    damage: list[BadInputError] = []
+    for path in paths:
+        try:
+            height, width = read_depth_png(path).shape
+        except BadInputError as error:
+            damage.append(error)
+        else:
+            return width, height
+    raise damage[0]
 
 
 def measured(raw: Shaped[np.ndarray, "h w"]) -> Shaped[np.ndarray, "h w"]:

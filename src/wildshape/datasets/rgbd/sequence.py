@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Shaped
 
-from wildshape.datasets.rgbd.depth_image import measured, read_depth_png
+from wildshape.datasets.rgbd.depth_image import first_size, measured, read_depth_png
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import read_json
@@ -20,9 +20,8 @@ from wildshape.io.poses import read_poses
 from wildshape.io.tracks import folder_name
 from wildshape.records import Intrinsics, Points
 
-_KEYS = ("fx", "fy", "cx", "cy")
+_KEYS = ("fx", "fy", "cx", "cy", "depth_scale")
 _BENT = ("distortion", "dist_coeffs", "coeffs", "k1", "k2", "p1", "p2", "k3")  # of a lens
-_DEPTH_SCALE = 1000.0
 _INSTANCE = re.compile(r"[0-9]{1,9}")
 _MOST, _LEAST = 1e9, 1e-6
 _MIDDLE = (0.3, 0.7)  # of an image: where a camera's axis meets it, unless it is a part of one
@@ -120,15 +119,14 @@ def open_sequence(folder: Path) -> Sequence:
     if not (folder / "masks").is_dir():
         raise BadInputError(f"{folder / 'masks'}: no such folder; a sequence keeps its masks here.")
     _check_instances(folder / "masks")
-    expected = f"JSON with {', '.join(_KEYS)} and depth_scale"
+    expected = f"JSON with {', '.join(_KEYS)}"
     raw = read_json(folder / "camera.json", expected, dict)
-    size = read_depth_png(depth[0]).shape[::-1]
     poses = folder / "poses.txt"
     return Sequence(
         folder,
         depth,
-        _camera(raw, (int(size[0]), int(size[1])), folder / "camera.json"),
-        _depth_scale(raw.get("depth_scale", _DEPTH_SCALE), folder / "camera.json"),
+        _camera(raw, first_size(depth), folder / "camera.json"),
+        _depth_scale(raw["depth_scale"], folder / "camera.json"),
         _categories(folder / "objects.json"),
         read_poses(poses, len(depth)) if poses.exists() else None,
     )
@@ -155,7 +153,10 @@ def instances_of(
 def _camera(raw: dict[str, Any], size: tuple[int, int], path: Path) -> Intrinsics:
     missing = [key for key in _KEYS if key not in raw]
     if missing:
-        raise BadInputError(f"{path}: lacks {', '.join(missing)}; all are in pixels.")
+        raise BadInputError(
+            f"{path}: lacks {', '.join(missing)}; depth_scale is the units in a metre, the"
+            " others are in pixels."
+        )
     bent = next((key for key in _BENT if _bends(raw.get(key))), None)
     if bent is not None:
         raise BadInputError(

@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 from uuid import uuid4
 
 from wildshape.datasets.tracks.source import Source
-from wildshape.datasets.tracks.truth import TruthBuilder
+from wildshape.datasets.tracks.truth import TruthBuilder, misplaced
 from wildshape.errors import BadInputError, SharedInputError
 from wildshape.io.atomic import write_json
 from wildshape.io.store.store import StoreWriter, open_store
@@ -24,6 +24,7 @@ STORE, TRACKS = "store", "tracks"
 Layout = Literal["packed", "folders"]
 _RESULT = "part.json"
 DAMAGED = "part: damaged, left out whole"
+_POSES_CURE = "check unit, frame and direction of its poses, and the scale of its scans"
 
 
 @dataclass
@@ -133,7 +134,7 @@ def convert_part(
         tracks = _counted(source, result, truth)
         (_write_store if layout == "packed" else _write_folders)(tracks, unfinished, result)
         result.left_out = dict(sorted((result.left_out | source.rejected).items()))
-        result.doubts = list(getattr(source, "doubts", ()))
+        result.doubts += getattr(source, "doubts", ())
         write_json(unfinished / _RESULT, asdict(result))
         _put(unfinished, folder, result.part)
     finally:
@@ -153,7 +154,13 @@ def finished_part(folder: Path, part: str) -> PartResult | None:
 
 
 def _counted(source: Source, result: PartResult, truth: TruthBuilder | None) -> Iterator[Track]:
+    looked = False
     for track in source.tracks_of(result.part):
+        # A labelled box need not be asked: its scans were cut out by its pose.
+        if not looked and track.T_sensor_object is not None and track.label_size_m is None:
+            looked = True
+            if odd := misplaced(track):
+                result.doubts.append(f"{track.name}: {odd}; {_POSES_CURE}")
         shaped = track if truth is None else truth.with_shape(track)
         if shaped is None:
             posed = track.T_sensor_object is not None
