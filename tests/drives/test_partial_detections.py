@@ -22,6 +22,7 @@ from wildshape.drives.tracking.segmentation import cut_file
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detector import DetectorBox, upright_box
 from wildshape.parallel.team import ALONE
+from wildshape.records import Turn
 
 SIZE = (4.0, 2.0, 1.5)
 
@@ -67,20 +68,29 @@ def test_a_vehicle_detected_in_keyframes_alone_is_followed(tmp_path: Path, step)
     known = Detections(Path("boxes.json"), frames, tracked=False, warnings=())
     assert known.every == step
     for frame, row in enumerate(frames):
-        points = points_of(0.0) + np.float32([speed * frame, 0, 0]) if row else np.empty((0, 3))
+        points = (
+            points_of(0.0) + np.array([speed * frame, 0, 0], np.float32)
+            if row
+            else np.empty((0, 3))
+        )
         path = cut_file(tmp_path / "stages" / "clusters", frame)
         path.parent.mkdir(parents=True, exist_ok=True)
         np.savez(
             path,
             points=points.astype(np.float32),
             rows=np.arange(len(points), dtype=np.int32),
-            counts=np.array([len(points)] * len(row), np.int64),
+            counts=np.full(len(row), len(points)),
             scanned=np.array(100),
             tracks=np.array((), np.str_),
             grounds=np.zeros((len(row), 3)),
         )
     names = [f"{frame:06d}" for frame in range(scans)]
-    drive = Drive.of("street", names, lambda _: None, [0.1 * f for f in range(scans)])
+    drive = Drive.of(
+        "street",
+        names,
+        lambda _: Turn(np.empty((0, 3), np.float32)),
+        [0.1 * f for f in range(scans)],
+    )
     predictor = wildshape.load()  # nothing is completed
     run = Pipeline(drive, tmp_path, DriveConfig(), predictor, ALONE, known, Clock(silent))
     (found,) = run.linked(SE3.identity(scans))
@@ -105,7 +115,7 @@ def test_labels_of_kitti_without_a_calibration_say_which_camera_is_assumed(tmp_p
     calibration.write_text(
         "R0_rect: 1 0 0 0 1 0 0 0 1\nTr_velo_to_cam: 0 -1 0 0 0 0 -1 0 1 0 0 0\n"
     )
-    drive = Drive.of("street", ["000000"], lambda _: None)
+    drive = Drive.of("street", ["000000"], lambda _: Turn(np.empty((0, 3), np.float32)))
     (said,) = find_detections(DetectionFile(path), drive).warnings
     assert said.startswith("0001.txt is taken to be of a camera at the LiDAR's own place")
     assert find_detections(DetectionFile(path, calibration), drive).warnings == ()

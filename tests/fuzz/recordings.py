@@ -189,7 +189,9 @@ def _read_detections(folder: Path) -> Arrays:
     found = find_detections(file, drive)
     config = DriveConfig()
     heights = height_above_ground(CLOUD, _LEVEL.height_m, config.ground)
-    cuts = [cut_boxes(CLOUD, row, heights, config, CLOUD) for row in found.frames]
+    cuts = [
+        cut_boxes(CLOUD, row, heights, config, CLOUD, tracked=found.tracked) for row in found.frames
+    ]
     for row, cut in zip(found.frames, cuts):
         yield np.array([(*one.box.centre, *one.box.size) for one in row])
         yield cut.points

@@ -173,7 +173,9 @@ def test_poses_the_wrong_way_round_are_doubted(tmp_path):
     class Inverted(Posed):
         def tracks_of(self, part):
             for track in (drive_by(name, scans=5) for name in ("a", "b")):
-                yield replace(track, T_sensor_object=track.T_sensor_object.inverse())
+                given = track.T_sensor_object
+                assert given is not None
+                yield replace(track, T_sensor_object=given.inverse())
 
     (said,) = convert_part(Inverted(), "part", tmp_path / "0").doubts  # of the first alone
     assert "check unit, frame and direction of its poses" in said

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """RGB-D frames with instance masks: depth images of anybody's camera become tracks.
 
-    ROOT/SEQUENCE/camera.json          fx fy cx cy, depth_scale: units of the PNG a metre (1000)
+    ROOT/SEQUENCE/camera.json          fx fy cx cy, depth_scale: units of the PNG a metre
     ROOT/SEQUENCE/depth/NAME.png       16 bits, 0: not measured; sorted by name = in time order
     ROOT/SEQUENCE/masks/NAME.png       instance numbers, 0: background; or
     ROOT/SEQUENCE/masks/ID/NAME.png    a folder an instance, not 0: the object
