@@ -86,3 +86,19 @@ def test_a_training_says_so(cars, tmp_path):
         writer.add(cars[0].part([0]))
     train(tmp_path / "store", tmp_path / "run", TrainingOptions("tiny", steps=1), Heard())
     assert [text for text in heard if "no track has two scans" in text]
+
+
+def test_true_poses_the_wrong_way_round_are_told_before_the_oracle_learns(cars, tmp_path):
+    class Heard(Silent):
+        def say(self, text):
+            heard.append(text)
+
+    heard: list[str] = []
+    poses = cars[0].T_sensor_object
+    for name, T in (("sound", poses), ("turned", poses.inverse())):
+        with StoreWriter(tmp_path / name, {}) as writer:
+            writer.add(replace(cars[0], T_sensor_object=T))
+        options = TrainingOptions("tiny", steps=1, teacher="truth")
+        train(tmp_path / name, tmp_path / f"{name}.run", options, Heard())
+    (said,) = (text for text in heard if "true poses" in text)
+    assert said.startswith(f"{tmp_path / 'turned'}: ")

@@ -4,6 +4,7 @@
 
 import numpy as np
 
+from wildshape.datasets.tracks.truth import misplaced
 from wildshape.geometry.box import extent
 from wildshape.io.store.store import Store
 from wildshape.training.config import Recipe
@@ -43,6 +44,14 @@ def doubts_of(store: Store, recipe: Recipe) -> list[str]:
             f" and are not trained on; {without:,} of {len(store):,} tracks have no others"
         )
     return doubts if made_for != kind else doubts + _doubts_of_size(store, recipe)
+
+
+def doubts_of_truth(store: Store) -> list[str]:
+    """Where the first track's true poses do not put its scans onto its shape; for the oracle."""
+    first = store.track(0)
+    odd = "" if first.T_sensor_object is None else misplaced(first)
+    cure = "check unit, frame and direction of the poses before the oracle learns from them"
+    return [f"{store.named}: {first.name}: {odd}; {cure}"] if odd else []
 
 
 def _doubts_of_size(store: Store, recipe: Recipe) -> list[str]:

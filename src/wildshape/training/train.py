@@ -20,7 +20,7 @@ from wildshape.io.store.store import Store
 from wildshape.method.checkpoint import MODEL, load_checkpoint, weights_file
 from wildshape.ops.device import choose_device
 from wildshape.training.config import Recipe
-from wildshape.training.data_checks import doubts_of
+from wildshape.training.data_checks import doubts_of, doubts_of_truth
 from wildshape.training.loop import Run, StopRequested, fit, setup
 from wildshape.training.options import TrainingOptions
 from wildshape.training.recipes import recipe_for, with_encoder, with_rays
@@ -165,7 +165,8 @@ def _set_up(
 ) -> Run:
     learns = isinstance(weights.teacher, Path)
     leads = int(os.environ.get("RANK", "0")) == 0
-    for doubt in doubts_of(store, recipe) if leads else ():
+    truth = doubts_of_truth(store) if weights.teacher == "truth" else []
+    for doubt in (*doubts_of(store, recipe), *truth) if leads else ():
         progress.say(doubt)
     with (progress if learns and leads else SILENT).bar("fusing tracks", 0) as bar:
         return setup(

@@ -3,6 +3,7 @@
 """A drive written here in KITTI's own layout, with known points."""
 
 import math
+import re
 import shutil
 from pathlib import Path
 
@@ -126,6 +127,8 @@ def test_missing_and_corrupt_files_are_named(drive):
     refused(drive, r"tracklet_labels\.xml: not valid XML")
     labels.write_text(good.replace("<tx>10.0</tx>", "<tx>nan</tx>", 1))
     refused(drive, r"tracklet_labels\.xml: tracklet 0: <tx> is 'nan'")
+    labels.write_text(re.sub(r"<rz>.*?</rz>", "<rz>-90</rz>", good))
+    refused(drive, r"tracklet_labels\.xml: tracklet 0: <rz> is 90, expected radians")
     labels.write_text("<a/>")
     refused(drive, r"tracklet_labels\.xml: holds no tracklets")
     labels.unlink()

@@ -168,6 +168,8 @@ def test_damaged_labels_are_named(training):
     refused(training, r"0001\.txt, line 11: 1\d fields, expected 17")
     path.write_text(good.replace("1.700000", "wide", 1))
     refused(training, r"0001\.txt, line 2: a field is no number")
+    path.write_text(good.replace(good.splitlines()[1].split()[-1], "90.0"))
+    refused(training, r"0001\.txt, line 2: .* turn 90\.0 radians")
     path.write_text(good + good.splitlines()[1] + "\n")
     refused(training, r"0001\.txt, line 12: object \d+ has a box in frame 0 already")
     path.write_text(good)

@@ -120,7 +120,7 @@ def test_missing_and_damaged_files_are_named(tmp_path):
     refused(tmp_path, r"scene_gt\.json: holds no image")
     truth.write_text(good[1])
     (scene / "mask_visib" / "000001_000001.png").unlink()
-    passed_over(Bop(tmp_path), r"000001_000001\.png: no such file")
+    passed_over(Bop(tmp_path), r"000001_000001\.png: no such file; the split's archive")
     (scene / "depth" / "000000.png").write_bytes(b"\x89PNG")
     (track,) = passed_over(Bop(tmp_path), r"depth/000000\.png: ")
     assert track.scan_names == ("000001",)

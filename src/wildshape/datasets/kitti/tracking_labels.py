@@ -26,6 +26,7 @@ CATEGORIES = (
 )
 _IGNORED = "DontCare"
 _MOST = 1_000_000_000
+_MOST_TURN = 4 * math.pi  # what is more than two turns counts degrees
 _CURE = "download KITTI tracking's labels again"
 
 
@@ -89,8 +90,10 @@ def _box(words: list[str], where: str) -> LabelledBox:
         height, width, length, x, y, z, turn = map(float, words[10:17])
     except ValueError:
         raise BadInputError(f"{where}: a field is no number; {_CURE}.") from None
-    if not math.isfinite(turn) or not 0 <= frame < _MOST or not 0 <= track < _MOST:
-        raise BadInputError(f"{where}: frame {words[0]}, object {words[1]}, turn {turn}; {_CURE}.")
+    if not abs(turn) <= _MOST_TURN or not 0 <= frame < _MOST or not 0 <= track < _MOST:
+        raise BadInputError(
+            f"{where}: frame {words[0]}, object {words[1]}, turn {turn} radians; {_CURE}."
+        )
     pose = _pose(x, y - height / 2, z, turn)
     check_boxes(np.asarray([[length, width, height]]), pose, where, _CURE)
     return LabelledBox(frame, track, words[2], (length, width, height), pose)

@@ -119,6 +119,8 @@ class Bop:
         self, scene: Scene, frame: Frame, thing: Thing, name: str, depth: np.ndarray, to: Gathering
     ) -> None:
         path = scene.folder / "mask_visib" / f"{frame.stem}_{thing.number:06d}.png"
+        if not path.is_file():
+            raise BadInputError(f"{path}: no such file; the split's archive of BOP brings masks.")
         mask = read_png(path, "a PNG mask of one channel") != 0
         if mask.shape != depth.shape:
             raise BadInputError(f"{path}: {mask.shape} pixels, its depth image has {depth.shape}.")
