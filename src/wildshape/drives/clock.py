@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
+from wildshape.errors import BadInputError
 from wildshape.io.atomic import write_json
 from wildshape.io.guard import read_json, reading
 
@@ -71,5 +72,9 @@ class Clock:
 
         try:
             yield at
-        finally:
+        except BadInputError:
+            raise  # of what is refused nothing is kept
+        except BaseException:
             count()
+            raise
+        count()
