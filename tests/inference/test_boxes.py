@@ -107,6 +107,14 @@ def test_ground_left_around_the_wheels_is_no_end_or_side():
     assert whole.size.tolist() == pytest.approx((4.48, 2.16, 1.5), abs=0.05)
 
 
+def test_a_box_reaches_down_to_a_bottom_that_is_known_and_never_ends_above_its_shape():
+    for at, height in ((-0.85, 1.6), (-0.6, 1.5)):
+        bottom = torch.tensor((0.3, 0.0, at), dtype=torch.float64)
+        fitted = fit_to_scans(surface(), [], mirror=True, bottom=bottom)
+        assert fitted.size.tolist() == pytest.approx((4.0, 1.8, height), abs=0.02)
+        assert float(fitted.centre[2] + fitted.size[2] / 2) == pytest.approx(0.75, abs=0.02)
+
+
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("side", [-9.0, 9.0])
 def test_a_few_strays_far_outside_are_not_believed(axis, side):

@@ -51,10 +51,12 @@ def fit_for(
     shape: Float[Tensor, "P 3"],
     seen: Iterable[Tensor],
     config: BoxConfig = _DEFAULT,
+    bottom: Float[Tensor, "3"] | None = None,
 ) -> FittedBox:
     """`fit_to_scans` of what a network with these settings completes."""
     mirror, body = settings.network.mirror, settings.sensor == "lidar"
-    return fit_to_scans(shape, seen, mirror=mirror, body=body, unit=settings.unit, config=config)
+    known = {"mirror": mirror, "body": body, "unit": settings.unit, "bottom": bottom}
+    return fit_to_scans(shape, seen, config=config, **known)
 
 
 def fit_to_scans(
@@ -64,6 +66,7 @@ def fit_to_scans(
     mirror: bool,
     body: bool = True,
     unit: float = 1.0,
+    bottom: Float[Tensor, "3"] | None = None,
     config: BoxConfig = _DEFAULT,
 ) -> FittedBox:
     """The box around a shape and what scans saw of it, in the canonical frame.
@@ -79,6 +82,8 @@ def fit_to_scans(
         body: what little sticks out does not count, as of a vehicle; of an aeroplane wings do, and
             what was seen of one side, by an exact camera, is believed of the other.
         unit: `unit_of` such objects, by which lengths of `config` shrink.
+        bottom: a point that the box reaches down to at least, if known: a mean of shapes ends above
+            their floors.
         config: what is not believed.
     """
     exact = shape.double()
@@ -88,7 +93,9 @@ def fit_to_scans(
     shown = _rows(exact, axes)
     low, high = _ends(shown, config)
     reach = config.reach * (high - low).norm()
-    floor = low[2] + config.ground_share * (high[2] - low[2]) if body else -math.inf
+    soil = low[2] + config.ground_share * (high[2] - low[2]) if body else -math.inf
+    if bottom is not None:
+        low[2] = torch.minimum(low[2], axes[:, 2] @ bottom)
     lows, highs, scans = [], [], 0
     for points in seen:
         scans += 1
@@ -96,8 +103,8 @@ def fit_to_scans(
         if reflect:
             rows[1].abs_()
         near = rows[:, ((rows > (low - reach)[:, None]) & (rows < (high + reach)[:, None])).all(0)]
-        if (near[2] > floor).any():
-            begins, ends = _seen_ends(near, floor, config)
+        if (near[2] > soil).any():
+            begins, ends = _seen_ends(near, soil, config)
             highs.append(ends)
             lows.append(_reflected(begins, ends) if reflect else begins)
     rank = scans // config.scans_a_witness

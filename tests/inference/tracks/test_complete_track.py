@@ -9,6 +9,7 @@ import pytest
 import torch
 from tests.cars import poses_of
 from tests.inference.tracks.known_car import (
+    SHAPE,
     TRACK,
     completed,
     each_turned,
@@ -115,6 +116,22 @@ def test_a_scan_that_fits_nowhere_as_it_is_is_put_between_its_neighbours():
     start = stack([true[i] @ quarter if i == 3 else true[i] for i in range(7)])
     for i, item in enumerate(together(completed(start), TRACK.scans)):
         assert float(torch.rad2deg((true[i].inverse() @ item.pose).angle())) < 5.0
+
+
+def test_the_box_of_a_track_reaches_down_as_those_of_its_scans_do():
+    """Each has its wheels elsewhere, so that of the mean shape none reach the ground."""
+    poses, ground = poses_of(TRACK), SHAPE[:, 2].min()
+    without_wheels = SHAPE.clone()
+    without_wheels[:, 2].clamp_(min=ground + 0.2)
+    done = [
+        replace(one, points=poses[i].apply(without_wheels).float().numpy())
+        for i, one in enumerate(completed(poses))
+    ]
+    clouds = [torch.from_numpy(scan).double() for scan in TRACK.scans]
+    heights = [poses[i].inverse().apply(cloud)[:, 2] - ground for i, cloud in enumerate(clouds)]
+    scans = [cloud[high > 0.25].float().numpy() for cloud, high in zip(clouds, heights)]
+    box = together(done, scans)[0].box
+    assert box.size[2] == pytest.approx(done[0].box.size[2], abs=0.03)
 
 
 def test_a_better_refinement_is_kept():

@@ -10,6 +10,7 @@ import torch
 from scipy.spatial import KDTree
 from tests.cars import poses_of
 from tests.inference.tracks.known_car import (
+    BOX,
     SHAPE,
     TRACK,
     completed,
@@ -20,9 +21,11 @@ from tests.inference.tracks.known_car import (
 from tests.inference.tracks.spoilt import spoilt
 from tests.models import CONFIG, SETTINGS
 
+from wildshape.geometry.box import FittedBox
 from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.projection.visibility import FacingBins
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.inference.boxes import carried
 from wildshape.inference.confidence import ConfidenceFeatures, Glance
 from wildshape.inference.config import BoxConfig, TrackConfig
 from wildshape.inference.tracks import complete_track as whole
@@ -105,7 +108,11 @@ def test_of_objects_half_as_large_all_lengths_are_half_as_large(sensor):
     done = completed(start)
     found = together(done, track.scans, large)
     halved = [SE3(item.pose.rotation, item.pose.translation / 2) for item in done]
-    less = [replace(one, points=one.points / 2, pose=pose) for one, pose in zip(done, halved)]
+    boxes = [carried(FittedBox(BOX.centre / 2, BOX.size / 2, BOX.rotation), T) for T in halved]
+    less = [
+        replace(one, points=one.points / 2, pose=pose, box=box)
+        for one, pose, box in zip(done, halved, boxes)
+    ]
     twin = together(less, [scan / np.float32(2) for scan in track.scans], small)
     for one, other in zip(found, twin):
         np.testing.assert_allclose(2 * other.points, one.points, atol=2e-3)
@@ -174,9 +181,9 @@ def test_the_surface_seen_is_that_of_both_sides_of_a_symmetric_object():
 def test_the_box_is_fitted_to_each_scan_where_it_lies_on_the_object(monkeypatch):
     handed, fit, true = [], whole.fit_for, poses_of(TRACK)
 
-    def kept(settings, shape, seen, config):
+    def kept(settings, shape, seen, *more):
         handed.extend(seen)
-        return fit(settings, shape, handed, config)
+        return fit(settings, shape, handed, *more)
 
     monkeypatch.setattr(whole, "fit_for", kept)
     whole._box(SHAPE, list(TRACK.scans), true, SETTINGS, whole.BoxConfig())

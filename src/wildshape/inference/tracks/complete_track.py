@@ -14,7 +14,7 @@ import torch
 from jaxtyping import Float, Int64
 from torch import Tensor
 
-from wildshape.geometry.box import FittedBox
+from wildshape.geometry.box import FittedBox, box_axes
 from wildshape.geometry.densify import denser, partners
 from wildshape.geometry.sampling import sorted_points, voxel_thin
 from wildshape.geometry.surface import mirrored
@@ -48,7 +48,7 @@ from wildshape.method.trust import TrackFeatures
 from wildshape.method.trust_features import track_features
 from wildshape.ops.device import plain_torch
 from wildshape.ops.nearest import nearest
-from wildshape.records import Completion, Points, Sensor
+from wildshape.records import Box, Completion, Points, Sensor
 
 _LEAST_SURE = 1e-3
 _ASTRAY = 2.0  # times as far from the shape as scans usually are
@@ -75,12 +75,15 @@ class Gathered:
         self.scans: list[Points] = []
         self._odds: list[float] = []
         self._sum = torch.zeros(settings.network.points, 3, dtype=torch.float64)
+        self._bottoms = torch.zeros(3, dtype=torch.float64)
 
     def add(self, done: Completion, scan: Points) -> None:
         """The next scan, completed."""
         own = torch.from_numpy(done.points[: len(self._sum)]).double()
         self._odds.append(odds_of(done))
-        self._sum += self._odds[-1] * done.pose.inverse().apply(own)
+        T_canonical_sensor = done.pose.inverse()
+        self._sum += self._odds[-1] * T_canonical_sensor.apply(own)
+        self._bottoms += self._odds[-1] * T_canonical_sensor.apply(_bottom(done.box))[0]
         self.said.append(replace(done, points=done.points[:0].copy()))
         self.scans.append(sorted_points(scan))
 
@@ -117,6 +120,11 @@ class Gathered:
         """The mean of the canonical shapes."""
         return self._sum / self.weights.sum()
 
+    @property
+    def bottom(self) -> Float[Tensor, "3"]:
+        """The mean of the single boxes' bottoms, canonical frame."""
+        return self._bottoms / self.weights.sum()
+
 
 @plain_torch()
 def complete_together(
@@ -148,7 +156,8 @@ def complete_together(
     if any(one is not None for one in rays):
         sights = Sights.of_objects(scans, rays, config.free_space, unit)
         solid = without_free_space(shape, fit.T_sensor_object, sights)
-    fitted = _box(solid, scans, fit.T_sensor_object, settings, config.box)
+    bottom = gathered.bottom if body else None
+    fitted = _box(solid, scans, fit.T_sensor_object, settings, config.box, bottom)
     whole = _denser(shape, config) if settings.facing else shape
     if settings.facing:
         seen = _shown_by(scans, fit.T_sensor_object, whole, settings, config.track)
@@ -229,11 +238,18 @@ def _box(
     T_sensor_object: SE3,
     settings: ModelSettings,
     config: BoxConfig,
+    bottom: Float[Tensor, "3"] | None = None,
 ) -> FittedBox:
     """One box for all scans of the track, object frame."""
     T_object_sensor = T_sensor_object.inverse()
     seen = (T_object_sensor[i].apply(torch.from_numpy(s).double()) for i, s in enumerate(scans))
-    return fit_for(settings, shape, seen, config)
+    return fit_for(settings, shape, seen, config, bottom)
+
+
+def _bottom(box: Box) -> Float[Tensor, "1 3"]:
+    """The middle of its lower side, its own frame's."""
+    down = box.size[2] / 2 * box_axes(box.quaternion_wxyz)[:, 2]
+    return torch.from_numpy(np.asarray(box.centre) - down)[None]
 
 
 def _voted(
