@@ -27,14 +27,8 @@ import wildshape
 from wildshape.drives import pipeline
 from wildshape.drives.config import DetectionConfig, DriveConfig, GroundConfig
 from wildshape.drives.recordings.recording_kinds import open_drive
-from wildshape.drives.tracking.detections import (
-    BoxCutter,
-    DetectionFile,
-    check_cut,
-    find_detections,
-    given_tracks,
-    points_in_boxes,
-)
+from wildshape.drives.tracking.box_cutter import BoxCutter, check_cut, points_in_boxes
+from wildshape.drives.tracking.detections import DetectionFile, find_detections, given_tracks
 from wildshape.drives.tracking.ground import height_above_ground
 from wildshape.drives.tracking.mounting import find_mounting
 from wildshape.drives.tracking.segmentation import read_cut, read_cuts

@@ -12,12 +12,8 @@ from wildshape.drives.clock import Clock, silent
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.pipeline import Pipeline
 from wildshape.drives.source import Drive
-from wildshape.drives.tracking.detections import (
-    DetectionFile,
-    Detections,
-    cut_boxes,
-    find_detections,
-)
+from wildshape.drives.tracking.box_cutter import cut_boxes
+from wildshape.drives.tracking.detections import DetectionFile, Detections, find_detections
 from wildshape.drives.tracking.segmentation import cut_file
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detector import DetectorBox, upright_box

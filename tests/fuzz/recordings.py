@@ -29,12 +29,8 @@ from wildshape.drives.config import DriveConfig
 from wildshape.drives.recordings import waymo as waymo_drives
 from wildshape.drives.recordings.recording_kinds import find_drives, open_drive
 from wildshape.drives.source import Drive
-from wildshape.drives.tracking.detections import (
-    DetectionFile,
-    cut_boxes,
-    find_detections,
-    given_tracks,
-)
+from wildshape.drives.tracking.box_cutter import cut_boxes
+from wildshape.drives.tracking.detections import DetectionFile, find_detections, given_tracks
 from wildshape.drives.tracking.ground import height_above_ground
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.drives.writing.files import DriveFiles, detections_of

@@ -38,7 +38,8 @@ from wildshape.drives.config import DriveConfig
 from wildshape.drives.recording_checks import clock_told, count_told, rate_told
 from wildshape.drives.result import DriveResult
 from wildshape.drives.source import Drive
-from wildshape.drives.tracking.detections import BoxCutter, Detections, check_cut, given_tracks
+from wildshape.drives.tracking.box_cutter import BoxCutter, check_cut
+from wildshape.drives.tracking.detections import Detections, given_tracks
 from wildshape.drives.tracking.mounting import Mounting, find_mounting
 from wildshape.drives.tracking.segmentation import Cutter, read_cuts
 from wildshape.drives.tracking.sightings import Sightings, read_sightings, write_sightings

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What somebody else's detector found in a drive, in place of its clusters.
 
-The points in each box, the ground taken away, are the cluster. Boxes that carry tracks keep them.
+The points in each box, the ground taken away, are the cluster (`box_cutter.py`). Boxes that carry
+tracks keep them.
 """
 
 from collections import Counter
@@ -12,15 +13,13 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
 
-from wildshape.drives.config import DetectionConfig, DriveConfig
 from wildshape.drives.source import Drive
-from wildshape.drives.tracking.segmentation import CutScan, Cutter
+from wildshape.drives.tracking.segmentation import CutScan
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.errors import BadInputError
 from wildshape.inference.folders.box_files import read_camera
-from wildshape.io.boxes.detections import frame_numbers, number_of, pose_of
+from wildshape.io.boxes.detections import frame_numbers, number_of
 from wildshape.io.boxes.detector import DetectorBox
 from wildshape.io.boxes.kitti import camera_at_the_lidar
 from wildshape.io.boxes.read_detector import (
@@ -30,7 +29,6 @@ from wildshape.io.boxes.read_detector import (
     takes_calibration,
 )
 from wildshape.io.output import file_name
-from wildshape.records import Box, Points
 
 # Of KITTI, nuScenes, Waymo and Argoverse 2; an empty kind is not known.
 VEHICLES = frozenset(
@@ -234,111 +232,6 @@ def _check_tracks(path: Path, frames: Iterable[tuple[DetectorBox, ...]]) -> None
                 raise BadInputError(
                     f"{path}: {count} boxes of track '{track}' in frame {frame}; a track has one."
                 )
-
-
-@dataclass(frozen=True)
-class BoxCutter(Cutter):
-    """Cuts what is in the boxes out of the scans of a drive.
-
-    Attributes:
-        detections: of the drive.
-    """
-
-    detections: Detections
-
-    def cut(
-        self, frame: int, scan: Points, heights: Float[np.ndarray, "n"], as_measured: Points
-    ) -> CutScan:
-        """What is in the boxes of a frame; see `cut_boxes`."""
-        given = self.detections
-        seen = scan if given.corrected else as_measured
-        known = given.frames[frame], heights, self.config, seen
-        return cut_boxes(scan, *known, tracked=given.tracked)
-
-
-def cut_boxes(
-    scan: Points,
-    boxes: tuple[DetectorBox, ...],
-    heights: Float[np.ndarray, "n"],
-    config: DriveConfig,
-    as_measured: Points,
-    *,
-    tracked: bool,
-) -> CutScan:
-    """The points in each box that are not ground.
-
-    Args:
-        scan: whole, sensor frame, metres; it may be empty.
-        boxes: in it.
-        heights: of its points above the ground.
-        config: see there.
-        as_measured: the scan on which the boxes lie, if this one was corrected for motion.
-        tracked: every box knows its track; else no point is of two.
-    """
-    stands = np.nan_to_num(heights, nan=0.0) > config.clusters.lowest_m
-    above = np.flatnonzero(stands)
-    inside = points_in_boxes(as_measured[above], [one.box for one in boxes], config.detections)
-    if not tracked:
-        inside = _told_apart(inside, boxes, config.detections)
-    found = [(one, above[own]) for one, own in zip(boxes, inside)]
-    full = [(one, own) for one, own in found if len(own) >= config.detections.fewest_points]
-    rows = np.concatenate([above[:0], *(own for _, own in full)])
-    return CutScan(
-        points=scan[rows],
-        rows=rows.astype(np.int32),
-        counts=np.array([len(own) for _, own in full], np.int64),
-        scanned=len(scan),
-        tracks=tuple(one.track for one, _ in full if one.track is not None),
-    )
-
-
-def points_in_boxes(
-    points: Points, boxes: list[Box], config: DetectionConfig
-) -> Bool[np.ndarray, "k n"]:
-    """Which points belong to each box: those in it, and those around it that are in no other.
-
-    Args:
-        points: sensor frame.
-        boxes: in the same frame.
-        config: how far around.
-    """
-    apart = [np.abs(pose_of(box).inverse().apply_numpy(points)) for box in boxes]
-    halves = [np.asarray(box.size) / 2 for box in boxes]
-    shape = len(boxes), len(points)
-    inside = np.array([(a <= h).all(-1) for a, h in zip(apart, halves)], bool).reshape(shape)
-    reach = config.around_m
-    around = np.array([(a <= h + reach).all(-1) for a, h in zip(apart, halves)], bool)
-    return inside | (around.reshape(shape) & ~inside.any(0))
-
-
-def _told_apart(
-    inside: Bool[np.ndarray, "k n"], boxes: tuple[DetectorBox, ...], config: DetectionConfig
-) -> Bool[np.ndarray, "k n"]:
-    """Each point given to the surest of its boxes; a box that then has hardly any has none.
-
-    A detector may find one vehicle twice, for example as car and as truck.
-    """
-    free = np.ones(inside.shape[1], bool)
-    found = np.zeros_like(inside)
-    for row in sorted(range(len(boxes)), key=lambda row: -(boxes[row].score or 0.0)):
-        own = inside[row] & free
-        if own.sum() >= (1 - config.shared) * inside[row].sum():
-            found[row] = own
-            free &= ~own
-    return found
-
-
-def check_cut(detections: Detections, cuts: Iterable[CutScan]) -> None:
-    """Refuse boxes that miss all points: they are in another frame.
-
-    Raises:
-        BadInputError: no box holds enough points.
-    """
-    if not any(len(cut.counts) for cut in cuts):
-        raise BadInputError(
-            f"{detections.path}: no box holds the points of a vehicle; boxes must be in each scan's"
-            " own sensor frame (KITTI's labels: pass their calibration)."
-        )
 
 
 def given_tracks(cuts: Iterable[CutScan]) -> list[Sightings]:
