@@ -37,6 +37,14 @@ def test_an_error_leaves_the_old_file_and_nothing_else(error, tmp_path: Path) ->
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_only_what_is_asked_for_is_flushed_and_before_it_has_its_name(tmp_path, monkeypatch):
+    named: list[bool] = []
+    monkeypatch.setattr(os, "fsync", lambda _: named.append((tmp_path / "long").exists()))
+    write_text(tmp_path / "short", "soon made again")
+    write_json(tmp_path / "long", {}, flush=True)
+    assert named == [False]
+
+
 def test_permissions_are_those_of_an_ordinary_file(tmp_path: Path) -> None:
     write_text(tmp_path / "a", "")
     (tmp_path / "b").write_text("")

@@ -33,11 +33,16 @@ _writers: dict[_Folder, object] = {}
 
 
 @contextmanager
-def atomic_write(path: Path | str) -> Iterator[IO[bytes]]:
+def atomic_write(path: Path | str, *, flush: bool = False) -> Iterator[IO[bytes]]:
     """A binary file that appears under `path` only if the block ends without an error.
 
-    It is written beside its final place, flushed to the disk and renamed; folders are made. After
-    an error (Ctrl-C included) nothing is left and an older file under `path` is as it was.
+    It is written beside its final place and renamed; folders are made. After an error (Ctrl-C
+    included) nothing is left and an older file under `path` is as it was.
+
+    Args:
+        path: the file.
+        flush: to the disk, which takes milliseconds: for what took long to make, and is to be whole
+            after a loss of power, too.
 
     Raises:
         OSError: the disk is full, the folder cannot be written or the name is too long; it names
@@ -53,8 +58,9 @@ def atomic_write(path: Path | str) -> Iterator[IO[bytes]]:
     try:
         with os.fdopen(descriptor, "wb") as file:
             yield file
-            file.flush()
-            os.fsync(file.fileno())
+            if flush:
+                file.flush()
+                os.fsync(file.fileno())
         with _naming(path):
             temporary.chmod(0o666 & ~_umask())
             temporary.replace(path)
@@ -73,20 +79,20 @@ def _naming(path: Path) -> Iterator[None]:
         raise
 
 
-def write_text(path: Path | str, text: str) -> None:
+def write_text(path: Path | str, text: str, *, flush: bool = False) -> None:
     """Write UTF-8 text atomically; names of files that are no UTF-8 are spelt out."""
-    with atomic_write(path) as file:
+    with atomic_write(path, flush=flush) as file:
         file.write(text.encode("utf-8", "backslashreplace"))
 
 
-def write_json(path: Path | str, data: object) -> None:
+def write_json(path: Path | str, data: object, *, flush: bool = False) -> None:
     """Write `data` as indented JSON, atomically.
 
     Raises:
         ValueError: a number is NaN or infinite (JSON has no such thing).
         TypeError: something in `data` is no JSON value.
     """
-    write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
+    write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n", flush=flush)
 
 
 def _umask() -> int:

@@ -152,7 +152,7 @@ def save_checkpoint(
     described = asdict(settings)
     described["projection"]["kind"] = type(settings.projection).__name__
     metadata = {"format": FORMAT, "version": str(VERSION), "settings": json.dumps(described)}
-    with atomic_write(path) as file:
+    with atomic_write(path, flush=True) as file:
         file.write(packed_network(weights, metadata))
 
 

@@ -59,7 +59,7 @@ def save_state(folder: Path, state: TrainState, identity: dict[str, str]) -> Non
         tensors["anchors"] = state.anchors
     tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
     metadata = {"step": str(state.step), "identity": json.dumps(identity)}
-    with atomic_write(folder / STATE) as file:
+    with atomic_write(folder / STATE, flush=True) as file:
         file.write(save(tensors, metadata))
 
 

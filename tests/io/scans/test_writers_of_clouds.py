@@ -10,7 +10,7 @@ import torch
 
 from wildshape.errors import BadInputError
 from wildshape.io.scans.points import Coordinates, read_points
-from wildshape.io.scans.writers import CLOUD_SUFFIXES, cloud_writer, save, write_cloud
+from wildshape.io.scans.writers import CLOUD_SUFFIXES, save, write_cloud
 
 OFFSET = np.array((83.1, -61.9, -2.2))
 POINTS = (np.random.default_rng(0).normal(size=(50, 3)) + OFFSET).astype(np.float32)
@@ -87,21 +87,3 @@ def test_another_suffix_is_refused_and_leaves_nothing(tmp_path):
         with pytest.raises(BadInputError, match=r"\.ply \.pcd \.npy"):
             save(POINTS, tmp_path / name)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_clouds_written_at_once_are_all_there_at_the_end_of_the_block(tmp_path):
-    clouds = {tmp_path / f"{i}.ply": POINTS + i for i in range(40)}
-    with cloud_writer() as write:
-        for path, points in clouds.items():
-            write(path, points)
-    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in clouds}
-    for path, points in clouds.items():
-        np.testing.assert_array_equal(read_points(path), points)
-
-
-def test_a_cloud_that_cannot_be_written_is_told(tmp_path):
-    (tmp_path / "taken").write_text("")
-    with pytest.raises(OSError, match="taken"), cloud_writer() as write:  # noqa: PT012
-        write(tmp_path / "whole.ply", POINTS)
-        write(tmp_path / "taken" / "a.ply", POINTS)
-    np.testing.assert_array_equal(read_points(tmp_path / "whole.ply"), POINTS)

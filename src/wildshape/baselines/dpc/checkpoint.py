@@ -65,7 +65,7 @@ def save_dpc(path: Path, network: DpcNet, settings: DpcSettings) -> None:
     described = asdict(settings)
     described["network"]["volume"]["kind"] = type(settings.network.volume).__name__
     metadata = {"format": FORMAT, "version": str(VERSION), "settings": json.dumps(described)}
-    with atomic_write(path) as file:
+    with atomic_write(path, flush=True) as file:
         file.write(packed_network(weights, metadata))
 
 

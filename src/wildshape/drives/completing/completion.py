@@ -35,7 +35,7 @@ from wildshape.io.atomic import write_json
 from wildshape.io.boxes.detections import moved
 from wildshape.io.output import file_name, remove_leftovers
 from wildshape.io.poses import write_poses
-from wildshape.io.scans.writers import cloud_writer
+from wildshape.io.scans.writers import write_cloud
 from wildshape.records import Completion, Points
 
 RULED_OUT, CATEGORY = "ruled_out.json", "car"
@@ -224,9 +224,8 @@ class Completer:
             done = [_carried(one, self.T_level_sensor.inverse()) for one in done]
         track = chosen.track(self.cuts, self.drive, CATEGORY)
         folder = self.folder / chosen.name
-        with cloud_writer() as write:
-            for name, one in zip(track.scan_names, done, strict=True):
-                write(folder / COMPLETED / f"{file_name(name)}.ply", one.points)
+        for name, one in zip(track.scan_names, done, strict=True):
+            write_cloud(folder / COMPLETED / f"{file_name(name)}.ply", one.points)
         write_poses(folder / POSES, stack([one.pose for one in done]))
         remove_leftovers(folder)  # of a worker that was killed over this object
         said = objects_of(track, done, self.predictor, self.cuts, together=True)

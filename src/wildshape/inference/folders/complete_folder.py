@@ -30,7 +30,7 @@ from wildshape.io.scans.writers import (
     MESH_FORMATS,
     CloudFormat,
     MeshFiles,
-    cloud_writer,
+    write_cloud,
     write_mesh,
 )
 from wildshape.method.checkpoint import fingerprint, weights_file
@@ -258,14 +258,13 @@ class _PartCompleter:
             track.scans, track.sensor, track=self.together, rays=track.rays
         )
         bare, folder = [], self.out / file_name(track.name)
-        with cloud_writer() as write:
-            for scan_name, scan, one in zip(track.scan_names, track.scans, done):
-                name = file_name(scan_name)
-                write(folder / COMPLETED / f"{name}.{self.clouds}", one.points)
-                if self.mesh is not None:
-                    seen = scan if self.mesh.coloured else None
-                    write_mesh(folder / MESH / f"{name}.{self.mesh.kind}", one.mesh(seen))
-                bare.append(replace(one, points=one.points[:0].copy()))
+        for scan_name, scan, one in zip(track.scan_names, track.scans, done):
+            name = file_name(scan_name)
+            write_cloud(folder / COMPLETED / f"{name}.{self.clouds}", one.points)
+            if self.mesh is not None:
+                seen = scan if self.mesh.coloured else None
+                write_mesh(folder / MESH / f"{name}.{self.mesh.kind}", one.mesh(seen))
+            bare.append(replace(one, points=one.points[:0].copy()))
         return replace(part, track=replace(track, scans=(), rays=())), bare
 
 

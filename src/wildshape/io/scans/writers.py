@@ -2,10 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writing points and triangle meshes, in the format that a file's suffix names."""
 
-from collections import deque
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from io import BytesIO
@@ -27,7 +24,6 @@ CLOUD_FORMATS: tuple[CloudFormat, ...] = get_args(CloudFormat)
 """Of completed shapes."""
 MeshFormat = Literal["ply", "obj", "glb"]
 MESH_FORMATS: tuple[MeshFormat, ...] = get_args(MeshFormat)
-_AT_ONCE = 8  # files
 
 
 def ply_bytes(points: Float[np.ndarray, "n 3"]) -> bytes:
@@ -144,29 +140,6 @@ def _check_rounding(points: Float[np.ndarray, "n 3"], path: Path) -> None:
             f"{path}: is a file of float32, which would move points by up to {100 * moved:.2g} cm;"
             " subtract the sensor's position first, or write .npy, .xyz or .las."
         )
-
-
-@contextmanager
-def cloud_writer() -> Iterator[Callable[[Path, Float[np.ndarray, "n 3"]], None]]:
-    """Gives a `write_cloud` that does not wait for the disk; the end of the block does.
-
-    A disk flushes several files in the time of one or two.
-
-    Raises:
-        BadInputError: another suffix.
-        OSError: a file could not be written.
-    """
-    pending: deque[Future[None]] = deque()
-    with ThreadPoolExecutor(_AT_ONCE) as threads:
-
-        def write(path: Path, points: Float[np.ndarray, "n 3"]) -> None:
-            if len(pending) == _AT_ONCE:  # of a long track few shapes are kept in memory
-                pending.popleft().result()
-            pending.append(threads.submit(write_cloud, path, points))
-
-        yield write
-        for one in pending:
-            one.result()
 
 
 def save(shape: object, path: str | Path) -> None:

@@ -66,7 +66,7 @@ class IndexWriter:
     def finish(self) -> FileRecord:
         """Write `index.safetensors`, and remove the columns."""
         path = self.folder / INDEX_TENSORS
-        with atomic_write(path) as file:
+        with atomic_write(path, flush=True) as file:
             file.write(self._header())
             for name in self._layout():
                 self._columns[name].copy_to(file)

@@ -68,7 +68,7 @@ def join_stores(parts: Sequence[Path], out: Path, provenance: dict[str, Any]) ->
         for place, s in zip(places, renamed)
     ]
     manifest = manifest_of(index, renamed, counts, provenance)
-    write_json(out / JOINING_JSON, sealed({"moves": moves, "manifest": manifest}))
+    write_json(out / JOINING_JSON, sealed({"moves": moves, "manifest": manifest}), flush=True)
     finish_join(out)
 
 
@@ -91,7 +91,7 @@ def finish_join(out: Path) -> dict[str, Any]:
         elif not (out / target).is_file():
             raise BadInputError(f"{out / source}: lost; write the store again with --overwrite.")
     shutil.rmtree(out / PARTS, ignore_errors=True)
-    write_json(out / INDEX_JSON, manifest)
+    write_json(out / INDEX_JSON, manifest, flush=True)
     (out / WRITING_JSON).unlink(missing_ok=True)
     (out / JOINING_JSON).unlink()
     return manifest

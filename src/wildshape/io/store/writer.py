@@ -169,7 +169,7 @@ class StoreWriter:
             "points": self._points,
         }
         manifest = manifest_of(self._index.finish(), self._shards, counts, self._provenance)
-        write_json(self.path / INDEX_JSON, manifest)
+        write_json(self.path / INDEX_JSON, manifest, flush=True)
         (self.path / WRITING_JSON).unlink(missing_ok=True)
         self._closed = True
         self._let_go()

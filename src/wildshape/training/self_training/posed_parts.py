@@ -72,7 +72,7 @@ class PosedParts:
             "votes": torch.cat([votes for _, votes in part]),
             "middle_x": torch.tensor([track.middle_x for track, _ in part], dtype=torch.float64),
         }
-        with atomic_write(path) as file:
+        with atomic_write(path, flush=True) as file:
             file.write(save({k: v.contiguous() for k, v in tensors.items()}, self._identity))
 
     def _read(self, path: Path, scans_of: Sequence[Int64[np.ndarray, "_"]]) -> list[Posed] | None:

@@ -85,7 +85,7 @@ def true_targets(sampler: ViewSampler, config: FusionConfig = _DEFAULT) -> Fused
 def save_targets(folder: Path, targets: FusedTargets, identity: dict[str, str]) -> None:
     """Keep the targets beside a run, so that it can be resumed without making them again."""
     tensors = {k: v.contiguous() for k, v in targets._asdict().items() if isinstance(v, Tensor)}
-    with atomic_write(folder / TARGETS) as file:
+    with atomic_write(folder / TARGETS, flush=True) as file:
         file.write(save(tensors, {**identity, "complete": str(targets.complete)}))
 
 
