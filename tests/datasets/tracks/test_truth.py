@@ -88,6 +88,16 @@ def test_truth_that_is_not_where_the_scans_are_is_told():
     assert "do not bring its scans together" in misplaced(replace(bare, T_sensor_object=inverse))
 
 
+def test_inverted_poses_of_a_short_way_are_told_without_a_shape():
+    track = drive_by(scans=9)
+    poses, kept = poses_of(track), slice(3, 6)
+    short = replace(track, shape=None, scans=track.scans[kept], T_sensor_object=poses[kept])
+    assert misplaced(short) == ""
+    inverted = replace(short, T_sensor_object=poses[kept].inverse())
+    assert np.ptp(fuse_by_truth(inverted), axis=0).max() < 20
+    assert "do not bring its scans together" in misplaced(inverted)
+
+
 def test_no_poses_no_truth():
     with pytest.raises(BadInputError, match=r"drive: no poses"):
         shape_partial(replace(drive_by(scans=2), T_sensor_object=None))
