@@ -122,7 +122,7 @@ def compare(
     if odd := misplaced(first):
         progress.say(
             f"{first.name}: {odd}; poses.txt holds T_sensor_object, shape.ply is in the object's"
-            " frame and of the scans' unit"
+            " frame and of the scans' unit, label_size_m is length, width, height in metres"
         )
     models = load_models(options.models, options.device, raw=options.raw)
     for told in _other_sensors(source, models):

@@ -69,6 +69,43 @@ def test_the_truth_is_right(wildshape, street, found, tmp_path):
     assert "AP BEV 0.5" in (out / "table.md").read_text()
 
 
+def _exchanged(words):
+    return [*words[:11], words[12], words[11], *words[13:]]
+
+
+def _from_the_middle(words):
+    return [*words[:14], str(float(words[14]) - float(words[10]) / 2), *words[15:]]
+
+
+def _but_of_the_first(words):
+    return [] if words[0] == "0" else words
+
+
+def _same(words):
+    return words
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (_same, ""),
+        (_exchanged, "no box found lies on a label"),
+        (_from_the_middle, "at other heights"),
+        (_but_of_the_first, "1 of 3 scans without a label, the first 000000.bin"),
+    ],
+)
+def test_labels_that_are_odd_are_told(wildshape, street, found, tmp_path, change, told):
+    other = tmp_path / "other"
+    shutil.copytree(street, other)
+    path = other / "label_02" / "0000.txt"
+    lines = [change(line.split()) for line in path.read_text().splitlines()]
+    path.write_text("".join(f"{' '.join(words)}\n" for words in lines if words))
+    said = wildshape("evaluate-drive", found, "--labels", other, "--json")
+    assert said.code == 0, said
+    assert told in said.err
+    assert bool(told) == (str(other) in said.err)
+
+
 def test_a_place_that_cannot_be_written_is_refused_before_anything_is_measured(
     refused, street, found, tmp_path
 ):

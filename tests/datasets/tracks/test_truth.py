@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 from scipy.spatial import KDTree
 from tests.cars import car_surface, drive_by, poses_of
 
@@ -96,6 +97,25 @@ def test_inverted_poses_of_a_short_way_are_told_without_a_shape():
     inverted = replace(short, T_sensor_object=poses[kept].inverse())
     assert np.ptp(fuse_by_truth(inverted), axis=0).max() < 20
     assert "do not bring its scans together" in misplaced(inverted)
+
+
+def test_a_shape_turned_by_a_quarter_is_told():
+    track = drive_by(scans=9)
+    assert track.shape is not None
+    ahead, left, up = track.shape.T
+    assert "off its true shape" in misplaced(
+        replace(track, shape=np.stack((-left, ahead, up), axis=1))
+    )
+
+
+def test_a_label_that_is_not_where_the_scans_are_is_told():
+    track = replace(drive_by(scans=9), shape=None)
+    told = "beside its labelled box"
+    poses = poses_of(track)
+    on_floor = SE3(poses.rotation, poses.translation - torch.tensor([0, 0, 0.75]))
+    assert misplaced(replace(track, label_size_m=(4.2, 1.7, 1.4))) == ""
+    assert told in misplaced(replace(track, label_size_m=(1.7, 4.2, 1.4)))
+    assert told in misplaced(replace(track, label_size_m=(4.2, 1.7, 1.4), T_sensor_object=on_floor))
 
 
 def test_no_poses_no_truth():

@@ -18,6 +18,7 @@ from wildshape.evaluation.drives.labels import (
 )
 from wildshape.evaluation.drives.overlap import UprightBox
 from wildshape.evaluation.drives.protocol import DriveScores, evaluate_drives
+from wildshape.evaluation.drives.results import as_json, markdown
 
 CAR = UprightBox(15.0, 2.0, -0.9, 4.0, 1.8, 1.5, 0.1)
 FAR = CAR._replace(x=30.0)
@@ -112,6 +113,14 @@ def test_boxes_that_the_labelled_camera_does_not_see(unseen: UprightBox) -> None
     scores = _evaluated([[unseen, FAR]], [[_label(FAR)]], view=view)
     assert _precisions(scores)[0] == 1
     assert _precisions(_evaluated([[unseen, FAR]], [[_label(FAR)]]))[0] == pytest.approx(0.5)
+
+
+def test_the_table_says_where_only_a_camera_s_view_counts() -> None:
+    for view, drives in ((View(AHEAD, Counting()), 1), (None, 0)):
+        scores = _evaluated([[FAR]], [[_label(FAR)]], view=view)
+        assert as_json(scores, Counting(), {})["cameras"] == drives
+        told = "only what the camera sees within 60 m counts: 1" in markdown(scores, Counting())
+        assert told == bool(drives)
 
 
 def test_boxes_in_regions_that_nobody_cared_to_label() -> None:

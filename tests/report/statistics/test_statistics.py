@@ -122,6 +122,14 @@ def test_lengths_by_the_best_that_is_known(tmp_path, truth):
     assert by["length"].basis.startswith(basis)
 
 
+@pytest.mark.parametrize("kind", ["partial", "mirrored"])
+def test_what_scans_were_put_together_to_is_no_true_shape(tmp_path, kind):
+    shape = np.asarray([[-3, -1, 0], [3, 1, 2]], np.float32)
+    _, by = described(packed(tmp_path, [replace(around(), shape=shape, shape_kind=kind)]))
+    assert by["length"].tally.mean == pytest.approx(6.0)
+    assert by["length"].basis.startswith("scans joined")
+
+
 def test_where_only_some_have_their_truth_that_is_said(tmp_path):
     bare = [replace(around(name), T_sensor_object=None) for name in "bcd"]
     shaped = replace(around("a"), shape=np.eye(3, dtype=np.float32))

@@ -64,6 +64,7 @@ def run(settings: Settings) -> None:
         BadInputError: drives or labels that cannot be used, or that do not belong together.
     """
     from wildshape.cli.terminal import TERMINAL, answer, say
+    from wildshape.evaluation.drives.doubts import doubts_of
     from wildshape.evaluation.drives.found import drives_of, read_found
     from wildshape.evaluation.drives.labels import Counting, read_labels
     from wildshape.evaluation.drives.protocol import evaluate_drives
@@ -82,6 +83,8 @@ def run(settings: Settings) -> None:
         output = _begin(settings)
         with nullcontext() if output is None else output.abandoned_if_refused():
             scores = evaluate_drives(found, labelled, lambda rows: bar.at(len(found) + rows))
+    for told in doubts_of(labelled, scores):
+        say(told)
     if settings.range != Counting.range_m and any(one.view is None for one in labelled):
         say(f"--range {settings.range:g} is no limit where labels are of all around, as these are")
     made = {**provenance(command_line()), "settings": _identity(settings)}

@@ -16,7 +16,8 @@ from wildshape.geometry.sampling import radius_inliers, statistical_inliers, vox
 from wildshape.records import Points, Track
 
 _VOXEL_M, _SMALL_M = 0.04, 2.4
-_OFF, _APART = 0.1, 4.0  # of the object's diagonal, and of the largest scan's
+_OFF, _APART = 0.05, 4.0  # of the object's diagonal, and of the largest scan's
+_BESIDE = 0.25  # share of the points
 _TIGHTER = 0.8  # of what the poses as given span; 285 simulated and real tracks: at least 1.0
 
 
@@ -84,7 +85,8 @@ def whole_shape(track: Track) -> Points | None:
 def misplaced(track: Track) -> str:
     """What is odd about where true poses put the scans, or nothing.
 
-    Poses the wrong way round and shapes of another unit or frame would make figures meaningless.
+    Poses the wrong way round, shapes of another unit or frame and labels with length and width
+    exchanged would make figures meaningless.
 
     Raises:
         BadInputError: the track has no poses.
@@ -96,6 +98,8 @@ def misplaced(track: Track) -> str:
     points = fuse_by_truth(track)
     if not len(points):
         return ""
+    if _beside_label(track, points) > _BESIDE:
+        return "by its true poses its scans lie beside its labelled box (label_size_m)"
     if track.shape is None or not len(track.shape):
         largest = max(extent(scan) for scan in finite if len(scan))
         apart = extent(points) > _APART * largest
@@ -111,6 +115,14 @@ def misplaced(track: Track) -> str:
 def _spanned_if_inverted(track: Track) -> float:
     assert track.T_sensor_object is not None
     return extent(fuse_by_truth(replace(track, T_sensor_object=track.T_sensor_object.inverse())))
+
+
+def _beside_label(track: Track, points: Points) -> float:
+    """Share of the points, in the object frame, that are well outside of its labelled box."""
+    if track.label_size_m is None:
+        return 0.0
+    beyond = np.abs(points) - np.asarray(track.label_size_m) / 2
+    return float((beyond > _OFF * extent(points)).any(1).mean())
 
 
 @dataclass(frozen=True)

@@ -116,11 +116,13 @@ class DriveScores:
         rows: ours first.
         trajectories: one a drive; None where one of the two trajectories is not known.
         corrections: one a drive; where its scans were corrected for motion, what of its labels.
+        cameras: drives of which only what the labelled camera sees counts.
     """
 
     rows: tuple[RowScores, ...]
     trajectories: tuple[TrajectoryError | None, ...]
     corrections: tuple[Correction, ...]
+    cameras: int
 
 
 @dataclass(frozen=True)
@@ -184,7 +186,8 @@ def evaluate_drives(
         rows.append(_row(name, refitted, labelled))
         at(number)
     errors = tuple(_trajectory(one, other) for one, other in zip(found, labelled, strict=True))
-    return DriveScores(tuple(rows), errors, corrections)
+    cameras = sum(one.view is not None for one in labelled)
+    return DriveScores(tuple(rows), errors, corrections, cameras)
 
 
 def _refitted(

@@ -53,6 +53,7 @@ def as_json(scores: DriveScores, counting: Counting, made: Mapping[str, object])
         "methods": rows,
         "trajectories": [None if one is None else asdict(one) for one in scores.trajectories],
         "corrections": list(scores.corrections),
+        "cameras": scores.cameras,
         "provenance": dict(made),
     }
 
@@ -116,6 +117,9 @@ def notes(found: Mapping[str, Any]) -> list[str]:
         "AP in percent; recall in percent at IoU 0.5 in bird's eye view (BEV), as HOTA's overlap.",
         "Length, width, height: mean of found minus labelled.",
     ]
+    if cameras := found.get("cameras"):  # of older results it is not known
+        within = f"within {found['counting']['range_m']:g} m"
+        lines.append(f"Drives of which only what the camera sees {within} counts: {cameras}.")
     for correction, said in _CORRECTED.items():
         if drives := found["corrections"].count(correction):
             lines.append(f"Drives corrected for motion: {drives}; {said}.")

@@ -67,7 +67,7 @@ class RunningDistribution:
     def size(self, track: Track) -> None:
         """Count how long, wide and high the object is, by the best that is known of it."""
         if track.shape is not None and len(track.shape):
-            kind = "fused" if track.shape_kind == "partial" else "shape"
+            kind = "shape" if track.shape_kind == "whole" else "fused"
             lengths = np.ptp(track.shape, axis=0)
         elif track.T_sensor_object is not None:
             kind, lengths = "fused", np.ptp(fuse_by_truth(track), axis=0)
