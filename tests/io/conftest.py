@@ -11,7 +11,7 @@ import torch
 
 from wildshape.geometry.transforms.rotation import random_rotation
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.scans.points import write_ply
+from wildshape.io.scans.writers import write_ply
 from wildshape.records import Intrinsics, Sensor, Track
 
 _LISTS = """ply

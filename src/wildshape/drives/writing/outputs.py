@@ -28,7 +28,8 @@ from wildshape.io.boxes.table import BoxRow
 from wildshape.io.guard import read_json
 from wildshape.io.poses import write_poses, write_tum
 from wildshape.io.rays import rays_bytes
-from wildshape.io.scans.points import read_points, write_ply
+from wildshape.io.scans.points import read_points
+from wildshape.io.scans.writers import write_ply
 from wildshape.io.tracks import file_names, write_track
 from wildshape.records import Box
 
