@@ -180,10 +180,6 @@ def frames(tables: dict[str, Path], boxes: dict[int, list[Labelled]]) -> Iterato
 def find_splits(root: Path, components: tuple[str, ...] = COMPONENTS) -> list[Path]:
     """Split folders at, or just below `root`, that have all tables needed, sorted.
 
-    Args:
-        root: the folder.
-        components: the tables needed.
-
     Raises:
         BadInputError: there is none.
     """

@@ -76,13 +76,7 @@ def as_box_sees(points: Points, box: Float[np.ndarray, "4"]) -> Float[np.ndarray
 
 
 def read_completed(seen: Sightings, folder: Path, drive: Drive, turns: Turns) -> Completed:
-    """A completed object in the level world.
-
-    Args:
-        seen: the object.
-        folder: where `completion.py` wrote it.
-        drive: whose.
-        turns: of its sensor.
+    """A completed object, from where `completion.py` wrote it, in the level world.
 
     Raises:
         BadInputError: the files are damaged.
@@ -112,12 +106,6 @@ def on_ground(one: Completed, cuts: Path, turns: Turns, config: BoxConfig) -> Co
     """The same vehicle, its boxes from the ground up, as data sets label them.
 
     What a scan holds of wheels is cut with the ground, and so are the shapes that networks learn.
-
-    Args:
-        one: completed.
-        cuts: folder of the clusters.
-        turns: of the drive's sensor.
-        config: how much of a gap is believed.
     """
     rows = dict(zip(one.seen.frames, one.seen.rows))
     length, width, height = one.size

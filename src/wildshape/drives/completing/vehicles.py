@@ -67,14 +67,7 @@ def judge(objects: list[Completed], places: Places, config: VehicleConfig) -> li
 def surer_if_driving(
     one: Completed, turns: Turns, boxes: BoxConfig, config: VehicleConfig
 ) -> Completed:
-    """What gets far and looks the way it goes is a vehicle, whatever the weights make of its shape.
-
-    Args:
-        one: completed.
-        turns: of the drive's sensor.
-        boxes: what counts as moving.
-        config: see there.
-    """
+    """What gets far and looks the way it goes is a vehicle, whatever is said of its shape."""
     kind = one.p_kind
     if kind is None or kind < config.least_driving:
         return one

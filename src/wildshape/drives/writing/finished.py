@@ -162,12 +162,7 @@ class FinishedDrive:
         return read_points(self.out / SHAPES / f"{vehicle.name}.ply")
 
     def scan(self, vehicle: FoundVehicle, name: str) -> Points:
-        """`(n, 3)` one of a vehicle's scans as measured, sensor frame, metres; none if it is lost.
-
-        Args:
-            vehicle: whose.
-            name: of the frame.
-        """
+        """`(n, 3)` a vehicle's scan of a frame as measured, sensor frame; none if it is lost."""
         try:
             return read_points(self.out / TRACKS / vehicle.name / "scans" / f"{name}.ply")
         except BadInputError:
