@@ -94,12 +94,7 @@ def setup_dpc(
 def fit_dpc(
     run: DpcRun, report: Progress | None = None, stopped: Callable[[], bool] = lambda: False
 ) -> None:
-    """Train to the last step by the loop that all trainings have; a finished run stays as it is.
-
-    Args:
-        run: set up.
-        report: called every 25 steps with the step and the means since the last call.
-        stopped: asked after every step.
+    """As `fit` of all trainings, whose loop it is; a finished run stays as it is.
 
     Raises:
         StopRequested: `stopped` said so; model and state are saved.

@@ -145,13 +145,7 @@ def weighted_median(values: Float[np.ndarray, "k"], weights: Float[np.ndarray, "
 def boxes_in_scans(
     boxes: Float[np.ndarray, "k 4"], size: tuple[float, float, float], T_level_sensor: SE3
 ) -> list[Box]:
-    """Upright boxes of the level world, each in the sensor frame of its frame.
-
-    Args:
-        boxes: centre x, y, z and yaw.
-        size: length, width, height.
-        T_level_sensor: `(k,)` of these frames.
-    """
+    """Boxes of the level world (centre x, y, z and yaw), each in the sensor frame of its frame."""
     upright = SE3(rotation_z(torch.from_numpy(boxes[:, 3])), torch.from_numpy(boxes[:, :3]))
     T_sensor_box = T_level_sensor.inverse() @ upright
     turns = quaternion_from_rotation(T_sensor_box.rotation).tolist()

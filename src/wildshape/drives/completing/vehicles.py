@@ -121,13 +121,7 @@ def stated(one: Completed, sure: Mapping[str, float]) -> float:
 
 
 def shape_nats(cost_m: float, size: tuple[float, float, float], config: VehicleConfig) -> float:
-    """What a completed shape alone says for a vehicle, log-odds: its label-free cost and its size.
-
-    Args:
-        cost_m: metres.
-        size: length, width, height, metres.
-        config: see there.
-    """
+    """What a completed shape alone says for a vehicle, log-odds: its cost and its size."""
     cost = (config.even_cost_m - cost_m) / config.cost_scale_m
     apart = (np.array(size) / np.array(config.kinds) - 1.0) / config.spread
     return cost + 1.0 - 0.5 * float((apart**2).sum(1).min())
