@@ -158,8 +158,9 @@ def complete_together(
         solid = without_free_space(shape, fit.T_sensor_object, sights)
     bottom = gathered.bottom if body else None
     fitted = _box(solid, scans, fit.T_sensor_object, settings, config.box, bottom)
-    whole = _denser(shape, config) if settings.facing else shape
+    whole = shape
     if settings.facing:
+        whole = denser(shape[None], partners(shape[None], config.refine.partner))[0]
         seen = _shown_by(scans, fit.T_sensor_object, whole, settings, config.track)
         middles, own = whole[len(shape) :].float().numpy(), shape.float().numpy()
         added = shown(middles, own, seen.numpy(), settings, config.refine)
@@ -197,10 +198,6 @@ def _evidence(
     length, width, height = fitted.size.tolist()
     size = length, width, height
     return track_features(gathered.done, gathered.rows, T_sensor_object, size, cost)
-
-
-def _denser(shape: Float[Tensor, "P 3"], config: InferenceConfig) -> Float[Tensor, "Q 3"]:
-    return denser(shape[None], partners(shape[None], config.refine.partner))[0]
 
 
 def _shown_by(
