@@ -166,7 +166,6 @@ class TrackConfig:
     """How all scans of a track make one object (`tracks/complete_track.py`).
 
     Attributes:
-        vote: of the headings.
         outliers: poses that no neighbour shares.
         coarse: first fit of the poses to each other.
         fine: the fit that goes on from it.
@@ -327,7 +326,6 @@ class InferenceConfig:
     """Everything that decides a result besides the checkpoint.
 
     Attributes:
-        hypothesis: which pose hypothesis speaks.
         refine: how one completion is fitted to its scan.
         track: how the scans of a track make one object.
         box: how a box is laid around a shape.

@@ -65,9 +65,6 @@ class DpcRecipe:
     Attributes:
         name: of the preset.
         network: sizes, and the sensor.
-        loss: weights.
-        views: how batches are drawn.
-        optim: optimiser and schedule.
         save_every: steps between two savings.
     """
 

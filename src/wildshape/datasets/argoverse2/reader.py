@@ -58,7 +58,6 @@ class Argoverse2:
         crop: how much around the labelled box belongs to the object.
         lidar: whose points are taken; see `read_sensor_pose` for the frame of the scans.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
     """
 
     root: Path

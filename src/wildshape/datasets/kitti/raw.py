@@ -46,7 +46,6 @@ class KittiRaw:
             Whether an object moves is told by the drive's GPS/IMU records, read if it is asked.
         crop: how much around the labelled box belongs to the object.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
     """
 
     root: Path

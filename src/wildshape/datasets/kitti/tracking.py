@@ -41,7 +41,6 @@ class KittiTracking:
             Whether an object moves is known where `oxts` lies beside the labels.
         crop: how much around the labelled box belongs to the object.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
     """
 
     root: Path
@@ -113,8 +112,6 @@ class _Sequence:
     """An opened sequence.
 
     Attributes:
-        name: of the sequence.
-        labels: its boxes.
         scans: the velodyne file of each frame that has one.
         T_velo_rect: from the rectified camera frame of the labels to the velodyne's.
         T_world_velo: one pose a frame; None where there is no GPS/IMU record.

@@ -52,7 +52,6 @@ class NuScenes:
         lidar: channel of the LiDAR; default: the first of `CHANNELS` that there is.
         cache: where the index of the tables is kept; default `table_index.cache_folder()`.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
     """
 
     root: Path

@@ -56,7 +56,6 @@ class PandaSet:
         selection: which objects and scans; its categories are the data set's, default `VEHICLES`.
         crop: how much around the labelled cuboid belongs to the object.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
     """
 
     root: Path

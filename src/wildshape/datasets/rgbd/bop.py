@@ -42,7 +42,6 @@ class Bop:
         longest: most scans of a track, and most frames in which an object may be unseen before its
             track ends: memory stays flat however long a scene is.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
     """
 
     root: Path

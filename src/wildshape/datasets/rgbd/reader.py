@@ -62,7 +62,6 @@ class Rgbd:
             does one at `longest` scans: memory stays flat however long a sequence is.
         longest: most scans of a track.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
         doubts: on the camera of the sequence that was read last.
     """
 

@@ -53,7 +53,6 @@ class Waymo:
             `sign`, `cyclist`.
         crop: how much around the labelled box belongs to the object.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
     """
 
     root: Path

@@ -27,8 +27,6 @@ class Places:
     """Where completed objects of a drive are, and which of them are one.
 
     Attributes:
-        turns: of the drive's sensor.
-        config: see there.
         boxes: how objects move.
     """
 

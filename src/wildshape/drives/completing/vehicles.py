@@ -27,7 +27,6 @@ class Judged:
     """What was said of an object.
 
     Attributes:
-        name: of it.
         confidence: that it is a vehicle, 0 to 1.
         reasons: why it is no vehicle, or not this one; empty for vehicles.
     """

@@ -62,13 +62,7 @@ def held_against(
 
 @dataclass(frozen=True)
 class _Shown:
-    """One scan after the other shown to watchers; it goes along to other processes.
-
-    Attributes:
-        read: see `show_scans`.
-        turns: see there.
-        watchers: see there.
-    """
+    """One scan after the other shown to watchers; it goes along to other processes."""
 
     read: Callable[[int], Points]
     turns: Turns

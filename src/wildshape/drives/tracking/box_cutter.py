@@ -19,11 +19,7 @@ from wildshape.records import Box, Points
 
 @dataclass(frozen=True)
 class BoxCutter(Cutter):
-    """Cuts what is in the boxes out of the scans of a drive.
-
-    Attributes:
-        detections: of the drive.
-    """
+    """Cuts what is in the boxes out of the scans of a drive."""
 
     detections: Detections
 

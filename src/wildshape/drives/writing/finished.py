@@ -89,7 +89,6 @@ class FinishedDrive:
     """What `wildshape drive` left in a folder.
 
     Attributes:
-        out: the folder.
         scan_names: one a frame.
         times: seconds, if known.
         ticks: when each scan was taken, counted in scans, if times are not known.

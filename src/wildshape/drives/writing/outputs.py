@@ -75,7 +75,6 @@ class RayWriter:
     """Writes the rays beside vehicles into their track folders, a frame at a time.
 
     Attributes:
-        cutter: of the drive.
         files: by frame: where each vehicle's go, and its clusters.
     """
 
@@ -113,8 +112,6 @@ class VehicleWriter:
         out: folder of the results.
         folders: of the completed objects.
         cuts: folder of the clusters.
-        drive: whose.
-        turns: of its sensor.
     """
 
     out: Path

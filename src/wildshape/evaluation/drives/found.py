@@ -38,7 +38,6 @@ class FoundDrive:
     """What was found in a drive.
 
     Attributes:
-        path: of the folder.
         frames: the vehicles of each scan.
         T_world_sensor: the trajectory, if there is one.
     """

@@ -42,7 +42,6 @@ class Bag:
     """The scans of one topic of a recording, in time order.
 
     Attributes:
-        topic: its name.
         times: of each scan, seconds, increasing: the messages' own stamps, or when they were
             recorded if they bear none.
         warnings: what is odd about it, a sentence each.

@@ -41,7 +41,6 @@ class Wish:
     """What the panel asks for.
 
     Attributes:
-        scan: number of the scan.
         shown: of `scan`, `completed`, `box`, `axes`, `fused`, `truth`.
         way: whose poses fuse the track, one of `fusing.WAYS`.
         hold: what stands still.

@@ -106,13 +106,11 @@ class Teacher:
     """Who poses the scans, and what is known of them.
 
     Attributes:
-        network: poses the scans.
         settings: of its checkpoint.
         views: of the tracks trained on, as the next network reads them.
         asked: of the same tracks, as the teacher reads them.
         time_ordered: the scans of a track follow each other (`LossConfig.time_ordered`).
         headings: is asked which way each scan looks; None if the tracks agree among themselves.
-        config: the rules' numbers.
         fronts: where the object of each scan of the store looks, where that is known.
     """
 
