@@ -326,12 +326,6 @@ class InferenceConfig:
     """Everything that decides a result besides the checkpoint.
 
     Attributes:
-        refine: how one completion is fitted to its scan.
-        track: how the scans of a track make one object.
-        box: how a box is laid around a shape.
-        free_space: how the rays of a frame are held against a shape.
-        reasons: when a result is flagged.
-        inliers: which points count for a registration's inlier ratio.
         ground_share: a scan of which more than this share is ground beside the object is given to
             the network once more without it.
     """
