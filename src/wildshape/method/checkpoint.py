@@ -188,9 +188,5 @@ def settings_from_dict(values: object) -> ModelSettings:
     return settings
 
 
-def _build(settings: ModelSettings) -> ShapePoseNet:
-    return ShapePoseNet(settings.network)
-
-
 _SOURCE = "name a file that wildshape train wrote (those of its dpc presets are for evaluate alone)"
-_FORMAT = Format(FORMAT, VERSION, _SOURCE, settings_from_dict, _build)
+_FORMAT = Format(FORMAT, VERSION, _SOURCE, settings_from_dict, lambda s: ShapePoseNet(s.network))

@@ -26,7 +26,7 @@ from wildshape.datasets.tracks.gathering import Gathering
 from wildshape.datasets.tracks.parts import found_in
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
-from wildshape.records import Intrinsics, Sensor, Track
+from wildshape.records import Sensor, Track
 
 
 @dataclass
@@ -123,7 +123,7 @@ class Bop:
         mask = read_png(path, "a PNG mask of one channel") != 0
         if mask.shape != depth.shape:
             raise BadInputError(f"{path}: {mask.shape} pixels, its depth image has {depth.shape}.")
-        camera = _sized(frame.camera, depth)
+        camera = replace(frame.camera, height=depth.shape[0], width=depth.shape[1])
         points = cut_out(depth, mask, camera, self.cut)
         place = None
         if frame.T_camera_world is not None:
@@ -139,10 +139,6 @@ class Bop:
                 continue
             shape = model_shape(scene.folder, track.category, self.shape_points)
             yield replace(track, shape=shape)
-
-
-def _sized(camera: Intrinsics, depth: np.ndarray) -> Intrinsics:
-    return replace(camera, height=depth.shape[0], width=depth.shape[1])
 
 
 def _name(part: str, thing: Thing) -> str:
