@@ -71,7 +71,6 @@ class Pipeline:
     """One drive on its way through the stages.
 
     Attributes:
-        config: the numbers of every stage.
         helpers: processes that cut scans and complete objects.
         detections: of somebody else's detector, in place of the clusters.
         second: whether this is the pass with an adapted model.

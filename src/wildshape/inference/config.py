@@ -166,7 +166,6 @@ class TrackConfig:
     """How all scans of a track make one object (`tracks/complete_track.py`).
 
     Attributes:
-        outliers: poses that no neighbour shares.
         coarse: first fit of the poses to each other.
         fine: the fit that goes on from it.
         key_scans: of a longer track so many, evenly spread, are fitted to each other; with the

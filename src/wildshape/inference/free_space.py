@@ -34,7 +34,6 @@ class Sights(NamedTuple):
     Attributes:
         scans: sensor frames, metres.
         rays: one set a scan.
-        config: how both are held against a shape.
     """
 
     scans: Sequence[Points]

@@ -70,7 +70,6 @@ class ModelSettings:
     """Everything besides the weights that inference needs, and where the weights come from.
 
     Attributes:
-        network: sizes.
         sensor: how scans are centred.
         input_points: n, points a scan is resampled to.
         projection: binning of the projection term.

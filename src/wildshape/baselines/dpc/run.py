@@ -40,11 +40,9 @@ class DpcRun:
     """All that a run needs, set up.
 
     Attributes:
-        recipe: what to train and how.
         seed: of weights and batches.
         folder: where the results go.
         state: network, its running mean and the optimiser.
-        sampler: draws the batches.
         identity: what a state must share with a run that resumes it.
         provenance: written into the checkpoint.
     """

@@ -39,7 +39,6 @@ class KittiTracking:
         root: the folder above `training`, or `training` (the testing half has no labels).
         selection: which objects and scans; categories are the labels' types, by default `VEHICLES`.
             Whether an object moves is known where `oxts` lies beside the labels.
-        crop: how much around the labelled box belongs to the object.
         rays: with each scan keep the rays of its frame that passed the object by, too.
     """
 

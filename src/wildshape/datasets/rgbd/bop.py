@@ -36,7 +36,6 @@ class Bop:
     Attributes:
         root: the data set, one of its splits, or one scene.
         selection: which objects and scans; categories are such as `obj_000005`.
-        cut: how points are cut out of a depth image.
         shapes: whether to sample the true shapes from the models.
         shape_points: of a true shape.
         longest: most scans of a track, and most frames in which an object may be unseen before its

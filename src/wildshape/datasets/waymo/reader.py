@@ -51,7 +51,6 @@ class Waymo:
         root: a split's folder, which holds `lidar`, `lidar_box`, ..., or the folder above.
         selection: which objects and scans; categories are `vehicle` (the default), `pedestrian`,
             `sign`, `cyclist`.
-        crop: how much around the labelled box belongs to the object.
         rays: with each scan keep the rays of its frame that passed the object by, too.
     """
 

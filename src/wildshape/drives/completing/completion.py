@@ -103,7 +103,6 @@ class Completer:
         cuts: folder of the clusters.
         folder: where a folder of each object is written.
         T_level_sensor: of a tilted sensor; None for one held level, as networks expect it.
-        vehicles: what speaks for one.
     """
 
     predictor: Predictor

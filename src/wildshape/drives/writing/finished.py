@@ -94,7 +94,6 @@ class FinishedDrive:
         ticks: when each scan was taken, counted in scans, if times are not known.
         scanned: points of each scan.
         T_level_sensor: from each frame's sensor frame to the level world.
-        turns: of the sensor.
         ground_m: height of the sensor above the ground.
         vehicles: by name.
         record: what `wildshape.json` holds.

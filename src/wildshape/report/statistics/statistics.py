@@ -36,7 +36,6 @@ class Quantity:
         title: for people.
         unit: of the numbers; empty for counts.
         basis: what it was taken from, in words.
-        tally: the numbers.
     """
 
     name: str

@@ -80,11 +80,6 @@ class SelfTrainingConfig:
         headings: which way tracks look; also agreed on in the midst of a run without a teacher.
         transfer: which way views look, asked of weights of another sensor.
         track: outliers among the poses, and how scans are moved onto the mean of all.
-        graph: how scans are laid on their neighbours.
-        fusion: how scans become a shape.
-        roof: which roofs nobody saw.
-        draw: which scans are drawn, and what is changed of them.
-        loss: how far the network is from what it is taught.
     """
 
     headings: HeadingConfig = field(default_factory=HeadingConfig)
