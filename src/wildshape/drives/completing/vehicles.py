@@ -127,12 +127,7 @@ def shape_nats(cost_m: float, size: tuple[float, float, float], config: VehicleC
 
 
 def vehicle_sized(clouds: Sequence[Points], config: VehicleConfig) -> bool:
-    """Whether the points alone are as long, wide and high as a vehicle, in the middle one of scans.
-
-    Args:
-        clouds: of one object, level frames.
-        config: see there.
-    """
+    """Whether the points, level frames, are as large as a vehicle, in the middle one of scans."""
     sides = np.median([(*extents(cloud), np.ptp(cloud[:, 2])) for cloud in clouds], axis=0)
     return all(low <= side <= high for side, (low, high) in zip(sides, _sizes(config)))
 

@@ -129,10 +129,6 @@ def points_inside(drive: FoundDrive, scans: Sequence[Path]) -> Clusters:
 
     For drives whose clusters were not kept.
 
-    Args:
-        drive: what was found.
-        scans: its files, of KITTI's format.
-
     Raises:
         BadInputError: a scan is damaged.
     """

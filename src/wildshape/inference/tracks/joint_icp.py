@@ -175,14 +175,7 @@ def fused_surface(
 def refine_onto(
     surface: Surface, scans: list[Points], T_sensor_object: SE3, config: JointIcpConfig
 ) -> SE3:
-    """Poses near the given ones under which each scan by itself lies on a surface.
-
-    Args:
-        surface: of the same object (`fused_surface`).
-        scans: sensor frames, metres.
-        T_sensor_object: one pose a scan.
-        config: how.
-    """
+    """Poses near the given ones under which each scan by itself lies on a surface."""
     points = torch.from_numpy(sampled(scans, config.points))
     T_object_sensor = T_sensor_object.to(torch.float32).inverse()
     for step in range(config.rounds):
