@@ -13,7 +13,8 @@ from safetensors.torch import load_file, save_file
 
 from wildshape.io.poses import read_poses, write_poses
 from wildshape.io.scans import writers
-from wildshape.io.scans.points import read_points, write_ply
+from wildshape.io.scans.points import read_points
+from wildshape.io.scans.writers import write_ply
 
 
 @pytest.fixture

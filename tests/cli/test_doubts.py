@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tests.cars import car_surface
 
-from wildshape.io.scans.points import write_ply
+from wildshape.io.scans.writers import write_ply
 
 
 def _wall(rng):

@@ -11,7 +11,7 @@ from tests.datasets.street import street
 from tests.datasets.write_argoverse2 import write_log, write_table
 from tests.datasets.write_kitti_raw import tracklet_xml, write_drive
 from tests.datasets.write_kitti_tracking import write_sequence
-from tests.io.limits import allowed, costs
+from tests.io.limits import allowed, costs, read_within_limits
 from tests.refusal import refused
 
 from wildshape.datasets.argoverse2.log import read_boxes
@@ -84,10 +84,8 @@ def test_xml_bombs_keep_to_the_rule(tmp_path):
     paths = [tmp_path / name for name in bombs]
     for path, text in zip(paths, bombs.values()):
         path.write_text(text)
-    for path, cost in zip(paths, costs("wildshape.datasets.kitti.tracklets:read_tracklets", paths)):
-        assert cost.is_answer, (path, cost)
-        assert (cost.points > 0) == (path.name == "many"), (path, cost)
-        assert cost.grown < allowed(path), (path, cost)
+    found = read_within_limits("wildshape.datasets.kitti.tracklets:read_tracklets", paths)
+    assert found == {"many"}
 
 
 @pytest.mark.parametrize("column", range(10, 17))

@@ -13,7 +13,7 @@ from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.table import BoxRow, write_box_table
 from wildshape.io.poses import write_poses, write_tum
-from wildshape.io.scans.points import write_ply
+from wildshape.io.scans.writers import write_ply
 from wildshape.io.tracks import write_track
 from wildshape.records import Track
 

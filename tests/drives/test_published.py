@@ -20,7 +20,7 @@ from tests.refusal import refused
 from wildshape.cli.main import main
 from wildshape.drives.recordings import recording_kinds
 from wildshape.drives.recordings.recording_kinds import find_drives, open_drive
-from wildshape.io.scans.points import write_ply
+from wildshape.io.scans.writers import write_ply
 
 SCENE = street(frames=3)
 

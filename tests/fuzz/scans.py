@@ -12,6 +12,7 @@ from unittest import mock
 import numpy as np
 import torch
 from tests.fuzz.target import Arrays, Target, numbers_of, only_file
+from tests.io.ply_with_lists import ply_with_lists
 
 from wildshape.cli.pipe import as_file
 from wildshape.geometry.transforms.se3 import SE3
@@ -23,22 +24,6 @@ from wildshape.records import Intrinsics, Sensor, Track
 
 CLOUD = np.random.default_rng(7).normal((6, 1, 0), size=(24, 3)).astype(np.float32)
 """`(24, 3)`, a few metres across."""
-
-_LISTS = """ply
-format {} 1.0
-comment lists before, in and after the points
-element grid 2
-property list uchar int index
-element vertex {}
-property uchar before
-property list uchar short tags
-property double x
-property double y
-property double z
-element face 1
-property list uchar int vertex_indices
-end_header
-"""
 
 
 def _put(folder: Path, name: str, data: bytes) -> None:
@@ -55,22 +40,10 @@ def _plain_ply(order: str) -> bytes:
     return head.encode() + b"".join(struct.pack(sign + "fffB", *row, 7) for row in CLOUD)
 
 
-def _ply_with_lists(order: str) -> bytes:
-    head = _LISTS.format(order, len(CLOUD))
-    if order == "ascii":
-        rows = [f"9 {i % 3}{' 1' * (i % 3)} {x} {y} {z}" for i, (x, y, z) in enumerate(CLOUD)]
-        return (head + "\n".join(["1 5", "2 6 7", *rows, "3 0 1 2"]) + "\n").encode()
-    sign = "<" if "little" in order else ">"
-    body = struct.pack(sign + "BiBii", 1, 5, 2, 6, 7)
-    for i, point in enumerate(CLOUD):
-        body += struct.pack(f"{sign}BB{i % 3}h3d", 9, i % 3, *[1] * (i % 3), *point)
-    return head.encode() + body + struct.pack(sign + "B3i", 3, 0, 1, 2)
-
-
 def _build_ply(folder: Path) -> None:
     for order in ("ascii", "binary_little_endian", "binary_big_endian"):
         _put(folder / order, "scan.ply", _plain_ply(order))
-        _put(folder / f"{order}_lists", "scan.ply", _ply_with_lists(order))
+        _put(folder / f"{order}_lists", "scan.ply", ply_with_lists(order, CLOUD))
 
 
 def _build_pcd(folder: Path) -> None:

@@ -82,10 +82,6 @@ def test_nan_rows_do_not_matter(predictor):
     assert_same(predictor.complete(dirty), predictor.complete(points))
 
 
-def test_tensors_are_welcome(predictor):
-    assert_same(predictor.complete(torch.from_numpy(scan())), predictor.complete(scan()))
-
-
 def test_many_are_completed_one_by_one(predictor):
     """More than one batch: scan i alone gives what scan i among others gives."""
     scans = [scan(seed, count=20 + 9 * seed) for seed in range(37)]

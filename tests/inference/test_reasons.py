@@ -6,8 +6,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+from tests import models
 
-from wildshape.geometry.projection.visibility import FacingBins
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.confidence import (
     judged,
@@ -15,19 +15,9 @@ from wildshape.inference.confidence import (
     reasons_of_scan,
     reasons_of_track,
 )
-from wildshape.method.checkpoint import ModelSettings
-from wildshape.method.network import NetworkConfig
 from wildshape.records import Box, Completion, Sensor
 
-SETTINGS = ModelSettings(
-    network=NetworkConfig(),
-    sensor="lidar",
-    input_points=128,
-    projection=FacingBins(0.3),
-    beta=0.25,
-    extent_m=(2.0, 6.0),
-    cost_m=(0.1, 0.2),
-)
+SETTINGS = dataclasses.replace(models.SETTINGS, cost_m=(0.1, 0.2))
 
 
 def line(length, count=64):

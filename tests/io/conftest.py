@@ -2,34 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """One cloud in every format, and one track."""
 
-import struct
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from tests.io.ply_with_lists import ply_with_lists
 
 from wildshape.geometry.transforms.rotation import random_rotation
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.scans.points import write_ply
+from wildshape.io.scans.writers import write_ply
 from wildshape.records import Intrinsics, Sensor, Track
-
-_LISTS = """ply
-format {} 1.0
-comment lists before, in and after the points, of different lengths
-element grid 2
-property list uchar int index
-element vertex {}
-property uchar before
-property list uchar short tags
-property double x
-property double y
-property double z
-property float confidence
-element face 1
-property list uchar int vertex_indices
-end_header
-"""
 
 
 @pytest.fixture(scope="session")
@@ -62,9 +45,8 @@ def full_formats(tmp_path_factory: pytest.TempPathFactory, full_scan) -> dict[st
 
 def _write_all(folder: Path, cloud: np.ndarray) -> dict[str, Path]:
     write_ply(folder / "plain.ply", cloud)
-    for order, sign in (("binary_little_endian", "<"), ("binary_big_endian", ">")):
-        (folder / f"{order}.ply").write_bytes(_ply_with_lists(order, sign, cloud))
-    (folder / "ascii.ply").write_text(_ascii_ply_with_lists(cloud))
+    for order in ("ascii", "binary_little_endian", "binary_big_endian"):
+        (folder / f"{order}.ply").write_bytes(ply_with_lists(order, cloud))
     _write_pcd(folder, cloud)
     np.save(folder / "array.npy", cloud.astype(np.float64))
     np.savez(folder / "only.npz", cloud)
@@ -74,19 +56,6 @@ def _write_all(folder: Path, cloud: np.ndarray) -> dict[str, Path]:
     np.hstack([cloud, np.abs(cloud[:, :1])]).tofile(folder / "kitti.bin")
     _write_las(folder, cloud)
     return {path.name: path for path in sorted(folder.iterdir())}
-
-
-def _ply_with_lists(order: str, sign: str, cloud: np.ndarray) -> bytes:
-    body = [_LISTS.format(order, len(cloud)).encode(), struct.pack(sign + "BiBii", 1, 5, 2, 6, 7)]
-    for i, point in enumerate(cloud):
-        tags = [1] * (i % 3)
-        body.append(struct.pack(f"{sign}BB{len(tags)}h3df", 9, len(tags), *tags, *point, 0.5))
-    return b"".join((*body, struct.pack(sign + "B3i", 3, 0, 1, 2)))
-
-
-def _ascii_ply_with_lists(cloud: np.ndarray) -> str:
-    rows = [f"9 {i % 3}{' 1' * (i % 3)} {x} {y} {z} 0.5" for i, (x, y, z) in enumerate(cloud)]
-    return _LISTS.format("ascii", len(cloud)) + "\n".join(["1 5", "2 6 7", *rows, "3 0 1 2"]) + "\n"
 
 
 def _write_pcd(folder: Path, cloud: np.ndarray) -> None:

@@ -76,6 +76,15 @@ def costs(reader: str, paths: Sequence[Path], cpu_s: int = 20) -> list[Cost]:
     return [Cost(**json.loads(line)) for line in done.stdout.splitlines()]
 
 
+def read_within_limits(reader: str, paths: Sequence[Path], cpu_s: int = 20) -> set[str]:
+    """Check that no path costs more than it holds, as `costs` reads them; names of those read."""
+    found = list(zip(paths, costs(reader, paths, cpu_s)))
+    for path, cost in found:
+        assert cost.is_answer, (path, cost)
+        assert cost.grown < allowed(path, cost.points), (path, cost)
+    return {path.name for path, cost in found if cost.points}
+
+
 def _serve(reader: str, cpu_s: int) -> None:
     module, _, name = reader.partition(":")
     read = getattr(import_module(module), name)

@@ -14,43 +14,29 @@ from wildshape.io import guard
 from wildshape.io.guard import reading
 from wildshape.io.scans.points import read_points
 
+_PLY = ("plain.ply", "binary_big_endian.ply", "ascii.ply")
+_PCD = ("ascii.pcd", "binary.pcd", "binary_compressed.pcd")
+
 
 @pytest.mark.parametrize("count", [61, 10**9, 10**15, 10**30, -1])
-@pytest.mark.parametrize("name", ["plain.ply", "binary_big_endian.ply", "ascii.ply"])
-def test_ply_header_that_lies_about_the_count(
+@pytest.mark.parametrize("name", [*_PLY, *_PCD])
+def test_ply_and_pcd_header_that_lies_about_the_count(
     name: str, count: int, formats: dict[str, Path], tmp_path: Path
 ) -> None:
-    data = formats[name].read_bytes()
-    _refused(tmp_path / "a.ply", data.replace(b"vertex 60", b"vertex %d" % count))
+    said = b"vertex" if name in _PLY else b"POINTS"
+    data = formats[name].read_bytes().replace(said + b" 60", said + b" %d" % count)
+    _refused(tmp_path / f"a{Path(name).suffix}", data)
 
 
-@pytest.mark.parametrize("count", [61, 10**9, 10**15, -1])
-@pytest.mark.parametrize("name", ["ascii.pcd", "binary.pcd", "binary_compressed.pcd"])
-def test_pcd_header_that_lies_about_the_count(
-    name: str, count: int, formats: dict[str, Path], tmp_path: Path
-) -> None:
-    data = formats[name].read_bytes()
-    _refused(tmp_path / "a.pcd", data.replace(b"POINTS 60", b"POINTS %d" % count))
-
-
-@pytest.mark.parametrize("count", [61, 10**9, 2**32 - 1])
-@pytest.mark.parametrize("name", ["format3.las", "format3.laz"])
+@pytest.mark.parametrize("count", [61, 10**9, 2**32 - 1, 10**15])
+@pytest.mark.parametrize(("kind", "at", "size"), [("format3", 107, 4), ("format6", 247, 8)])
+@pytest.mark.parametrize("suffix", [".las", ".laz"])
 def test_las_header_that_lies_about_the_count(
-    name: str, count: int, formats: dict[str, Path], tmp_path: Path
+    kind: str, at: int, size: int, suffix: str, count: int, formats, tmp_path: Path
 ) -> None:
-    data = bytearray(formats[name].read_bytes())
-    data[107:111] = count.to_bytes(4, "little")
-    _refused(tmp_path / f"a{Path(name).suffix}", bytes(data))
-
-
-@pytest.mark.parametrize("count", [61, 10**9, 10**15])
-@pytest.mark.parametrize("name", ["format6.las", "format6.laz"])
-def test_las_1_4_header_that_lies_about_the_count(
-    name: str, count: int, formats: dict[str, Path], tmp_path: Path
-) -> None:
-    data = bytearray(formats[name].read_bytes())
-    data[247:255] = count.to_bytes(8, "little")
-    _refused(tmp_path / f"a{Path(name).suffix}", bytes(data))
+    data = bytearray(formats[kind + suffix].read_bytes())
+    data[at : at + size] = count.to_bytes(8, "little")[:size]
+    _refused(tmp_path / f"a{suffix}", bytes(data))
 
 
 @pytest.mark.parametrize("shape", [b"(99, 3)", b"(1000000000000000, 3)", b"(-60, 3)"])

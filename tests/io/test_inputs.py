@@ -8,7 +8,8 @@ import pytest
 
 from wildshape.errors import BadInputError
 from wildshape.io.inputs import open_tracks
-from wildshape.io.scans.points import Coordinates, write_ply
+from wildshape.io.scans.points import Coordinates
+from wildshape.io.scans.writers import write_ply
 from wildshape.io.store.store import StoreWriter
 from wildshape.io.tracks import NoUsableScanError, write_track
 from wildshape.records import Track

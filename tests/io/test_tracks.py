@@ -8,7 +8,8 @@ import pytest
 import torch
 
 from wildshape.errors import BadInputError
-from wildshape.io.scans.points import Coordinates, write_ply
+from wildshape.io.scans.points import Coordinates
+from wildshape.io.scans.writers import write_ply
 from wildshape.io.tracks import NoUsableScanError, read_track, read_track_file, write_track
 from wildshape.records import Sensor, SightLines, Track
 

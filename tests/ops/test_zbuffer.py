@@ -42,15 +42,6 @@ def test_backend_is_the_loop(backend, B, N, n_bins, seed):
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
-def test_one_point_an_occupied_bin(backend):
-    bins, depth = image(3, 500, 40)
-    seen = backend(bins, depth, 40)
-    for b in range(3):
-        inside = bins[b][(bins[b] >= 0) & (bins[b] < 40)]
-        assert sorted(bins[b][seen[b]].tolist()) == inside.unique().tolist()
-
-
-@pytest.mark.parametrize("backend", BACKENDS)
 def test_order_does_not_matter(backend):
     generator = torch.Generator().manual_seed(3)
     bins = torch.randint(0, 30, (2, 400), generator=generator)

@@ -10,7 +10,8 @@ import pytest
 from wildshape.errors import BadInputError
 from wildshape.io.inputs import open_tracks
 from wildshape.io.output import MARKER, begin
-from wildshape.io.scans.points import Coordinates, write_ply
+from wildshape.io.scans.points import Coordinates
+from wildshape.io.scans.writers import write_ply
 from wildshape.io.write_tracks import write_tracks
 from wildshape.method.checkpoint import load_checkpoint, weights_file
 from wildshape.training.options import TrainingOptions

@@ -46,16 +46,16 @@ class GlobalIcp:
         return point_to_point(source, target, self.distance, self.iterations).T
 
 
-def available(voxel: float = 0.125) -> FastGlobal | KissMatcher:
+def available() -> FastGlobal | KissMatcher:
     """Open3D's fast global registration as in the paper, or KISS-Matcher where it is missing.
 
     Raises:
         MissingExtraError: neither is installed; says how to get one.
     """
     try:
-        return FastGlobal(voxel)
+        return FastGlobal(voxel=0.125)
     except MissingExtraError as missing:
         try:
-            return KissMatcher(voxel)
+            return KissMatcher(voxel=0.125)
         except MissingExtraError as also:
             raise MissingExtraError(f"global-icp: {missing} Or else: {also}") from also

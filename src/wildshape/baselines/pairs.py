@@ -35,11 +35,7 @@ class Pair(Protocol):
 
 @dataclass(frozen=True)
 class Chained:
-    """A method of pairs, chained over the neighbours of a track to its middle scan.
-
-    Attributes:
-        pair: registers one scan to the next.
-    """
+    """A method of pairs, chained over the neighbours of a track to its middle scan."""
 
     pair: Pair
 

@@ -71,13 +71,8 @@ class Pipeline:
     """One drive on its way through the stages.
 
     Attributes:
-        drive: the recording.
-        out: folder to write.
-        config: the numbers of every stage.
-        predictor: completes objects.
         helpers: processes that cut scans and complete objects.
         detections: of somebody else's detector, in place of the clusters.
-        clock: of the stages.
         second: whether this is the pass with an adapted model.
     """
 

@@ -23,9 +23,6 @@ def copies_told(files: Sequence[Path]) -> list[str]:
     """A sentence if scans are exact copies of the ones before, as of a sensor that hangs.
 
     Files of one size are read as far as they are alike.
-
-    Args:
-        files: one a scan.
     """
     copies = [
         frame

@@ -176,11 +176,7 @@ class Drive:
         return FullScan(points, _places(self.motion[frame], turn.seconds))
 
     def moved_by(self, T_world_sensor: SE3) -> "Drive":
-        """The drive with its scans corrected for the sensor's motion during each turn.
-
-        Args:
-            T_world_sensor: of every frame.
-        """
+        """The drive with its scans corrected for the sensor's motion during each turn."""
         if self.times is None or len(self) < 2:
             return self  # how long a scan takes is not known
         return replace(self, motion=tuple(_motion(T_world_sensor, self.times)))

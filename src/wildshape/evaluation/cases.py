@@ -47,9 +47,7 @@ class Case:
         name: the track's.
         scans: what a method may see, with `sensor`.
         scan_names: one a scan.
-        sensor: how they were taken.
         T_sensor_object: true poses of the scans as turned, if known.
-        truth: if known.
         rays: of each scan those that passed the object by, if any are known.
         skipped: scans left out.
     """

@@ -22,7 +22,6 @@ class Example:
 
     Attributes:
         label: `best`, `median` or `worst`.
-        track: name.
         cd: mean over the track's scans, metres.
         scan: `(n, 3)`, the middle scan.
         truth: `(g, 3)`.

@@ -32,8 +32,6 @@ class Skipped:
     """One scan that did not count, or one track completed as a whole (then its middle scan).
 
     Attributes:
-        track: name.
-        scan: name.
         reason: in a few words, the same for all of a kind.
     """
 
@@ -47,8 +45,6 @@ class CompletionScore:
     """One completed scan, or one track completed as a whole (then `scan` is its middle one).
 
     Attributes:
-        track: name.
-        scan: name.
         error: against the shape, or the mirrored accumulation where the shape is not known.
         error_partial: against the accumulation as it is; None where the shape is known.
         truth: `shape` or `mirrored`.
@@ -84,7 +80,6 @@ class MethodScores:
     """One method under one seed.
 
     Attributes:
-        name: of its row.
         completions: one a scan, or one a track.
         registrations: one a scan.
         skipped: what counted in neither.

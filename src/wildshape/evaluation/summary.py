@@ -204,7 +204,6 @@ class Summary:
     """One row of the table.
 
     Attributes:
-        name: of the method.
         truth: what completions were measured against, in a word.
         per_seed: the figures of each seed, keyed by name; None where there is none.
         mean: over the seeds.

@@ -22,12 +22,7 @@ def upright_places(T_level_box: SE3) -> Float[np.ndarray, "n 4"]:
 
 
 def footprint(box: Place, size: Sequence[float]) -> Float[np.ndarray, "4 2"]:
-    """Corners of a box seen from above, counter-clockwise.
-
-    Args:
-        box: centre x, y, z and yaw.
-        size: length, width and more.
-    """
+    """Corners of a box (centre x, y, z and yaw) seen from above, counter-clockwise."""
     c, s = math.cos(box[3]), math.sin(box[3])
     half = np.array(((1, 1), (-1, 1), (-1, -1), (1, -1))) * np.array(size[:2]) / 2
     return half @ np.array(((c, s), (-s, c))) + np.array(box[:2])

@@ -32,9 +32,6 @@ def level_turn(R_sensor_object: Float[Tensor, "V 3 3"]) -> Float[Tensor, "3 3"]:
 
     Scans of a track say nothing of the pitch of the frame that they are posed in: it is chosen. Of
     roll the mirror plane y = 0 says more. The identity where the sensors are not level.
-
-    Args:
-        R_sensor_object: of the scans of one object.
     """
     up = mean_up(R_sensor_object)
     pitch = 0.0 if up is None else math.atan2(float(up[0]), float(up[2]))

@@ -150,14 +150,7 @@ def glance_of(
 def reasons_of_scan(
     scan: Points, sensor: Sensor | None, settings: ModelSettings, rule: ReasonRule = _RULE
 ) -> tuple[str, ...]:
-    """What speaks against the scan itself, a line a reason.
-
-    Args:
-        scan: sensor frame, metres.
-        sensor: how it was taken, if known.
-        settings: of the weights.
-        rule: the bounds.
-    """
+    """What speaks against the scan itself, a line a reason."""
     low, high = settings.extent_m
     size = extent(scan)
     holds = {

@@ -166,8 +166,6 @@ class TrackConfig:
     """How all scans of a track make one object (`tracks/complete_track.py`).
 
     Attributes:
-        vote: of the headings.
-        outliers: poses that no neighbour shares.
         coarse: first fit of the poses to each other.
         fine: the fit that goes on from it.
         key_scans: of a longer track so many, evenly spread, are fitted to each other; with the
@@ -327,13 +325,6 @@ class InferenceConfig:
     """Everything that decides a result besides the checkpoint.
 
     Attributes:
-        hypothesis: which pose hypothesis speaks.
-        refine: how one completion is fitted to its scan.
-        track: how the scans of a track make one object.
-        box: how a box is laid around a shape.
-        free_space: how the rays of a frame are held against a shape.
-        reasons: when a result is flagged.
-        inliers: which points count for a registration's inlier ratio.
         ground_share: a scan of which more than this share is ground beside the object is given to
             the network once more without it.
     """

@@ -36,7 +36,6 @@ class Learned:
     """Our row in a table. Every method raises BadInputError at fewer than 16 finite points.
 
     Attributes:
-        predictor: does the work.
         track: use all scans of a track together; each scan still gets a shape of its own.
 
     The last answer is kept: the protocol asks for the shapes of scans, then for their poses. With

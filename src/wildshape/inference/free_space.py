@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from torch import Tensor
 
 from wildshape.geometry.projection.sight_lines import SightLines, Standing, standing
@@ -34,7 +34,6 @@ class Sights(NamedTuple):
     Attributes:
         scans: sensor frames, metres.
         rays: one set a scan.
-        config: how both are held against a shape.
     """
 
     scans: Sequence[Points]
@@ -116,7 +115,8 @@ def without_free_space(
         T_sensor_canonical: one pose a scan.
         sights: scans and rays.
     """
-    free, asked = np.zeros(len(shape), bool), ~_low(shape, sights.config)
+    low = shape[:, 2] - shape[:, 2].min() < sights.config.low_m
+    free, asked = np.zeros(len(shape), bool), ~low.numpy()
     high = shape.numpy()[asked]
     for i in range(len(sights.scans)):
         if sights.rays[i] is not None:
@@ -124,8 +124,3 @@ def without_free_space(
             free[asked] |= False if found is None else found.free
     kept = torch.from_numpy(~free)
     return shape[kept] if kept.float().mean() > sights.config.least_kept else shape
-
-
-def _low(shape: Float[Tensor, "P 3"], config: FreeSpaceConfig) -> Bool[np.ndarray, "P"]:
-    heights = shape[:, 2] - shape[:, 2].min()
-    return (heights < config.low_m).numpy()

@@ -29,13 +29,10 @@ def fingerprint_of(path: Path) -> str:
 
 def _files_in(folder: Path) -> Iterator[Path]:
     """Of a TRACK, of each TRACK of a DATASET, or else the scans of a plain folder."""
-    tracks = [folder] if (folder / "scans").is_dir() else _tracks_in(folder)
+    scans = [folder / "scans"] if (folder / "scans").is_dir() else folder.glob("[!.]*/scans")
+    tracks = [place.parent for place in scans if place.is_dir()]
     for track in tracks:
         yield from filter(is_scan_file, track.glob("scans/*"))
         yield from (file for beside in _BESIDE for file in track.glob(beside) if file.is_file())
     if not tracks:
         yield from filter(is_scan_file, folder.glob("*"))
-
-
-def _tracks_in(folder: Path) -> list[Path]:
-    return [scans.parent for scans in folder.glob("[!.]*/scans") if scans.is_dir()]

@@ -35,7 +35,6 @@ class Output:
     """A folder being written.
 
     Attributes:
-        path: the folder.
         record: what `wildshape.json` holds.
         resumed: whether finished work of an earlier, interrupted run lies in it.
     """

@@ -32,17 +32,6 @@ from wildshape.io.scans.writers import ply_bytes, write_ply
 from wildshape.io.sensor_json import sensor_from_json, sensor_to_json
 from wildshape.records import ShapeKind, SightLines, Track, as_text
 
-__all__ = [
-    "NoUsableScanError",
-    "TrackFile",
-    "read_poses",
-    "read_track",
-    "read_track_file",
-    "track_of_files",
-    "write_poses",
-    "write_track",
-]
-
 Skipped = tuple[tuple[str, str], ...]
 
 _MOST_METRES = 1e3

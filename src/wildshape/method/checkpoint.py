@@ -70,7 +70,6 @@ class ModelSettings:
     """Everything besides the weights that inference needs, and where the weights come from.
 
     Attributes:
-        network: sizes.
         sensor: how scans are centred.
         input_points: n, points a scan is resampled to.
         projection: binning of the projection term.
@@ -188,9 +187,5 @@ def settings_from_dict(values: object) -> ModelSettings:
     return settings
 
 
-def _build(settings: ModelSettings) -> ShapePoseNet:
-    return ShapePoseNet(settings.network)
-
-
 _SOURCE = "name a file that wildshape train wrote (those of its dpc presets are for evaluate alone)"
-_FORMAT = Format(FORMAT, VERSION, _SOURCE, settings_from_dict, _build)
+_FORMAT = Format(FORMAT, VERSION, _SOURCE, settings_from_dict, lambda s: ShapePoseNet(s.network))

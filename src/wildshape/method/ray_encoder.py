@@ -50,12 +50,7 @@ class RayConfig:
 
 
 class RayEncoder(nn.Module):
-    """Points of rays to a change of the code: a small PointNet; none at the start of training.
-
-    Args:
-        widths: of its layers.
-        code: length of the code.
-    """
+    """Points of rays to a change of the code: a small PointNet; none at the start of training."""
 
     def __init__(self, widths: tuple[int, int, int], code: int) -> None:
         super().__init__()

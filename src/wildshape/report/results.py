@@ -32,7 +32,6 @@ class TrackResult:
     """One track's folder.
 
     Attributes:
-        folder: where it lies.
         record: the content of its objects.json.
         track: the scans it is about; None where they have moved, changed or were lost.
     """

@@ -54,7 +54,6 @@ class Job:
     """A whole simulation.
 
     Attributes:
-        config: what is wanted.
         seed: of all chance.
         meshes: the user's files, or empty for our own shapes.
     """

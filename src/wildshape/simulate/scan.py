@@ -199,18 +199,7 @@ def passing_rays(
     """The rays of the same turn that passed the object by, or did not come back from it.
 
     The ground goes on for ever; behind the object there is nothing else than what blocks the view
-    of it, and the backdrop.
-
-    Args:
-        scene: see `scan`.
-        target: see `scan`.
-        sensor: see `scan`.
-        T_object_sensor: see `scan`.
-        returns: see `scan`.
-        turn: what `scan` made of it.
-        most: rays returned at most.
-        rng: the only source of chance.
-        backdrop: what stands beyond the object, if anything.
+    of it, and the backdrop. `turn` is what `scan` made of the same; at most `most` rays come back.
     """
     half = target.bounds[1]
     R, origin = T_object_sensor[:3, :3], T_object_sensor[:3, 3]

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+_RATE_HZ = 10.0
+_CLEARANCE_M = 0.8  # between the sensor's way and the object's box
+
 
 @dataclass(frozen=True)
 class Drive:
@@ -22,14 +25,7 @@ class Drive:
 
 
 def drive_by(
-    height: float,
-    half: np.ndarray,
-    near: float,
-    far: float,
-    rng: np.random.Generator,
-    *,
-    rate_hz: float = 10.0,
-    clearance_m: float = 0.8,
+    height: float, half: np.ndarray, near: float, far: float, rng: np.random.Generator
 ) -> Drive:
     """A random pass of a sensor along a parked object.
 
@@ -44,15 +40,13 @@ def drive_by(
         near: smallest range of the object's centre, metres.
         far: largest range, metres.
         rng: the only source of chance.
-        rate_hz: scans a second.
-        clearance_m: the sensor's way keeps so far from the object's box, metres.
 
     Returns:
         All scan poses within the ranges; possibly none.
     """
     kind = str(rng.choice(("straight", "bend", "turn"), p=(0.45, 0.30, 0.25)))
     speed = float(rng.uniform(3.0, 12.0))
-    s = np.arange(-45.0, 45.0, speed / rate_hz) + rng.uniform(0, speed / rate_hz)
+    s = np.arange(-45.0, 45.0, speed / _RATE_HZ) + rng.uniform(0, speed / _RATE_HZ)
     path = _path(kind, s, rng)
     place = _beside(path, kind, rng)
     yaw = place[2]
@@ -62,7 +56,7 @@ def drive_by(
     T_object_world[:3, 3] = -turn.T @ (place[0], place[1], half[2])
     T_object_sensor = T_object_world @ _sensor_poses(path, height, rng)
     at = T_object_sensor[:, :2, 3]
-    clear = bool((np.abs(at) - half[:2]).max(1).min() > clearance_m)
+    clear = bool((np.abs(at) - half[:2]).max(1).min() > _CLEARANCE_M)
     distance = np.linalg.norm(at, axis=1)
     keep = (distance >= near) & (distance <= far) & clear
     return Drive(kind, T_object_sensor[keep])

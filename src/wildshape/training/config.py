@@ -67,13 +67,8 @@ class Recipe:
 
     Attributes:
         name: of the preset it comes from.
-        network: sizes.
-        loss: weights of the terms.
-        views: how batches are drawn.
-        optim: optimiser and schedule.
         self_training: what a teacher's words become; and how headings are agreed on in any run.
         validate_every: steps between validations and checkpoints; on a GPU ten times as many.
-        validation: what a validation looks at.
         held_out: one track in so many is validated on and not fitted; none if there are fewer.
     """
 

@@ -87,12 +87,10 @@ def _record_of_run(out: Path) -> dict[str, Any] | None:
     if not marker.is_file():
         return None
     record = read_json(marker, "how a folder was made", dict)
+    if record.get("command") != "train":
+        return None
     with reading(marker, "how a folder was made"):
-        return {**record, "settings": dict(record["settings"])} if _is_run(record) else None
-
-
-def _is_run(record: dict[str, Any]) -> bool:
-    return record.get("command") == "train"
+        return {**record, "settings": dict(record["settings"])}
 
 
 def _refuse_other(out: Path, begun: dict[str, Any], settings: dict[str, str]) -> None:

@@ -66,12 +66,6 @@ def save_state(folder: Path, state: TrainState, identity: dict[str, str]) -> Non
 def load_state(folder: Path, state: TrainState, identity: dict[str, str], scans: int) -> None:
     """Fill `state` from the folder.
 
-    Args:
-        folder: of the run.
-        state: of the sizes to be filled.
-        identity: says which run it is.
-        scans: of the data, of which headings may have been agreed on.
-
     Raises:
         BadInputError: damaged, or written by a run with other settings, data or seed.
     """

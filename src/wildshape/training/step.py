@@ -29,7 +29,6 @@ class Dials:
     """A step's settings, scalars on the device.
 
     Attributes:
-        step: number of the step.
         rate: learning rate, the very tensor that the optimiser reads.
         fresh: share of the new weights in their running mean.
     """

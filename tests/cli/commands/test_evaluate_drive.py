@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from wildshape.cli.main import main
-from wildshape.io.scans.points import write_ply
+from wildshape.io.scans.writers import write_ply
 
 SCANS = 3
 

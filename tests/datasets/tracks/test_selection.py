@@ -10,7 +10,7 @@ import pytest
 from wildshape.datasets.tracks.selection import LARGEST_M, Selection
 from wildshape.datasets.tracks.source import all_tracks
 from wildshape.datasets.tracks.whole_tracks import Folder
-from wildshape.io.scans.points import write_ply
+from wildshape.io.scans.writers import write_ply
 from wildshape.method.checkpoint import SHIPPED, load_checkpoint
 
 

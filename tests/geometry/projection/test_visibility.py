@@ -43,21 +43,10 @@ def scene(projection, seed=0, count=300):
 
 @pytest.mark.parametrize("projection", PROJECTIONS)
 @pytest.mark.parametrize("seed", range(3))
-def test_one_point_an_occupied_bin_and_it_is_the_nearest(projection, seed):
-    points, centre = scene(projection, seed)
-    bins, mask = seen(points, centre, projection)
-    index, depth = bins.index[0], bins.depth[0]
-    assert 0 < int(mask.sum()) < len(points)
-    assert sorted(index[mask].tolist()) == sorted(set(index.tolist()))
-    for i in torch.nonzero(mask)[:, 0].tolist():
-        assert float(depth[i]) == float(depth[index == index[i]].min())
-
-
-@pytest.mark.parametrize("projection", PROJECTIONS)
-@pytest.mark.parametrize("seed", range(3))
 def test_equal_to_the_loop(projection, seed):
     points, centre = scene(projection, seed)
     _, mask = seen(points, centre, projection)
+    assert 0 < int(mask.sum()) < len(points)
     assert torch.nonzero(mask)[:, 0].tolist() == naive.visible(points, centre, projection)
 
 

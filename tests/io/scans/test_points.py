@@ -8,13 +8,8 @@ import pytest
 
 from wildshape.errors import BadInputError
 from wildshape.io.scans.arrays import read_rows
-from wildshape.io.scans.points import (
-    SUFFIXES,
-    Coordinates,
-    read_points,
-    read_scan,
-    write_ply,
-)
+from wildshape.io.scans.points import SUFFIXES, Coordinates, read_points, read_scan
+from wildshape.io.scans.writers import write_ply
 
 FORMATS = [
     "array.npy",

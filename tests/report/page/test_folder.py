@@ -19,7 +19,7 @@ from wildshape.evaluation.tables import COUNTED
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.poses import write_poses
-from wildshape.io.scans.points import write_ply
+from wildshape.io.scans.writers import write_ply
 from wildshape.io.tracks import write_track
 from wildshape.records import Track
 from wildshape.report.page.folder import report_from_folder

@@ -12,7 +12,7 @@ from tests.report.viewer.shown import perfect, track
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import stack
 from wildshape.io.poses import write_poses
-from wildshape.io.scans.points import write_ply
+from wildshape.io.scans.writers import write_ply
 from wildshape.io.tracks import write_track
 from wildshape.records import Completion, Sensor, Track
 from wildshape.report.viewer.live_completion import from_model

@@ -86,8 +86,5 @@ def _settings(values: object) -> DpcSettings:
     return settings
 
 
-def _build(settings: DpcSettings) -> DpcNet:
-    return DpcNet(settings.network)
-
-
-_FORMAT = Format(FORMAT, VERSION, "train it with wildshape train --preset dpc", _settings, _build)
+_SOURCE = "train it with wildshape train --preset dpc"
+_FORMAT = Format(FORMAT, VERSION, _SOURCE, _settings, lambda s: DpcNet(s.network))

@@ -43,12 +43,7 @@ def load(model: Path, device: str = "cpu") -> "Dpc":
 
 @dataclass(frozen=True)
 class Dpc:
-    """Completes and registers from the image of a scan; the student's pose speaks.
-
-    Attributes:
-        network: trained.
-        settings: of its training.
-    """
+    """Completes and registers from the image of a scan; the student's pose speaks."""
 
     network: DpcNet
     settings: DpcSettings

@@ -58,11 +58,7 @@ class DpcPoses(NamedTuple):
 
 
 class DpcNet(nn.Module):
-    """A convolutional encoder, a dense decoder of points, K + 1 small pose branches.
-
-    Args:
-        config: sizes.
-    """
+    """A convolutional encoder, a dense decoder of points, K + 1 small pose branches."""
 
     def __init__(self, config: DpcConfig) -> None:
         super().__init__()

@@ -65,9 +65,6 @@ class DpcRecipe:
     Attributes:
         name: of the preset.
         network: sizes, and the sensor.
-        loss: weights.
-        views: how batches are drawn.
-        optim: optimiser and schedule.
         save_every: steps between two savings.
     """
 
@@ -121,12 +118,7 @@ PRESETS = {recipe.name: recipe for base in (dpc(), dpc_dagger(), dpc_lidar())
 
 
 class DpcObjective(nn.Module):
-    """The reference view's shape, posed by each view's best candidate, must look like the view.
-
-    Args:
-        network: is trained.
-        config: weights.
-    """
+    """The reference view's shape, posed by each view's best candidate, must look like the view."""
 
     def __init__(self, network: DpcNet, config: DpcLoss) -> None:
         super().__init__()

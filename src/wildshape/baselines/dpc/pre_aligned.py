@@ -24,7 +24,6 @@ class PreAligned:
     """Completes in the object's own frame.
 
     Attributes:
-        method: trained.
         R_object_canonical: found by `pre_aligned`.
     """
 

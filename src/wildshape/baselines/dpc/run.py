@@ -40,11 +40,9 @@ class DpcRun:
     """All that a run needs, set up.
 
     Attributes:
-        recipe: what to train and how.
         seed: of weights and batches.
         folder: where the results go.
         state: network, its running mean and the optimiser.
-        sampler: draws the batches.
         identity: what a state must share with a run that resumes it.
         provenance: written into the checkpoint.
     """
@@ -94,12 +92,7 @@ def setup_dpc(
 def fit_dpc(
     run: DpcRun, report: Progress | None = None, stopped: Callable[[], bool] = lambda: False
 ) -> None:
-    """Train to the last step by the loop that all trainings have; a finished run stays as it is.
-
-    Args:
-        run: set up.
-        report: called every 25 steps with the step and the means since the last call.
-        stopped: asked after every step.
+    """As `fit` of all trainings, whose loop it is; a finished run stays as it is.
 
     Raises:
         StopRequested: `stopped` said so; model and state are saved.

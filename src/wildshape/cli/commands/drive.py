@@ -212,7 +212,8 @@ def _answer(
 
     said = [] if change is None else [change.sentence]
     said += map(_sentence, done.found)
-    data: dict[str, Any] = {"drives": list(map(_data, done.found))}
+    found = [{**asdict(one), "out": str(one.out)} for one in done.found]
+    data: dict[str, Any] = {"drives": found}
     if change is not None:
         data["adapted"] = change.data
     if several:
@@ -339,7 +340,3 @@ def _sentence(found: "DriveResult") -> str:
         f" in {duration(sum(found.seconds.values()))} with {counted(found.workers, 'worker')};"
         f" see {page if page.is_file() else found.out}"
     )
-
-
-def _data(found: "DriveResult") -> dict[str, Any]:
-    return {**asdict(found), "out": str(found.out)}

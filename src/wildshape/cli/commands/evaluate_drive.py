@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from tyro.conf import Positional, arg
 
 from wildshape.cli.options import AsJson, Overwrite, option
+from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
     from wildshape.io.output import Output
@@ -95,8 +96,6 @@ def run(settings: Settings) -> None:
 
 
 def _check(settings: Settings) -> None:
-    from wildshape.errors import BadInputError
-
     if settings.points < 0:
         raise BadInputError(f"--points {settings.points}: expected 0 or more.")
     if not settings.range > 0:

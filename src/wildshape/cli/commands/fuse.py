@@ -9,6 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from wildshape.cli.options import DEFAULT_SCANS, Scans
+from wildshape.errors import BadInputError
 
 EXAMPLES = (
     "wildshape fuse track --out fused.ply",
@@ -80,8 +81,6 @@ def _keep_out(track: Path, out: Path) -> None:
     Raises:
         BadInputError: it would lie there.
     """
-    from wildshape.errors import BadInputError
-
     scans = track / "scans" if (track / "scans").is_dir() else track
     if out.resolve().parent == scans.resolve():
         raise BadInputError(

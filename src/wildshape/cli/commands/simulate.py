@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from tyro.conf import Positional, arg
 
 from wildshape.cli.options import AsJson, Layout, Overwrite, option
+from wildshape.errors import BadInputError
 from wildshape.simulate.sensor import SensorName
 
 EXAMPLES = (
@@ -88,8 +89,6 @@ def run(settings: Settings) -> None:
         BadInputError: a setting out of range, a mesh that cannot be used, or an existing output.
         MissingExtraError: the ray caster is not installed.
     """
-    from wildshape.errors import BadInputError
-
     if settings.seed < 0:
         raise BadInputError(f"--seed {settings.seed}: expected 0 or more.")
     _refuse(settings, OF_TRACKS if settings.drive else OF_DRIVES)
@@ -109,8 +108,6 @@ def _refuse(settings: Settings, foreign: tuple[str, ...]) -> None:
     Raises:
         BadInputError: one is given.
     """
-    from wildshape.errors import BadInputError
-
     for name in foreign:
         if getattr(settings, name) != getattr(Settings, name):
             said = "means nothing with" if settings.drive else "needs"
@@ -157,7 +154,6 @@ def _drive(settings: Settings) -> None:
 
 def _tracks(settings: Settings) -> None:
     from wildshape.cli.terminal import TERMINAL, answer
-    from wildshape.errors import BadInputError
     from wildshape.geometry.projection.full_scan import MOST_RAYS
     from wildshape.io.progress import counted, duration
     from wildshape.io.write_tracks import write_tracks

@@ -18,6 +18,7 @@ from wildshape.cli.options import (
     listed,
     option,
 )
+from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -152,7 +153,6 @@ def _scans(settings: Settings, path: Path) -> "Source":
 def _evaluated(settings: Settings) -> "Source":
     """The data of an evaluation, the worst object first, completed once more."""
     from wildshape.baselines.compare import OURS
-    from wildshape.errors import BadInputError
     from wildshape.io.guard import reading
     from wildshape.io.inputs import open_tracks
     from wildshape.io.scans.points import SENSOR_METRES

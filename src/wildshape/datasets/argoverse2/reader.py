@@ -55,10 +55,8 @@ class Argoverse2:
     Attributes:
         root: a log, a split folder (`val`), or one of the two folders above.
         selection: which objects and scans; its categories are the data set's, default `VEHICLES`.
-        crop: how much around the labelled box belongs to the object.
         lidar: whose points are taken; see `read_sensor_pose` for the frame of the scans.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
     """
 
     root: Path

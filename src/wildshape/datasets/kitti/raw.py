@@ -44,9 +44,7 @@ class KittiRaw:
         root: a drive folder, a date folder or the folder above.
         selection: which objects and scans; its categories are `objectType`s, by default `VEHICLES`.
             Whether an object moves is told by the drive's GPS/IMU records, read if it is asked.
-        crop: how much around the labelled box belongs to the object.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
     """
 
     root: Path

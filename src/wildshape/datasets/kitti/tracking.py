@@ -39,9 +39,7 @@ class KittiTracking:
         root: the folder above `training`, or `training` (the testing half has no labels).
         selection: which objects and scans; categories are the labels' types, by default `VEHICLES`.
             Whether an object moves is known where `oxts` lies beside the labels.
-        crop: how much around the labelled box belongs to the object.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
     """
 
     root: Path
@@ -113,8 +111,6 @@ class _Sequence:
     """An opened sequence.
 
     Attributes:
-        name: of the sequence.
-        labels: its boxes.
         scans: the velodyne file of each frame that has one.
         T_velo_rect: from the rectified camera frame of the labels to the velodyne's.
         T_world_velo: one pose a frame; None where there is no GPS/IMU record.

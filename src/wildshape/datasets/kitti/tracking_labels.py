@@ -35,7 +35,6 @@ class LabelledBox:
     """One object in one frame.
 
     Attributes:
-        frame: number of the frame.
         track: the object's number, unique in its sequence.
         category: for example `Car`.
         size: full lengths along the box's own x (forward), y (left), z (up), metres.

@@ -47,12 +47,10 @@ class NuScenes:
         root: the folder with `v1.0-*`, `samples` and `sweeps`, or one of its `v1.0-*` folders.
         selection: which objects and scans; categories are words of the data set's dotted names
             (`vehicle.bus.rigid`, `bus` or `bus.rigid`), default `VEHICLES`.
-        crop: how much around the labelled box belongs to the object.
         sweeps: also take the 20 Hz sweeps between the 2 Hz key frames; boxes are interpolated.
         lidar: channel of the LiDAR; default: the first of `CHANNELS` that there is.
         cache: where the index of the tables is kept; default `table_index.cache_folder()`.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
     """
 
     root: Path

@@ -54,9 +54,7 @@ class PandaSet:
     Attributes:
         root: a scene, the folder of the scenes, or the folder above.
         selection: which objects and scans; its categories are the data set's, default `VEHICLES`.
-        crop: how much around the labelled cuboid belongs to the object.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
     """
 
     root: Path

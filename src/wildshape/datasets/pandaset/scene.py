@@ -149,11 +149,7 @@ class Drive:
 
 
 def read_drive(scene: Path, frames: int) -> Drive:
-    """The poses of a scene.
-
-    Args:
-        scene: its folder.
-        frames: how many it must have at least.
+    """The poses of a scene, which has at least so many frames.
 
     Raises:
         BadInputError: a file is missing or corrupt, or has another number of poses.

@@ -26,7 +26,7 @@ from wildshape.datasets.tracks.gathering import Gathering
 from wildshape.datasets.tracks.parts import found_in
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
-from wildshape.records import Intrinsics, Sensor, Track
+from wildshape.records import Sensor, Track
 
 
 @dataclass
@@ -36,13 +36,11 @@ class Bop:
     Attributes:
         root: the data set, one of its splits, or one scene.
         selection: which objects and scans; categories are such as `obj_000005`.
-        cut: how points are cut out of a depth image.
         shapes: whether to sample the true shapes from the models.
         shape_points: of a true shape.
         longest: most scans of a track, and most frames in which an object may be unseen before its
             track ends: memory stays flat however long a scene is.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
     """
 
     root: Path
@@ -124,7 +122,7 @@ class Bop:
         mask = read_png(path, "a PNG mask of one channel") != 0
         if mask.shape != depth.shape:
             raise BadInputError(f"{path}: {mask.shape} pixels, its depth image has {depth.shape}.")
-        camera = _sized(frame.camera, depth)
+        camera = replace(frame.camera, height=depth.shape[0], width=depth.shape[1])
         points = cut_out(depth, mask, camera, self.cut)
         place = None
         if frame.T_camera_world is not None:
@@ -140,10 +138,6 @@ class Bop:
                 continue
             shape = model_shape(scene.folder, track.category, self.shape_points)
             yield replace(track, shape=shape)
-
-
-def _sized(camera: Intrinsics, depth: np.ndarray) -> Intrinsics:
-    return replace(camera, height=depth.shape[0], width=depth.shape[1])
 
 
 def _name(part: str, thing: Thing) -> str:

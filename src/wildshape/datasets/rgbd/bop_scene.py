@@ -54,7 +54,6 @@ class Frame:
         stem: of its files, six digits.
         camera: pixel i covers [i, i + 1): half a pixel is added to cam_K's principal point.
         metres: of one unit of the depth image.
-        things: the objects in it.
         T_camera_world: if the data set says so.
     """
 
@@ -70,7 +69,6 @@ class Scene:
     """A folder of images.
 
     Attributes:
-        folder: where it lies.
         frames: in the order of their numbers.
         camera: of the first image.
     """

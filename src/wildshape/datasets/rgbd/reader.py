@@ -57,12 +57,10 @@ class Rgbd:
     Attributes:
         root: a folder of sequences, or one.
         selection: which objects and scans; categories are the words of objects.json.
-        cut: how points are cut out.
         gap: an object that is not seen for more than so many frames begins a new track, and so
             does one at `longest` scans: memory stays flat however long a sequence is.
         longest: most scans of a track.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
         doubts: on the camera of the sequence that was read last.
     """
 

@@ -32,7 +32,6 @@ class Sequence:
     """One folder of frames.
 
     Attributes:
-        folder: where it lies.
         depth: the depth images in time order.
         camera: pixel i covers [i, i + 1): half a pixel is added to the file's cx and cy.
         depth_scale: units of the depth images in a metre.

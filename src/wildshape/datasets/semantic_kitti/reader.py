@@ -65,7 +65,6 @@ class SemanticKitti:
             it stays one object over the whole sequence, as it is labelled.
         longest_m: as `LONGEST_M`, of the categories that it does not name, metres.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
     """
 
     root: Path

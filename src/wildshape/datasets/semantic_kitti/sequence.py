@@ -42,7 +42,6 @@ class Sequence:
     """An opened sequence.
 
     Attributes:
-        folder: where it lies.
         name: of the sequence, the beginning of its tracks' names.
         files: the label file of each frame that has one.
         kinds: the class ids that are asked for.

@@ -40,7 +40,6 @@ class ShapeNetViews:
         views: a model's first so many depth images, in the order of their names, as DPC takes.
         pixels: of a larger image only so many rows and columns are taken, the nearest ones, as
             DPC does for its 128; 0 takes all. Its points stay on the rays of their own pixels.
-        rejected: see `Source`.
     """
 
     root: Path

@@ -32,7 +32,6 @@ class PartResult:
     """What became of a part.
 
     Attributes:
-        part: its name.
         tracks: how many were written; `scans` and `points` likewise.
         left_out: how many objects and scans were not, by reason.
         names: of the tracks that were written as folders, in order.
@@ -74,7 +73,6 @@ class Conversion:
     """`convert_part` for each part of a data set; handed to workers.
 
     Attributes:
-        source: the data set.
         folder: of the finished parts.
         layout: see `convert_part`; `truth` likewise.
     """

@@ -31,7 +31,6 @@ class Folder:
             is larger than any vehicle is left out: it may be a scan of a whole scene.
         unit: of the coordinates on disk.
         origin: the sensor's position in them.
-        rejected: see `Source`.
         doubts: see `TrackSource`, of the part that was read last.
     """
 
@@ -87,7 +86,6 @@ class Packed:
     Attributes:
         root: of the store.
         selection: which objects and scans; 16 points are the least that any model takes.
-        rejected: see `Source`.
     """
 
     root: Path

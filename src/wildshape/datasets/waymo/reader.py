@@ -51,9 +51,7 @@ class Waymo:
         root: a split's folder, which holds `lidar`, `lidar_box`, ..., or the folder above.
         selection: which objects and scans; categories are `vehicle` (the default), `pedestrian`,
             `sign`, `cyclist`.
-        crop: how much around the labelled box belongs to the object.
         rays: with each scan keep the rays of its frame that passed the object by, too.
-        rejected: see `Source`.
     """
 
     root: Path
@@ -179,10 +177,6 @@ def frames(tables: dict[str, Path], boxes: dict[int, list[Labelled]]) -> Iterato
 
 def find_splits(root: Path, components: tuple[str, ...] = COMPONENTS) -> list[Path]:
     """Split folders at, or just below `root`, that have all tables needed, sorted.
-
-    Args:
-        root: the folder.
-        components: the tables needed.
 
     Raises:
         BadInputError: there is none.

@@ -71,7 +71,8 @@ class Adaptation:
             end = f"kept; the weights are {self.model}"
         return (
             f"adapted on {counted(self.trained, 'track')} in {counted(self.steps, 'step')}"
-            f" ({duration(self.seconds)}); on {self.held_out} held out {_change(self)}: {end}"
+            f" ({duration(self.seconds)}); on {self.held_out} held out"
+            f" {_change(self.before, self.after)}: {end}"
         )
 
     @property
@@ -80,10 +81,7 @@ class Adaptation:
         return {"sentence": self.sentence, "kept": self.model is not None, **asdict(self)}
 
 
-def _change(one: Adaptation) -> str:
-    before, after = one.before, one.after
-    if before is None or after is None:
-        return ""
+def _change(before: Measures, after: Measures) -> str:
     sides = zip(("length", "width", "height"), before.spread_m, after.spread_m)
     spread = ", ".join(f"{name} {was:.3f} to {now:.3f} m" for name, was, now in sides)
     return (

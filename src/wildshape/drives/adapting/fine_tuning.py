@@ -7,7 +7,7 @@ left to themselves, near-symmetric vehicles turn around.
 """
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ import torch
 
 from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.adapting.examples import Example
+from wildshape.drives.clock import Watch
 from wildshape.inference.predictor import Predictor
 from wildshape.io.output import command_line, provenance
 from wildshape.io.store.store import Store, is_finished_store, open_store
@@ -25,12 +26,11 @@ from wildshape.training.config import OptimConfig, Recipe, ValidationConfig
 from wildshape.training.loop import fit, setup
 from wildshape.training.recipes import default
 
-Told = Callable[[str, int, int], None]
 _BASE, _STORE, _RUN = "base.safetensors", "tracks.store", "run"
 
 
 def taught(
-    base: Predictor, examples: Sequence[Example], folder: Path, config: AdaptConfig, told: Told
+    base: Predictor, examples: Sequence[Example], folder: Path, config: AdaptConfig, told: Watch
 ) -> Path:
     """A checkpoint trained on the examples; an interrupted run is gone on with.
 
@@ -39,7 +39,7 @@ def taught(
         examples: tracks to train on.
         folder: to work in.
         config: see there.
-        told: a stage, how much of it is done, and how much there is.
+        told: of its stages.
 
     Raises:
         BadInputError: what an earlier run left is damaged.

@@ -48,14 +48,7 @@ def measure(
     config: AdaptConfig,
     at: Callable[[int], None],
 ) -> Measures:
-    """The measures of a model.
-
-    Args:
-        predictor: of the model.
-        examples: tracks held out.
-        config: see there.
-        at: told how many tracks are done.
-    """
+    """The measures of a model."""
     rows = []
     for done, example in enumerate(examples, 1):
         some = example.some(config.measured)
@@ -74,14 +67,7 @@ def clear_headed(
     config: AdaptConfig,
     at: Callable[[int], None],
 ) -> list[Example]:
-    """Those of which it is sure which way they look: they drive there, or most scans say so.
-
-    Args:
-        predictor: of the earlier model.
-        examples: all that there are.
-        config: see there.
-        at: told how many are done.
-    """
+    """Those of which it is sure which way they look: they drive there, or most scans say so."""
     raw = Predictor(predictor.network, predictor.settings, raw=True, config=predictor.config)
     kept = []
     for done, example in enumerate(examples, 1):

@@ -51,13 +51,7 @@ def begin_second(out: Path, model: str) -> None:
 
 
 def conclude(out: Path, found: DriveResult, model: str) -> DriveResult:
-    """Say that a second pass is finished, put its results in place, and give back what it found.
-
-    Args:
-        out: the drive's folder.
-        found: by the second pass.
-        model: that completed it.
-    """
+    """Say that a second pass is finished, put its results in place, and give back what it found."""
     result = {**asdict(found), "out": str(out)}
     said = {"result": result, "adapted": fingerprint(Path(model))}
     write_json(stages_of(out) / _FINISHED, said)

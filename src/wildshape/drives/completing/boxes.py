@@ -48,13 +48,7 @@ class Way:
 
 
 def smooth(one: Completed, turns: Turns, config: BoxConfig) -> Way:
-    """The way of one vehicle over the frames in which it was seen, and short gaps between.
-
-    Args:
-        one: completed.
-        turns: of the drive's sensor.
-        config: see there.
-    """
+    """The way of one vehicle over the frames in which it was seen, and short gaps between."""
     seen = one.seen.frames
     frames = [seen[0]]
     for frame in seen[1:]:

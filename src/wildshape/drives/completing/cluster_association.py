@@ -94,14 +94,7 @@ def _in_boxes(
 def in_box(
     points: Points, box: Float[np.ndarray, "4"], size: tuple[float, float, float], around_m: float
 ) -> Bool[np.ndarray, "n"]:
-    """Which points lie in an upright box or so near around it.
-
-    Args:
-        points: in the box's frame.
-        box: centre x, y, z and yaw.
-        size: length, width, height.
-        around_m: metres.
-    """
+    """Which points lie in an upright box (centre x, y, z and yaw) or so near around it."""
     reach = np.array(size) / 2 + around_m
     return np.all(np.abs(as_box_sees(points, box)) <= reach, axis=1)
 

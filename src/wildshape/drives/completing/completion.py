@@ -100,13 +100,9 @@ class Completer:
     """What completes the objects of one drive, some at a time: networks are faster in batches.
 
     Attributes:
-        predictor: completes and refines.
-        drive: whose objects.
         cuts: folder of the clusters.
         folder: where a folder of each object is written.
         T_level_sensor: of a tilted sensor; None for one held level, as networks expect it.
-        config: see there.
-        vehicles: what speaks for one.
     """
 
     predictor: Predictor

@@ -76,13 +76,7 @@ def as_box_sees(points: Points, box: Float[np.ndarray, "4"]) -> Float[np.ndarray
 
 
 def read_completed(seen: Sightings, folder: Path, drive: Drive, turns: Turns) -> Completed:
-    """A completed object in the level world.
-
-    Args:
-        seen: the object.
-        folder: where `completion.py` wrote it.
-        drive: whose.
-        turns: of its sensor.
+    """A completed object, from where `completion.py` wrote it, in the level world.
 
     Raises:
         BadInputError: the files are damaged.
@@ -112,12 +106,6 @@ def on_ground(one: Completed, cuts: Path, turns: Turns, config: BoxConfig) -> Co
     """The same vehicle, its boxes from the ground up, as data sets label them.
 
     What a scan holds of wheels is cut with the ground, and so are the shapes that networks learn.
-
-    Args:
-        one: completed.
-        cuts: folder of the clusters.
-        turns: of the drive's sensor.
-        config: how much of a gap is believed.
     """
     rows = dict(zip(one.seen.frames, one.seen.rows))
     length, width, height = one.size
@@ -157,13 +145,7 @@ def weighted_median(values: Float[np.ndarray, "k"], weights: Float[np.ndarray, "
 def boxes_in_scans(
     boxes: Float[np.ndarray, "k 4"], size: tuple[float, float, float], T_level_sensor: SE3
 ) -> list[Box]:
-    """Upright boxes of the level world, each in the sensor frame of its frame.
-
-    Args:
-        boxes: centre x, y, z and yaw.
-        size: length, width, height.
-        T_level_sensor: `(k,)` of these frames.
-    """
+    """Boxes of the level world (centre x, y, z and yaw), each in the sensor frame of its frame."""
     upright = SE3(rotation_z(torch.from_numpy(boxes[:, 3])), torch.from_numpy(boxes[:, :3]))
     T_sensor_box = T_level_sensor.inverse() @ upright
     turns = quaternion_from_rotation(T_sensor_box.rotation).tolist()

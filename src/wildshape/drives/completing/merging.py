@@ -24,13 +24,7 @@ _LOOKED_AT = 7  # frames that tell whether two share a place
 
 @dataclass
 class Places:
-    """Where completed objects of a drive are, and which of them are one.
-
-    Attributes:
-        turns: of the drive's sensor.
-        config: see there.
-        boxes: how objects move.
-    """
+    """Where completed objects of a drive are, and which of them are one."""
 
     turns: Turns
     config: MergeConfig

@@ -20,15 +20,7 @@ _SOME = 3  # scans that tell most objects
 def carries_sensor(
     seen: Sightings, cuts: Path, T_world_sensor: SE3, nearest_m: float, config: OwnVehicleConfig
 ) -> bool:
-    """Whether an object goes with the sensor and begins where the nearest points are cut off.
-
-    Args:
-        seen: the object.
-        cuts: folder of the clusters.
-        T_world_sensor: of every frame.
-        nearest_m: nearer points were cut off.
-        config: see there.
-    """
+    """Whether an object goes with the sensor and begins where the nearest points are cut off."""
     places = T_world_sensor.translation.numpy()[list(seen.frames)]
     if np.linalg.norm(places[-1] - places[0]) < config.way_m:
         return False

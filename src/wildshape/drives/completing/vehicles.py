@@ -27,7 +27,6 @@ class Judged:
     """What was said of an object.
 
     Attributes:
-        name: of it.
         confidence: that it is a vehicle, 0 to 1.
         reasons: why it is no vehicle, or not this one; empty for vehicles.
     """
@@ -67,14 +66,7 @@ def judge(objects: list[Completed], places: Places, config: VehicleConfig) -> li
 def surer_if_driving(
     one: Completed, turns: Turns, boxes: BoxConfig, config: VehicleConfig
 ) -> Completed:
-    """What gets far and looks the way it goes is a vehicle, whatever the weights make of its shape.
-
-    Args:
-        one: completed.
-        turns: of the drive's sensor.
-        boxes: what counts as moving.
-        config: see there.
-    """
+    """What gets far and looks the way it goes is a vehicle, whatever is said of its shape."""
     kind = one.p_kind
     if kind is None or kind < config.least_driving:
         return one
@@ -128,25 +120,14 @@ def stated(one: Completed, sure: Mapping[str, float]) -> float:
 
 
 def shape_nats(cost_m: float, size: tuple[float, float, float], config: VehicleConfig) -> float:
-    """What a completed shape alone says for a vehicle, log-odds: its label-free cost and its size.
-
-    Args:
-        cost_m: metres.
-        size: length, width, height, metres.
-        config: see there.
-    """
+    """What a completed shape alone says for a vehicle, log-odds: its cost and its size."""
     cost = (config.even_cost_m - cost_m) / config.cost_scale_m
     apart = (np.array(size) / np.array(config.kinds) - 1.0) / config.spread
     return cost + 1.0 - 0.5 * float((apart**2).sum(1).min())
 
 
 def vehicle_sized(clouds: Sequence[Points], config: VehicleConfig) -> bool:
-    """Whether the points alone are as long, wide and high as a vehicle, in the middle one of scans.
-
-    Args:
-        clouds: of one object, level frames.
-        config: see there.
-    """
+    """Whether the points, level frames, are as large as a vehicle, in the middle one of scans."""
     sides = np.median([(*extents(cloud), np.ptp(cloud[:, 2])) for cloud in clouds], axis=0)
     return all(low <= side <= high for side, (low, high) in zip(sides, _sizes(config)))
 

@@ -62,13 +62,7 @@ def held_against(
 
 @dataclass(frozen=True)
 class _Shown:
-    """One scan after the other shown to watchers; it goes along to other processes.
-
-    Attributes:
-        read: see `show_scans`.
-        turns: see there.
-        watchers: see there.
-    """
+    """One scan after the other shown to watchers; it goes along to other processes."""
 
     read: Callable[[int], Points]
     turns: Turns
@@ -83,14 +77,7 @@ class _Shown:
 def show_scans(
     read: Callable[[int], Points], turns: Turns, *watchers: Watcher, in_order: InOrder = map
 ) -> None:
-    """Show watchers the scans that they ask for.
-
-    Args:
-        read: the whole scan of a frame, sensor frame, metres.
-        turns: of the drive's sensor.
-        watchers: who is shown them.
-        in_order: looks at the scans.
-    """
+    """Show watchers the scans that they ask for; arguments as of `held_against`."""
     frames = sorted(frozenset[int]().union(*(one.frames for one in watchers)))
     for said in in_order(_Shown(read, turns, watchers), frames):
         for one, counted in zip(watchers, said):

@@ -19,11 +19,7 @@ from wildshape.records import Box, Points
 
 @dataclass(frozen=True)
 class BoxCutter(Cutter):
-    """Cuts what is in the boxes out of the scans of a drive.
-
-    Attributes:
-        detections: of the drive.
-    """
+    """Cuts what is in the boxes out of the scans of a drive."""
 
     detections: Detections
 
@@ -76,13 +72,7 @@ def cut_boxes(
 def points_in_boxes(
     points: Points, boxes: list[Box], config: DetectionConfig
 ) -> Bool[np.ndarray, "k n"]:
-    """Which points belong to each box: those in it, and those around it that are in no other.
-
-    Args:
-        points: sensor frame.
-        boxes: in the same frame.
-        config: how far around.
-    """
+    """Which points belong to each box: those in it, and those around it that are in no other."""
     apart = [np.abs(pose_of(box).inverse().apply_numpy(points)) for box in boxes]
     halves = [np.asarray(box.size) / 2 for box in boxes]
     shape = len(boxes), len(points)

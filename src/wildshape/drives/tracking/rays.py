@@ -26,12 +26,7 @@ class RayCutter:
         return RayCutter, (self.drive, self.cuts)
 
     def in_frame(self, frame: int, objects: Sequence[tuple[int, ...]]) -> list[SightLines | None]:
-        """Those beside each of some objects, sensor frame; None for all if the scan is not there.
-
-        Args:
-            frame: which.
-            objects: the clusters of each.
-        """
+        """Those beside each of some objects, sensor frame; None for all if the scan is not read."""
         full, cut = self._scans(frame), read_cut(self.cuts, frame)
         if len(full.points) != cut.scanned:
             return [None] * len(objects)

@@ -78,9 +78,7 @@ class Cutter:
 
     Attributes:
         drive: its scans are read one by one.
-        mounting: of its sensor.
         folder: `000000.npz` of each frame is written there.
-        config: see there.
     """
 
     drive: Drive

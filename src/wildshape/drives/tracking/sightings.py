@@ -21,7 +21,6 @@ class Sightings:
     """Where one object is among the clusters of a drive.
 
     Attributes:
-        name: of the object.
         frames: in which it was seen, rising.
         rows: of its clusters in each of them; fragments are several.
         points: of its clusters in each of them.

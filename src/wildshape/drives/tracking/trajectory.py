@@ -235,14 +235,7 @@ def _steps_differ(drive: Drive, frame: int) -> bool:
 def landmarks(
     turn: Turn, heights: Float[np.ndarray, "n"], mounting: Mounting, config: DriveConfig
 ) -> Turn:
-    """What stands on the ground, and the ground near the sensor: a point a cell, as KISS-ICP thins.
-
-    Args:
-        turn: whole.
-        heights: of its points above the ground (`ground.py`).
-        mounting: of the sensor.
-        config: see there.
-    """
+    """What stands on the ground, and the ground near the sensor: a point a cell, as in KISS-ICP."""
     level = mounting.level(turn.points)
     away = np.hypot(level[:, 0], level[:, 1])
     used = (away < config.trajectory.ground_m) | (heights > config.trajectory.standing_m)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from wildshape.drives.completing.completion import CATEGORY
-from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle, read_finished
+from wildshape.drives.writing.finished import FinishedDrive, read_finished
 from wildshape.drives.writing.folder import MCAP, MESHES, RRD
 from wildshape.drives.writing.playback.mcap import check_mcap, write_mcap
 from wildshape.drives.writing.playback.rerun import load_rerun, write_rerun
@@ -62,7 +62,8 @@ class DriveFiles:
             self.boxes.write_detections(found.out, list(detections_of(found)), found.name)
         if self.mesh is not None:
             for one in found.vehicles:
-                _write_mesh(found, one, self.mesh)
+                path = found.out / MESHES / f"{one.name}.{self.mesh}"
+                write_mesh(path, closed_mesh(found.shape(one)))
         if self.mcap:
             write_mcap(found, found.out / MCAP)
         if self.rerun:
@@ -104,9 +105,3 @@ def _time_ns(seconds: float, scan: str) -> int:
     time_ns = round(seconds * 1e9)
     named = scan.isascii() and scan.isdigit() and abs(int(scan) - time_ns) < _ROUNDED_NS
     return int(scan) if named else time_ns
-
-
-def _write_mesh(found: FinishedDrive, one: FoundVehicle, kind: MeshFormat) -> None:
-    """A vehicle's mesh, in the frame of its box."""
-    path: Path = found.out / MESHES / f"{one.name}.{kind}"
-    write_mesh(path, closed_mesh(found.shape(one)))

@@ -89,13 +89,11 @@ class FinishedDrive:
     """What `wildshape drive` left in a folder.
 
     Attributes:
-        out: the folder.
         scan_names: one a frame.
         times: seconds, if known.
         ticks: when each scan was taken, counted in scans, if times are not known.
         scanned: points of each scan.
         T_level_sensor: from each frame's sensor frame to the level world.
-        turns: of the sensor.
         ground_m: height of the sensor above the ground.
         vehicles: by name.
         record: what `wildshape.json` holds.
@@ -162,12 +160,7 @@ class FinishedDrive:
         return read_points(self.out / SHAPES / f"{vehicle.name}.ply")
 
     def scan(self, vehicle: FoundVehicle, name: str) -> Points:
-        """`(n, 3)` one of a vehicle's scans as measured, sensor frame, metres; none if it is lost.
-
-        Args:
-            vehicle: whose.
-            name: of the frame.
-        """
+        """`(n, 3)` a vehicle's scan of a frame as measured, sensor frame; none if it is lost."""
         try:
             return read_points(self.out / TRACKS / vehicle.name / "scans" / f"{name}.ply")
         except BadInputError:

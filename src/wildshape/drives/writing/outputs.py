@@ -28,7 +28,8 @@ from wildshape.io.boxes.table import BoxRow
 from wildshape.io.guard import read_json
 from wildshape.io.poses import write_poses, write_tum
 from wildshape.io.rays import rays_bytes
-from wildshape.io.scans.points import read_points, write_ply
+from wildshape.io.scans.points import read_points
+from wildshape.io.scans.writers import write_ply
 from wildshape.io.tracks import file_names, write_track
 from wildshape.records import Box
 
@@ -74,7 +75,6 @@ class RayWriter:
     """Writes the rays beside vehicles into their track folders, a frame at a time.
 
     Attributes:
-        cutter: of the drive.
         files: by frame: where each vehicle's go, and its clusters.
     """
 
@@ -112,8 +112,6 @@ class VehicleWriter:
         out: folder of the results.
         folders: of the completed objects.
         cuts: folder of the clusters.
-        drive: whose.
-        turns: of its sensor.
     """
 
     out: Path

@@ -38,7 +38,6 @@ class FoundDrive:
     """What was found in a drive.
 
     Attributes:
-        path: of the folder.
         frames: the vehicles of each scan.
         T_world_sensor: the trajectory, if there is one.
     """
@@ -129,10 +128,6 @@ def points_inside(drive: FoundDrive, scans: Sequence[Path]) -> Clusters:
     """The points in and close around each found box, without the ground under it.
 
     For drives whose clusters were not kept.
-
-    Args:
-        drive: what was found.
-        scans: its files, of KITTI's format.
 
     Raises:
         BadInputError: a scan is damaged.

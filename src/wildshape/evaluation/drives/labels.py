@@ -103,7 +103,6 @@ class LabelledFrame:
     """The labels of one scan.
 
     Attributes:
-        labels: of everything.
         regions: `(k, 4)` left, top, right, bottom that nobody cared to label, pixels.
     """
 
@@ -121,7 +120,6 @@ class LabelledDrive:
         scans: their files.
         view: of the camera that labels were drawn for; None: all around is labelled.
         T_world_sensor: the true trajectory, if known.
-        counting: what counts.
     """
 
     path: Path

@@ -85,13 +85,11 @@ class RowScores:
     """One row of the table.
 
     Attributes:
-        name: of the row.
         detections: at each overlap.
         labels: that count.
         boxes: found, of those that are asked for.
         hota: None where nothing is labelled.
         identity_switches: at an IoU of 0.5.
-        purity: of the tracks.
         size_bias_m: mean of found minus labelled length, width, height; None where nothing is
             found.
         vehicles: every labelled vehicle.

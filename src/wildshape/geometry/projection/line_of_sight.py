@@ -108,9 +108,6 @@ def surrounded(points: Float[np.ndarray, "n 3"]) -> bool:
 
     Frank-Wolfe steps to the hull's point nearest to the origin. As soon as all points lie before
     a plane through the origin it is outside; for a real scan that is seen at the first step.
-
-    Args:
-        points: of one object, sensor frame.
     """
     exact = points.astype(np.float64)
     reach = _NEAR * extent(exact)

@@ -186,13 +186,7 @@ def standing(
 def seen_alike(
     starts: Float[np.ndarray, "m 3"], start: Float[np.ndarray, "3"], middle: Float[np.ndarray, "3"]
 ) -> Bool[np.ndarray, "m"]:
-    """From which places an object is seen from much the same side as from another place.
-
-    Args:
-        starts: of rays.
-        start: the other place, the same frame.
-        middle: of the object.
-    """
+    """From which places an object is seen from much the same side as from another place."""
     toward, from_there = middle - starts, middle - start
     lengths = np.linalg.norm(toward, axis=1) * np.linalg.norm(from_there)
     return toward @ from_there >= _ALIKE * lengths

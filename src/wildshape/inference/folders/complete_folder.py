@@ -238,7 +238,6 @@ class _PartCompleter:
     """Completes a part and writes its shapes and meshes.
 
     Attributes:
-        predictor: does the work.
         out: a folder of each track is written there.
         together: use all scans of a track together.
         clouds: format of the shapes.

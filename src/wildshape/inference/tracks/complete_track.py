@@ -40,7 +40,7 @@ from wildshape.inference.tracks.heading_vote import (
     turned_where,
     voted_signs,
 )
-from wildshape.inference.tracks.joint_icp import fused, refine_checked
+from wildshape.inference.tracks.joint_icp import fused, refine_checked, sampled
 from wildshape.inference.tracks.pose_outliers import without_outliers
 from wildshape.inference.tracks.track_cost import network_inputs, track_cost
 from wildshape.method.checkpoint import ModelSettings
@@ -158,8 +158,9 @@ def complete_together(
         solid = without_free_space(shape, fit.T_sensor_object, sights)
     bottom = gathered.bottom if body else None
     fitted = _box(solid, scans, fit.T_sensor_object, settings, config.box, bottom)
-    whole = _denser(shape, config) if settings.facing else shape
+    whole = shape
     if settings.facing:
+        whole = denser(shape[None], partners(shape[None], config.refine.partner))[0]
         seen = _shown_by(scans, fit.T_sensor_object, whole, settings, config.track)
         middles, own = whole[len(shape) :].float().numpy(), shape.float().numpy()
         added = shown(middles, own, seen.numpy(), settings, config.refine)
@@ -197,10 +198,6 @@ def _evidence(
     length, width, height = fitted.size.tolist()
     size = length, width, height
     return track_features(gathered.done, gathered.rows, T_sensor_object, size, cost)
-
-
-def _denser(shape: Float[Tensor, "P 3"], config: InferenceConfig) -> Float[Tensor, "Q 3"]:
-    return denser(shape[None], partners(shape[None], config.refine.partner))[0]
 
 
 def _shown_by(
@@ -294,18 +291,11 @@ def _votes(
     if settings.sensor == "lidar":
         links = nearness_of_next(T_sensor_can.inverse().translation, middle, config.vote)
     else:
-        clouds = _some_of_each(gathered.scans, T_sensor_can, config.voting_points) / unit
+        some = torch.from_numpy(sampled(gathered.scans, config.voting_points))
+        clouds = T_sensor_can.inverse().apply(some.double()).float() / unit
         mirror = settings.network.mirror
         links = likeness_of_next(clouds, middle / unit, mirror=mirror, config=config.vote)
     return gain / unit, links
-
-
-def _some_of_each(scans: list[Points], T_sensor_object: SE3, count: int) -> Float[Tensor, "V n 3"]:
-    """As many points of each scan, object frame."""
-    rng = np.random.default_rng(0)
-    rows = [rng.permutation(len(s))[np.arange(count) % len(s)] for s in scans]
-    picked = torch.stack([torch.from_numpy(s[row]) for s, row in zip(scans, rows)])
-    return T_sensor_object.inverse().apply(picked.double()).float()
 
 
 def _seen(

@@ -16,6 +16,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from wildshape.geometry.surface import mirrored
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import HeadingVoteConfig
 from wildshape.ops.nearest import nearest
@@ -185,9 +186,7 @@ def likeness_of_next(
         config: `far_m`, `same_side_m`.
     """
     turned = half_turn(middle_x, clouds.dtype).apply(clouds)
-    bank = clouds
-    if mirror:
-        bank = torch.cat((clouds, clouds * clouds.new_tensor((1.0, -1.0, 1.0))), dim=1)
+    bank = mirrored(clouds) if mirror else clouds
     there = _difference(turned[:-1], clouds[:-1], bank[1:], config)
     back = _difference(turned[1:], clouds[1:], bank[:-1], config)
     return (there + back).double()

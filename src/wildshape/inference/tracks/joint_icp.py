@@ -140,7 +140,7 @@ def refine_jointly(
     if len(scans) < 2:
         return T_sensor_object
     each = max(1, min(config.points, config.most // len(scans)))
-    points = torch.from_numpy(_sampled(scans, each))
+    points = torch.from_numpy(sampled(scans, each))
     start = T_sensor_object.to(torch.float32).inverse()
     T_object_sensor = start
     onto = torch.arange(len(scans)) if onto is None else onto
@@ -165,7 +165,7 @@ def fused_surface(
     scans: list[Points], T_sensor_object: SE3, config: JointIcpConfig, *, mirror: bool
 ) -> Surface:
     """What some scans show together, `most` points (with `mirror` twice as many), object frame."""
-    points = torch.from_numpy(_sampled(scans, config.most // len(scans)))
+    points = torch.from_numpy(sampled(scans, config.most // len(scans)))
     points = T_sensor_object.to(torch.float32).inverse().apply(points).flatten(0, 1)
     surface = Surface(points, surface_normals(points, config))
     return Surface(*(mirrored(part[None])[0] for part in surface)) if mirror else surface
@@ -175,15 +175,8 @@ def fused_surface(
 def refine_onto(
     surface: Surface, scans: list[Points], T_sensor_object: SE3, config: JointIcpConfig
 ) -> SE3:
-    """Poses near the given ones under which each scan by itself lies on a surface.
-
-    Args:
-        surface: of the same object (`fused_surface`).
-        scans: sensor frames, metres.
-        T_sensor_object: one pose a scan.
-        config: how.
-    """
-    points = torch.from_numpy(_sampled(scans, config.points))
+    """Poses near the given ones under which each scan by itself lies on a surface."""
+    points = torch.from_numpy(sampled(scans, config.points))
     T_object_sensor = T_sensor_object.to(torch.float32).inverse()
     for step in range(config.rounds):
         moved = T_object_sensor.apply(points)
@@ -200,7 +193,7 @@ def stayed_near(before: SE3, after: SE3, config: TrackConfig = _TRACK) -> Bool[T
     return (moved.angle() < config.within_rad) & (moved.translation.norm(dim=-1) < config.within_m)
 
 
-def _sampled(scans: list[Points], count: int) -> Float[np.ndarray, "V n 3"]:
+def sampled(scans: list[Points], count: int) -> Float[np.ndarray, "V n 3"]:
     """As many points of every scan, chosen by a fixed seed."""
     rng = np.random.default_rng(0)
     rows = [rng.permutation(len(scan))[np.arange(count) % len(scan)] for scan in scans]

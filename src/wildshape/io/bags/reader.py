@@ -42,7 +42,6 @@ class Bag:
     """The scans of one topic of a recording, in time order.
 
     Attributes:
-        topic: its name.
         times: of each scan, seconds, increasing: the messages' own stamps, or when they were
             recorded if they bear none.
         warnings: what is odd about it, a sentence each.
@@ -124,7 +123,8 @@ def open_bag(path: Path, topic: str | None = None) -> Bag:
         except (MissingExtraError, MemoryError):
             raise
         except Exception as error:  # noqa: BLE001 - whatever it is, the scans before it are good
-            damaged.append(f"{file.name} is cut off or damaged ({_said(error)})")
+            why = first_line(error) or type(error).__name__
+            damaged.append(f"{file.name} is cut off or damaged ({why})")
         topics |= storage.topics
     chosen = _chosen(path, topic, topics, damaged)
     scans = found.get(chosen, [])
@@ -133,10 +133,6 @@ def open_bag(path: Path, topic: str | None = None) -> Bag:
     told = tuple(f"{one}; {len(scans)} scans could be read" for one in damaged)
     scans, others = _of_one_sensor(chosen, scans)
     return _in_order(chosen, scans, (*told, *others))
-
-
-def _said(error: Exception) -> str:
-    return first_line(error) or type(error).__name__
 
 
 def _listed(message: Message, file: Path) -> _Scan:
@@ -167,15 +163,12 @@ def _chosen(path: Path, topic: str | None, topics: dict[str, str], damaged: list
             f"{path}: {'; '.join([*damaged, f'no topic of {CLOUD}, found {there}'])}; record the"
             " point clouds of the sensor's driver."
         )
+    every = ", ".join(clouds)
     if topic is not None:
-        raise BadInputError(f"{path}: no topic {topic} of point clouds; there are {_all(clouds)}.")
+        raise BadInputError(f"{path}: no topic {topic} of point clouds; there are {every}.")
     if len(clouds) > 1:
-        raise BadInputError(f"{path}: choose one of its topics with --topic: {_all(clouds)}.")
+        raise BadInputError(f"{path}: choose one of its topics with --topic: {every}.")
     return clouds[0]
-
-
-def _all(names: list[str]) -> str:
-    return ", ".join(names)
 
 
 def _of_one_sensor(topic: str, scans: list[_Scan]) -> tuple[list[_Scan], tuple[str, ...]]:

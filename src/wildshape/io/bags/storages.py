@@ -31,7 +31,6 @@ class Message(NamedTuple):
     """A point cloud as recorded.
 
     Attributes:
-        topic: its name.
         logged: when it was recorded, nanoseconds.
         key: finds it again in its file.
         data: serialized.
@@ -50,7 +49,6 @@ class Storage(ABC):
     """A file of recorded messages.
 
     Attributes:
-        path: of the file.
         topics: the type of each topic, known once all messages were read.
     """
 

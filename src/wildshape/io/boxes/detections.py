@@ -46,7 +46,6 @@ class Detection:
         category: for example `car`; empty if unknown.
         sensor: tells the axes of the frame.
         score: confidence, 0 to 1.
-        box: in the scan's sensor frame.
         sequence: name of the drive; empty where each track is one of its own.
         time_ns: when the scan was taken, if known.
         points: of the scan that belong to the object, if known.

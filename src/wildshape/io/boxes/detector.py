@@ -19,7 +19,6 @@ class DetectorBox:
         scan: the scan's name or its number, as the file has it; an int counts scans from 0.
         category: as the file has it, for example `Car`; empty if unknown.
         track: which object it is, if known.
-        box: in the scan's sensor frame, metres.
         score: the detector's own, if it gives one.
     """
 

@@ -28,10 +28,6 @@ _OBJECT, _TRACKING = (15, 16), (17, 18)  # fields of a line, without and with a 
 def read_kitti_file(path: Path, T_rect_sensor: SE3) -> list[DetectorBox]:
     """The boxes of one file; of the object benchmark's the scan is the file's name.
 
-    Args:
-        path: of the file.
-        T_rect_sensor: from the scans' frame to the rectified camera frame.
-
     Raises:
         BadInputError: it cannot be read, or a line has another format.
     """

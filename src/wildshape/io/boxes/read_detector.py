@@ -21,11 +21,6 @@ _PICKLES = (".pkl", ".pickle")
 def read_detector_boxes(path: Path, T_rect_sensor: SE3, scans: int) -> list[DetectorBox]:
     """All boxes of a file, or of the files in a folder by name.
 
-    Args:
-        path: of either.
-        T_rect_sensor: from the scans' frame to KITTI's rectified camera frame.
-        scans: of the drive.
-
     Raises:
         BadInputError: no such format, a file of it that is damaged, or files of several drives.
     """

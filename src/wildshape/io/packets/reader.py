@@ -21,7 +21,6 @@ class PacketFile:
     """A recording of packets.
 
     Attributes:
-        path: of the file.
         turns: in it.
     """
 

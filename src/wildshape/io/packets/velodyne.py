@@ -78,7 +78,6 @@ class VelodyneTurns:
     """The turns of a recording, in time order.
 
     Attributes:
-        path: of the file.
         times: of each turn's last packet, seconds.
         warnings: what is odd about it, a sentence each.
         source: the sensor whose turns they are, if there are any.

@@ -17,30 +17,7 @@ from wildshape.io.scans.las import read_las
 from wildshape.io.scans.pcd import read_pcd
 from wildshape.io.scans.ply import read_ply
 from wildshape.io.scans.text import header_unit, read_text
-from wildshape.io.scans.writers import write_ply
 from wildshape.records import Unit
-
-__all__ = [
-    "LEAST_POINTS",
-    "METRES",
-    "SENSOR_METRES",
-    "SUFFIXES",
-    "Coordinates",
-    "ScanFile",
-    "Unit",
-    "check_near",
-    "check_one_object",
-    "check_repeats",
-    "check_scan",
-    "drop_nonfinite",
-    "is_finite",
-    "is_scan_file",
-    "read_all",
-    "read_points",
-    "read_scan",
-    "without_repeats",
-    "write_ply",
-]
 
 _READERS: dict[str, tuple[str, Callable[[Path], Float[np.ndarray, "n 3"]]]] = {
     ".ply": ("a PLY file", read_ply),

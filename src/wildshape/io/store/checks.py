@@ -99,11 +99,6 @@ def _refuse(said: str) -> None:
 def check_index(index: dict[str, np.ndarray], manifest: dict[str, Any], path: Path) -> None:
     """Whether the parts of an index fit each other, and `index.json`: nothing points outside.
 
-    Args:
-        index: all its tensors.
-        manifest: what `index.json` says.
-        path: of the store.
-
     Raises:
         BadInputError: something does not fit.
     """

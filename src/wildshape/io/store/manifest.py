@@ -28,14 +28,7 @@ _CHECKSUM = "checksum"
 def manifest_of(
     index: FileRecord, shards: list[FileRecord], counts: dict[str, int], provenance: dict[str, Any]
 ) -> dict[str, Any]:
-    """What `index.json` says.
-
-    Args:
-        index: the file of the index.
-        shards: the files of points, in order.
-        counts: of `tracks`, `scans` and `points`.
-        provenance: JSON values.
-    """
+    """What `index.json` says."""
     return sealed(
         {
             "format": FORMAT,

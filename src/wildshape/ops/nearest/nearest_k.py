@@ -10,7 +10,7 @@ from torch import Tensor
 
 from wildshape.errors import BadInputError
 from wildshape.ops.library import added_kernel, check_memory
-from wildshape.ops.nearest.neighbours import Neighbourhoods, as_int64, check_clouds
+from wildshape.ops.nearest.neighbours import Neighbourhoods, as_int64, beyond_sizes, check_clouds
 from wildshape.ops.threads import exact_threads
 
 _CHUNK_ELEMENTS = 1 << 22
@@ -104,7 +104,7 @@ def nearest_k_torch(
     index = torch.zeros(B, N, k, dtype=torch.int64, device=query.device)
     gone = ~target.isfinite().all(-1)
     if target_sizes is not None:
-        gone = gone | _beyond(target, target_sizes)
+        gone = gone | beyond_sizes(target, target_sizes)
     step = max(1, _CHUNK_ELEMENTS // max(B * M, 1))
     for start in range(0, N if M else 0, step):
         part = slice(start, start + step)
@@ -118,13 +118,8 @@ def nearest_k_torch(
     index = index.masked_fill(squared.isinf(), 0)
     if query_sizes is None:
         return Neighbourhoods(squared, index)
-    beyond = _beyond(query, query_sizes)[..., None]
+    beyond = beyond_sizes(query, query_sizes)[..., None]
     return Neighbourhoods(squared.masked_fill(beyond, 0.0), index.masked_fill(beyond, 0))
-
-
-def _beyond(points: Tensor, sizes: Int[Tensor, "B"]) -> Tensor:
-    """`(B, n)`: which places lie past each row's size."""
-    return torch.arange(points.shape[1], device=points.device) >= sizes.to(points.device)[:, None]
 
 
 def check_k(

@@ -6,7 +6,7 @@ import torch
 from jaxtyping import Float, Float32, Int, Int64
 from torch import Tensor
 
-from wildshape.ops.nearest.neighbours import Neighbours, check_clouds
+from wildshape.ops.nearest.neighbours import Neighbours, beyond_sizes, check_clouds
 
 _CHUNK_ELEMENTS = 1 << 19  # 2 MiB of float32: stays in the cache
 _BLOCK = 32
@@ -120,7 +120,7 @@ def _far_away(
     """Put targets infinitely far away that are padding or not finite."""
     gone = ~target.isfinite().all(-1)
     if sizes is not None:
-        gone = gone | _beyond(target, sizes)
+        gone = gone | beyond_sizes(target, sizes)
     return target.masked_fill(gone[..., None], torch.inf)
 
 
@@ -130,10 +130,5 @@ def _cleared(found: Neighbours, broken: Tensor, sizes: Int[Tensor, "B"] | None) 
     squared, index = squared.masked_fill(broken, torch.inf), index.masked_fill(broken, 0)
     if sizes is None:
         return Neighbours(squared, index)
-    beyond = _beyond(index, sizes)
+    beyond = beyond_sizes(index, sizes)
     return Neighbours(squared.masked_fill(beyond, 0.0), index.masked_fill(beyond, 0))
-
-
-def _beyond(rows: Tensor, sizes: Int[Tensor, "B"]) -> Tensor:
-    """`(B, n)`: which places lie past each row's size."""
-    return torch.arange(rows.shape[1], device=rows.device) >= sizes.to(rows.device)[:, None]

@@ -67,6 +67,11 @@ def as_int64(sizes: Int[Tensor, "B"] | None) -> Int64[Tensor, "B"] | None:
     return None if sizes is None else sizes.to("cpu", torch.int64).contiguous()
 
 
+def beyond_sizes(rows: Tensor, sizes: Int[Tensor, "B"]) -> Tensor:
+    """`(B, n)`: which places lie past each row's size."""
+    return torch.arange(rows.shape[1], device=rows.device) >= sizes.to(rows.device)[:, None]
+
+
 def check_neighbours(found: Neighbours, query: Tensor) -> None:
     """Refuse neighbours that are not those of as many queries.
 

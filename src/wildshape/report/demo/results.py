@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the demo measures, makes of unseen scans, says and draws."""
 
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -136,14 +137,6 @@ def _completion(name: str, ours: Mapping[str, Any], one_scan: Mapping[str, Any])
     )
 
 
-@dataclass(frozen=True)
-class _Cost:
-    """Figures for the tiles."""
-
-    steps: int
-    rate: float
-
-
 def draw(
     out: Path,
     output: Output,
@@ -155,13 +148,13 @@ def draw(
     driven: DemoDrive,
 ) -> Path:
     """Write `report.html`; returns its path."""
-    cost = _cost(out / "run" / "log.jsonl")
+    steps, rate = _pace(out / "run" / "log.jsonl")
     tables = tuple(metrics_table(as_json([results[rotate]], {})) for rotate in _PROTOCOLS)
     report = Report(
         title="Wildshape demo",
         summary="\n\n".join(
             (
-                f"Trained on {data.described} without labels, for {cost.steps} steps; everything"
+                f"Trained on {data.described} without labels, for {steps} steps; everything"
                 f" below is of {data.tested}, which it has never seen.",
                 *judged,
                 driven.sentence,
@@ -169,8 +162,8 @@ def draw(
         ),
         cost=(
             ("all of it", duration(seconds)),
-            ("training steps", f"{cost.steps}"),
-            ("steps a second", f"{cost.rate:.1f}"),
+            ("training steps", f"{steps}"),
+            ("steps a second", f"{rate:.1f}"),
             ("scans trained on", data.described.split()[0]),
         ),
         tables=tables,
@@ -192,12 +185,11 @@ _NOTE = (
 )
 
 
-def _cost(log: Path) -> _Cost:
-    import json
-
+def _pace(log: Path) -> tuple[int, float]:
+    """The last step, and the middle one of the steps a second."""
     entries = [json.loads(line) for line in log.read_text("utf-8").splitlines()]
     rates = [entry["steps_per_second"] for entry in entries if "steps_per_second" in entry]
-    return _Cost(entries[-1]["step"], sorted(rates)[len(rates) // 2])
+    return entries[-1]["step"], sorted(rates)[len(rates) // 2]
 
 
 def _slug(name: str) -> str:

@@ -72,12 +72,6 @@ def run_demo(
 
     At last a whole simulated drive, the vehicles in it found.
 
-    Args:
-        out: folder to write.
-        options: what of.
-        progress: is told what goes on.
-        stopping: a context of the training; what it gives is asked between two steps.
-
     Raises:
         BadInputError: the user's data cannot be used, or a demo is there already.
         StopRequested: `stopping` said so.

@@ -30,7 +30,6 @@ class DriveAndPage:
     """`drive` of a source into a folder, and its `report.html`.
 
     Attributes:
-        predictor: completes the objects.
         topic: see `drive`, as `config`, `files`, `detections`, `adapt` and `overwrite`.
         report: write the page, too, where there is none.
         workers: processes for one drive.

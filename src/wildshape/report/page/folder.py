@@ -106,7 +106,7 @@ def report_from_folder(folder: Path, inputs: Path | None = None) -> Report:
         objects=tuple(_checked_object(one, where) for one in drawn),
         notes=tuple(_notes(len(tracks), len(drawn))),
         provenance=_provenance(folder, evaluations),
-        figures=tuple(_figure(one, file) for one in evaluations for file in _pictures(one.path)),
+        figures=tuple(picture for one in evaluations for picture in _pictures(one)),
     )
 
 
@@ -126,12 +126,9 @@ def _judged(folder: Path, where: Inputs) -> Judged:
         return judge(read_result(folder, where))
 
 
-def _pictures(metrics: Path) -> list[Path]:
-    return sorted(metrics.parent.glob("*.png"))
-
-
-def _figure(of: Evaluation, picture: Path) -> Figure:
-    return Figure(f"{of.which}{picture.stem.replace('_', ' ')}", picture.read_bytes())
+def _pictures(of: Evaluation) -> Iterator[Figure]:
+    for file in sorted(of.path.parent.glob("*.png")):
+        yield Figure(f"{of.which}{file.stem.replace('_', ' ')}", file.read_bytes())
 
 
 def _summary(folder: Path, evaluations: list[Evaluation], tracks: int, curves: int) -> str:

@@ -85,7 +85,8 @@ def worst_first(judged: Iterable[Judged]) -> list[Judged]:
 
 def index_of(ranked: Sequence[Judged], drawn: int) -> Table:
     """All tracks in a table, the first `drawn` of them leading to their object."""
-    by = "error" if any(_truth(one) != (None, None) for one in ranked) else "confidence"
+    known = any((one.cd, one.rotation_deg) != (None, None) for one in ranked)
+    by = "error" if known else "confidence"
     first = "the largest error" if by == "error" else "the least confidence"
     columns, rows = _without_empty(
         (
@@ -155,10 +156,6 @@ def objects_of_scores(scores: Path, method: str) -> Table | None:
         f"objects in this order.{_meaning(columns)}",
         sortable=True,
     )
-
-
-def _truth(one: Judged) -> tuple[float | None, float | None]:
-    return one.cd, one.rotation_deg
 
 
 def _row(one: Judged) -> tuple[Cell, ...]:

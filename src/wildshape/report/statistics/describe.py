@@ -35,7 +35,6 @@ class Description:
 
     Attributes:
         title: its name.
-        statistics: the numbers.
         written: the files.
     """
 

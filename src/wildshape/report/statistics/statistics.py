@@ -36,7 +36,6 @@ class Quantity:
         title: for people.
         unit: of the numbers; empty for counts.
         basis: what it was taken from, in words.
-        tally: the numbers.
     """
 
     name: str
@@ -91,11 +90,6 @@ def sample_of(count: int, wanted: int) -> list[int]:
 def statistics_of_store(store: Store, chosen: list[int], at: Callable[[int], None]) -> Statistics:
     """The numbers of a packed store; only the points of the chosen tracks are read.
 
-    Args:
-        store: however large.
-        chosen: numbers of the tracks whose points are read.
-        at: called with the number of tracks read.
-
     Raises:
         BadInputError: the store is damaged.
     """
@@ -130,11 +124,6 @@ def statistics_of_tracks(
     source: TrackSource, chosen: list[int], at: Callable[[int], None]
 ) -> Statistics:
     """The numbers of tracks in files, of which the chosen ones are read, one held at a time.
-
-    Args:
-        source: a scan, TRACK or DATASET folder.
-        chosen: numbers of the tracks to read.
-        at: called with the number of tracks read.
 
     Raises:
         BadInputError: not a single one can be used; the message is that of the last.

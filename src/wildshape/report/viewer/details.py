@@ -18,14 +18,14 @@ _ROW = "<div style='display:flex;gap:.8em;justify-content:space-between'><span s
 
 def details(stage: Stage, wish: Wish, status: str = "") -> str:
     """A piece of HTML; every name is escaped."""
-    track = stage.track
+    track, done = stage.track, stage.completions.get(wish.scan, CompletedScan())
     about = ", ".join(part for part in (track.category, track.source) if part)
     parts = [
         f"<b style='overflow-wrap:anywhere'>{escape(track.name)}</b>",
         f"<div style='opacity:.65;overflow-wrap:anywhere'>{escape(about)}</div>" if about else "",
         *(row(label, value) for label, value in _rows(stage, wish)),
         _small(f"Completed shape: {LEGENDS[wish.colouring]}."),
-        _small(_warning(stage.completions.get(wish.scan)), "color:#d55e00"),
+        _small(done.warning, "color:#d55e00"),
         _small(status),
     ]
     inside = "".join(part for part in parts if part)
@@ -80,7 +80,3 @@ def row(label: str, value: str) -> str:
 
 def _small(text: str, style: str = "opacity:.65") -> str:
     return f"<div style='{style};margin-top:.4em'>{escape(text)}</div>" if text else ""
-
-
-def _warning(done: CompletedScan | None) -> str:
-    return done.warning if done is not None else ""

@@ -46,11 +46,7 @@ def serving_drive(
 ) -> AbstractContextManager["DrivePage"]:
     """The page of a drive for as long as the block runs; arguments and errors as of `serving`.
 
-    Args:
-        found: the drive.
-        port: see there.
-        allowed: see there.
-        moved: where the recording is now, if it is no longer where it was.
+    `moved` is where the recording is now, if it is no longer where it was.
 
     Raises:
         BadInputError: `moved` is another recording.

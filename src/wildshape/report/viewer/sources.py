@@ -31,7 +31,6 @@ class CompletedScan:
 
     Attributes:
         points: the completed shape; None where only the pose was asked for.
-        box: around it.
         pose: `T_sensor_canonical`.
         confidence: 0 to 1.
         chances: the probabilities that make it, by the words for them (`results.MEANING`).

@@ -7,12 +7,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
 
 from wildshape.geometry.sampling import thin
-from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.registration import fuse_scans
+from wildshape.io.boxes.detections import pose_of
 from wildshape.records import Box, Points, Track
 from wildshape.report.content import BLUE, GREEN, GREY, ORANGE
 from wildshape.report.scene import TRUTH_POINTS, box_segments
@@ -42,7 +41,6 @@ class Wish:
     """What the panel asks for.
 
     Attributes:
-        scan: number of the scan.
         shown: of `scan`, `completed`, `box`, `axes`, `fused`, `truth`.
         way: whose poses fuse the track, one of `fusing.WAYS`.
         hold: what stands still.
@@ -177,10 +175,12 @@ class Stage:
 
     def _show_lines(self, wish: Wish, T_draw_sensor: SE3) -> None:
         done = self.completions.get(wish.scan, CompletedScan())
-        for kind, T_sensor_own in (("box", _box_pose(done.box)), ("axes", done.pose)):
+        box = None if done.box is None else pose_of(done.box)
+        for kind, T_sensor_own in (("box", box), ("axes", done.pose)):
             visible = kind in wish.shown and T_sensor_own is not None
             if T_sensor_own is None or (not visible and kind not in self.lines):
-                _hide(self.lines.get(kind))
+                if kind in self.lines and self.lines[kind].visible:
+                    self.lines[kind].visible = False
                 continue
             handle = self._line(kind)
             handle.wxyz, handle.position = as_node(T_draw_sensor @ T_sensor_own)
@@ -263,16 +263,3 @@ class Stage:
     def _shaded(self, points: Points, colour: str) -> Rgb:
         heights = upright(self.track.sensor.kind).apply_numpy(points)[:, 2]
         return by_height(heights, colour)
-
-
-def _box_pose(box: Box | None) -> SE3 | None:
-    """`T_sensor_box`."""
-    if box is None:
-        return None
-    rotation = rotation_from_quaternion(torch.tensor(box.quaternion_wxyz, dtype=torch.float64))
-    return SE3(rotation, torch.tensor(box.centre, dtype=torch.float64))
-
-
-def _hide(handle: Any) -> None:
-    if handle is not None and handle.visible:
-        handle.visible = False

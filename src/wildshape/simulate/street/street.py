@@ -60,7 +60,6 @@ class Actor:
         track: number, unique in the drive.
         kind: `Car`, `Van`, `Truck` or `Pedestrian`, as KITTI names them.
         size: of its box, metres.
-        motion: along the street.
         lateral: metres to the left of the street's middle.
         heading: turn against the street's direction, radians.
         seed: what its shape is drawn from.

@@ -26,7 +26,6 @@ class Surfaces:
     """Solids in one scene, and what they are.
 
     Attributes:
-        scene: of the solids.
         owner: `(k,)` the track number of each solid's actor, or `NOBODY`.
         ground: `(k,)` whether it is ground, which is told at more grazing angles.
         glass: of all faces, solid after solid.

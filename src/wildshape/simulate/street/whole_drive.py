@@ -103,7 +103,6 @@ class TrueBox:
         size: along its own x (forward), y (left), z (up), metres; a vehicle's without mirrors.
         T_sensor_object: `(4, 4)`, origin at the box's centre, when the beam passed that centre.
         points: how many of the scan's points lie on it.
-        moving: whether it moves.
     """
 
     track: int

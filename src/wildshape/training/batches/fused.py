@@ -40,7 +40,6 @@ class DrawConfig:
         near_m: LiDAR scans from nearer than this are drawn more often, as their distance squared.
         near: at most so many times.
         without_rays: share of the scans whose rays are left out, so that scans alone work, too.
-        occlusion: what is taken away of LiDAR scans.
     """
 
     sensors: int = 2

@@ -166,7 +166,7 @@ class ViewSampler:
         self, scans: list[int], rng: np.random.Generator
     ) -> tuple[Float[Tensor, "B n 3"], Float[Tensor, "B 3"]]:
         """Scans of the store, centred and resampled, and their centres."""
-        clouds = torch.stack([self._resampled(scan, rng) for scan in scans])
+        clouds = torch.stack([self.picked(scan, rng) - self._centre(scan) for scan in scans])
         return clouds, torch.stack([self._centre(scan) for scan in scans])
 
     def extent_range(self, scans: int = 500) -> tuple[float, float]:
@@ -185,9 +185,6 @@ class ViewSampler:
         near = scans[rng.integers(last + 1) :]
         near = near[near < near[0] + config.window]
         return rng.choice(near, size=config.views, replace=len(near) < config.views)
-
-    def _resampled(self, scan: int, rng: np.random.Generator) -> Tensor:
-        return self.picked(scan, rng) - self._centre(scan)
 
     def picked(self, scan: int, rng: np.random.Generator) -> Float[Tensor, "n 3"]:
         """A scan of the store resampled with replacement, sensor frame, metres."""

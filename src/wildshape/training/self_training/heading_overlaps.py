@@ -15,11 +15,11 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from wildshape.geometry.surface import mirrored
 from wildshape.inference.tracks.heading_vote import half_turn
 from wildshape.ops.nearest import nearest
 
 _SMALLEST_M = 1e-9
-_ACROSS = (1.0, -1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -57,9 +57,7 @@ def agreeing_signs(
     """
     size = clouds.flatten(0, 1)
     far = config.far * float((size.amax(0) - size.amin(0)).norm()) + _SMALLEST_M
-    seen = clouds
-    if mirror:
-        seen = torch.cat((clouds, clouds * clouds.new_tensor(_ACROSS)), dim=1)
+    seen = mirrored(clouds) if mirror else clouds
     turned = half_turn(middle_x, clouds.dtype).apply(seen)
     rows = [
         _contradiction(turned, cloud, sensor, far) - _contradiction(seen, cloud, sensor, far)

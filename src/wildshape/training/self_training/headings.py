@@ -51,9 +51,6 @@ class HeadingConfig:
 
     Attributes:
         scan_points: of each scan, where scans and tracks are compared.
-        overlap: how views that come in no order contradict each other.
-        profile: how alike tracks are.
-        contradiction: when a trained network's own word counts for more than the profiles.
     """
 
     scan_points: int = 256

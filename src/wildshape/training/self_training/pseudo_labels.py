@@ -80,11 +80,6 @@ class SelfTrainingConfig:
         headings: which way tracks look; also agreed on in the midst of a run without a teacher.
         transfer: which way views look, asked of weights of another sensor.
         track: outliers among the poses, and how scans are moved onto the mean of all.
-        graph: how scans are laid on their neighbours.
-        fusion: how scans become a shape.
-        roof: which roofs nobody saw.
-        draw: which scans are drawn, and what is changed of them.
-        loss: how far the network is from what it is taught.
     """
 
     headings: HeadingConfig = field(default_factory=HeadingConfig)
@@ -106,13 +101,11 @@ class Teacher:
     """Who poses the scans, and what is known of them.
 
     Attributes:
-        network: poses the scans.
         settings: of its checkpoint.
         views: of the tracks trained on, as the next network reads them.
         asked: of the same tracks, as the teacher reads them.
         time_ordered: the scans of a track follow each other (`LossConfig.time_ordered`).
         headings: is asked which way each scan looks; None if the tracks agree among themselves.
-        config: the rules' numbers.
         fronts: where the object of each scan of the store looks, where that is known.
     """
 

@@ -92,14 +92,7 @@ def save_targets(folder: Path, targets: FusedTargets, identity: dict[str, str]) 
 def load_targets(
     folder: Path, identity: dict[str, str], scans: int, tracks: int
 ) -> FusedTargets | None:
-    """The targets kept beside a run of the same identity; None if there are none, or damaged ones.
-
-    Args:
-        folder: of the run.
-        identity: says what they were made of.
-        scans: of the data.
-        tracks: that are trained on.
-    """
+    """The targets kept beside a run of the same identity; None without, or if they are damaged."""
     path = folder / TARGETS
     if not path.exists():
         return None

@@ -35,7 +35,6 @@ class Present:
     """A vehicle in one frame.
 
     Attributes:
-        vehicle: which.
         colour: red, green, blue, 0 to 255.
         T_level_box: where its box is.
         points: of the scan that belong to it.
