@@ -58,8 +58,10 @@ def atomic_write(path: Path | str) -> Iterator[IO[bytes]]:
         with _naming(path):
             temporary.chmod(0o666 & ~_umask())
             temporary.replace(path)
-    except BaseException:
+    except BaseException as error:
         temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename is None:  # a full disk names no file
+            error.filename = str(path)
         raise
 
 
