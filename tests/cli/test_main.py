@@ -77,6 +77,16 @@ def test_help_of_no_command_imports_torch():
     )
 
 
+@pytest.mark.parametrize("words", [("", "--out", "o"), ("t", "--out", ""), ("t", "--out=")])
+def test_an_empty_word_is_no_folder(refused, words, tmp_path, monkeypatch):
+    """As of a variable that is not set: it stood for the folder that one is in."""
+    monkeypatch.chdir(tmp_path)
+    for command in ("complete", "info", "convert"):
+        source = ("folder",) if command == "convert" else ()
+        assert "an argument is empty" in refused(command, *source, *words)
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_ends_with_examples_that_can_be_typed(wildshape, command):
     found = wildshape(command, "--help")

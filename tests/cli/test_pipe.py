@@ -116,6 +116,11 @@ def test_register_takes_a_pipe_for_either_scan(pipe, dataset):
     assert first == second == expected
 
 
+def test_a_mesh_is_no_json(refused, scan_file):
+    said = refused("complete", scan_file, "--out", "-", "--mesh", "--json")
+    assert "--mesh: with --json stdout holds points" in said
+
+
 def test_meshes_of_a_folder_are_coloured(wildshape, scan_file, trained, tmp_path):
     order = ("complete", scan_file, "--out", tmp_path / "c", "--model", trained, "--mesh")
     assert wildshape(*order, "--mesh-colours", "confidence", "--mesh-format", "obj").code == 0

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What scripts read: one JSON object on stdout and nothing else, from every command."""
 
+import io
 import json
 import signal
+import sys
 
 import numpy as np
 import pytest
@@ -43,6 +45,14 @@ def test_what_is_no_number_is_null(capsys):
     answer("", data, as_json=True)
     found = json.loads(capsys.readouterr().out, parse_constant=refuse)
     assert found == {"a": [1.5, None], "b": {"c": None}, "d": [None, "x", 3]}
+
+
+@pytest.mark.parametrize(("code", "shown"), [("ascii", "\\u8eca \\xe9"), ("cp1252", "\\u8eca é")])
+def test_a_terminal_that_does_not_know_a_letter_is_shown_its_number(code, shown, monkeypatch):
+    written = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written, code))
+    answer("see 車 é", {}, as_json=False)
+    assert written.getvalue().decode(code).strip() == f"see {shown}"
 
 
 def blame(number, error):

@@ -140,7 +140,7 @@ def test_rays_may_be_handed_in_in_any_form_and_none_change_nothing(track: Track,
     assert len(together) == 2
     refused(model.complete_track, track.scans, rays=[rays], match="1 sets of rays for 2 scans")
     refused(as_rays, 3, match="expected directions")
-    refused(as_rays, (np.eye(3), ["a"]), match="rays: could not convert")
+    refused(as_rays, (np.eye(3), ["a"]), match="rays: ranges are no array of numbers")
 
 
 def test_rays_count_in_every_way_to_pose_a_track(track: Track) -> None:

@@ -15,6 +15,7 @@ from tests.models import scan
 
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.predictor import load
+from wildshape.ops.device import plain_torch
 from wildshape.ops.nearest import nearest_k
 
 SCANS = [scan(seed, 300) for seed in range(3)]
@@ -29,6 +30,16 @@ def default_type(dtype):
         torch.set_default_dtype(torch.float32)
 
 
+@contextmanager
+def coarse_products():
+    torch.set_float32_matmul_precision("medium")
+    try:
+        yield
+        assert torch.get_float32_matmul_precision() == "medium"
+    finally:
+        torch.set_float32_matmul_precision("highest")
+
+
 def autocast():
     return torch.autocast("cpu", dtype=torch.bfloat16)
 
@@ -37,6 +48,7 @@ AROUND = {
     "float64": lambda: default_type(torch.float64),
     "float16": lambda: default_type(torch.float16),
     "autocast": autocast,
+    "coarse": coarse_products,
     "device": lambda: torch.device("meta"),  # as `torch.set_default_device` of a GPU
     "inference": torch.inference_mode,
 }
@@ -74,6 +86,13 @@ def test_neighbours_are_float32_whatever_is_the_default(dtype):
         found = nearest_k(points, points, 4).distance_squared
     assert found.dtype == torch.float32
     assert torch.equal(found, usual)
+
+
+def test_products_are_float32_whatever_is_set():
+    on_cpu = torch.backends.mkldnn.matmul  # pyright: ignore[reportAttributeAccessIssue]
+    for kind in (torch.backends.cuda.matmul, on_cpu):
+        with coarse_products(), plain_torch():
+            assert kind.fp32_precision == "ieee"
 
 
 def test_poses_can_have_gradients():

@@ -115,6 +115,19 @@ def test_rays_may_be_learned_of_and_have_one_range_each():
         as_rays((np.eye(3), np.ones((3, 1))))
 
 
+@pytest.mark.parametrize("which", [0, 1, 2])
+def test_masked_and_complex_rays_are_refused(which):
+    """numpy drops a mask, and imaginary parts, without a word."""
+    rays = [np.eye(3), np.ones(3), np.zeros((3, 3))]
+    assert len(as_rays(tuple(np.ma.masked_array(part) for part in rays)) or ()) == 3
+    for wrong, said in (
+        (np.ma.masked_less(rays[which], 2), "masked in part"),
+        (rays[which] * 1j, "no array of numbers"),
+    ):
+        with pytest.raises(BadInputError, match=f"^rays 7: .*{said}"):
+            as_rays([*rays[:which], wrong, *rays[which + 1 :]], "rays 7")
+
+
 def test_what_may_not_be_written_is_copied():
     """Of such an array torch warns, and warnings may be errors."""
     points = scan()
@@ -139,7 +152,7 @@ def test_a_place_counts_once_however_often_it_is_repeated(tmp_path):
 def test_scans_may_be_handed_in_one_after_the_other():
     scans = [scan(), scan()]
     assert [one is other for one, other in zip(each_of(one for one in scans), scans)] == [True] * 2
-    for wrong in ({"a": scans[0]}, "scan.ply", 3):
+    for wrong in ({"a": scans[0]}, "scan.ply", 3, {"b.ply", "a.ply"}):
         with pytest.raises(BadInputError, match="expected a list of scans"):
             each_of(wrong)
 

@@ -1,5 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
+import errno
 import json
 import os
 import stat
@@ -85,8 +86,14 @@ def test_a_folder_in_the_way_is_named(tmp_path: Path) -> None:
     (tmp_path / "taken" / "by").mkdir(parents=True)
     with pytest.raises(OSError, match="taken") as refused:
         write_text(tmp_path / "taken", "")
-    assert ".part" not in str(refused.value)
+    assert str(refused.value).endswith(f"'{tmp_path / 'taken'}'")
     assert [file.name for file in tmp_path.iterdir()] == ["taken"]
+
+
+def test_a_full_disk_names_the_file(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="No space left") as full, atomic_write(tmp_path / "a"):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    assert full.value.filename == str(tmp_path / "a")
 
 
 def test_names_that_are_no_utf8_are_spelt_out(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -155,6 +156,11 @@ def test_truth_beside_scans_is_no_scan(tmp_path: Path, cloud: np.ndarray) -> Non
 def test_nothing_recognisable(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match=r"no such file or folder.*pass a scan file"):
         open_tracks(tmp_path / "missing")
+    pipe = tmp_path / "pipe.ply"
+    os.mkfifo(pipe)
+    with pytest.raises(BadInputError, match=r"pipe\.ply: no such file or folder"):
+        open_tracks(pipe)
+    pipe.unlink()
     with pytest.raises(BadInputError, match=r"an empty folder.*pass a scan file"):
         open_tracks(tmp_path)
     (tmp_path / "a.pdf").write_text("")

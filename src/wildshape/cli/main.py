@@ -157,6 +157,11 @@ def _drop_output() -> None:
 def _parse(module: ModuleType, command: str, arguments: list[str]) -> object:
     import tyro
 
+    if any(not word or (word[:2] == "--" and word[-1] == "=") for word in arguments):
+        raise BadInputError(
+            f"{command}: an argument is empty, and would mean this folder; is a variable of the"
+            " shell not set? Name what is meant, or leave it away."
+        )
     said = StringIO()
     try:
         with redirect_stderr(said):

@@ -36,7 +36,8 @@ def say(text: str) -> None:
 def answer(text: str, data: Mapping[str, Any], *, as_json: bool) -> None:
     """The result of a command: a text, or with `--json` one JSON object, null for NaN."""
     said = json.dumps(_finite(data), allow_nan=False) if as_json else text
-    print(said.encode("utf-8", "backslashreplace").decode(), flush=True)
+    code = sys.stdout.encoding or "utf-8"
+    print(said.encode(code, "backslashreplace").decode(code), flush=True)
 
 
 def _finite(data: Any) -> Any:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is handed in from Python as a scan."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from operator import attrgetter
 from pathlib import Path
 
@@ -78,7 +78,7 @@ def each_of(scans: object, what: str = "scans") -> Sequence[object]:
     Raises:
         BadInputError: it holds none in an order.
     """
-    if isinstance(scans, str | Path | Mapping) or not isinstance(scans, Iterable):
+    if isinstance(scans, str | Path | Mapping | Set) or not isinstance(scans, Iterable):
         raise BadInputError(f"{what}: expected a list of {what}, found {type(scans).__name__}.")
     if getattr(scans, "ndim", 0) == 2:
         raise BadInputError(
@@ -140,8 +140,8 @@ def as_rays(rays: object, name: str = "rays") -> SightLines | None:
     if not isinstance(rays, tuple | list) or len(rays) not in (2, 3):
         raise BadInputError(f"{name}: expected directions (m, 3), ranges (m,) and perhaps origins.")
     try:
-        return SightLines(*(np.asarray(_host(part), np.float32) for part in rays))
-    except (TypeError, ValueError) as error:
+        return SightLines(*(np.asanyarray(_host(part)) for part in rays))  # masks stay
+    except (TypeError, ValueError, RuntimeError) as error:
         raise BadInputError(f"{name}: {str(error).removeprefix('rays: ')}") from error
 
 

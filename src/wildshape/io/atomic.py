@@ -64,8 +64,10 @@ def atomic_write(path: Path | str, *, flush: bool = False) -> Iterator[IO[bytes]
         with _naming(path):
             temporary.chmod(0o666 & ~_umask())
             temporary.replace(path)
-    except BaseException:
+    except BaseException as error:
         temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename is None:  # a full disk names no file
+            error.filename = str(path)
         raise
 
 
@@ -75,7 +77,8 @@ def _naming(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        error.filename, error.filename2 = str(path), None
+        error.filename = str(path)
+        del error.filename2  # None would be named, too
         raise
 
 

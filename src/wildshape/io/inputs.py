@@ -235,7 +235,7 @@ def open_tracks(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> T
             is to be read otherwise.
     """
     path = Path(path)
-    if not path.exists():
+    if not (path.is_file() or path.is_dir()):  # a pipe is neither
         raise BadInputError(f"{path}: no such file or folder; {_CURE}.")
     if path.is_file():
         return _single_scan(path, coordinates)

@@ -44,6 +44,7 @@ def choose_device(device: str | torch.device) -> str:
 def plain_torch() -> Iterator[None]:
     """Inside, in this thread: `inference_mode`, no autocast, and new tensors lie on the CPU.
 
+    Matrix products are float32 in full, of all threads: TF32 knows a car's far end to 2 mm only.
     A result is the same whatever the program around has set. Autograd refuses tensors made here;
     what a caller gets is copied (`SE3.owned`).
     """
@@ -53,6 +54,11 @@ def plain_torch() -> Iterator[None]:
                 held.enter_context(torch.autocast(kind, enabled=False))
         if torch.get_default_device().type != "cpu":
             held.enter_context(torch.device("cpu"))
+        on_cpu = torch.backends.mkldnn.matmul  # pyright: ignore[reportAttributeAccessIssue]
+        for products in (torch.backends.cuda.matmul, on_cpu):
+            if (before := products.fp32_precision) in ("tf32", "bf16"):
+                held.callback(setattr, products, "fp32_precision", before)
+                products.fp32_precision = "ieee"
         yield
 
 

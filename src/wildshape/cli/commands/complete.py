@@ -153,6 +153,8 @@ def _to_stdout(settings: Settings) -> None:
         from wildshape.inference.predictor import load
 
     mesh = _mesh(settings)
+    if mesh is not None and settings.scans.json:
+        raise BadInputError("--mesh: with --json stdout holds points; leave one of the two away.")
     if not settings.scans.json:
         refuse_terminal()
     track = _one_scan(settings)

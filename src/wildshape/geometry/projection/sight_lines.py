@@ -120,8 +120,13 @@ class SightLines:
 
 
 def _as_floats(name: str, value: object) -> Float[np.ndarray, "..."]:
+    if np.ma.is_masked(value):
+        raise BadInputError(f"rays: {name} are masked in part; leave such rays out.")
     try:
-        return np.ascontiguousarray(value, np.float32)
+        numbers = np.asarray(value)
+        if numbers.dtype.kind == "c":  # numpy would drop the imaginary parts
+            raise TypeError
+        return np.ascontiguousarray(numbers, np.float32)
     except (TypeError, ValueError) as error:
         raise BadInputError(f"rays: {name} are no array of numbers.") from error
 
