@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wildshape.drives.recording_checks import copies_told
+from wildshape.drives.recording_checks import copies_of, copies_told
 from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
 from wildshape.io.bags.storages import STORAGES
@@ -141,7 +141,7 @@ def _drive(
         read=_Files(tuple(files), None if times is None else tuple(times)),
         times=times,
         T_world_sensor=None if poses is None else read_poses(poses, len(files)),
-        warnings=copies_told(files) + _unread_times_told(files, times),
+        warnings=copies_told(copies_of(files)) + _unread_times_told(files, times),
         files=files,
     )
 
