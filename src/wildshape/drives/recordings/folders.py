@@ -15,6 +15,7 @@ import numpy as np
 from wildshape.drives.recording_checks import copies_of, copies_told
 from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
+from wildshape.io.bags.reader import bag_files
 from wildshape.io.bags.storages import STORAGES
 from wildshape.io.guard import reading
 from wildshape.io.order import check_counted
@@ -186,7 +187,7 @@ def _files(folder: Path) -> list[Path]:
     files = certain or files
     if not files:
         for entry in entries:
-            if entry.suffix.lower() in _RECORDINGS:
+            if entry.suffix.lower() in _RECORDINGS or bag_files(entry):
                 raise BadInputError(f"{folder}: holds recordings; name each, such as {entry}.")
         raise BadInputError(f"{folder}: holds no scan (.bin .pcd .ply .npy .laz ...).")
     for one, other in pairwise(files):
