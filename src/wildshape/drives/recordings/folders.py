@@ -173,7 +173,7 @@ def _unusable(field: Callable[[tuple[str, ...]], np.ndarray | None]) -> str:
 
 def _holds_objects(path: Path) -> bool:
     """Whether a folder holds objects cut out of scans, as the other commands take them."""
-    tracks = [path / "scans", *path.glob("*/scans")]
+    tracks = [path / "scans", *path.glob("*/scans"), *path.glob("tracks/*/scans")]
     return (path / _OBJECTS).is_dir() or any(
         is_scan_file(entry) for track in tracks for entry in track.glob("*")
     )
