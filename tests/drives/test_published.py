@@ -165,6 +165,12 @@ def test_objects_cut_out_of_their_scans_are_refused(tmp_path):
     write_ply(tmp_path / "car" / "scans" / "000000.ply", np.ones((20, 3), np.float32))
     for folder in (tmp_path, tmp_path / "car"):
         refused(open_drive, folder, match=r"objects that were cut out .* complete .* --track")
+    found = tmp_path / "found"
+    for name in ("shapes", "tracks/0001/scans"):
+        (found / name).mkdir(parents=True)
+        write_ply(found / name / "000000.ply", np.ones((20, 3), np.float32))
+    assert find_drives(found).drives == [found]  # and not the shapes that a drive found
+    refused(open_drive, found, match="objects that were cut out")
     write_drive(tmp_path / "raw", [], {0: np.zeros((20, 3))}, "velodyne_objects_xyz0")
     refused(open_drive, tmp_path / "raw", match="objects that were cut out")
 

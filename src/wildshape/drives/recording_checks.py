@@ -19,16 +19,20 @@ _FEWEST_SCANS = 5
 _LEAST_BYTES = 2000  # of a file; smaller ones hold hardly any points, and may be alike
 
 
-def copies_told(files: Sequence[Path]) -> list[str]:
-    """A sentence if scans are exact copies of the ones before, as of a sensor that hangs.
+def copies_of(files: Sequence[Path]) -> list[int]:
+    """The frames that are exact copies of the ones before; `files`: one a frame.
 
-    Files of one size are read as far as they are alike.
+    Those of one size are read as far as they are alike.
     """
-    copies = [
+    return [
         frame
         for frame, (before, after) in enumerate(pairwise(files), 1)
         if after.stat().st_size > _LEAST_BYTES and filecmp.cmp(before, after, shallow=False)
     ]
+
+
+def copies_told(copies: Sequence[int]) -> list[str]:
+    """A sentence if frames are copies of the ones before, as of a sensor that hangs."""
     if not copies:
         return []
     return [

@@ -102,11 +102,11 @@ def test_a_conversion_killed_while_it_names_its_index_leaves_nothing(tmp_path, m
     result = convert_part(Made(2), "part", out / PARTS / "0")
     real = join.write_json
 
-    def killed(path, data):
+    def killed(path, data, *, flush):
         if path.name == INDEX_JSON:
             (out / ".killed.part").write_bytes(b"{")
             raise KeyboardInterrupt
-        real(path, data)
+        real(path, data, flush=flush)
 
     with monkeypatch.context() as patch:
         patch.setattr(join, "write_json", killed)

@@ -122,6 +122,15 @@ def test_an_empty_scan_is_a_scan(written, kind):
 
 
 @every_kind
+def test_scans_that_are_copies_of_the_ones_before_are_said(written, kind):
+    """A driver that hangs sends them under new stamps; of folders that was said."""
+    one, other = scans(2)
+    nothing = one[:0]
+    (told,) = open_drive(written(kind, {TOPIC: [one, other, other, nothing, nothing]})).warnings
+    assert told == "1 scan equal to the one before, to the last bit; the first: frame 2"
+
+
+@every_kind
 def test_of_two_sensors_in_a_topic_the_one_with_most_scans_is_taken(written, kind):
     """Each in its own frame: no way was found through them."""
     frames = ["left", "right", "left", "left", "right", "left"]

@@ -113,6 +113,17 @@ def test_a_list_that_holds_a_scan_twice_is_refused(tmp_path):
     refused(read, written(path, [one, one]), match=r"holds scan '000003' 2 times")
 
 
+@pytest.mark.parametrize("name", ["tracking.txt", "openpcdet.json", "000004.json", "boxes.csv"])
+def test_turns_in_degrees_are_refused(name, tmp_path):
+    """Their boxes stood across the vehicles, and cut out of each what lay in them."""
+    content = FILES[name][0]
+    text = content if isinstance(content, str) else json.dumps(content)
+    for radians in (-math.pi, LEFT[-1], 1.5707963):
+        text = text.replace(f"{radians}", "90.0")
+    path = written(tmp_path / name, text)
+    refused(read, path, match=f"{name}.*a box turned by 90, expected radians")
+
+
 def test_a_fingerprint_tells_names_and_contents(tmp_path):
     path = written(tmp_path / "000001.txt", LABEL.format(turn=0))
     one = fingerprint(tmp_path)

@@ -7,6 +7,7 @@ import struct
 import numpy as np
 import pytest
 from numpy.lib.recfunctions import append_fields
+from tests.refusal import refused
 
 from wildshape.io.scans.point_times import seconds_since
 from wildshape.io.scans.turns import read_turn
@@ -69,6 +70,34 @@ def test_times_are_read_from_packed_clouds_and_from_records_too(tmp_path, kind):
     turn = read_turn(path, 1.7e9)
     assert turn.points[:, 0] == pytest.approx(np.arange(200) / 7)
     assert turn.seconds == pytest.approx(TURN, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "head"),
+    [
+        ("scan.pcd", "FIELDS x y z t\nSIZE 4 4 4 4\nTYPE F F F U\nPOINTS 200\nDATA ascii\n"),
+        (
+            "scan.ply",
+            "ply\nformat ascii 1.0\nelement vertex 200\nproperty float x\nproperty float y\n"
+            "property float z\nproperty uint t\nend_header\n",
+        ),
+        (
+            "lists.ply",
+            "ply\nformat ascii 1.0\nelement vertex 200\nproperty float x\nproperty float y\n"
+            "property float z\nproperty uint t\nproperty list uchar int more\nend_header\n",
+        ),
+    ],
+)
+def test_times_are_read_from_text_too(tmp_path, name, head):
+    """They were left out of it without a word: scans stayed as measured."""
+    more = " 2 5 6" * (name == "lists.ply")
+    rows = [f"{i / 8} 5 0 {round(time * 1e9)}{more}\n" for i, time in enumerate(TURN)]
+    (tmp_path / name).write_text(head + "".join(rows))
+    turn = read_turn(tmp_path / name, 1.7e9)
+    assert turn.points[:, 0] == pytest.approx(np.arange(200) / 8)
+    assert turn.seconds == pytest.approx(TURN, abs=1e-6)
+    (tmp_path / name).write_text(head + "".join([*rows[:-1], f"1 5 0 late{more}\n"]))
+    refused(read_turn, tmp_path / name, 1.7e9, match=f"{name}: expected a .* file, found a damaged")
 
 
 def write_pcd(path, rows, data="binary", body=None):

@@ -12,6 +12,7 @@ import torch
 from wildshape.datasets.tracks.labelled_boxes import check_boxes
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.boxes.detector import MOST_TURN
 
 CATEGORIES = (
     "Car",
@@ -26,7 +27,6 @@ CATEGORIES = (
 )
 _IGNORED = "DontCare"
 _MOST = 1_000_000_000
-_MOST_TURN = 4 * math.pi  # what is more than two turns counts degrees
 _CURE = "download KITTI tracking's labels again"
 
 
@@ -89,7 +89,7 @@ def _box(words: list[str], where: str) -> LabelledBox:
         height, width, length, x, y, z, turn = map(float, words[10:17])
     except ValueError:
         raise BadInputError(f"{where}: a field is no number; {_CURE}.") from None
-    if not abs(turn) <= _MOST_TURN or not 0 <= frame < _MOST or not 0 <= track < _MOST:
+    if not abs(turn) <= MOST_TURN or not 0 <= frame < _MOST or not 0 <= track < _MOST:
         raise BadInputError(
             f"{where}: frame {words[0]}, object {words[1]}, turn {turn} radians; {_CURE}."
         )

@@ -16,12 +16,12 @@ from wildshape.datasets.tracks.labelled_boxes import check_boxes
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.boxes.detector import MOST_TURN
 from wildshape.io.guard import reading
 
 _PIECE = 1 << 16
 _DEEPEST, _MOST_ELEMENTS = 16, 200_000  # of one tracklet; each pose has a dozen elements
 _MOST_FRAMES = 1_000_000
-_MOST_TURN = 4 * np.pi  # what is more than two turns counts degrees
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def _tracklet(item: ElementTree.Element, where: str) -> Tracklet:
     keys = ("tx", "ty", "tz", "rx", "ry", "rz")
     numbers = np.asarray([[_number(pose, key, where) for key in keys] for pose in poses])
     turn = float(np.abs(numbers[:, 5]).max())
-    if turn > _MOST_TURN:
+    if turn > MOST_TURN:
         raise BadInputError(f"{where}: <rz> is {turn:g}, expected radians; write these.")
     T_velo_object = _poses(numbers, size[2])
     sizes = np.asarray([size] * len(poses))

@@ -12,9 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from wildshape.drives.recording_checks import copies_told
+from wildshape.drives.recording_checks import copies_of, copies_told
 from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
+from wildshape.io.bags.reader import bag_files
 from wildshape.io.bags.storages import STORAGES
 from wildshape.io.guard import reading
 from wildshape.io.order import check_counted
@@ -141,7 +142,7 @@ def _drive(
         read=_Files(tuple(files), None if times is None else tuple(times)),
         times=times,
         T_world_sensor=None if poses is None else read_poses(poses, len(files)),
-        warnings=copies_told(files) + _unread_times_told(files, times),
+        warnings=copies_told(copies_of(files)) + _unread_times_told(files, times),
         files=files,
     )
 
@@ -172,7 +173,7 @@ def _unusable(field: Callable[[tuple[str, ...]], np.ndarray | None]) -> str:
 
 def _holds_objects(path: Path) -> bool:
     """Whether a folder holds objects cut out of scans, as the other commands take them."""
-    tracks = [path / "scans", *path.glob("*/scans")]
+    tracks = [path / "scans", *path.glob("*/scans"), *path.glob("tracks/*/scans")]
     return (path / _OBJECTS).is_dir() or any(
         is_scan_file(entry) for track in tracks for entry in track.glob("*")
     )
@@ -186,7 +187,7 @@ def _files(folder: Path) -> list[Path]:
     files = certain or files
     if not files:
         for entry in entries:
-            if entry.suffix.lower() in _RECORDINGS:
+            if entry.suffix.lower() in _RECORDINGS or bag_files(entry):
                 raise BadInputError(f"{folder}: holds recordings; name each, such as {entry}.")
         raise BadInputError(f"{folder}: holds no scan (.bin .pcd .ply .npy .laz ...).")
     for one, other in pairwise(files):

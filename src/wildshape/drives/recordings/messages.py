@@ -4,6 +4,7 @@
 
 from pathlib import Path
 
+from wildshape.drives.recording_checks import copies_told
 from wildshape.drives.source import Drive
 from wildshape.io.bags.reader import bag_files, open_bag
 from wildshape.io.guard import reading
@@ -33,7 +34,7 @@ def open_recording(path: Path, topic: str | None = None) -> Drive:
         scan_names=[f"{frame:06d}" for frame in range(len(bag.times))],
         read=bag,
         times=bag.times,
-        warnings=bag.warnings + bag.unread_times_told(),
+        warnings=[*bag.warnings, *copies_told(bag.copies), *bag.unread_times_told()],
         files=bag_files(path),
     )
 

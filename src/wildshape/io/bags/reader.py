@@ -35,6 +35,7 @@ class _Scan(NamedTuple):
     cdr: bool
     dropped: int
     frame: str
+    mark: int  # equal for equal points; 0 of hardly any
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,12 @@ class Bag:
             kept = _returned(points)
             known = None if clock is None else seconds_since(clock[kept], self.times[frame])
             return Turn(points[kept].astype(np.float32), known)
+
+    @property
+    def copies(self) -> list[int]:
+        """The scans that hold the points of the one before, to the last bit."""
+        pairs = enumerate(pairwise(self.scans), 1)
+        return [frame for frame, (before, after) in pairs if before.mark == after.mark != 0]
 
     def unread_times_told(self) -> tuple[str, ...]:
         """A sentence if some scans' points have times, and none tells when they were taken."""
@@ -136,14 +143,16 @@ def open_bag(path: Path, topic: str | None = None) -> Bag:
 
 
 def _listed(message: Message, file: Path) -> _Scan:
-    """A scan's place, and how many of its points are no measurement."""
-    dropped = 0
+    """A scan's place, how many of its points are no measurement, and what tells of copies."""
+    dropped = mark = 0
     with suppress(BadInputError), reading(file, "a point cloud"):  # reading the scan says why
         points = cloud_of(message.data, cdr=message.cdr).points
-        dropped = len(points) - int(_returned(points).sum())
+        kept = points[_returned(points)]
+        dropped = len(points) - len(kept)
+        mark = hash(kept.tobytes()) if len(kept) >= _FEWEST_POINTS else 0
     stamped = stamp(message.data, cdr=message.cdr)
     frame = frame_name(message.data, cdr=message.cdr)
-    return _Scan(stamped, message.logged, file, message.key, message.cdr, dropped, frame)
+    return _Scan(stamped, message.logged, file, message.key, message.cdr, dropped, frame, mark)
 
 
 def _returned(points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:

@@ -8,6 +8,9 @@ from dataclasses import dataclass
 
 from wildshape.records import Box
 
+MOST_TURN = 4 * math.pi
+"""Radians; what is more than two turns counts degrees."""
+
 _SHORTEST = 0.1  # a quaternion of any other length is normalised
 
 
@@ -54,6 +57,17 @@ def check_turn(box: Box) -> Box:
     return box
 
 
+def check_radians(turn: float) -> float:
+    """The turn itself.
+
+    Raises:
+        ValueError: it counts degrees.
+    """
+    if abs(turn) > MOST_TURN:
+        raise ValueError(f"a box turned by {turn:g}, expected radians")
+    return turn
+
+
 def upright_box(centre: Sequence[float], size: Sequence[float], yaw: float) -> Box:
     """A box that does not lean.
 
@@ -63,11 +77,11 @@ def upright_box(centre: Sequence[float], size: Sequence[float], yaw: float) -> B
         yaw: about z, counter-clockwise from x, radians.
 
     Raises:
-        ValueError: not three numbers each, or no box.
+        ValueError: not three numbers each, no box, or a turn in degrees.
     """
     x, y, z = map(float, centre)
     length, width, height = map(float, size)
-    half = float(yaw) / 2
+    half = check_radians(float(yaw)) / 2
     return checked(
         Box((x, y, z), (length, width, height), (math.cos(half), 0.0, 0.0, math.sin(half)))
     )

@@ -16,7 +16,7 @@ import torch
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detections import moved
-from wildshape.io.boxes.detector import DetectorBox, checked
+from wildshape.io.boxes.detector import DetectorBox, check_radians, checked
 from wildshape.io.guard import reading
 from wildshape.records import Box
 
@@ -55,7 +55,7 @@ def _boxes(lines: list[str], stem: str, T_sensor_rect: SE3) -> Iterator[Detector
 
 def _given(words: list[str], scan: str, track: str | None, T_sensor_rect: SE3) -> DetectorBox:
     height, width, length, x, y, z, turn = map(float, words[8:15])
-    upright = Box((x, y - height / 2, z), (length, width, height), _quaternion(turn))
+    upright = Box((x, y - height / 2, z), (length, width, height), _quaternion(check_radians(turn)))
     score = float(words[_SCORE]) if len(words) > _SCORE else None
     return DetectorBox(scan, words[0], track, moved(checked(upright), T_sensor_rect), score)
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import write_text
+from wildshape.io.boxes.detector import check_radians
 from wildshape.io.guard import MAX_POINTS, reading
 
 
@@ -106,6 +107,7 @@ def _row(words: list[str]) -> BoxRow:
     )
     if not all(map(math.isfinite, (*map(float, numbers), found.time or 0.0))):
         raise ValueError("a number that is not finite")
+    check_radians(found.yaw)
     if not 0 <= found.points <= MAX_POINTS:
         raise ValueError(f"{found.points} points")
     return found

@@ -8,6 +8,7 @@ several times.
 
 import math
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -17,7 +18,7 @@ import numpy as np
 from jaxtyping import Float, Num
 
 from wildshape.errors import BadInputError
-from wildshape.io.guard import check_promise, lines_of
+from wildshape.io.guard import check_promise, lines_of, reading
 
 _SIZES = {"F": (4, 8), "I": (1, 2, 4, 8), "U": (1, 2, 4, 8)}
 _ENCODINGS = ("ascii", "binary", "binary_compressed")
@@ -56,7 +57,7 @@ def read_pcd(path: Path) -> Float[np.ndarray, "n 3"]:
         header = _read_header(file, path)
         present = path.stat().st_size - file.tell()
         if header.encoding == "ascii":
-            points = _read_ascii(file, header, present, path)
+            points = _read_ascii(file, header, present, path, _AXES)
         elif header.encoding == "binary":
             check_promise(path, "points", header.points, header.points * header.row_bytes, present)
             points = _read_rows(file, header)
@@ -73,20 +74,20 @@ def read_pcd(path: Path) -> Float[np.ndarray, "n 3"]:
 
 
 def read_pcd_field(path: Path, names: tuple[str, ...]) -> Num[np.ndarray, "n"] | None:
-    """The first of these fields of each point, as written.
-
-    None where there is none of them, and of text.
+    """The first of these fields of each point, as written; None where there is none of them.
 
     Raises:
         BadInputError: as `read_pcd`.
     """
-    with path.open("rb") as file:
+    with reading(path, "a PCD file"), path.open("rb") as file:
         header = _read_header(file, path)
         found = [name for name in names if name in header.fields]
-        if header.encoding == "ascii" or not found:
+        if not found:
             return None
         place = header.fields.index(found[0])
         present = path.stat().st_size - file.tell()
+        if header.encoding == "ascii":
+            return _read_ascii(file, header, present, path, found[:1])[:, 0]
         if header.encoding == "binary_compressed":
             return _columns(_unpacked(file, header, present, path), header, [place])[0]
         check_promise(path, "points", header.points, header.points * header.row_bytes, present)
@@ -141,16 +142,17 @@ def _point_count(found: dict[str, list[str]]) -> int:
 
 
 def _read_ascii(
-    file: IO[bytes], header: _Header, present: int, path: Path
-) -> Float[np.ndarray, "n 3"]:
+    file: IO[bytes], header: _Header, present: int, path: Path, names: Sequence[str]
+) -> Float[np.ndarray, "n k"]:
+    """The first number of some fields, of each point."""
     check_promise(
         path, "points", header.points, header.points * 2 * sum(header.counts) - 1, present
     )
     lines = lines_of(file, path)
     first = next(lines, None)
     if first is None:
-        return np.empty((0, 3))
-    columns = [sum(header.counts[: header.fields.index(axis)]) for axis in _AXES]
+        return np.empty((0, len(names)))
+    columns = [sum(header.counts[: header.fields.index(name)]) for name in names]
     return np.loadtxt(chain([first], lines), usecols=columns, ndmin=2, comments=None)
 
 

@@ -7,7 +7,7 @@ a line of text, and believes the header before it looks at the file.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, islice
 from pathlib import Path
 from struct import Struct
@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float, Num
 
 from wildshape.errors import BadInputError
-from wildshape.io.guard import lines_of
+from wildshape.io.guard import lines_of, reading
 from wildshape.io.scans.ply_header import AXES, NAMES, Element, Header, Property, read_header
 
 _CODES = dict(zip(NAMES, "bBhHiIqQefd"))  # of the module struct
@@ -33,35 +33,38 @@ def read_ply(path: Path) -> Float[np.ndarray, "n 3"]:
         header = read_header(file, path)
         if header.order:
             return _read_binary(file.read(), header, path)
-        return _read_ascii(file, header, path)
+        return _read_ascii(file, header, path, AXES)
 
 
 def read_ply_property(path: Path, names: tuple[str, ...]) -> Num[np.ndarray, "n"] | None:
-    """The first of these properties of each point, as written.
-
-    None where there is none of them, and of text.
+    """The first of these properties of each point, as written; None where there is none of them.
 
     Raises:
         BadInputError: as `read_ply`.
     """
-    with path.open("rb") as file:
+    with reading(path, "a PLY file"), path.open("rb") as file:
         header = read_header(file, path)
+        vertex = next(one for one in header.elements if one.name == "vertex")
+        plain = ["" if prop.list_type else prop.name for prop in vertex.properties]
+        found = [name for name in names if name in plain]
+        if not found:
+            return None
+        if not header.order:
+            return _read_ascii(file, header, path, found[:1])[:, 0]
         body = file.read()
-    for element, offset in offsets(body, header, path) if header.order else ():
-        if element.name == "vertex":
-            kind = row_type(body, offset, element, header.order)
-            plain = ["" if prop.list_type else prop.name for prop in element.properties]
-            found = [name for name in names if name in plain]
-            if kind is None or not found:
-                return None
-            return np.frombuffer(body, kind, element.count, offset)[f"{plain.index(found[0])}"]
-    return None
+    offset = next(offset for one, offset in offsets(body, header, path) if one is vertex)
+    kind = row_type(body, offset, vertex, header.order)
+    if kind is None:
+        return None
+    return np.frombuffer(body, kind, vertex.count, offset)[f"{plain.index(found[0])}"]
 
 
-def _read_ascii(file: IO[bytes], header: Header, path: Path) -> Float[np.ndarray, "n 3"]:
+def _read_ascii(
+    file: IO[bytes], header: Header, path: Path, names: Sequence[str]
+) -> Float[np.ndarray, "n k"]:
     for element, rows in rows_of_elements(file, header, path):
         if element.name == "vertex":
-            return parse_rows(rows, element, path)
+            return parse_rows(rows, element, path, names)
     raise AssertionError
 
 
@@ -76,16 +79,18 @@ def rows_of_elements(
         deque(rows, maxlen=0)
 
 
-def parse_rows(rows: Iterator[bytes], element: Element, path: Path) -> Float[np.ndarray, "n 3"]:
-    """The points in the lines of the element `vertex`."""
+def parse_rows(
+    rows: Iterator[bytes], element: Element, path: Path, names: Sequence[str] = AXES
+) -> Float[np.ndarray, "n k"]:
+    """Some properties, by default the points, in the lines of the element `vertex`."""
     first = next(rows, None)
-    points = np.empty((0, 3))
+    points = np.empty((0, len(names)))
     if first is not None and element.has_lists:
-        values = (v for row in chain([first], rows) for v in _parse_list_row(row.split(), element))
-        points = np.fromiter(values, np.float64).reshape(-1, 3)
+        parsed = (_parse_list_row(row.split(), element, names) for row in chain([first], rows))
+        points = np.fromiter(chain.from_iterable(parsed), np.float64).reshape(-1, len(names))
     elif first is not None:
-        names = [p.name for p in element.properties]
-        columns = [names.index(axis) for axis in AXES]
+        listed = [p.name for p in element.properties]
+        columns = [listed.index(name) for name in names]
         points = np.loadtxt(chain([first], rows), usecols=columns, ndmin=2, comments=None)
     if len(points) < element.count:
         raise BadInputError(
@@ -95,10 +100,10 @@ def parse_rows(rows: Iterator[bytes], element: Element, path: Path) -> Float[np.
     return points
 
 
-def _parse_list_row(words: list[bytes], element: Element) -> list[float]:
+def _parse_list_row(words: list[bytes], element: Element, names: Sequence[str]) -> list[float]:
     values = values_of(words, element)
     places = {prop.name: place for place, prop in enumerate(element.properties)}
-    return [float(values[places[axis]][0]) for axis in AXES]
+    return [float(values[places[name]][0]) for name in names]
 
 
 def values_of(words: list[bytes], element: Element) -> list[list[bytes]]:
