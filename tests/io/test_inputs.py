@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
 import os
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -211,6 +212,18 @@ def test_scans_beside_tracks_are_not_passed_over(dataset: Path) -> None:
 def test_hidden_folders_are_no_tracks(dataset: Path) -> None:
     (dataset / "a").rename(dataset / ".a")
     assert open_tracks(dataset).names == ("b",)
+
+
+def test_what_drives_found_is_one_dataset_whose_names_say_the_drive(dataset: Path, tmp_path):
+    for drive in ("monday", "tuesday"):
+        shutil.copytree(dataset, tmp_path / "found" / drive / "tracks")
+        (tmp_path / "found" / drive / "boxes.csv").write_text("frame,time\n")
+    source = open_tracks(tmp_path / "found")
+    assert source.names == ("monday_a", "monday_b", "tuesday_a", "tuesday_b")
+    assert tuple(track.name for track in source) == source.names
+    for track, other in zip(source, [*open_tracks(dataset)] * 2, strict=True):
+        for scan, same in zip(track.scans, other.scans, strict=True):
+            np.testing.assert_array_equal(scan, same)
 
 
 def test_what_drive_found_is_no_scan(tmp_path):

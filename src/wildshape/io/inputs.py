@@ -226,8 +226,8 @@ def open_tracks(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> T
     """The tracks at `path`, lazily.
 
     Args:
-        path: a packed store; a DATASET folder, whose subfolders have scans/; a TRACK folder, which
-            has scans/; a folder of scan files (one track); or a scan file (a track of one scan).
+        path: a packed store; a DATASET folder of TRACK folders, which have scans/; what `drive`
+            found in several recordings; a TRACK; or a scan file or a folder of some, one track.
         coordinates: of the files; a packed store is in metres and its sensors' frames always.
 
     Raises:
@@ -335,18 +335,21 @@ def _read_single(path: Path, coordinates: Coordinates) -> TrackFile:
 
 
 def _folder(path: Path, coordinates: Coordinates) -> TrackSource:
-    """A DATASET, or a plain folder of scan files."""
+    """A DATASET, what `drive` found in several recordings, or a plain folder of scan files."""
     entries = sorted(path.iterdir(), key=lambda entry: entry.name)
     shown = [entry for entry in entries if not entry.name.startswith(".")]
     folders = [entry for entry in shown if (entry / "scans").is_dir()]
     if (path / "boxes.csv").is_file() and (path / "tracks").is_dir():
         raise BadInputError(f"{path}: holds what `drive` found; name {path / 'tracks'}.")
+    folders = folders or sorted(one.parent for one in path.glob("[!.]*/tracks/[!.]*/scans"))
     if folders:
         for other in (entry for entry in shown if entry.is_dir() and entry not in folders):
             if any(is_scan_file(f) and f.suffix not in (".txt", ".csv") for f in other.iterdir()):
                 raise BadInputError(f"{other}: has points, but no scans/; move its scans there.")
-        names = tuple(as_text(folder.name) for folder in folders)
-        return TrackSource(path, names, lambda index: read_track_file(folders[index], coordinates))
+        names = tuple(as_text("_".join(one.relative_to(path).parts[::2])) for one in folders)
+        return TrackSource(
+            path, names, lambda row: read_track_file(folders[row], coordinates, names[row])
+        )
     files = [f for f in entries if is_scan_file(f) and f.name not in _NO_SCANS]
     if not files:
         found = f"{len(entries)} other entries" if entries else "an empty folder"

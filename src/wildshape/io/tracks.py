@@ -69,7 +69,9 @@ def read_track(folder: Path | str, coordinates: Coordinates = SENSOR_METRES) -> 
     return read_track_file(folder, coordinates).track
 
 
-def read_track_file(folder: Path | str, coordinates: Coordinates = SENSOR_METRES) -> TrackFile:
+def read_track_file(
+    folder: Path | str, coordinates: Coordinates = SENSOR_METRES, name: str | None = None
+) -> TrackFile:
     """The track in a folder with the list of the scans that had to be skipped.
 
     Args:
@@ -77,6 +79,7 @@ def read_track_file(folder: Path | str, coordinates: Coordinates = SENSOR_METRES
         coordinates: the unit is that of scans, shape and the poses' translations; the "unit" of
             track.json goes before the default `m`. The origin is subtracted from scans and poses.
             Everything returned is in metres.
+        name: of the track, if not the folder's.
 
     Raises:
         BadInputError: no scans, none of them usable, or damaged rays, poses, shape or track.json.
@@ -89,7 +92,7 @@ def read_track_file(folder: Path | str, coordinates: Coordinates = SENSOR_METRES
     rows = [row for row, file in enumerate(files) if file in kept]
     poses = _read_truth(folder / "poses.txt", len(files), rows, coordinates)
     track = Track(
-        name=folder_name(folder),
+        name=name or folder_name(folder),
         scans=tuple(kept.values()),
         scan_names=_stems(list(kept)),
         sensor=info["sensor"],
