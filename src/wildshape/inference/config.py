@@ -154,11 +154,15 @@ class PoseOutlierConfig:
         apart_deg: a scan that differs from both by more is an outlier.
         worse_m: it stays if the shape of the track costs so much more between its neighbours, for
             a sensor that passes close by sees an object turn fast.
+        misfit: nor is it one if the shape costs no more than so many times what it usually does.
+        less_sure: a run of scans against a surer one is wrong if it is less sure than this share.
     """
 
     alike_deg: float = 25.0
     apart_deg: float = 45.0
     worse_m: float = 0.5
+    misfit: float = 1.5
+    less_sure: float = 0.75
 
 
 @dataclass(frozen=True)

@@ -264,14 +264,15 @@ def _voted(
         gain, links = _votes(T_sensor_can, shape, middle, gathered, inputs, config)
         signs = voted_signs(gain, links, gathered.sure, config.vote)
     turned = turned_where(T_sensor_can, signs, middle)
-    between = without_outliers(turned, config)
+    between = without_outliers(turned, gathered.scans, shape, gathered.sure, config)
     if between is turned:
         return turned
     own, other = (
         track_cost(shape, poses, inputs, gathered.settings) for poses in (turned, between)
     )
-    unit = gathered.settings.unit
-    return between.where(other - own < unit * config.outliers.worse_m, turned)
+    usual = own[(between.rotation == turned.rotation).all(-1).all(-1)].median()
+    better = other - own < gathered.settings.unit * config.outliers.worse_m
+    return between.where(better & (own > config.outliers.misfit * usual), turned)
 
 
 def _votes(

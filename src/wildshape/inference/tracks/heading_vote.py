@@ -21,7 +21,9 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import HeadingVoteConfig
 from wildshape.ops.nearest import nearest
 
-_FEWEST, _SMALLEST_M = 4, 1e-9
+FEWEST = 4
+"""Scans that tell whether they follow each other."""
+_SMALLEST_M = 1e-9
 _DEFAULT = HeadingVoteConfig()
 
 
@@ -74,9 +76,11 @@ def continuous_signs(
     return signs
 
 
-def slow(rotation: Float[Tensor, "V 3 3"], config: HeadingVoteConfig = _DEFAULT) -> bool:
+def slow(
+    rotation: Float[Tensor, "V 3 3"], config: HeadingVoteConfig = _DEFAULT, fewest: int = FEWEST
+) -> bool:
     """Whether most neighbours are posed alike, half turns aside: the scans follow each other."""
-    if len(rotation) < _FEWEST:
+    if len(rotation) < fewest:
         return False
     flipped = rotation * rotation.new_tensor((-1.0, -1.0, 1.0))
     trace = torch.maximum(

@@ -1,54 +1,142 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Scans whose pose no neighbour shares, put where their neighbours are (beyond the paper).
+"""Scans posed as no neighbour is, put where their neighbours say they are (beyond the paper).
 
-Right in front of a truck's rear a LiDAR sees a flat wall and nothing of its edges: alone, such a
-scan is taken for a piece of the side as often as not. Votes on half turns do not see that, and
-fitting scans onto each other cannot turn one by a quarter. But where most neighbours are posed
-alike, one that is not is an outlier: it stands between them, on the way from one to the other.
+Behind a truck a LiDAR sees a flat wall: alone, such a scan is taken for a piece of the side as
+often as not. Votes on half turns do not see that, and fitting scans onto each other cannot turn one
+by a quarter. But an object does not turn by one from scan to scan. Where most neighbours are posed
+alike, one that is not is an outlier, and so is a run of scans that is less sure than the others.
+Turned back, it stands where what was seen of it begins.
 """
+
+import math
+from collections.abc import Sequence
+from itertools import product
 
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import PoseOutlierConfig, TrackConfig
-from wildshape.inference.tracks.heading_vote import slow
+from wildshape.inference.tracks.heading_vote import FEWEST, slow
+from wildshape.records import Points
 
 _DEFAULT = TrackConfig()
 _REACH = 3  # scans apart of two neighbours that are compared
+_STRAYS = 0.02
 
 
-def without_outliers(T_sensor_object: SE3, config: TrackConfig = _DEFAULT) -> SE3:
-    """The poses of a track's scans, outliers replaced by what lies between their neighbours.
+def without_outliers(
+    T_sensor_object: SE3,
+    scans: Sequence[Points],
+    shape: Float[Tensor, "P 3"],
+    sure: Float[Tensor, "V"],
+    config: TrackConfig = _DEFAULT,
+) -> SE3:
+    """The poses of a track's scans, outliers replaced by what their neighbours say.
 
     Args:
         T_sensor_object: one a scan, in time order, headings agreed on; if most neighbours are not
             posed alike (`slow`), they are returned as they are, for nothing is known then.
+        scans: of one object, sensor frames.
+        shape: points of the object, its frame.
+        sure: how sure each scan is of its own pose, 0 to 1.
         config: what is alike, what is slow.
     """
-    off = outliers(T_sensor_object.rotation, config.outliers)
-    if not bool(off.any()) or not slow(T_sensor_object.rotation[~off], config.vote):
+    rotation = T_sensor_object.rotation
+    alone = outliers(rotation, config.outliers)
+    off = alone | _unsure_runs(rotation, alone, sure, config.outliers)
+    off &= sure <= sure[~off].mean()
+    if not bool(off.any()):
         return T_sensor_object
-    rotation = T_sensor_object.rotation.clone()
-    place = T_sensor_object.inverse().translation.clone()
-    right = torch.nonzero(~off)[:, 0]
-    for i in torch.nonzero(off)[:, 0].tolist():
-        before, after = right[right < i], right[right > i]
-        # Two that are right: on either side, or the nearest two on the one side there is.
-        a, b = (before[-1], after[0]) if len(before) and len(after) else _ends(before, after)
-        share = (i - float(a)) / float(b - a)
-        rotation[i] = rotation[a if abs(i - int(a)) <= abs(i - int(b)) else b]
-        place[i] = place[a] + share * (place[b] - place[a])
-    translation = -(rotation @ place[..., None])[..., 0]
-    kept = off[:, None]
-    return SE3(rotation, torch.where(kept, translation, T_sensor_object.translation))
+    unsure = bool((sure[off] < config.outliers.less_sure * sure[~off].mean()).all())
+    if not slow(rotation[~off], config.vote, fewest=2 if unsure else FEWEST):
+        return T_sensor_object
+    found = SE3(rotation.clone(), T_sensor_object.translation.clone())
+    ends = _ends(shape)
+    known, left = (torch.nonzero(rows)[:, 0].tolist() for rows in (~off, off))
+    while left:
+        i, near = min(product(left, known), key=lambda pair: abs(pair[0] - pair[1]))
+        turned = _turned_back(rotation[i], found.rotation[near], config.outliers)
+        found.translation[i] = _placed(scans[i], turned, ends, found.translation[near])
+        found.rotation[i] = turned
+        left.remove(i)
+        known.append(i)
+    return found
 
 
-def _ends(before: Tensor, after: Tensor) -> tuple[Tensor, Tensor]:
-    """The two nearest of the side that has any: the way goes on as it went."""
-    return (before[-1], before[-2]) if len(before) else (after[0], after[1])
+def _placed(
+    scan: Points,
+    rotation: Float[Tensor, "3 3"],
+    ends: Float[Tensor, "2 3"],
+    near: Float[Tensor, "3"],
+) -> Float[Tensor, "3"]:
+    """Where an object so turned is: what the scan saw begins where the object faces the sensor.
+
+    Args:
+        scan: sensor frame.
+        rotation: `R_sensor_object`.
+        ends: least and largest coordinates of the object, its frame.
+        near: where it is in a scan nearby, sensor frame; as high it is here.
+    """
+    seen = torch.from_numpy(scan).to(rotation) @ rotation
+    low, high = _ends(seen)
+    place = ((low + high) - ends.sum(0)) / 2
+    place = torch.where(low > 0, low - ends[0], torch.where(high < 0, high - ends[1], place))
+    place[2] = (near @ rotation)[2]
+    return rotation @ place
+
+
+def _ends(points: Float[Tensor, "n 3"]) -> Float[Tensor, "2 3"]:
+    """Where points begin and end along each axis, but for strays."""
+    return torch.quantile(points, points.new_tensor((_STRAYS, 1 - _STRAYS)), dim=0)
+
+
+def _turned_back(
+    own: Float[Tensor, "3 3"], near: Float[Tensor, "3 3"], config: PoseOutlierConfig
+) -> Float[Tensor, "3 3"]:
+    """A pose turned by quarters until it is like the neighbour's; that one if none is.
+
+    A flat wall shows which way it faces, and not of which side it is.
+    """
+    turned = own @ rotation_z(torch.arange(4, dtype=own.dtype) * (math.pi / 2))
+    best = min(turned, key=lambda one: _degrees(one, near))
+    return best if _degrees(best, near) < config.apart_deg else near
+
+
+def _unsure_runs(
+    rotation: Float[Tensor, "V 3 3"],
+    off: Bool[Tensor, "V"],
+    sure: Float[Tensor, "V"],
+    config: PoseOutlierConfig,
+) -> Bool[Tensor, "V"]:
+    """Of runs of scans, each posed like the next, those against a much surer one."""
+    runs: list[list[int]] = []
+    for i in torch.nonzero(~off)[:, 0].tolist():
+        if runs and _degrees(rotation[runs[-1][-1]], rotation[i]) < config.apart_deg:
+            runs[-1].append(i)
+        else:
+            runs.append([i])
+    found = torch.zeros_like(off)
+    best = max(runs, key=lambda run: float(sure[run].sum()))
+    enough = config.less_sure * float(sure[best].mean())
+    for way in (1, -1):
+        last = best[-1] if way > 0 else best[0]
+        for run in runs[runs.index(best) :: way][1:]:
+            first, end = (run[0], run[-1])[::way]
+            against = _degrees(rotation[last], rotation[first]) >= config.apart_deg
+            if against and float(sure[run].mean()) < enough:
+                found[run] = True
+            else:
+                last = end
+    return found
+
+
+def _degrees(one: Float[Tensor, "3 3"], other: Float[Tensor, "3 3"]) -> float:
+    cosine = (float((one.mT @ other).diagonal().sum()) - 1) / 2
+    return math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
 
 
 def outliers(

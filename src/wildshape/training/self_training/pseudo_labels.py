@@ -29,7 +29,7 @@ from wildshape.geometry.projection.field_of_view import slope, view_top
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import TrackConfig
 from wildshape.inference.predictor import Predictor, load
-from wildshape.inference.tracks.joint_icp import refine_jointly, stayed_near
+from wildshape.inference.tracks.joint_icp import fused, refine_jointly, stayed_near
 from wildshape.inference.tracks.pose_outliers import without_outliers
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint
 from wildshape.method.network import ShapePoseNet
@@ -251,10 +251,11 @@ def heading_votes(teacher: Teacher, track: PosedTrack) -> Float[Tensor, "V"]:
 def refined(teacher: Teacher, track: PosedTrack) -> PosedTrack:
     """The scans of a track moved onto each other, and those in time order onto their neighbours."""
     config, clouds = teacher.config, teacher.clouds(track)
-    ordered, start = teacher.time_ordered, track.T_sensor_can
+    ordered, start = teacher.time_ordered, track.T_sensor_can.scaled(1 / teacher.unit)
     if ordered:
-        start = without_outliers(start, config.track)
-    start = start.scaled(1 / teacher.unit)
+        sure, most = torch.ones(len(clouds)), config.track.most_points
+        seen = fused(clouds, start.to(torch.float64), slice(None), most).to(start.rotation)
+        start = without_outliers(start, clouds, seen, sure, config.track)
     found = refine_jointly(clouds, start, mirror=teacher.mirror, config=config.track.coarse)
     if ordered:
         found = chained(clouds, found, config)
