@@ -11,8 +11,8 @@ import pytest
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
+from wildshape.inference.folders import complete_folder
 from wildshape.io.poses import read_poses, write_poses
-from wildshape.io.scans import writers
 from wildshape.io.scans.points import read_points
 from wildshape.io.scans.writers import write_ply
 
@@ -249,7 +249,7 @@ def test_output_of_other_settings_is_not_mixed_in(refused, dataset, trained, tmp
 
 
 def test_full_disk(wildshape, dataset, trained, tmp_path, monkeypatch):
-    write = writers.write_cloud
+    write = complete_folder.write_cloud
 
     def full(path, points):
         if path.name == "000002.ply":
@@ -258,7 +258,7 @@ def test_full_disk(wildshape, dataset, trained, tmp_path, monkeypatch):
 
     command = ("complete", dataset, "--out", tmp_path / "c", "--model", trained)
     with monkeypatch.context() as patch:
-        patch.setattr(writers, "write_cloud", full)
+        patch.setattr(complete_folder, "write_cloud", full)
         found = wildshape(*command)
     assert found.code == 1
     assert "no space left" in found.err
