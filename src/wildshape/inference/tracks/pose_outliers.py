@@ -11,7 +11,6 @@ Turned back, it stands where what was seen of it begins.
 
 import math
 from collections.abc import Sequence
-from itertools import product
 
 import torch
 from jaxtyping import Bool, Float
@@ -56,14 +55,15 @@ def without_outliers(
         return T_sensor_object
     found = SE3(rotation.clone(), T_sensor_object.translation.clone())
     ends = _ends(shape)
-    known, left = (torch.nonzero(rows)[:, 0].tolist() for rows in (~off, off))
-    while left:
-        i, near = min(product(left, known), key=lambda pair: abs(pair[0] - pair[1]))
+    rows, right = torch.nonzero(off)[:, 0], torch.nonzero(~off)[:, 0]
+    known = set(right.tolist())
+    away = (rows[:, None] - right).abs().amin(1)
+    for i in rows[away.argsort(stable=True)].tolist():
+        near = i - 1 if i - 1 in known else i + 1
         turned = _turned_back(rotation[i], found.rotation[near], config.outliers)
         found.translation[i] = _placed(scans[i], turned, ends, found.translation[near])
         found.rotation[i] = turned
-        left.remove(i)
-        known.append(i)
+        known.add(i)
     return found
 
 
