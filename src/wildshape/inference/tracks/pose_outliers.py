@@ -16,7 +16,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from wildshape.geometry.transforms.rotation import rotation_z
+from wildshape.geometry.transforms.rotation import rotation_angle, rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.config import PoseOutlierConfig, TrackConfig
 from wildshape.inference.tracks.heading_vote import FEWEST, slow
@@ -135,8 +135,7 @@ def _unsure_runs(
 
 
 def _degrees(one: Float[Tensor, "3 3"], other: Float[Tensor, "3 3"]) -> float:
-    cosine = (float((one.mT @ other).diagonal().sum()) - 1) / 2
-    return math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
+    return math.degrees(float(rotation_angle(one.mT @ other)))
 
 
 def outliers(
@@ -160,8 +159,7 @@ def _to_next(rotation: Float[Tensor, "V 3 3"]) -> Float[Tensor, "V 4"]:
     angle = rotation.new_full((count, _REACH + 1), torch.nan)
     for on in range(min(_REACH + 1, count)):
         relative = rotation[: count - on].mT @ rotation[on:]
-        cosine = (relative.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2
-        angle[: count - on, on] = torch.rad2deg(torch.acos(cosine.clamp(-1, 1)))
+        angle[: count - on, on] = torch.rad2deg(rotation_angle(relative))
     return angle
 
 
