@@ -128,9 +128,12 @@ class Pipeline:
         objects = self.tracks(T_level_sensor)
         self.complete("completion", objects, mounting)
         turns = self.turns(objects, T_level_sensor)
-        parts = self.merged(objects, turns)
+        places = Places(turns, self.config.merging, self.config.boxes)
+        completed = self.completed(objects, turns)
+        parts = self.merged(completed, places)
         self.complete("merging", parts, mounting)
-        vehicles = self.vehicles([*objects, *parts], turns)
+        completed += self.completed(parts, turns)
+        vehicles = self.vehicles([*objects, *parts], completed, places)
         return DriveResult(
             out=self.out,
             frames=len(self.drive),
@@ -252,26 +255,24 @@ class Pipeline:
             if (self.folder(seen) / OBJECTS).is_file()
         ]
 
-    def merged(self, objects: list[Sightings], turns: Turns) -> list[Sightings]:
+    def merged(self, completed: list[Completed], places: Places) -> list[Sightings]:
         """Tracks that are one object by their shapes, put together."""
         path = self.completing / "merged.json"
         if not path.is_file():
-            write_sightings(path, [] if self.tracked else self.fragments(objects, turns))
+            least = self.config.merging.least_confidence
+            found = [] if self.tracked else likely(completed, least, self.config.vehicles)
+            write_sightings(path, places.fragments(found))
         return read_sightings(path)
 
-    def fragments(self, objects: list[Sightings], turns: Turns) -> list[Sightings]:
-        """The same, found now."""
-        merging, vehicles = self.config.merging, self.config.vehicles
-        found = likely(self.completed(objects, turns), merging.least_confidence, vehicles)
-        return Places(turns, merging, self.config.boxes).fragments(found)
-
-    def vehicles(self, objects: list[Sightings], turns: Turns) -> list[Vehicle]:
-        """Which of the completed objects are vehicles, and where they are."""
-        places = Places(turns, self.config.merging, self.config.boxes)
+    def vehicles(
+        self, objects: list[Sightings], completed: list[Completed], places: Places
+    ) -> list[Vehicle]:
+        """Which of the objects are vehicles, and where they are; `completed`: not ruled out."""
+        turns = places.turns
         with self.clock.stage("vehicles", 1) as at:
             completed = [
                 surer_if_driving(one, turns, self.config.boxes, self.config.vehicles)
-                for one in self.completed(objects, turns)
+                for one in completed
             ]
             own = {one.seen.name for one in completed if self.is_own(one, turns)}
             others = [one for one in completed if one.seen.name not in own]

@@ -39,8 +39,11 @@ class Seen:
     @classmethod
     def of(cls, tick: int, clusters: Sequence[Points]) -> "Seen":
         """What is seen of clusters, world frame: the middle and the size of each one's extent."""
-        low = np.array([part.min(0) for part in clusters], np.float64).reshape(-1, 3)
-        high = np.array([part.max(0) for part in clusters], np.float64).reshape(-1, 3)
+        if not clusters:
+            return cls(tick, np.empty((0, 3)), np.empty((0, 3)))
+        starts = np.cumsum([0, *map(len, clusters[:-1])])
+        points = np.concatenate(clusters).astype(np.float64)
+        low, high = (end.reduceat(points, starts) for end in (np.minimum, np.maximum))
         return cls(tick, (low + high) / 2, high - low)
 
 

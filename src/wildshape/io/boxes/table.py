@@ -6,7 +6,8 @@ import csv
 import io
 import math
 from collections.abc import Iterable
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass, fields
+from operator import attrgetter
 from pathlib import Path
 
 from wildshape.errors import BadInputError
@@ -51,6 +52,7 @@ class BoxRow:
 
 
 HEADER = tuple(field.name for field in fields(BoxRow))
+_words = attrgetter(*HEADER)
 _DECIMALS = 4
 
 
@@ -60,7 +62,7 @@ def write_box_table(path: Path, rows: Iterable[BoxRow]) -> None:
     table = csv.writer(text, lineterminator="\n")
     table.writerow(HEADER)
     for row in sorted(rows, key=lambda row: (row.frame, row.track)):
-        frame, time, *others = astuple(row)
+        frame, time, *others = _words(row)
         table.writerow([frame, "" if time is None else time, *map(_word, others)])
     write_text(path, text.getvalue())
 
