@@ -112,6 +112,9 @@ class GroundConfig:
         below_m: what lies lower than this under the ground at the sensor is a reflection.
         steepest: it may lie lower by so much a metre of range; no road falls faster.
         reflected: reflections are left out where they are more than this share of a scan's points.
+        beside: within so many of the sensor's heights,
+        rise: no ground lies higher than this share of it above the ground at the sensor. Too near
+            for the lowest beam to meet the road, a roof is the lowest flat thing that is seen.
     """
 
     range_m: float = 80.0
@@ -120,6 +123,8 @@ class GroundConfig:
     below_m: float = 1.0
     steepest: float = 0.3
     reflected: float = 0.001
+    beside: float = 3.0
+    rise: float = 0.25
 
 
 @dataclass(frozen=True)
