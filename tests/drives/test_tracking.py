@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 import torch
-
 from tests.drives.street import HEIGHT, moved, scan, things
+
 from wildshape.drives.config import (
     ClusterConfig,
     DriveConfig,
