@@ -18,6 +18,7 @@ import torch
 from wildshape.errors import BadInputError
 from wildshape.geometry.box import unit_of
 from wildshape.io.atomic import write_text
+from wildshape.io.progress import counted
 from wildshape.io.store.store import Store
 from wildshape.method.checkpoint import load_checkpoint
 from wildshape.method.network import Encoding, ShapePoseNet
@@ -144,6 +145,11 @@ def setup(
     described = {"recipe": asdict(recipe), "identity": identity, **(provenance or {})}
     if processes.leads and state.step < recipe.optim.steps:  # a finished run is left as it is
         write_text(folder / "run.json", json.dumps(described, indent=1, default=str))
+    if held_tracks is fit_tracks:
+        say(
+            f"{store.named}: {counted(len(store), 'track')}, of which none is held out: validation"
+            " measures what was trained on"
+        )
     return Run(
         recipe=recipe,
         seed=seed,
