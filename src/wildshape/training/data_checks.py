@@ -49,7 +49,7 @@ def doubts_of(store: Store, recipe: Recipe) -> list[str]:
     if np.mean([surrounded(scan) for scan in seen]) > _MOST:
         doubts.append(
             f"{store.named}: the origin lies within most scans, where no sensor can have stood, and"
-            " a model may learn little; leave scans in their sensors' frames, not about their middle"
+            " a model may learn little; leave scans in their sensors' frames, uncentred"
         )
     return doubts if made_for != kind else doubts + _doubts_of_size(store, recipe, seen)
 

@@ -177,7 +177,7 @@ def _use_exact_products(device: torch.device) -> None:
 def _new_state(recipe: Recipe, start: Path | None, seed: int, device: torch.device) -> TrainState:
     """Network, mean and optimiser; its learning rate lies on the device, for the step to turn."""
     torch.manual_seed(seed)
-    network = _network(recipe, start).to(device)
+    network = new_network(recipe, start).to(device)
     rate = torch.tensor(recipe.optim.lr, device=device)
     captured = device.type == "cuda"
     optimiser = torch.optim.Adam(network.parameters(), lr=rate, fused=True, capturable=captured)
@@ -309,7 +309,7 @@ def _records(run: Run) -> bool:
     return False
 
 
-def _network(recipe: Recipe, start: Path | None) -> ShapePoseNet:
+def new_network(recipe: Recipe, start: Path | None) -> ShapePoseNet:
     """A new network, or the checkpoint's; one that sees rays may start from one that does not."""
     if start is None:
         return ShapePoseNet(recipe.network)
