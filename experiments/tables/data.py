@@ -101,12 +101,17 @@ def _meshes(folder: Path, cad: Cad) -> Path:
     manifest = cad.folder / "manifest.csv"
     if not manifest.is_file():
         raise BadInputError(f"{manifest}: no such file; --cad names a folder with a manifest.csv.")
-    with manifest.open(encoding="utf-8") as file:
+    with manifest.open(encoding="utf-8-sig") as file:
         table = csv.DictReader(file)
         if lacks := [name for name in _COLUMNS if name not in (table.fieldnames or ())]:
             raise BadInputError(f"{manifest}: has no column {', '.join(lacks)}; add it.")
         rows = [row for row in table if row["split"] == cad.split]
     files = [cad.folder / row["file"] for row in rows if row["category"] in cad.categories]
+    if not files:
+        wanted = f"{' or '.join(cad.categories)}, split {cad.split}"
+        raise BadInputError(f"{manifest}: lists no mesh of {wanted}; add some.")
+    if lost := [mesh for mesh in files if not mesh.is_file()]:
+        raise BadInputError(f"{manifest}: lists {lost[0]}, which is not there; copy it again.")
     into.mkdir(parents=True, exist_ok=True)
     for place, mesh in zip(np.random.default_rng(0).permutation(len(files)), files):
         link = into / f"{place:04d}_{mesh.name}"

@@ -58,6 +58,7 @@ def measure(
     shop: Workshop, row: Row, block: Block, rotate: Rotate, seed: int, max_scans: int | None
 ) -> Measured | None:
     """Scores of a row; None where a library that it needs is not installed."""
+    test = store_of(shop.folder, block.test)  # first: it may be refused, training takes hours
     model = model_of(shop, row, seed) if isinstance(row, Trained) else None
     mark = _mark(row, model)
     truth = ("accumulated",) if block.accumulated else ()
@@ -67,7 +68,7 @@ def measure(
         method = method_of(shop, row, model)
         if method is None:
             return None
-        source = open_tracks(store_of(shop.folder, block.test))
+        source = open_tracks(test)
         source = WithoutShapes(source) if block.accumulated else source
         found = evaluate_once(source, {row.name: method}, rotate, seed, max_scans, TERMINAL)
         made = {**provenance(shop.command), "model": mark}

@@ -111,6 +111,26 @@ def test_a_table_that_needs_a_folder_says_so():
             TABLES[name](Sources(SIZES["tiny"]))
 
 
+def test_data_that_are_measured_are_looked_at_before_anything_is_trained(tmp_path):
+    given = Settings("kitti", "test", tmp_path, kitti=tmp_path / "nowhere")
+    with pytest.raises(BadInputError, match=r"nowhere: no such folder"):
+        main(given, "the command")
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [("car,a.ply,test", "a.ply, which is not"), ("bus,a.ply,test", "no mesh of car")],
+)
+def test_meshes_that_are_not_there_are_named_as_the_manifest_does(tmp_path, row, said):
+    manifest = tmp_path / "cad" / "manifest.csv"
+    manifest.parent.mkdir()
+    manifest.write_text(f"\ufeffcategory,file,split\n{row}\n", "utf-8")
+    given = Settings("vehicle", "test", tmp_path, cad=manifest.parent, rows="^identity")
+    with pytest.raises(BadInputError, match=f"manifest.csv: lists .*{said}"):
+        main(given, "the command")
+
+
 def test_trucks_are_measured_against_partial_truth_as_the_papers_are():
     known, accumulated = TABLES["trucks"](Sources(SIZES["tiny"], Path("cad"))).blocks
     assert (known.accumulated, accumulated.accumulated) == (False, True)

@@ -76,6 +76,13 @@ def test_objects_of_another_size_than_the_presets_are_doubted(doubts, cars):
     assert "objects of 1 to 25 m" in said
 
 
+def test_scans_about_their_own_middle_are_doubted(doubts, cars):
+    """Crops are often centred before they are saved; where the sensor stood is lost then."""
+    centred = tuple(scan - (scan.min(0) + scan.max(0)) / 2 for scan in cars[0].scans)
+    (said,) = doubts("small", replace(cars[0], scans=centred))
+    assert "the origin lies within most scans" in said
+
+
 def test_a_training_says_so(cars, tmp_path):
     class Heard(Silent):
         def say(self, text):

@@ -18,8 +18,10 @@ def test_tracks_held_out_without_a_usable_scan_are_those_fitted(cars, tmp_path):
             few = tuple(scan[:20] for scan in track.scans)
             writer.add(replace(track, scans=few) if number in held else track)
     recipe = replace(SMALLEST, held_out=20)
-    run = setup(recipe, open_store(tmp_path / "store"), tmp_path / "run")
+    said = []
+    run = setup(recipe, open_store(tmp_path / "store"), tmp_path / "run", say=said.append)
     assert sorted(run.held_tracks) == [i for i in range(20) if i not in held]
+    assert "none is held out: validation measures what was trained on" in said[0]
 
 
 def test_few_tracks_are_both_fitted_and_held_out_many_are_not():
@@ -32,7 +34,11 @@ def test_few_tracks_are_both_fitted_and_held_out_many_are_not():
 
 
 def test_tracks_that_are_held_out_are_not_fitted(car_store, tmp_path):
-    run = setup(replace(SMALLEST, held_out=4), car_store, tmp_path)
+    said = []
+    run = setup(replace(SMALLEST, held_out=4), car_store, tmp_path / "many", say=said.append)
+    assert not said
+    setup(replace(SMALLEST, held_out=9), car_store, tmp_path / "few", say=said.append)
+    assert "none is held out" in said[0]
     fitted, held = (
         {int(scan) for scans in sampler.scans_of for scan in scans}
         for sampler in (run.sampler, run.held_out)

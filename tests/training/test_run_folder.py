@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from wildshape.baselines.dpc.train import train_dpc
 from wildshape.errors import BadInputError
 from wildshape.io.inputs import open_tracks
 from wildshape.io.output import MARKER, begin
@@ -156,3 +157,29 @@ def test_weights_are_not_removed_by_the_run_that_reads_them(folders, tmp_path):
     assert sorted(path.name for path in run.iterdir()) == before
     with pytest.raises(BadInputError, match="pass one of them"):
         replace(OPTIONS, resume=True, overwrite=True)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"data": "nowhere"},
+        {"coordinates": Coordinates("mm")},
+        {"start": "shipped"},
+        {"teacher": "two/scan.npy"},
+        {"preset": "dpc-lidar-small", "data": "nowhere"},
+    ],
+    ids=str,
+)
+def test_a_finished_run_stays_where_the_one_to_replace_it_is_refused(folders, tmp_path, wrong):
+    run = tmp_path / "run"
+    train(folders[0], run, OPTIONS)
+    before = sorted(path.name for path in run.iterdir())
+    named = {name: value for name, value in wrong.items() if name != "data"}
+    if "teacher" in named:
+        named["teacher"] = str(tmp_path / named["teacher"])
+        (tmp_path / "two" / "scan.npy").write_bytes(b"")
+    options = replace(OPTIONS, overwrite=True, **named)
+    begin = train_dpc if options.preset.startswith("dpc") else train
+    with pytest.raises(BadInputError):
+        begin(tmp_path / wrong.get("data", "one"), run, options)
+    assert sorted(path.name for path in run.iterdir()) == before

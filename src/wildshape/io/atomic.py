@@ -50,7 +50,7 @@ def atomic_write(path: Path | str, *, flush: bool = False) -> Iterator[IO[bytes]
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with _naming(path):
+    with naming(path):
         with suppress(FileNotFoundError):
             path.lstat()  # a name that is too long fails here, and not after all is written
         descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".part")
@@ -61,7 +61,7 @@ def atomic_write(path: Path | str, *, flush: bool = False) -> Iterator[IO[bytes]
             if flush:
                 file.flush()
                 os.fsync(file.fileno())
-        with _naming(path):
+        with naming(path):
             temporary.chmod(0o666 & ~_umask())
             temporary.replace(path)
     except BaseException as error:
@@ -72,7 +72,7 @@ def atomic_write(path: Path | str, *, flush: bool = False) -> Iterator[IO[bytes]
 
 
 @contextmanager
-def _naming(path: Path) -> Iterator[None]:
+def naming(path: Path) -> Iterator[None]:
     """Errors of the system name the file that was asked for, not the temporary one."""
     try:
         yield

@@ -6,11 +6,13 @@ import numpy as np
 
 from wildshape.datasets.tracks.truth import misplaced
 from wildshape.geometry.box import extent
+from wildshape.geometry.projection.line_of_sight import surrounded
 from wildshape.io.store.store import Store
+from wildshape.records import Points
 from wildshape.training.config import Recipe
 from wildshape.training.recipes import PRESETS, recipe_named
 
-_SAMPLE = 200
+_SAMPLE, _MOST = 200, 0.5
 _USUAL_M = {"lidar": (1.0, 25.0), "camera": (0.4, 2.5)}
 """Diagonals of what presets are for: vehicles; objects of unit size, or chairs in metres."""
 
@@ -43,7 +45,13 @@ def doubts_of(store: Store, recipe: Recipe) -> list[str]:
             f"{store.named}: {few:,} of {store.scan_count:,} scans have fewer than {least} points"
             f" and are not trained on; {without:,} of {len(store):,} tracks have no others"
         )
-    return doubts if made_for != kind else doubts + _doubts_of_size(store, recipe)
+    seen = _sample_of(store)
+    if np.mean([surrounded(scan) for scan in seen]) > _MOST:
+        doubts.append(
+            f"{store.named}: the origin lies within most scans, where no sensor can have stood, and"
+            " a model may learn little; leave scans in their sensors' frames, uncentred"
+        )
+    return doubts if made_for != kind else doubts + _doubts_of_size(store, recipe, seen)
 
 
 def doubts_of_truth(store: Store) -> list[str]:
@@ -54,11 +62,15 @@ def doubts_of_truth(store: Store) -> list[str]:
     return [f"{store.named}: {first.name}: {odd}; {cure}"] if odd else []
 
 
-def _doubts_of_size(store: Store, recipe: Recipe) -> list[str]:
-    """Where scans are far from the size of object that the preset's lengths were chosen for."""
+def _sample_of(store: Store) -> list[Points]:
     rows = np.random.default_rng(0).permutation(store.scan_count)[:_SAMPLE]
     scans = (store.scan_points(int(row)) for row in rows)
-    size = float(np.median([extent(scan) for scan in scans if len(scan)]))
+    return [scan for scan in scans if len(scan)]
+
+
+def _doubts_of_size(store: Store, recipe: Recipe, seen: list[Points]) -> list[str]:
+    """Where scans are far from the size of object that the preset's lengths were chosen for."""
+    size = float(np.median([extent(scan) for scan in seen]))
     low, high = _USUAL_M[recipe_named(recipe.name).views.sensor]
     if low <= size <= high:
         return []

@@ -78,6 +78,7 @@ def _begin(
             f"{out}: a run is there already; pass --resume to go on with it, --overwrite"
             " to replace it, or choose another --out."
         )
+    next(iter(open_tracks(data, options.coordinates)))  # else refused once an earlier run is gone
     return begin(out, "train", settings, _FILES, overwrite=options.overwrite)
 
 

@@ -18,6 +18,7 @@ import torch
 from wildshape.errors import BadInputError
 from wildshape.geometry.box import unit_of
 from wildshape.io.atomic import write_text
+from wildshape.io.progress import counted
 from wildshape.io.store.store import Store
 from wildshape.method.checkpoint import load_checkpoint
 from wildshape.method.network import Encoding, ShapePoseNet
@@ -144,6 +145,11 @@ def setup(
     described = {"recipe": asdict(recipe), "identity": identity, **(provenance or {})}
     if processes.leads and state.step < recipe.optim.steps:  # a finished run is left as it is
         write_text(folder / "run.json", json.dumps(described, indent=1, default=str))
+    if held_tracks is fit_tracks:
+        say(
+            f"{store.named}: {counted(len(store), 'track')}, of which none is held out: validation"
+            " measures what was trained on"
+        )
     return Run(
         recipe=recipe,
         seed=seed,
@@ -171,7 +177,7 @@ def _use_exact_products(device: torch.device) -> None:
 def _new_state(recipe: Recipe, start: Path | None, seed: int, device: torch.device) -> TrainState:
     """Network, mean and optimiser; its learning rate lies on the device, for the step to turn."""
     torch.manual_seed(seed)
-    network = _network(recipe, start).to(device)
+    network = new_network(recipe, start).to(device)
     rate = torch.tensor(recipe.optim.lr, device=device)
     captured = device.type == "cuda"
     optimiser = torch.optim.Adam(network.parameters(), lr=rate, fused=True, capturable=captured)
@@ -303,7 +309,7 @@ def _records(run: Run) -> bool:
     return False
 
 
-def _network(recipe: Recipe, start: Path | None) -> ShapePoseNet:
+def new_network(recipe: Recipe, start: Path | None) -> ShapePoseNet:
     """A new network, or the checkpoint's; one that sees rays may start from one that does not."""
     if start is None:
         return ShapePoseNet(recipe.network)

@@ -23,10 +23,11 @@ from wildshape.training.config import Recipe
 from wildshape.training.data_checks import doubts_of, doubts_of_truth
 from wildshape.training.loop import Run, StopRequested, fit, setup
 from wildshape.training.options import TrainingOptions
-from wildshape.training.recipes import recipe_for, with_encoder, with_rays
+from wildshape.training.recipes import recipe_for, recipe_named, with_encoder, with_rays
 from wildshape.training.run_folder import begun_run, finish_run, open_training_data
 from wildshape.training.runtime.profiler import PROFILE
 from wildshape.training.runtime.torchrun import launched
+from wildshape.training.setup import new_network
 
 Stopping = Callable[[], AbstractContextManager[Callable[[], bool]]]
 """Gives a context in which a training asks between two steps whether to stop."""
@@ -95,12 +96,10 @@ def train(
         StopRequested: `stopping` said so, the state is saved; its text says how to go on.
     """
     device, weights = choose_device(options.device), _Weights.named_in(options)
+    weights.refuse_misfits(options)
     with begun_run(data, out, options, weights.files), _resumable(options):
         store = open_training_data(data, out, options, progress)
-        recipe = recipe_for(store, options.preset, options.steps)
-        recipe = with_encoder(recipe, options.encoder or recipe.network.backbone)
-        if weights.start is not None:
-            recipe = with_rays(recipe, load_checkpoint(weights.start)[1].network.rays)
+        recipe = weights.suited(recipe_for(store, options.preset, options.steps), options)
         run = _set_up(recipe, store, data, out, options, weights, device, progress)
     if options.profile and run.processes.leads:
         run.profile = out / PROFILE
@@ -151,6 +150,23 @@ class _Weights(NamedTuple):
     def files(self) -> list[Path]:
         """Those that are named."""
         return [named for named in self if isinstance(named, Path)]
+
+    def suited(self, recipe: Recipe, options: TrainingOptions) -> Recipe:
+        """The recipe with the encoder asked for, and rays where the weights to start from do."""
+        recipe = with_encoder(recipe, options.encoder or recipe.network.backbone)
+        if self.start is None:
+            return recipe
+        return with_rays(recipe, load_checkpoint(self.start)[1].network.rays)
+
+    def refuse_misfits(self, options: TrainingOptions) -> None:
+        """Look into the files before an earlier run is replaced, and tracks are packed.
+
+        Raises:
+            BadInputError: no checkpoint of ours, or to start from one of another preset.
+        """
+        for file in self.files:
+            load_checkpoint(file)
+        new_network(self.suited(recipe_named(options.preset), options), self.start)
 
 
 def _set_up(

@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
+import errno
 import gc
 import json
 import pickle
+import resource
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
@@ -116,6 +118,18 @@ def test_verify_names_the_damaged_file(store: Store) -> None:
     shard.write_bytes(data)
     with pytest.raises(BadInputError, match=r"points-00001\.safetensors: the checksum is wrong"):
         open_store(store.path).verify()
+
+
+def test_a_full_disk_names_the_shard(tmp_path: Path) -> None:
+    cloud = np.ones((10_000, 3), np.float32)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, hard))
+    try:
+        with pytest.raises(OSError, match="points-") as full, StoreWriter(tmp_path, {}) as writer:
+            writer.add(Track("large", (cloud,), ("0",)))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert full.value.errno == errno.EFBIG
 
 
 def test_half_written_stores_are_refused(track: Track, tmp_path: Path) -> None:

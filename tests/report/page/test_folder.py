@@ -322,6 +322,16 @@ def test_the_curve_of_the_loss_shows_the_terms_of_any_objective(tmp_path: Path) 
     (tmp_path / "log.jsonl").write_text(json.dumps(line) + "\n", encoding="utf-8")
     (curve,) = report_from_folder(tmp_path).curves
     assert [name for name, _, _ in curve.series] == ["loss", "silhouette", "student"]
+    assert curve.y_label == "no unit"  # pixels, summed
+
+
+def test_the_curves_of_two_runs_are_told_apart(tmp_path: Path) -> None:
+    for run in ("first", "second"):
+        (tmp_path / run).mkdir()
+        (tmp_path / run / "log.jsonl").write_text('{"step": 1, "loss": 0.5}\n', "utf-8")
+    first, second = report_from_folder(tmp_path).curves
+    assert (first.title, second.title) == ("first: Loss", "second: Loss")
+    assert first.y_label == "metres"
 
 
 def test_the_floor_is_said_to_be_of_random_points(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import shutil
+from contextlib import suppress
 from itertools import repeat
 from pathlib import Path
 from typing import Any, get_args
@@ -16,7 +17,7 @@ from jaxtyping import Float32
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.atomic import hold_folder, write_json
+from wildshape.io.atomic import hold_folder, naming, write_json
 from wildshape.io.sensor_json import sensor_to_json
 from wildshape.io.store.checks import cloud_crc, is_finite
 from wildshape.io.store.index import IndexWriter, file_record
@@ -265,23 +266,26 @@ class _Shard:
         self._file.write(bytes(_HEADER_BYTES))
 
     def write(self, points: Float32[np.ndarray, "n 3"]) -> None:
-        self._file.write(points.data)
+        with naming(self.path):
+            self._file.write(points.data)
         self.points += len(points)
 
     def finish(self) -> FileRecord:
         offsets = [0, self.points * POINT_BYTES]
         tensor = {"dtype": "F32", "shape": [self.points, 3], "data_offsets": offsets}
         header = json.dumps({"points": tensor}).encode().ljust(_HEADER_BYTES - 8)
-        self._file.seek(0)
-        self._file.write(len(header).to_bytes(8, "little") + header)
-        self._file.flush()
-        os.fsync(self._file.fileno())
-        self._file.close()
+        with naming(self.path):
+            self._file.seek(0)
+            self._file.write(len(header).to_bytes(8, "little") + header)
+            self._file.flush()
+            os.fsync(self._file.fileno())
+            self._file.close()
         self._temporary.replace(self.path)
         return file_record(self.path)
 
     def abandon(self) -> None:
-        self._file.close()
+        with suppress(OSError):  # what a full disk did not take is tried again, and named no more
+            self._file.close()
 
 
 def check_room(path: Path, *, overwrite: bool) -> None:

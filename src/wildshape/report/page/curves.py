@@ -23,11 +23,12 @@ _TRUTH = {
 def training_curves(log: Path) -> tuple[Curve, ...]:
     """The curves of a run's `log.jsonl`."""
     entries = list(whole_entries(log))
-    loss = _series(entries, _terms(entries))
+    terms = _terms(entries)
+    unit = "no unit" if "silhouette" in terms else "metres"  # DPC's count pixels
     held_out = _series(entries, tuple(f"{_VALIDATION}{k}" for k in ("observation", "projection")))
     cycle = _series(entries, (f"{_VALIDATION}cycle_deg",))
     curves = (
-        Curve("Loss", "step", "metres", loss, log_y=True),
+        Curve("Loss", "step", unit, _series(entries, terms), log_y=True),
         Curve("Share of each pose branch", "step", "share", _shares(entries)),
         Curve("Held-out tracks, without truth", "step", "metres", held_out, log_y=True),
         Curve("Cycle consistency on held-out tracks", "step", "degrees", cycle),

@@ -17,7 +17,7 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.registration import to_middle
 from wildshape.io.guard import reading
 from wildshape.records import Track, as_text
-from wildshape.report.content import Cloud, Figure, Report, ReportObject, Table, track_object
+from wildshape.report.content import Cloud, Curve, Figure, Report, ReportObject, Table, track_object
 from wildshape.report.page.curves import training_curves
 from wildshape.report.page.metrics import (
     is_ours,
@@ -68,6 +68,15 @@ class Evaluation(NamedTuple):
     which: str
 
 
+def _curves(folder: Path) -> list[Curve]:
+    """Of all runs; where there are several, each curve says of which it is."""
+    logs = find(folder, "log.jsonl")
+    if len(logs) < 2:
+        return [curve for log in logs for curve in training_curves(log)]
+    runs = [(as_text(str(log.parent.relative_to(folder))), training_curves(log)) for log in logs]
+    return [replace(one, title=f"{run}: {one.title}") for run, curves in runs for one in curves]
+
+
 def report_from_folder(folder: Path, inputs: Path | None = None) -> Report:
     """What a folder holds, as a report: the objects to worry about first.
 
@@ -84,7 +93,7 @@ def report_from_folder(folder: Path, inputs: Path | None = None) -> Report:
     if not folder.is_dir():
         raise BadInputError(f"{folder}: no such folder; name the --out of an earlier command.")
     evaluations = _evaluations(folder)
-    curves = [curve for log in find(folder, "log.jsonl") for curve in training_curves(log)]
+    curves = _curves(folder)
     tracks = [path.parent for path in find(folder, OBJECTS)]
     if not (evaluations or curves or tracks):
         raise BadInputError(
