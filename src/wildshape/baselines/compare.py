@@ -23,6 +23,7 @@ from wildshape.io.inputs import TrackSource, open_tracks
 from wildshape.io.output import begin, keep_apart
 from wildshape.io.progress import SILENT, Progress
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates
+from wildshape.io.store.store import is_store, open_store
 from wildshape.method.checkpoint import MODEL, fingerprint, weights_file
 from wildshape.ops.device import choose_device
 from wildshape.parallel.team import team
@@ -125,7 +126,7 @@ def compare(
             " frame and of the scans' unit, label_size_m is length, width, height in metres"
         )
     models = load_models(options.models, options.device, raw=options.raw)
-    for told in _other_sensors(source, models):
+    for told in (*_other_sensors(source, models), *_seen_in_training(data, models)):
         progress.say(told)
     keep_apart(out, data, *map(weights_file, options.models))
     identity = options.identity(data)
@@ -259,6 +260,18 @@ def _other_sensors(source: TrackSource, models: Mapping[str, Model]) -> list[str
         " other weights by --model"
         for name, model in models.items()
         if isinstance(model, Predictor) and model.settings.sensor != kind
+    ]
+
+
+def _seen_in_training(data: Path, models: Mapping[str, Model]) -> list[str]:
+    """A sentence on each model that was trained on what it is measured on."""
+    packed = open_store(data).fingerprint if is_store(data) else None
+    made = {name: model.settings.provenance for name, model in models.items()}
+    return [
+        f"{name}: was trained on {data}; these figures say little of objects that it never saw"
+        for name, of in made.items()
+        if packed == of.get("identity", {}).get("data", "")
+        or data.resolve() == Path(of.get("data", "")).resolve()
     ]
 
 
