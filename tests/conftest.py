@@ -6,8 +6,8 @@ import pytest
 import tests.runtime_types  # noqa: F401  before wildshape is imported
 import torch
 from hypothesis import settings
+from tests.packed import packed
 
-from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.parallel import processes
 from wildshape.parallel.handout import Handout
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
@@ -28,10 +28,7 @@ def cars():
 def car_store(cars, tmp_path_factory):
     """The same cars as a packed store."""
     path = tmp_path_factory.mktemp("cars") / "store"
-    with StoreWriter(path, {}) as writer:
-        for track in cars:
-            writer.add(track)
-    return open_store(path)
+    return packed(path, cars)
 
 
 @pytest.fixture

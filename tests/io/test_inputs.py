@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.packed import packed
 
 from wildshape.errors import BadInputError
 from wildshape.io.inputs import open_tracks
 from wildshape.io.scans.points import Coordinates
 from wildshape.io.scans.writers import write_ply
-from wildshape.io.store.store import StoreWriter
 from wildshape.io.tracks import NoUsableScanError, write_track
 from wildshape.records import Track
 
@@ -50,8 +50,7 @@ def test_a_packed_store_gives_each_place_once_as_a_folder_does(
     track: Track, tmp_path: Path
 ) -> None:
     twice = replace(track, scans=tuple(np.concatenate((scan, scan)) for scan in track.scans))
-    with StoreWriter(tmp_path / "store", {}) as writer:
-        writer.add(twice)
+    packed(tmp_path / "store", [twice])
     write_track(tmp_path / "folder", twice)
     for path in (tmp_path / "store", tmp_path / "folder"):
         (found,) = open_tracks(path)
@@ -62,8 +61,7 @@ def test_a_packed_store_gives_each_place_once_as_a_folder_does(
 def test_what_is_done_to_a_track_of_a_store_changes_none_that_is_read_later(
     track: Track, tmp_path: Path
 ) -> None:
-    with StoreWriter(tmp_path / "store", {}) as writer:
-        writer.add(track)
+    packed(tmp_path / "store", [track])
     source = open_tracks(tmp_path / "store")
     found = source[0]
     assert found.shape is not None
@@ -75,8 +73,7 @@ def test_what_is_done_to_a_track_of_a_store_changes_none_that_is_read_later(
 
 
 def test_packed_store(track: Track, tmp_path: Path) -> None:
-    with StoreWriter(tmp_path / "store", {}) as writer:
-        writer.add(track)
+    packed(tmp_path / "store", [track])
     source = open_tracks(tmp_path / "store")
     assert source.names == ("car-1",)
     np.testing.assert_array_equal(source[0].scans[2], track.scans[2])

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.io.store.stores import make_parts
+from tests.packed import packed
 from tests.refusal import refused
 
 from wildshape.errors import BadInputError
@@ -17,7 +18,7 @@ from wildshape.io.rays import read_rays, write_rays
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates
 from wildshape.io.store.join import join_stores
 from wildshape.io.store.layout import PARTS, WRITING_JSON
-from wildshape.io.store.store import StoreWriter, open_store
+from wildshape.io.store.store import open_store
 from wildshape.io.tracks import read_track, write_track
 from wildshape.records import SightLines, Track
 
@@ -76,9 +77,9 @@ def test_stores_keep_rays_however_they_are_joined(seen: Track, tmp_path: Path) -
     bare = replace(seen, rays=(), label_size_m=None, shape_kind="partial")
     seen = replace(seen, shape_kind="mirrored")
     for path, order in zip(parts, ((bare, seen), (seen, bare, seen))):
-        with StoreWriter(path, {}) as writer:
-            for number, one in enumerate(order):
-                writer.add(replace(one, name=f"{path.name}{number}"))
+        packed(
+            path, [replace(one, name=f"{path.name}{number}") for number, one in enumerate(order)]
+        )
     join_stores(parts, tmp_path / "out", {})
     found = list(open_store(tmp_path / "out"))
     for one, truth in zip(found, (bare, seen, seen, bare, seen), strict=True):
@@ -96,13 +97,12 @@ def test_a_store_without_rays_is_what_it_was(track: Track, tmp_path: Path) -> No
 
 
 def test_rays_that_were_changed_are_refused(seen: Track, tmp_path: Path) -> None:
-    with StoreWriter(tmp_path / "s", {}) as writer:
-        writer.add(seen)
+    store = packed(tmp_path / "s", [seen])
     shard = tmp_path / "s" / "points-00000.safetensors"
     damaged = bytearray(shard.read_bytes())
     damaged[256 + 5] ^= 1  # rays come before the first scan
     shard.write_bytes(damaged)
-    refused(open_store(tmp_path / "s").track, 0, match="rays of scan 0 of the store are not those")
+    refused(store.track, 0, match="rays of scan 0 of the store are not those")
 
 
 @pytest.mark.parametrize("times", [0.001, 0.01, 100, 1000])

@@ -5,6 +5,7 @@
 from dataclasses import replace
 
 import pytest
+from tests.packed import packed
 
 from wildshape.io.progress import Silent
 from wildshape.io.store.store import StoreWriter, open_store
@@ -89,8 +90,7 @@ def test_a_training_says_so(cars, tmp_path):
             heard.append(text)
 
     heard: list[str] = []
-    with StoreWriter(tmp_path / "store", {}) as writer:
-        writer.add(cars[0].part([0]))
+    packed(tmp_path / "store", [cars[0].part([0])])
     train(tmp_path / "store", tmp_path / "run", TrainingOptions("tiny", steps=1), Heard())
     assert [text for text in heard if "no track has two scans" in text]
 
@@ -103,8 +103,7 @@ def test_true_poses_the_wrong_way_round_are_told_before_the_oracle_learns(cars, 
     heard: list[str] = []
     poses = cars[0].T_sensor_object
     for name, T in (("sound", poses), ("turned", poses.inverse())):
-        with StoreWriter(tmp_path / name, {}) as writer:
-            writer.add(replace(cars[0], T_sensor_object=T))
+        packed(tmp_path / name, [replace(cars[0], T_sensor_object=T)])
         options = TrainingOptions("tiny", steps=1, teacher="truth")
         train(tmp_path / name, tmp_path / f"{name}.run", options, Heard())
     (said,) = (text for text in heard if "true poses" in text)

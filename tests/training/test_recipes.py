@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from tests.packed import packed
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.projection.visibility import PixelBins, PolarBins
-from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.method.network import ShapePoseNet
 from wildshape.records import Sensor
 from wildshape.training.batches.fused import FusedSampler
@@ -72,17 +72,13 @@ def test_one_step_is_a_schedule_too(car_store):
 
 
 def test_a_store_of_two_kinds_of_sensor_is_refused(cars, tmp_path):
-    with StoreWriter(tmp_path, {}) as writer:
-        writer.add(cars[0])
-        writer.add(replace(cars[1], sensor=Sensor("camera")))
+    store = packed(tmp_path, [cars[0], replace(cars[1], sensor=Sensor("camera"))])
     with pytest.raises(BadInputError, match="split it"):
-        recipe_for(open_store(tmp_path), "small", None)
+        recipe_for(store, "small", None)
 
 
 def test_a_recipe_is_of_the_data_s_kind_of_sensor_and_the_paper_s_are_of_their_own(cars, tmp_path):
-    with StoreWriter(tmp_path, {}) as writer:
-        writer.add(replace(cars[0], sensor=Sensor("camera")))
-    store = open_store(tmp_path)
+    store = packed(tmp_path, [replace(cars[0], sensor=Sensor("camera"))])
     for name in ("small", "views", "paper-views"):
         assert recipe_for(store, name, None).views.sensor == "camera"
     with pytest.raises(BadInputError, match="preset paper-lidar is for lidar scans"):

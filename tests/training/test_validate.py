@@ -8,12 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
+from tests.packed import packed
 
 from wildshape.geometry.transforms.rotation import random_rotation, rotation_angle
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.choose_hypothesis import choose_hypothesis
 from wildshape.inference.predictor import load
-from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.multiview import LossConfig
 from wildshape.method.network import Poses
@@ -108,7 +108,5 @@ def test_of_other_networks_nobody_says_which_way_is_up(known, sampler, changed):
 
 
 def test_tracks_without_truth_give_no_figures(known, cars, tmp_path):
-    with StoreWriter(tmp_path / "store", {}) as writer:
-        writer.add(replace(cars[0], T_sensor_object=None, shape=None))
-    store = open_store(tmp_path / "store")
+    store = packed(tmp_path / "store", [replace(cars[0], T_sensor_object=None, shape=None)])
     assert truth_figures(known.network, known.settings, store, [0], "yaw", ValidationConfig()) == {}

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 from safetensors.torch import load_file
+from tests.packed import packed
 
 from wildshape.baselines.dpc.completer import Dpc, load
 from wildshape.baselines.dpc.network import DpcNet
@@ -17,7 +18,6 @@ from wildshape.baselines.dpc.silhouette import Hindsight
 from wildshape.baselines.dpc.viewing_volume import PolarVolume
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_angle
-from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.loop import MODEL, StopRequested
@@ -42,10 +42,7 @@ def planes():
 @pytest.fixture(scope="module")
 def plane_store(planes, tmp_path_factory):
     path = tmp_path_factory.mktemp("planes") / "store"
-    with StoreWriter(path, {}) as writer:
-        for track in planes:
-            writer.add(track)
-    return open_store(path)
+    return packed(path, planes)
 
 
 def test_the_presets_hold_the_authors_numbers():
@@ -150,11 +147,9 @@ def test_a_finished_run_that_lost_its_model_writes_it_again(plane_store, tmp_pat
 
 
 def test_two_kinds_of_sensor_are_refused(planes, cars, tmp_path):
-    with StoreWriter(tmp_path / "store", {}) as writer:
-        writer.add(replace(planes[0], name="plane"))
-        writer.add(cars[0])
+    store = packed(tmp_path / "store", [replace(planes[0], name="plane"), cars[0]])
     with pytest.raises(BadInputError, match="split it"):
-        setup_dpc(tiny("dpc-small"), open_store(tmp_path / "store"), tmp_path)
+        setup_dpc(tiny("dpc-small"), store, tmp_path)
 
 
 def test_the_wrong_data_is_refused_in_a_sentence(plane_store, car_store, tmp_path):

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tests.packed import packed
 
 from wildshape.datasets.tracks.whole_tracks import Folder
 from wildshape.errors import BadInputError
 from wildshape.io.inputs import open_tracks
 from wildshape.io.scans.points import Coordinates, read_points, read_scan
-from wildshape.io.store.store import StoreWriter
 from wildshape.io.tracks import read_track, write_track
 from wildshape.records import Track
 
@@ -82,8 +82,7 @@ def test_scans_and_poses_of_a_track_are_moved_and_its_shape_is_not(
 
 
 def test_a_packed_store_is_not_read_otherwise(track: Track, tmp_path: Path) -> None:
-    with StoreWriter(tmp_path / "store", {}) as writer:
-        writer.add(track)
+    packed(tmp_path / "store", [track])
     assert len(open_tracks(tmp_path / "store", Coordinates())) == 1
     for other in (Coordinates("mm"), Coordinates("m", (1.0, 0.0, 0.0))):
         with pytest.raises(BadInputError, match="leave --unit and --origin away"):

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import torch
 from tests.cars import drive_by
+from tests.packed import packed
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.inputs import open_tracks
-from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.io.tracks import write_track
 from wildshape.records import Intrinsics, Sensor, Track
 from wildshape.report.statistics.statistics import (
@@ -37,13 +37,6 @@ def around(name="around", scans=8, distance=10.0, height=0.0, category="car"):
     return Track(name, clouds, names, category=category, T_sensor_object=poses)
 
 
-def packed(folder, tracks):
-    with StoreWriter(folder / "store", {}) as writer:
-        for track in tracks:
-            writer.add(track)
-    return open_store(folder / "store")
-
-
 def described(store, sample=0):
     found = statistics_of_store(store, sample_of(len(store), sample), lambda _: None)
     return found, {q.name: q for q in found.quantities}
@@ -51,7 +44,7 @@ def described(store, sample=0):
 
 def test_sides_ranges_and_counts_come_from_the_index(tmp_path):
     shaped = replace(around("b", distance=20.0), shape=np.eye(3, dtype=np.float32))
-    store = packed(tmp_path, [around("a"), shaped, around("c", scans=4, category="van")])
+    store = packed(tmp_path / "store", [around("a"), shaped, around("c", scans=4, category="van")])
     found, by = described(store, sample=1)
     assert (found.tracks, found.scans, found.points, found.read) == (3, 20, 1200, 1)
     assert (found.with_poses, found.with_shape) == (3, 1)
@@ -74,14 +67,16 @@ def test_azimuth_is_the_side_that_is_seen(tmp_path):
         scan_names=one.scan_names[1:2],
         T_sensor_object=one.T_sensor_object[1:2],  # pyright: ignore[reportOptionalSubscript]
     )
-    _, by = described(packed(tmp_path, [left]))
+    _, by = described(packed(tmp_path / "store", [left]))
     assert by["azimuth"].tally.mean == pytest.approx(90.0)
     assert by["elevation"].tally.mean == pytest.approx(30.0)
 
 
 def test_posed_and_unposed_tracks_between_each_other(tmp_path):
     bare = replace(around("bare", distance=90.0), T_sensor_object=None)
-    found, by = described(packed(tmp_path, [around("a"), bare, around("z", distance=30.0)]))
+    found, by = described(
+        packed(tmp_path / "store", [around("a"), bare, around("z", distance=30.0)])
+    )
     assert found.with_poses == 2
     assert by["range"].tally.count == 16
     assert by["range"].tally.most == pytest.approx(30.0)
@@ -89,7 +84,7 @@ def test_posed_and_unposed_tracks_between_each_other(tmp_path):
 
 def test_without_truth_the_sensors_frame_is_said_and_used(tmp_path):
     bare = replace(around(), T_sensor_object=None)
-    _, by = described(packed(tmp_path, [bare]))
+    _, by = described(packed(tmp_path / "store", [bare]))
     assert by["azimuth"].basis.startswith("sensor's frame")
     assert by["azimuth"].tally.mean == pytest.approx(0.0, abs=3.0)
     assert by["range"].tally.mean == pytest.approx(10.0, abs=0.3)
@@ -100,14 +95,14 @@ def test_without_truth_the_sensors_frame_is_said_and_used(tmp_path):
 
 def test_a_sample_without_truth_is_said_once(tmp_path):
     bare = [replace(around(name), T_sensor_object=None) for name in "abc"]
-    _, by = described(packed(tmp_path, bare), sample=1)
+    _, by = described(packed(tmp_path / "store", bare), sample=1)
     assert by["range"].basis == "sensor's frame, middle of each scan; a sample of 1 of 3 tracks"
 
 
 def test_a_cameras_axes_are_turned_to_forward_left_up(tmp_path):
     ahead = np.random.default_rng(0).normal((1.0, 2.0, 10.0), 0.05, (50, 3)).astype(np.float32)
     camera = Sensor("camera", intrinsics=Intrinsics(240.0, 240.0, 64.0, 64.0, 128, 128))
-    found, by = described(packed(tmp_path, [Track("t", (ahead,), ("0",), sensor=camera)]))
+    found, by = described(packed(tmp_path / "store", [Track("t", (ahead,), ("0",), sensor=camera)]))
     assert by["azimuth"].tally.mean == pytest.approx(-5.7, abs=0.5)  # to the right
     assert by["elevation"].tally.mean == pytest.approx(-11.2, abs=0.5)  # and below
     assert found.sensors == {"camera, 128 x 128 px, f 240": 1}
@@ -116,7 +111,7 @@ def test_a_cameras_axes_are_turned_to_forward_left_up(tmp_path):
 @pytest.mark.parametrize("truth", ["shape", "fused"])
 def test_lengths_by_the_best_that_is_known(tmp_path, truth):
     shape = np.asarray([[-3, -1, 0], [3, 1, 2]], np.float32) if truth == "shape" else None
-    _, by = described(packed(tmp_path, [replace(around(), shape=shape)]))
+    _, by = described(packed(tmp_path / "store", [replace(around(), shape=shape)]))
     length, basis = (6.0, "truth shapes") if truth == "shape" else (4.0, "scans joined")
     assert by["length"].tally.mean == pytest.approx(length, abs=0.2)
     assert by["length"].basis.startswith(basis)
@@ -125,7 +120,7 @@ def test_lengths_by_the_best_that_is_known(tmp_path, truth):
 @pytest.mark.parametrize("kind", ["partial", "mirrored"])
 def test_what_scans_were_put_together_to_is_no_true_shape(tmp_path, kind):
     shape = np.asarray([[-3, -1, 0], [3, 1, 2]], np.float32)
-    _, by = described(packed(tmp_path, [replace(around(), shape=shape, shape_kind=kind)]))
+    _, by = described(packed(tmp_path / "store", [replace(around(), shape=shape, shape_kind=kind)]))
     assert by["length"].tally.mean == pytest.approx(6.0)
     assert by["length"].basis.startswith("scans joined")
 
@@ -133,7 +128,7 @@ def test_what_scans_were_put_together_to_is_no_true_shape(tmp_path, kind):
 def test_where_only_some_have_their_truth_that_is_said(tmp_path):
     bare = [replace(around(name), T_sensor_object=None) for name in "bcd"]
     shaped = replace(around("a"), shape=np.eye(3, dtype=np.float32))
-    _, by = described(packed(tmp_path, [shaped, *bare]))
+    _, by = described(packed(tmp_path / "store", [shaped, *bare]))
     assert by["range"].basis == "object's frame, by truth; all tracks, 8 of 32 scans"
     assert by["length"].basis == "truth shapes; all tracks, 1 of 4 of these"
 
@@ -149,7 +144,7 @@ def test_folders_say_the_same_as_the_store(tmp_path):
     read = statistics_of_tracks(source, sample_of(len(source), 0), lambda _: None)
     assert (read.tracks, read.read, read.scans) == (4, 3, 8)
     assert set(read.unusable) == {"b/000001.ply", "d", "d/0.npy"}
-    _, by = described(packed(tmp_path, [tracks[0], tracks[2]]))
+    _, by = described(packed(tmp_path / "store", [tracks[0], tracks[2]]))
     few = statistics_of_tracks(source, [0, 2], lambda _: None)
     assert few.scans is None  # not all were read
     for quantity in few.quantities:
@@ -169,4 +164,4 @@ def test_poses_that_are_far_away_are_refused(tmp_path):
     assert track.T_sensor_object is not None
     poses = SE3(track.T_sensor_object.rotation, track.T_sensor_object.translation + 1e200)
     with pytest.raises(BadInputError, match="store: a pose is not finite or far away"):
-        described(packed(tmp_path, [replace(track, T_sensor_object=poses)]))
+        described(packed(tmp_path / "store", [replace(track, T_sensor_object=poses)]))

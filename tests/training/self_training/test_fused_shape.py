@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.cars import drive_by, poses_of
+from tests.packed import packed
 from tests.training.self_training.taught import TAUGHT
 
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.self_training.fused_shape import (
     FusionConfig,
@@ -32,10 +32,9 @@ def drive(tmp_path_factory):
     ground = np.stack((x.ravel(), y.ravel(), np.full(x.size, low)), 1).astype(np.float32)
     beside = np.concatenate((ground, np.array([[0.0, 0.0, low + 4.0]], np.float32)))
     scans = [np.concatenate((s, T.apply_numpy(beside))) for T, s in zip(poses, track.scans)]
-    with StoreWriter(path, {}) as writer:
-        writer.add(replace(track, scans=tuple(scans)))
+    store = packed(path, [replace(track, scans=tuple(scans))])
     fitted = SE3(poses.rotation.float(), poses.translation.float())
-    return open_store(path), PosedTrack(np.arange(3), fitted, 0.0), low
+    return store, PosedTrack(np.arange(3), fitted, 0.0), low
 
 
 def fused(drive, sensor, *, mirror):

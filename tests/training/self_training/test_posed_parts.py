@@ -6,9 +6,9 @@ from contextlib import nullcontext
 
 import pytest
 import torch
+from tests.packed import packed
 from tests.training.self_training.taught import sampler_of
 
-from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.parallel.team import ALONE
 from wildshape.training.self_training import posed_parts, pseudo_labels
 from wildshape.training.self_training.posed_parts import PosedParts
@@ -32,10 +32,7 @@ def small(monkeypatch):
 def sampler(cars, tmp_path_factory):
     """Five tracks of four scans."""
     path = tmp_path_factory.mktemp("few") / "store"
-    with StoreWriter(path, {}) as writer:
-        for car in cars[:5]:
-            writer.add(car.part(range(4)))
-    return sampler_of(open_store(path))
+    return sampler_of(packed(path, [car.part(range(4)) for car in cars[:5]]))
 
 
 @pytest.fixture

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 import torch
 from tests.cars import poses_of
+from tests.packed import packed
 from tests.strategies import rotation_about
 from tests.training.self_training.taught import TAUGHT, sampler_of
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.predictor import load
-from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.self_training import pseudo_labels
 from wildshape.training.self_training.fused_shape import FusionConfig
@@ -88,15 +88,11 @@ def test_the_sensors_are_where_the_scans_were_taken(car_store, targets):
 
 def test_targets_do_not_depend_on_truth(cars, car_store, teacher, targets, tmp_path):
     """The same scans without poses and shapes give the same targets: no label enters."""
-    with StoreWriter(tmp_path / "store", {}) as writer:
-        for car in cars[:2]:
-            writer.add(replace(car, T_sensor_object=None, shape=None))
-    store = open_store(tmp_path / "store")
-    with StoreWriter(tmp_path / "known", {}) as writer:
-        for car in cars[:2]:
-            writer.add(car)
+    store = packed(
+        tmp_path / "store", [replace(car, T_sensor_object=None, shape=None) for car in cars[:2]]
+    )
     blind = fused_targets(teacher, sampler_of(store))
-    seeing = fused_targets(teacher, sampler_of(open_store(tmp_path / "known")))
+    seeing = fused_targets(teacher, sampler_of(packed(tmp_path / "known", cars[:2])))
     for one, two in zip(blind, seeing):
         assert torch.equal(torch.as_tensor(one), torch.as_tensor(two))
 

@@ -10,11 +10,12 @@ import pytest
 import torch
 from safetensors.torch import load_file
 from tests.cars import drive_by
+from tests.packed import packed
 from tests.training.self_training.taught import TAUGHT, sampler_of
 from tests.training.worker import FEW_STEPS
 
 from wildshape.errors import BadInputError
-from wildshape.io.store.store import StoreWriter, open_store
+from wildshape.io.store.store import open_store
 from wildshape.method.checkpoint import load_checkpoint
 from wildshape.training import setup as runs
 from wildshape.training.loop import StopRequested, fit, setup
@@ -79,9 +80,8 @@ def test_a_partial_shape_is_taught_with_its_reflection(tmp_path):
     car = drive_by(scans=3)
     assert car.shape is not None
     seen = car.shape[car.shape[:, 1] > 0.2]
-    with StoreWriter(tmp_path / "store", {}) as writer:
-        writer.add(replace(car, shape=seen, shape_kind="partial"))
-    found = true_targets(sampler_of(open_store(tmp_path / "store")))
+    store = packed(tmp_path / "store", [replace(car, shape=seen, shape_kind="partial")])
+    found = true_targets(sampler_of(store))
     assert found.complete
     across = found.shapes[0, :, 1]
     assert across.min() == pytest.approx(-seen[:, 1].max(), abs=0.05)
@@ -90,9 +90,13 @@ def test_a_partial_shape_is_taught_with_its_reflection(tmp_path):
 
 @pytest.mark.parametrize("missing", ["T_sensor_object", "shape"])
 def test_true_targets_refuse_data_without_truth_in_one_sentence(tmp_path, missing):
-    with StoreWriter(tmp_path / "store", {}) as writer:
-        writer.add(drive_by(name="known", scans=3))
-        writer.add(replace(drive_by(name="unknown", scans=3), **{missing: None}))
+    packed(
+        tmp_path / "store",
+        [
+            drive_by(name="known", scans=3),
+            replace(drive_by(name="unknown", scans=3), **{missing: None}),
+        ],
+    )
     with pytest.raises(BadInputError) as refused:
         true_targets(sampler_of(open_store(tmp_path / "store")))
     sentence = str(refused.value)
@@ -189,10 +193,7 @@ def test_targets_of_other_rules_are_made_anew(car_store, teacher, tmp_path):
 
 def test_targets_of_fewer_scans_are_made_anew(cars, teacher, tmp_path):
     """A run that also reads smaller scans does not take targets in which these have no pose."""
-    with StoreWriter(tmp_path / "store", {}) as writer:
-        for car in cars[:2]:
-            writer.add(car.part(range(3)))
-    store = open_store(tmp_path / "store")
+    store = packed(tmp_path / "store", [car.part(range(3)) for car in cars[:2]])
     smallest = int(np.argmin(store.scan_sizes))
     for least in (int(store.scan_sizes[smallest]) + 1, TAUGHT.views.min_points):
         recipe = replace(TAUGHT, views=replace(TAUGHT.views, min_points=least))
