@@ -83,6 +83,12 @@ def poses_of(track):
     return track.T_sensor_object
 
 
+def shape_of(track):
+    """The track's shape, which it must have."""
+    assert track.shape is not None
+    return track.shape
+
+
 def known(figures):
     """The figures that there are."""
     return {name: value for name, value in figures.items() if value is not None}

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.cars import drive_by
+from tests.cars import drive_by, poses_of, shape_of
 
 from wildshape.baselines.named import baseline
 from wildshape.baselines.rectangle import Rectangle
@@ -33,10 +33,8 @@ class Sighted:
 @pytest.mark.parametrize("name", ["rectangle", "l-shape"])
 def test_a_car_seen_from_all_sides_has_its_labelled_box(name) -> None:
     track = drive_by("a", scans=2, points=400)
-    assert track.shape is not None
-    assert track.T_sensor_object is not None
-    whole = tuple(pose.apply_numpy(track.shape) for pose in track.T_sensor_object)
-    size = tuple(np.ptp(track.shape, axis=0).tolist())
+    whole = tuple(pose.apply_numpy(shape_of(track)) for pose in poses_of(track))
+    size = tuple(np.ptp(shape_of(track), axis=0).tolist())
     seen = replace(track, scans=whole, label_size_m=size)
     figures = figures_of(run({name: baseline(name)}, [seen], "yaw", 3).methods[0])
     bev, bias = figures["box_bev"], figures["box_length_bias_m"]

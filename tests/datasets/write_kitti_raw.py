@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import torch
+from tests.cars import poses_of, shape_of
 
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
@@ -54,12 +55,10 @@ def picture_scene(root):
     """A simulated car, passed; what the documentation shows."""
     config = SimulationConfig(tracks=1, scans=11, occlusion=0.0)
     (track,) = simulate_tracks(config, seed=1, workers=1)
-    assert track.shape is not None
-    assert track.T_sensor_object is not None
-    low, high = track.shape.min(axis=0), track.shape.max(axis=0)
+    low, high = shape_of(track).min(axis=0), shape_of(track).max(axis=0)
     labels = []
     for i in range(len(track.scans)):
-        T = track.T_sensor_object[i]
+        T = poses_of(track)[i]
         yaw = math.atan2(float(T.rotation[1, 0]), float(T.rotation[0, 0]))
         labels.append((*(T.translation - torch.tensor([0, 0, (high - low)[2] / 2])).tolist(), yaw))
     tracklet = ("Car", 0, labels, (high - low).tolist())

@@ -9,7 +9,7 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.cars import drive_by, poses_of
+from tests.cars import drive_by, poses_of, shape_of
 from tests.evaluation import naive
 from tests.strategies import poses, rotations
 
@@ -23,12 +23,6 @@ from wildshape.geometry.transforms.se3 import SE3, stack
 def parts(T):
     """Quaternion and translation of one transform, as lists."""
     return naive.quaternion(T.rotation.tolist()), T.translation.tolist()
-
-
-def shape_of(track):
-    """The track's true shape, which it must have."""
-    assert track.shape is not None
-    return track.shape
 
 
 clouds = st.integers(0, 2**32 - 1).map(

@@ -7,7 +7,7 @@ from dataclasses import fields, make_dataclass, replace
 
 import numpy as np
 import pytest
-from tests.cars import drive_by, known, poses_of
+from tests.cars import drive_by, known, poses_of, shape_of
 from tests.refusal import refused
 
 from wildshape.baselines.icp import LocalIcp
@@ -184,9 +184,8 @@ class PickySighted(OneScan):
 def test_a_refused_scan_costs_no_other_its_shape_or_its_rays():
     track = drive_by(scans=4)
     shape = np.asarray(track.shape)
-    assert track.T_sensor_object is not None
     scans = (track.scans[0][:30], *track.scans[1:])
-    rays = tuple(SightLines.of_returns(pose.apply_numpy(shape)) for pose in track.T_sensor_object)
+    rays = tuple(SightLines.of_returns(pose.apply_numpy(shape)) for pose in poses_of(track))
     seen = replace(track, scans=scans, rays=rays)
     results = run({"canonical": PickyCanonical(shape), "sighted": PickySighted()}, [seen])
     for row in results.methods:
@@ -283,8 +282,7 @@ def test_truth_is_accumulated_where_no_shape_is_given():
 
 def test_a_shape_of_few_points_is_measured_and_one_of_none_is_no_truth():
     track = drive_by(scans=2)
-    assert track.shape is not None
-    three, none = (replace(track, shape=track.shape[:count]) for count in (3, 0))
+    three, none = (replace(track, shape=shape_of(track)[:count]) for count in (3, 0))
     scores = run({"scan": OneScan()}, [three])["scan"].completions
     assert [(score.truth_points, score.cd_floor) for score in scores] == [(3, 0.0)] * 2
     skipped = run({"scan": OneScan()}, [none])["scan"].skipped

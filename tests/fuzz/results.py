@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tests.cars import poses_of
 from tests.datasets import write_argoverse2 as av2
 from tests.datasets import write_kitti_tracking as tracking
 from tests.datasets.street import street
@@ -121,8 +122,7 @@ def _build_results(folder: Path) -> None:
     write_track(root / "data" / "car", car)
     for name, scan in zip(car.scan_names, car.scans):
         write_ply(done / "completed" / f"{name}.ply", scan)
-    assert car.T_sensor_object is not None
-    write_poses(done / "poses.txt", car.T_sensor_object)
+    write_poses(done / "poses.txt", poses_of(car))
     said = {"track": "car", "input": str(root / "data"), "category": "car", "sensor": "lidar"}
     said |= {"scans": [_entry(name) for name in car.scan_names], "skipped": []}
     files = {

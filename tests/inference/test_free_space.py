@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from tests.cars import poses_of, shape_of
 from tests.refusal import refused
 
 import wildshape
@@ -35,17 +36,15 @@ def track() -> Track:
 
 
 def test_what_rays_passed_is_taken_off_and_the_object_stays(track: Track) -> None:
-    assert track.shape is not None
-    assert track.T_sensor_object is not None
     sights = Sights(track.scans, track.rays, CONFIG)
-    truth = torch.from_numpy(track.shape)
+    truth = torch.from_numpy(shape_of(track))
     longer = truth * torch.tensor((1.1, 1.0, 1.0))
     beyond = longer[:, 0].abs() > truth[:, 0].abs().max() + 0.1
-    kept = without_free_space(truth, track.T_sensor_object, sights)
-    cut = without_free_space(longer, track.T_sensor_object, sights)
+    kept = without_free_space(truth, poses_of(track), sights)
+    cut = without_free_space(longer, poses_of(track), sights)
     assert len(kept) > 0.97 * len(truth)
     assert (cut[:, 0].abs() > truth[:, 0].abs().max() + 0.1).sum() < 0.8 * beyond.sum()
-    nowhere = stack([SE3(pose.rotation, -pose.translation) for pose in track.T_sensor_object])
+    nowhere = stack([SE3(pose.rotation, -pose.translation) for pose in poses_of(track)])
     assert torch.equal(without_free_space(truth, nowhere, sights), truth)  # no ray passes there
 
 
@@ -161,11 +160,9 @@ def test_rays_count_in_every_way_to_pose_a_track(track: Track) -> None:
 
 def test_small_objects_are_held_against_rays_as_large_ones_are(track: Track) -> None:
     """A tenth of the size gives the same answer, for `unit` shrinks all lengths."""
-    assert track.shape is not None
-    assert track.T_sensor_object is not None
     scan, rays = track.scans[0], track.rays[0]
     assert rays is not None
-    shape = track.T_sensor_object[0].apply_numpy(track.shape * np.float32(1.1))
+    shape = poses_of(track)[0].apply_numpy(shape_of(track) * np.float32(1.1))
     small = SightLines(rays.directions, rays.ranges / np.float32(10))
     large_sights = Sights.of_objects([scan], [rays], CONFIG, 1.0)
     small_sights = Sights.of_objects([scan / np.float32(10)], [small], CONFIG, 0.1)

@@ -4,7 +4,7 @@
 
 import numpy as np
 import torch
-from tests.cars import drive_by
+from tests.cars import drive_by, poses_of, shape_of
 
 from wildshape.inference.predictor import load
 
@@ -22,12 +22,10 @@ def _with_ground(scan: np.ndarray, T_sensor_object, low: np.ndarray, high: np.nd
 def test_a_box_is_hardly_wider_with_ground_than_without():
     model = load()
     track = drive_by(scans=5)
-    assert track.shape is not None
-    assert track.T_sensor_object is not None
-    low, high = track.shape.min(0), track.shape.max(0)
+    low, high = shape_of(track).min(0), shape_of(track).max(0)
     wider = []
     for i, scan in enumerate(track.scans):
-        pose = track.T_sensor_object[torch.tensor(i)]
+        pose = poses_of(track)[torch.tensor(i)]
         clean = np.asarray(model.complete(scan).box.size)
         grounded = np.asarray(model.complete(_with_ground(scan, pose, low, high)).box.size)
         wider.append((grounded / clean)[:2])

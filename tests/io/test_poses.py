@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from tests.cars import poses_of
 
 from wildshape.errors import BadInputError
 from wildshape.io.poses import read_poses, write_poses
@@ -13,8 +14,7 @@ _ROW = "1 0 0 5 0 1 0 6 0 0 1 7"
 
 
 def test_round_trip_keeps_every_bit(track: Track, tmp_path: Path) -> None:
-    poses = track.T_sensor_object
-    assert poses is not None
+    poses = poses_of(track)
     write_poses(tmp_path / "poses.txt", poses)
     back = read_poses(tmp_path / "poses.txt", expected=3)
     assert torch.equal(back.matrix, poses.matrix)

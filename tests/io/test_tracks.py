@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tests.cars import poses_of, shape_of
 
 from wildshape.errors import BadInputError
 from wildshape.io.scans.points import Coordinates
@@ -73,13 +74,11 @@ def test_poses_of_another_length(track: Track, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("said_by", ["track.json", "argument"])
 def test_units_apply_to_everything(said_by: str, track: Track, tmp_path: Path) -> None:
-    assert track.T_sensor_object is not None
-    assert track.shape is not None
-    poses = track.T_sensor_object
+    poses = poses_of(track)
     millimetres = replace(
         track,
         scans=tuple(scan * 1000 for scan in track.scans),
-        shape=track.shape * 1000,
+        shape=shape_of(track) * 1000,
         T_sensor_object=replace(poses, translation=poses.translation * 1000),
     )
     write_track(tmp_path / track.name, millimetres)
@@ -91,10 +90,8 @@ def test_units_apply_to_everything(said_by: str, track: Track, tmp_path: Path) -
         found = read_track(tmp_path / track.name, Coordinates("mm"))
     for scan, truth in zip(found.scans, track.scans):
         np.testing.assert_allclose(scan, truth, rtol=1e-6)
-    assert found.shape is not None
-    np.testing.assert_allclose(found.shape, track.shape, rtol=1e-6)
-    assert found.T_sensor_object is not None
-    torch.testing.assert_close(found.T_sensor_object.matrix, poses.matrix)
+    np.testing.assert_allclose(shape_of(found), shape_of(track), rtol=1e-6)
+    torch.testing.assert_close(poses_of(found).matrix, poses.matrix)
 
 
 def _camera(key: str, value: str) -> str:
@@ -170,9 +167,5 @@ def assert_equal(found: Track, track: Track) -> None:
     assert (found.category, found.source) == (track.category, track.source)
     for scan, truth in zip(found.scans, track.scans, strict=True):
         np.testing.assert_array_equal(scan, truth)
-    assert found.T_sensor_object is not None
-    assert track.T_sensor_object is not None
-    assert torch.equal(found.T_sensor_object.matrix, track.T_sensor_object.matrix)
-    assert found.shape is not None
-    assert track.shape is not None
-    np.testing.assert_array_equal(found.shape, track.shape)
+    assert torch.equal(poses_of(found).matrix, poses_of(track).matrix)
+    np.testing.assert_array_equal(shape_of(found), shape_of(track))

@@ -8,6 +8,7 @@ from typing import get_args
 import numpy as np
 import pytest
 from scipy.spatial import KDTree
+from tests.cars import poses_of, shape_of
 
 from wildshape.errors import BadInputError
 from wildshape.records import Track
@@ -17,9 +18,7 @@ from wildshape.simulate.shapes.solid import box
 
 
 def _bytes(track: Track) -> bytes:
-    assert track.T_sensor_object is not None
-    assert track.shape is not None
-    arrays = (*track.scans, np.asarray(track.T_sensor_object), track.shape)
+    arrays = (*track.scans, np.asarray(poses_of(track)), shape_of(track))
     return b"".join(np.ascontiguousarray(a).tobytes() for a in arrays) + track.source.encode()
 
 
@@ -32,24 +31,21 @@ def test_points_carried_back_lie_on_the_truth_shape(sensor: SensorName) -> None:
     lidar = sensor != "depth-camera"
     config = SimulationConfig(tracks=2, sensor=sensor, scans=6 if lidar else 3)
     for track in _tracks(config):
-        assert track.shape is not None
-        assert track.T_sensor_object is not None
-        assert track.shape.shape == (8192, 3)
-        assert track.shape.dtype == np.float32
-        tree = KDTree(track.shape)
+        assert shape_of(track).shape == (8192, 3)
+        assert shape_of(track).dtype == np.float32
+        tree = KDTree(shape_of(track))
         spacing = 0.12 if lidar else 0.03
         for i, scan in enumerate(track.scans):
             assert len(scan) >= 100
             assert scan.dtype == np.float32
-            off, _ = tree.query(track.T_sensor_object[i].inverse().apply_numpy(scan))
+            off, _ = tree.query(poses_of(track)[i].inverse().apply_numpy(scan))
             assert np.quantile(off, 0.99) < spacing + (0.06 if lidar else 0.0)
             assert np.median(off) < 0.5 * spacing
 
 
 def test_a_lidar_shape_is_centred_and_upright() -> None:
     for track in _tracks(SimulationConfig(tracks=3, scans=4)):
-        assert track.shape is not None
-        low, high = track.shape.min(0), track.shape.max(0)
+        low, high = shape_of(track).min(0), shape_of(track).max(0)
         assert np.abs(low + high)[:2].max() < 0.1
         assert high[0] - low[0] > high[1] - low[1] > 1.5
 
@@ -71,11 +67,9 @@ def test_half_of_the_varied_scans_are_cut_off_above_the_ground() -> None:
     config = SimulationConfig(tracks=6, scans=8, occlusion=0.0, shape_points=512, varied=True)
     lowest = []
     for track in _tracks(config):
-        assert track.T_sensor_object is not None
-        assert track.shape is not None
-        floor = track.shape[:, 2].min()
+        floor = shape_of(track)[:, 2].min()
         for i, scan in enumerate(track.scans):
-            z = track.T_sensor_object[i].inverse().apply_numpy(scan)[:, 2]
+            z = poses_of(track)[i].inverse().apply_numpy(scan)[:, 2]
             lowest.append(np.sort(z)[3] - floor)
     share = np.mean(np.array(lowest) > 0.12)
     assert 0.2 < share < 0.7

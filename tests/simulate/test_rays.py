@@ -5,6 +5,7 @@
 from dataclasses import replace
 
 import numpy as np
+from tests.cars import poses_of, shape_of
 
 from wildshape.geometry.projection.sight_lines import standing
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
@@ -17,15 +18,13 @@ def test_no_ray_that_came_back_passed_through_the_object() -> None:
     (before,), (track,) = (list(simulate_tracks(one, 7, workers=1)) for one in (plain, config))
     assert before.rays == ()
     assert all(map(np.array_equal, before.scans, track.scans))
-    assert track.T_sensor_object is not None
-    assert track.shape is not None
     # Lower down rays pass below the body to the ground.
-    body = track.shape[track.shape[:, 2] > track.shape[:, 2].min() + 0.4]
+    body = shape_of(track)[shape_of(track)[:, 2] > shape_of(track)[:, 2].min() + 0.4]
     larger = body * np.array((1.3, 1.3, 1.0), np.float32)
     for i, (scan, rays) in enumerate(zip(track.scans, track.rays)):
         assert rays is not None
         assert 100 < len(rays.returned) < len(rays) <= 2048
-        posed = (track.T_sensor_object[i].apply_numpy(one) for one in (body, larger))
+        posed = (poses_of(track)[i].apply_numpy(one) for one in (body, larger))
         true, wrong = (standing(shape, scan, rays).free.mean() for shape in posed)
         assert true < 0.03 < 0.1 < wrong
 

@@ -7,7 +7,7 @@ import pickle
 
 import numpy as np
 import pytest
-from tests.cars import poses_of
+from tests.cars import poses_of, shape_of
 from tests.datasets.damaged import passed_over
 from tests.datasets.unit_scene import off_boxes
 from tests.datasets.write_rgbd import THINGS, write_bop, write_model
@@ -43,9 +43,8 @@ def test_shapes_come_from_the_models(tmp_path):
     write_bop(tmp_path, count=1)
     write_model(tmp_path)
     for track in tracks(tmp_path).values():
-        assert track.shape is not None
-        assert track.shape.shape == (8192, 3)
-        assert off_boxes(track.shape.astype(np.float64)).max() < 1e-5
+        assert shape_of(track).shape == (8192, 3)
+        assert off_boxes(shape_of(track).astype(np.float64)).max() < 1e-5
     assert all(track.shape is None for track in tracks(tmp_path, shapes=False).values())
 
 

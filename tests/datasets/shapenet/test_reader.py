@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from scipy.io import savemat
-from tests.cars import poses_of
+from tests.cars import poses_of, shape_of
 from tests.datasets.unit_scene import off_boxes
 from tests.datasets.write_shapenet_views import SYNSET, write_data, write_list, write_model
 from tests.refusal import refusal_of
@@ -43,8 +43,7 @@ def test_points_land_back_on_the_chair(tmp_path, pixels, with_K):
 
 def test_the_true_shape_is_in_the_same_frame(written):
     for track in all_tracks(ShapeNetViews(written[0])):
-        assert track.shape is not None
-        assert off_boxes(track.shape.astype(np.float64)).max() < 1e-6
+        assert off_boxes(shape_of(track).astype(np.float64)).max() < 1e-6
 
 
 def test_depth_is_read_without_pushing_the_surface_away(written):

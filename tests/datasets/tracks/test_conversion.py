@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from tests.cars import drive_by
+from tests.cars import drive_by, poses_of, shape_of
 
 from wildshape.datasets.destinations import PackedStore, TrackFolders
 from wildshape.datasets.tracks.conversion import STORE, TRACKS, convert_part, finished_part
@@ -164,8 +164,7 @@ def test_truth_is_built_where_poses_are(tmp_path):
     stripped = convert_part(Posed(), "part", tmp_path / "1", truth=replace(truth, strip=9.0))
     assert stripped.left_out == result.left_out | {"truth: no shape, for no point is left of it": 1}
     seen, bare = open_store(tmp_path / "0" / STORE)
-    assert seen.shape is not None
-    assert np.ptp(seen.shape, axis=0) == pytest.approx([4.2, 1.7, 1.35], abs=0.1)
+    assert np.ptp(shape_of(seen), axis=0) == pytest.approx([4.2, 1.7, 1.35], abs=0.1)
     assert bare.shape is None
 
 
@@ -173,8 +172,7 @@ def test_poses_the_wrong_way_round_are_doubted(tmp_path):
     class Inverted(Posed):
         def tracks_of(self, part):
             for track in (drive_by(name, scans=5) for name in ("a", "b")):
-                given = track.T_sensor_object
-                assert given is not None
+                given = poses_of(track)
                 yield replace(track, T_sensor_object=given.inverse())
 
     (said,) = convert_part(Inverted(), "part", tmp_path / "0").doubts  # of the first alone

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 from scipy.spatial import KDTree
-from tests.cars import car_surface, drive_by, poses_of
+from tests.cars import car_surface, drive_by, poses_of, shape_of
 
 from wildshape.datasets.tracks.truth import (
     TruthBuilder,
@@ -56,13 +56,12 @@ def test_outliers_are_removed_and_the_cloud_is_thin():
 @pytest.mark.parametrize("size", [0.2, 0.02])
 def test_the_truth_of_small_objects_is_about_as_dense_as_that_of_vehicles(size):
     track = drive_by(scans=9)
-    assert track.shape is not None
     poses = poses_of(track)
     small = replace(
         track,
         scans=tuple(scan * np.float32(size) for scan in track.scans),
         T_sensor_object=SE3(poses.rotation, poses.translation * size),
-        shape=track.shape * np.float32(size),
+        shape=shape_of(track) * np.float32(size),
         shape_kind="partial",
     )
     for made in (shape_partial, shape_mirrored, whole_shape, TruthBuilder().with_shape):
@@ -78,12 +77,11 @@ def _count(made):
 
 def test_truth_that_is_not_where_the_scans_are_is_told():
     track = drive_by(scans=9)
-    assert track.shape is not None
     bare, inverse = replace(track, shape=None), poses_of(track).inverse()
     for one in (track, bare, replace(track, shape=shape_partial(track))):
         assert misplaced(one) == ""
     told = "off its true shape"
-    for shape in (track.shape * np.float32(1000), track.shape + np.float32(2)):
+    for shape in (shape_of(track) * np.float32(1000), shape_of(track) + np.float32(2)):
         assert told in misplaced(replace(track, shape=shape))
     assert told in misplaced(replace(track, T_sensor_object=inverse))
     assert "do not bring its scans together" in misplaced(replace(bare, T_sensor_object=inverse))
@@ -101,8 +99,7 @@ def test_inverted_poses_of_a_short_way_are_told_without_a_shape():
 
 def test_a_shape_turned_by_a_quarter_is_told():
     track = drive_by(scans=9)
-    assert track.shape is not None
-    ahead, left, up = track.shape.T
+    ahead, left, up = shape_of(track).T
     assert "off its true shape" in misplaced(
         replace(track, shape=np.stack((-left, ahead, up), axis=1))
     )

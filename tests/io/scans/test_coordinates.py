@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tests.cars import poses_of, shape_of
 from tests.packed import packed
 
 from wildshape.datasets.tracks.whole_tracks import Folder
@@ -61,9 +62,8 @@ def test_a_file_that_lost_its_centimetres_cannot_be_cured(
 def test_scans_and_poses_of_a_track_are_moved_and_its_shape_is_not(
     track: Track, tmp_path: Path
 ) -> None:
-    assert track.T_sensor_object is not None
     away = np.array([100.0, 20.0, -3.0])
-    poses = track.T_sensor_object
+    poses = poses_of(track)
     moved = replace(
         track,
         scans=tuple(scan + away.astype(np.float32) for scan in track.scans),
@@ -73,10 +73,8 @@ def test_scans_and_poses_of_a_track_are_moved_and_its_shape_is_not(
     found = read_track(tmp_path / "t", Coordinates("m", (100.0, 20.0, -3.0)))
     for scan, expected in zip(found.scans, track.scans):
         np.testing.assert_allclose(scan, expected, atol=2e-5)
-    assert found.T_sensor_object is not None
-    assert found.shape is not None
-    torch.testing.assert_close(found.T_sensor_object.translation, poses.translation)
-    np.testing.assert_array_equal(found.shape, track.shape)
+    torch.testing.assert_close(poses_of(found).translation, poses.translation)
+    np.testing.assert_array_equal(shape_of(found), track.shape)
     (converted,) = Folder(tmp_path / "t", origin=(100.0, 20.0, -3.0)).tracks_of("0-0")
     np.testing.assert_array_equal(converted.scans[0], found.scans[0])
 

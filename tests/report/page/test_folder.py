@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tests.cars import poses_of
 
 from wildshape.errors import BadInputError
 from wildshape.evaluation.drives.found import Found, FoundDrive
@@ -41,10 +42,9 @@ def _track() -> Track:
 
 
 def _completed(folder: Path, track: Track, objects: object) -> None:
-    assert track.T_sensor_object is not None
     for name, scan in zip(NAMES, track.scans, strict=True):
         write_ply(folder / "completed" / f"{name}.ply", scan)
-    write_poses(folder / "poses.txt", track.T_sensor_object)
+    write_poses(folder / "poses.txt", poses_of(track))
     (folder / "objects.json").write_text(json.dumps(objects), encoding="utf-8")
 
 
@@ -270,8 +270,7 @@ def test_scans_that_are_named_must_be_there(tmp_path: Path) -> None:
 
 def test_the_middle_scan_against_itself_says_nothing_of_poses(tmp_path: Path) -> None:
     track = _track()
-    poses = track.T_sensor_object
-    assert poses is not None
+    poses = poses_of(track)
     write_track(tmp_path / "data" / "0007", track)
     objects = {"input": str(tmp_path / "data"), "scans": [_entry(n) for n in NAMES]}
     _completed(tmp_path / "out" / "0007", track, objects)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.cars import drive_by
+from tests.cars import drive_by, poses_of
 from tests.packed import packed
 
 from wildshape.errors import BadInputError
@@ -161,7 +161,6 @@ def test_samples_are_repeatable_and_never_too_large():
 
 def test_poses_that_are_far_away_are_refused(tmp_path):
     track = around()
-    assert track.T_sensor_object is not None
-    poses = SE3(track.T_sensor_object.rotation, track.T_sensor_object.translation + 1e200)
+    poses = SE3(poses_of(track).rotation, poses_of(track).translation + 1e200)
     with pytest.raises(BadInputError, match="store: a pose is not finite or far away"):
         described(packed(tmp_path / "store", [replace(track, T_sensor_object=poses)]))

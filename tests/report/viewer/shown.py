@@ -3,7 +3,7 @@
 """A car driven past, and what a model without error would make of its scans."""
 
 import numpy as np
-from tests.cars import car_surface, drive_by
+from tests.cars import car_surface, drive_by, poses_of
 
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.records import Box, Track
@@ -18,8 +18,7 @@ def track(scans: int = 5, name: str = "car <b>") -> Track:
 
 def perfect(shown: Track, scan: int) -> CompletedScan:
     """The true pose as the learned one, and the true surface."""
-    assert shown.T_sensor_object is not None
-    pose = shown.T_sensor_object[scan]
+    pose = poses_of(shown)[scan]
     w, x, y, z = quaternion_from_rotation(pose.rotation).tolist()
     cx, cy, cz = pose.translation.tolist()
     points = pose.apply_numpy(car_surface(600)[0].astype(np.float32))

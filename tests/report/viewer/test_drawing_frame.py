@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from tests.cars import poses_of
 from tests.report.viewer.shown import perfect, track
 
 from wildshape.geometry.transforms.rotation import rotation_z
@@ -24,8 +25,7 @@ def test_a_camera_s_frame_is_turned_as_the_report_turns_it() -> None:
 @pytest.mark.parametrize("hold", ["sensor", "object"])
 def test_true_poses_lay_truth_scan_and_fused_scans_over_each_other(hold) -> None:
     shown = track()
-    poses = shown.T_sensor_object
-    assert poses is not None
+    poses = poses_of(shown)
     T_middle_scan = to_middle(poses)
     centres = poses.translation.numpy()
     before = None

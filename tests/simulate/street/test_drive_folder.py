@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.cars import poses_of
 
 from wildshape.datasets.kitti.tracking import KittiTracking
 from wildshape.datasets.kitti.tracking_labels import read_boxes
@@ -59,9 +60,8 @@ def test_our_reader_of_kitti_tracking_finds_the_vehicles(drive: WholeDrive, writ
     }
     found = 0
     for track in KittiTracking(written, Selection(min_points=100)).tracks_of("0000"):
-        assert track.T_sensor_object is not None
         for name, scan, T in zip(
-            track.scan_names, track.scans, track.T_sensor_object.matrix.numpy(), strict=True
+            track.scan_names, track.scans, poses_of(track).matrix.numpy(), strict=True
         ):
             box = boxes[int(name), int(track.name.rsplit("_", 1)[1])]
             np.testing.assert_allclose(T[:3, 3], box.T_sensor_object[:3, 3], atol=1e-5)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 from safetensors.torch import load_file
-from tests.cars import drive_by
+from tests.cars import drive_by, shape_of
 from tests.packed import packed
 from tests.training.self_training.taught import TAUGHT, sampler_of
 from tests.training.worker import FEW_STEPS
@@ -78,8 +78,7 @@ def test_true_targets_are_the_truth(car_store, cars):
 
 def test_a_partial_shape_is_taught_with_its_reflection(tmp_path):
     car = drive_by(scans=3)
-    assert car.shape is not None
-    seen = car.shape[car.shape[:, 1] > 0.2]
+    seen = shape_of(car)[shape_of(car)[:, 1] > 0.2]
     store = packed(tmp_path / "store", [replace(car, shape=seen, shape_kind="partial")])
     found = true_targets(sampler_of(store))
     assert found.complete
