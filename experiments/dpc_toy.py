@@ -43,19 +43,7 @@ def views_of_an_airplane() -> tuple[Track, Track]:
         tracks=1, scans=TRAINED + TESTED, sensor="depth-camera", category="airplane"
     )
     track = next(simulate_tracks(config, 1, workers=1))
-    return part(track, slice(0, TRAINED)), part(track, slice(TRAINED, None))
-
-
-def part(track: Track, rows: slice) -> Track:
-    """Some scans of a track."""
-    poses = track.T_sensor_object
-    assert poses is not None
-    return replace(
-        track,
-        scans=track.scans[rows],
-        scan_names=track.scan_names[rows],
-        T_sensor_object=poses[rows],
-    )
+    return track.part(range(TRAINED)), track.part(range(TRAINED, TRAINED + TESTED))
 
 
 def toy(options: argparse.Namespace) -> DpcRecipe:
@@ -99,7 +87,7 @@ def canonical(method: Dpc, track: Track) -> torch.Tensor:
 
 def train(run: DpcRun, trained: Track, tested: Track) -> dict[str, Any]:
     """Train to the end, with a look at the poses now and then."""
-    known = part(trained, slice(ALIGNED))
+    known = trained.part(range(ALIGNED))
     method = Dpc(
         run.state.mean.eval(), DpcSettings(run.recipe.network, depth=run.recipe.loss.depth)
     )

@@ -120,17 +120,14 @@ def main() -> None:
             found[name] = searched(name, search, tracks)
         except MissingExtraError as error:
             print(f"{name}: not searched. {error}")
+    line = " ".join(["python experiments/search_baselines.py", *sys.argv[1:]])
     record = {
         "data": {"seed": SEED, **asdict(config)},
         "criterion": "mean over scans of min(rotation error, 30 degrees), to the middle scan",
         "baselines": found,
-        "provenance": provenance(f"python experiments/search_baselines.py {_typed()}".strip()),
+        "provenance": provenance(line),
     }
     write_json(options.out, record)
-
-
-def _typed() -> str:
-    return " ".join(sys.argv[1:])
 
 
 if __name__ == "__main__":

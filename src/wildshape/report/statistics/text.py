@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 from wildshape.io.progress import printable
 from wildshape.report.statistics.drawing import number
 from wildshape.report.statistics.sheet import read_line, summary_line
-from wildshape.report.statistics.statistics import Statistics
+from wildshape.report.statistics.statistics import Quantity, Statistics
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from wildshape.report.statistics.statistics import Quantity
 
 _BLOCKS, _PLAIN = " ▁▂▃▄▅▆▇█", " .:-=+*#@"
 _BINS, _WIDTH, _LISTED = 24, 110, 12
@@ -56,7 +55,7 @@ def _distributions(found: Statistics, glyphs: str, *, ascii_only: bool) -> "Tabl
     return table
 
 
-def _bars(quantity: "Quantity", glyphs: str) -> str:
+def _bars(quantity: Quantity, glyphs: str) -> str:
     """A histogram of one line; what occurs at all is never drawn as nothing."""
     shares = quantity.tally.bars(_BINS)[1]
     top = shares.max() or 1.0
