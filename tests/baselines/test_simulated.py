@@ -2,12 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The paper's baselines on simulated drives: small motions they chain, half turns lose one."""
 
-from dataclasses import replace
-
 import pytest
 import torch
 from tests.baselines.named import errors, named
-from tests.cars import half_turned, poses_of
+from tests.cars import half_turned
 
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
@@ -32,9 +30,7 @@ def test_chained_over_a_drive_the_error_stays_small(drives, name):
 
 def turned_around(track):
     """Two neighbours, the first of them turned by 180 degrees."""
-    names, poses = track.scan_names[:2], poses_of(track)[:2]
-    pair = replace(track, scans=track.scans[:2], scan_names=names, T_sensor_object=poses)
-    return half_turned(pair, 0)
+    return half_turned(track.part([0, 1]), 0)
 
 
 def found_again(drives, name):

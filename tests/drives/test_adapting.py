@@ -14,6 +14,7 @@ import pytest
 import torch
 from tests.drives.finished_drive import CARS, finished_drive
 from tests.models import CONFIG, SETTINGS
+from tests.refusal import refused
 
 from wildshape.drives.adapting import adapt, second_pass
 from wildshape.drives.adapting.adapt import adapt_to
@@ -22,7 +23,6 @@ from wildshape.drives.adapting.examples import examples_of
 from wildshape.drives.adapting.fine_tuning import recipe_of
 from wildshape.drives.adapting.measures import Measures
 from wildshape.drives.result import DriveResult
-from wildshape.errors import BadInputError
 from wildshape.inference.predictor import Predictor, load
 from wildshape.method.checkpoint import MODEL, load_checkpoint
 from wildshape.method.network import ShapePoseNet
@@ -123,15 +123,13 @@ def test_an_adaptation_of_other_drives_weights_or_steps_is_not_gone_on_with(
         ([out], tmp_path, Predictor(ShapePoseNet(CONFIG).eval(), SETTINGS), FEW),
         ([out], tmp_path, predictor, replace(FEW, steps=4)),
     ):
-        with pytest.raises(BadInputError, match="remove this folder to adapt anew"):
-            adapt_to(*way)
+        refused(adapt_to, *way, match="remove this folder to adapt anew")
     record = out / "wildshape.json"
     before = record.read_text()
     record.write_text(before.replace('"settings": {', '"settings": {"recording": "another",'))
     assert record.read_text() != before
     try:
-        with pytest.raises(BadInputError, match="remove this folder to adapt anew"):
-            adapt_to([out], tmp_path, predictor, FEW)
+        refused(adapt_to, [out], tmp_path, predictor, FEW, match="remove this folder to adapt anew")
     finally:
         record.write_text(before)
 

@@ -48,15 +48,20 @@ def test_what_rays_passed_is_taken_off_and_the_object_stays(track: Track) -> Non
     assert torch.equal(without_free_space(truth, nowhere, sights), truth)  # no ray passes there
 
 
-def test_shape_in_free_space_costs_and_what_is_hidden_does_not(track: Track) -> None:
-    """A wall stands in front of half of a plane; the other half is in the way of rays."""
+def half_hidden() -> tuple[np.ndarray, np.ndarray, Sights]:
+    """A plane, a scan beside it, and rays: a wall hides half of the plane, they pass the other."""
     y, z = np.meshgrid(np.linspace(-2, 2, 41), np.linspace(-1, 1, 21))
     plane = np.stack((np.full(y.size, 10.0), y.ravel(), z.ravel()), -1).astype(np.float32)
     ends = plane * np.where(plane[:, 1:2] > 0, 0.5, 2.0).astype(np.float32)
     scan = np.array([[10.0, 9.0, 0.0]] * 16, np.float32)
+    return plane, scan, Sights([scan], [SightLines.of_returns(ends)], CONFIG)
+
+
+def test_shape_in_free_space_costs_and_what_is_hidden_does_not(track: Track) -> None:
+    """A wall stands in front of half of a plane; the other half is in the way of rays."""
+    plane, scan, sights = half_hidden()
     centres = torch.tensor([[10.0, 0.0, 0.0]])
     posed, centred = (torch.from_numpy(one) - centres for one in (plane, scan))
-    sights = Sights([scan], [SightLines.of_returns(ends)], CONFIG)
     inputs = (centred[None], centres, posed[None, None], wildshape.load().settings.projection)
     plain, seen = score_hypotheses(*inputs), SeenScores(sights, torch.eye(3)[None])(*inputs)
     assert seen.free_space is not None
@@ -69,13 +74,9 @@ def test_shape_in_free_space_costs_and_what_is_hidden_does_not(track: Track) -> 
 
 def test_free_space_costs_each_hypothesis_its_own_however_the_scan_is_turned() -> None:
     """Of a wall over half of the view, as above: one shape is half behind it, one is all."""
-    y, z = np.meshgrid(np.linspace(-2, 2, 41), np.linspace(-1, 1, 21))
-    plane = np.stack((np.full(y.size, 10.0), y.ravel(), z.ravel()), -1).astype(np.float32)
-    ends = plane * np.where(plane[:, 1:2] > 0, 0.5, 2.0).astype(np.float32)
+    plane, scan, sights = half_hidden()
     behind = np.abs(plane) + np.array((0.0, 0.05, 0.0), np.float32)
-    scan = np.array([[10.0, 9.0, 0.0]] * 16, np.float32)
     centre = torch.tensor((10.0, 0.0, 0.0))
-    sights = Sights([scan], [SightLines.of_returns(ends)], CONFIG)
     vector = torch.tensor((0.3, -0.2, 0.5))
     for turn in (torch.eye(3), rotation_from_vector(vector)):
         posed = torch.stack([torch.from_numpy(one) - centre for one in (plane, behind)]) @ turn.mT
@@ -91,12 +92,8 @@ def test_free_space_costs_each_hypothesis_its_own_however_the_scan_is_turned() -
 
 
 def test_what_a_shape_itself_hides_counts_no_more_with_rays_than_without() -> None:
-    y, z = np.meshgrid(np.linspace(-2, 2, 41), np.linspace(-1, 1, 21))
-    plane = np.stack((np.full(y.size, 10.0), y.ravel(), z.ravel()), -1).astype(np.float32)
-    ends = plane * np.where(plane[:, 1:2] > 0, 0.5, 2.0).astype(np.float32)
-    scan = np.array([[10.0, 9.0, 0.0]] * 16, np.float32)
+    plane, scan, sights = half_hidden()
     centre = torch.tensor((10.0, 0.0, 0.0))
-    sights = Sights([scan], [SightLines.of_returns(ends)], CONFIG)
     scored = []
     for shape in (plane, np.concatenate((plane, plane * np.float32(1.3)))):
         centred, posed = (torch.from_numpy(one) - centre for one in (scan, shape))

@@ -8,6 +8,7 @@ import sys
 from contextlib import contextmanager
 
 import pytest
+from tests.refusal import refused
 
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import hold_folder, lock_folder, release_folders
@@ -43,8 +44,7 @@ def held(folder):
 def test_a_second_process_is_refused_until_the_first_has_died(tmp_path):
     folder = tmp_path / "a" / "out"
     with held(folder) as process:
-        with pytest.raises(BadInputError, match="out: another process is writing there; wait"):
-            lock_folder(folder)
+        refused(lock_folder, folder, match="out: another process is writing there; wait")
         process.send_signal(signal.SIGKILL)
         process.wait()
         lock_folder(folder)
@@ -62,15 +62,13 @@ def test_one_process_may_claim_again_and_others_after_it_gave_up(tmp_path):
 def test_a_writer_keeps_out_others_of_its_process_and_leaves_an_earlier_claim(tmp_path):
     lock_folder(tmp_path)
     let_go = hold_folder(tmp_path)
-    with pytest.raises(BadInputError, match="another writer of this process"):
-        hold_folder(tmp_path)
+    refused(hold_folder, tmp_path, match="another writer of this process")
     let_go()
     with pytest.raises(AssertionError), held(tmp_path):  # refused: the earlier claim holds
         pass
     hold_folder(tmp_path)
     let_go()  # is none of the second writer's
-    with pytest.raises(BadInputError, match="another writer of this process"):
-        hold_folder(tmp_path)
+    refused(hold_folder, tmp_path, match="another writer of this process")
 
 
 def test_after_a_writer_other_processes_may_write(tmp_path):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from tests.cars import shape_of
 from tests.packed import packed
+from tests.refusal import refused
 
 from wildshape.errors import BadInputError
 from wildshape.io.inputs import open_tracks
@@ -152,23 +153,17 @@ def test_truth_beside_scans_is_no_scan(tmp_path: Path, cloud: np.ndarray) -> Non
 
 
 def test_nothing_recognisable(tmp_path: Path) -> None:
-    with pytest.raises(BadInputError, match=r"no such file or folder.*pass a scan file"):
-        open_tracks(tmp_path / "missing")
+    refused(open_tracks, tmp_path / "missing", match=r"no such file or folder.*pass a scan file")
     pipe = tmp_path / "pipe.ply"
     os.mkfifo(pipe)
-    with pytest.raises(BadInputError, match=r"pipe\.ply: no such file or folder"):
-        open_tracks(pipe)
+    refused(open_tracks, pipe, match=r"pipe\.ply: no such file or folder")
     pipe.unlink()
-    with pytest.raises(BadInputError, match=r"an empty folder.*pass a scan file"):
-        open_tracks(tmp_path)
+    refused(open_tracks, tmp_path, match=r"an empty folder.*pass a scan file")
     (tmp_path / "a.pdf").write_text("")
-    with pytest.raises(BadInputError, match="1 other entries"):
-        open_tracks(tmp_path)
-    with pytest.raises(BadInputError, match=r"a\.pdf: no scan file"):
-        open_tracks(tmp_path / "a.pdf")
+    refused(open_tracks, tmp_path, match="1 other entries")
+    refused(open_tracks, tmp_path / "a.pdf", match=r"a\.pdf: no scan file")
     (tmp_path / "t" / "scans").mkdir(parents=True)
-    with pytest.raises(BadInputError, match="holds no scan"):
-        open_tracks(tmp_path / "t")
+    refused(open_tracks, tmp_path / "t", match="holds no scan")
 
 
 def test_unit(dataset: Path, tmp_path: Path, cloud: np.ndarray) -> None:
@@ -202,8 +197,7 @@ def test_scans_beside_tracks_are_not_passed_over(dataset: Path) -> None:
     assert open_tracks(dataset).names == ("a", "b")
     (dataset / "b" / "scans").rename(dataset / "c")
     (dataset / "b").rename(dataset / ".b")
-    with pytest.raises(BadInputError, match=r"c: has points, but no scans/; move its scans there"):
-        open_tracks(dataset)
+    refused(open_tracks, dataset, match=r"c: has points, but no scans/; move its scans there")
 
 
 def test_hidden_folders_are_no_tracks(dataset: Path) -> None:
@@ -226,5 +220,4 @@ def test_what_drives_found_is_one_dataset_whose_names_say_the_drive(dataset: Pat
 def test_what_drive_found_is_no_scan(tmp_path):
     (tmp_path / "boxes.csv").write_text("frame,time\n")
     (tmp_path / "tracks").mkdir()
-    with pytest.raises(BadInputError, match=r"holds what `drive` found; name .*tracks"):
-        open_tracks(tmp_path)
+    refused(open_tracks, tmp_path, match=r"holds what `drive` found; name .*tracks")

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 import torch
 from tests.cars import poses_of
+from tests.refusal import refused
 
-from wildshape.errors import BadInputError
 from wildshape.io.poses import read_poses, write_poses
 from wildshape.records import Track
 
@@ -47,10 +47,8 @@ def test_row_major_order(tmp_path: Path) -> None:
 )
 def test_wrong_lines_are_named(text: str, said: str, tmp_path: Path) -> None:
     (tmp_path / "poses.txt").write_text(text)
-    with pytest.raises(BadInputError, match=rf"poses\.txt.*{said}"):
-        read_poses(tmp_path / "poses.txt", expected=2)
+    refused(read_poses, tmp_path / "poses.txt", expected=2, match=rf"poses\.txt.*{said}")
 
 
 def test_missing_file(tmp_path: Path) -> None:
-    with pytest.raises(BadInputError, match="no such file"):
-        read_poses(tmp_path / "poses.txt")
+    refused(read_poses, tmp_path / "poses.txt", match="no such file")

@@ -153,11 +153,17 @@ def test_threads_change_nothing(B, N, M):
     assert torch.equal(alone.distance_squared, together.distance_squared)
 
 
-@pytest.mark.parametrize("forced", ["torch", "native", "reference"])
-def test_permuted_targets_give_permuted_indices(forced, monkeypatch):
-    if forced == "native" and library() is None:
+@pytest.fixture(params=["torch", "native"])
+def forced(request, monkeypatch):
+    """The name of the backend that answers."""
+    if request.param == "native" and library() is None:
         pytest.skip("native library not built")
-    monkeypatch.setenv("WILDSHAPE_NEAREST", forced)
+    monkeypatch.setenv("WILDSHAPE_NEAREST", request.param)
+    return request.param
+
+
+@pytest.mark.parametrize("forced", ["torch", "native", "reference"], indirect=True)
+def test_permuted_targets_give_permuted_indices(forced):
     assert door.backend() == forced
     query, target = clouds(2, 50, 80)
     order = torch.randperm(80, generator=torch.Generator().manual_seed(1))
@@ -174,12 +180,8 @@ def test_both_ways_is_two_searches():
     agrees(back, b, a, sizes_b, sizes_a)
 
 
-@pytest.mark.parametrize("forced", ["torch", "native"])
 @pytest.mark.parametrize("shape", [(1, 1, 1), (2, 9, 5), (3, 30, 7)], ids=str)
-def test_gradient_is_the_loop(forced, shape, monkeypatch):
-    if forced == "native" and library() is None:
-        pytest.skip("native library not built")
-    monkeypatch.setenv("WILDSHAPE_NEAREST", forced)
+def test_gradient_is_the_loop(forced, shape):
     query, target = (x.requires_grad_() for x in clouds(*shape))
     weight = torch.rand(shape[:2], generator=torch.Generator().manual_seed(2))
     found = nearest(query, target)
@@ -190,11 +192,7 @@ def test_gradient_is_the_loop(forced, shape, monkeypatch):
     torch.testing.assert_close(target.grad, expected[1].float(), rtol=1e-5, atol=1e-6)
 
 
-@pytest.mark.parametrize("forced", ["torch", "native"])
-def test_gradient_at_zero_distance_in_padding_and_without_target_is_zero(forced, monkeypatch):
-    if forced == "native" and library() is None:
-        pytest.skip("native library not built")
-    monkeypatch.setenv("WILDSHAPE_NEAREST", forced)
+def test_gradient_at_zero_distance_in_padding_and_without_target_is_zero(forced):
     query, target = (x.requires_grad_() for x in clouds(3, 6, 8))
     with torch.no_grad():
         target[0, :6] = query[0]
@@ -214,11 +212,7 @@ def test_gradient_at_zero_distance_in_padding_and_without_target_is_zero(forced,
     assert query.grad[1, :2].norm(dim=-1).allclose(torch.ones(2))
 
 
-@pytest.mark.parametrize("forced", ["torch", "native"])
-def test_gradient_of_points_that_are_not_finite_is_zero(forced, monkeypatch):
-    if forced == "native" and library() is None:
-        pytest.skip("native library not built")
-    monkeypatch.setenv("WILDSHAPE_NEAREST", forced)
+def test_gradient_of_points_that_are_not_finite_is_zero(forced):
     query, target = (x.requires_grad_() for x in clouds(1, 6, 8))
     with torch.no_grad():
         query[0, 0], query[0, 1, 1], target[0, 0] = torch.inf, torch.nan, -torch.inf
@@ -238,11 +232,7 @@ def test_gradcheck_in_float64():
     assert torch.autograd.gradcheck(nearest_distance, (query, target))
 
 
-@pytest.mark.parametrize("forced", ["torch", "native"])
-def test_gradient_through_expanded_and_strided_inputs(forced, monkeypatch):
-    if forced == "native" and library() is None:
-        pytest.skip("native library not built")
-    monkeypatch.setenv("WILDSHAPE_NEAREST", forced)
+def test_gradient_through_expanded_and_strided_inputs(forced):
     scan, shapes = (x.requires_grad_() for x in clouds(1, 20, 15))
     posed = shapes.expand(4, -1, -1) * torch.arange(1.0, 5.0)[:, None, None]
     nearest_distance(scan.expand(4, -1, -1), posed).sum().backward()

@@ -8,8 +8,8 @@ from functools import partial
 import pytest
 import torch
 from tests.ops.test_nearest import clouds, needs_library, widest
+from tests.refusal import refused
 
-from wildshape.errors import BadInputError
 from wildshape.ops.nearest import nearest, nearest_k
 from wildshape.ops.nearest.nearest_k import (
     check_k,
@@ -144,7 +144,5 @@ def test_the_first_is_the_nearest_and_what_is_not_finite_is_nothing():
 
 def test_what_does_not_fit_is_refused():
     query, target = clouds(2, 5, 6)
-    with pytest.raises(BadInputError, match="at least 1"):
-        nearest_k(query, target, 0)
-    with pytest.raises(BadInputError, match="groups"):
-        check_k(query, target, 2, (torch.zeros(2, 5), torch.zeros(2, 6)))
+    refused(nearest_k, query, target, 0, match="at least 1")
+    refused(check_k, query, target, 2, (torch.zeros(2, 5), torch.zeros(2, 6)), match="groups")

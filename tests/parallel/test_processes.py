@@ -265,28 +265,17 @@ def test_a_script_without_a_guard_runs_once_and_its_own_tasks_are_done_here(tmp_
     assert run.stdout == "begun\n[-1]\n", run.stderr
 
 
-def test_a_script_may_end_while_its_task_is_written_for_a_helper(tmp_path):
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [(SHORT_SCRIPT, "[1]\n"), (FREEING_SCRIPT, "[1]\nfreed"), (LEFT_SCRIPT, "0\n")],
+    ids=["its task is written for a helper", "its task is freed", "its work has not begun"],
+)
+def test_a_script_may_end_while(tmp_path, text, said):
     """A thread that Python ends inside of torch ends the process: "terminate called"."""
     script = tmp_path / "script.py"
-    script.write_text(SHORT_SCRIPT)
+    script.write_text(text)
     run = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
-    assert (run.returncode, run.stdout, run.stderr) == (0, "[1]\n", "")
-
-
-def test_a_script_may_end_while_its_task_is_freed_for_a_helper(tmp_path):
-    """The thread that told the helper was the last to hold it."""
-    script = tmp_path / "script.py"
-    script.write_text(FREEING_SCRIPT)
-    run = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
-    assert (run.returncode, run.stdout, run.stderr) == (0, "[1]\nfreed", "")
-
-
-def test_a_script_may_end_before_its_work(tmp_path):
-    """Its generator is still there when Python ends, and nothing has closed the team."""
-    script = tmp_path / "script.py"
-    script.write_text(LEFT_SCRIPT)
-    run = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
-    assert (run.returncode, run.stdout, run.stderr) == (0, "0\n", "")
+    assert (run.returncode, run.stdout, run.stderr) == (0, said, "")
 
 
 def test_a_helper_ends_where_its_parent_was_killed_in_the_middle_of_a_message():

@@ -11,6 +11,7 @@ import pytest
 import torch
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
+from tests.refusal import refused
 from tests.training.worker import SMALLEST
 
 from wildshape.errors import BadInputError
@@ -253,16 +254,14 @@ def test_a_loss_that_is_not_finite_stops_and_spoils_no_checkpoint(car_store, tmp
     before = (tmp_path / STATE).read_bytes()
     with torch.no_grad():
         run.state.network.shape.layer3.bias[0] = math.inf
-    with pytest.raises(BadInputError, match="the loss is not finite; check the data"):
-        fit(run)
+    refused(fit, run, match="the loss is not finite; check the data")
     assert (tmp_path / STATE).read_bytes() == before
 
 
 def test_weights_that_are_not_finite_are_not_saved(car_store, tmp_path):
     """The last step's loss was finite, its update was not."""
     recipe = replace(SMALLEST, optim=replace(SMALLEST.optim, steps=1, lr=math.inf))
-    with pytest.raises(BadInputError, match="not finite"):
-        trained(car_store, tmp_path, recipe=recipe)
+    refused(trained, car_store, tmp_path, recipe=recipe, match="not finite")
     assert not (tmp_path / STATE).exists()
     assert not (tmp_path / "model.safetensors").exists()
 
@@ -276,8 +275,7 @@ def test_a_stop_keeps_the_last_state_that_can_be_resumed(car_store, tmp_path):
                 next(run.state.network.parameters()).fill_(math.nan)
             raise StopRequested
 
-    with pytest.raises(BadInputError, match="not finite"):
-        fit(run, spoil)
+    refused(fit, run, spoil, match="not finite")
     assert setup(SMALLEST, car_store, tmp_path, seed=3, resume=True).state.step == 30
 
 

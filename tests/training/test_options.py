@@ -2,17 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Options that cannot be followed are refused before anything is written."""
 
-import pytest
+from tests.refusal import refused
 
-from wildshape.errors import BadInputError
 from wildshape.training.options import TrainingOptions
 from wildshape.training.train import train
 
 
 def test_an_unknown_preset_is_refused_and_the_known_ones_are_named(tmp_path, car_store):
-    with pytest.raises(BadInputError, match=r"--preset nope: .*default, small, views"):
-        TrainingOptions(preset="nope")
+    refused(TrainingOptions, preset="nope", match=r"--preset nope: .*default, small, views")
     dpc = TrainingOptions(preset="dpc-lidar")  # has a training of its own
-    with pytest.raises(BadInputError, match="--preset dpc-lidar: is unknown"):
-        train(car_store.path, tmp_path / "run", dpc)
+    refused(train, car_store.path, tmp_path / "run", dpc, match="--preset dpc-lidar: is unknown")
     assert not list(tmp_path.glob("run/*"))

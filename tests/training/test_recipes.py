@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 from tests.packed import packed
+from tests.refusal import refused
 
-from wildshape.errors import BadInputError
 from wildshape.geometry.projection.visibility import PixelBins, PolarBins
 from wildshape.method.network import ShapePoseNet
 from wildshape.records import Sensor
@@ -73,16 +73,14 @@ def test_one_step_is_a_schedule_too(car_store):
 
 def test_a_store_of_two_kinds_of_sensor_is_refused(cars, tmp_path):
     store = packed(tmp_path, [cars[0], replace(cars[1], sensor=Sensor("camera"))])
-    with pytest.raises(BadInputError, match="split it"):
-        recipe_for(store, "small", None)
+    refused(recipe_for, store, "small", None, match="split it")
 
 
 def test_a_recipe_is_of_the_data_s_kind_of_sensor_and_the_paper_s_are_of_their_own(cars, tmp_path):
     store = packed(tmp_path, [replace(cars[0], sensor=Sensor("camera"))])
     for name in ("small", "views", "paper-views"):
         assert recipe_for(store, name, None).views.sensor == "camera"
-    with pytest.raises(BadInputError, match="preset paper-lidar is for lidar scans"):
-        recipe_for(store, "paper-lidar", None)
+    refused(recipe_for, store, "paper-lidar", None, match="preset paper-lidar is for lidar scans")
 
 
 @pytest.mark.parametrize("name", PRESETS)

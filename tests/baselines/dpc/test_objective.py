@@ -9,6 +9,7 @@ import pytest
 import torch
 from safetensors.torch import load_file
 from tests.packed import packed
+from tests.refusal import refused
 
 from wildshape.baselines.dpc.completer import Dpc, load
 from wildshape.baselines.dpc.network import DpcNet
@@ -161,8 +162,7 @@ def test_the_wrong_data_is_refused_in_a_sentence(plane_store, car_store, tmp_pat
     far = replace(
         far, network=replace(far.network, volume=replace(far.network.volume, distance=9.0))
     )
-    with pytest.raises(BadInputError, match="outside of DPC's images"):
-        setup_dpc(far, plane_store, tmp_path)
+    refused(setup_dpc, far, plane_store, tmp_path, match="outside of DPC's images")
 
 
 @pytest.fixture(scope="module")
@@ -200,12 +200,9 @@ def test_a_car_is_put_where_its_scan_is_and_turns_with_it(lidar_method, cars):
 
 def test_what_dpc_cannot_see_it_refuses(camera_method, lidar_method, planes, cars):
     plane, car = planes[0], cars[0]
-    with pytest.raises(BadInputError, match="a lidar scan"):
-        camera_method.complete(car.scans[0], car.sensor)
-    with pytest.raises(BadInputError, match="a camera scan"):
-        lidar_method.complete(plane.scans[0], plane.sensor)
-    with pytest.raises(BadInputError, match="outside of DPC's image"):
-        camera_method.complete(-plane.scans[0], plane.sensor)
+    refused(camera_method.complete, car.scans[0], car.sensor, match="a lidar scan")
+    refused(lidar_method.complete, plane.scans[0], plane.sensor, match="a camera scan")
+    refused(camera_method.complete, -plane.scans[0], plane.sensor, match="outside of DPC's image")
 
 
 def test_the_row_says_what_it_is_given(camera_method, lidar_method):

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from safetensors.numpy import load_file, save
 from tests.io.store.stores import assert_holds, make_parts, with_gaps
+from tests.refusal import refused
 
-from wildshape.errors import BadInputError
 from wildshape.io.store import index as store_index
 from wildshape.io.store.join import finish_join, is_joining, join_stores
 from wildshape.io.store.layout import JOINING_JSON
@@ -88,8 +88,7 @@ def test_a_join_that_was_killed_is_gone_on_with(track, tmp_path, monkeypatch, mo
             join_stores(parts, out, {})
     if moves < 99:
         assert is_joining(out)
-        with pytest.raises(BadInputError, match="half-written"):
-            open_store(out)
+        refused(open_store, out, match="half-written")
         finish_join(out)
     assert not is_joining(out)
     assert_holds(out, track, "abc")
@@ -100,8 +99,7 @@ def test_a_shard_that_is_lost_is_named(track: Track, tmp_path: Path) -> None:
     parts = make_parts(track, out)
     plan = {"moves": [[".parts/no", "points-00000.safetensors"]], "manifest": {}}
     (out / JOINING_JSON).write_text(json.dumps(sealed(plan)))
-    with pytest.raises(BadInputError, match=r"no: lost; .*--overwrite"):
-        finish_join(out)
+    refused(finish_join, out, match=r"no: lost; .*--overwrite")
     assert all(part.exists() for part in parts)
 
 
@@ -120,8 +118,7 @@ def test_a_plan_moves_parts_to_shards_and_nothing_else(track, tmp_path, move) ->
     make_parts(track, out)
     before = sorted(tmp_path.rglob("*"))
     (out / JOINING_JSON).write_text(json.dumps(sealed({"moves": [move], "manifest": {}})))
-    with pytest.raises(BadInputError, match=r"joining\.json"):
-        finish_join(out)
+    refused(finish_join, out, match=r"joining\.json")
     assert sorted(tmp_path.rglob("*")) == sorted([*before, out / JOINING_JSON])
 
 
@@ -130,13 +127,11 @@ def test_a_damaged_plan_is_refused(track: Track, tmp_path: Path) -> None:
     make_parts(track, out)
     for text in ("{}", "[]", '{"moves": [], "manifest": {"a": -Infinity}, "checksum": ""}'):
         (out / JOINING_JSON).write_text(text)
-        with pytest.raises(BadInputError, match=r"joining\.json"):
-            finish_join(out)
+        refused(finish_join, out, match=r"joining\.json")
 
 
 def test_equal_names_are_refused_before_anything_moves(track: Track, tmp_path: Path) -> None:
     out = tmp_path / "store"
     parts = make_parts(track, out, (("a", "c"), ("c",)))
-    with pytest.raises(BadInputError, match="two tracks are named 'c'"):
-        join_stores(parts, out, {})
+    refused(join_stores, parts, out, {}, match="two tracks are named 'c'")
     assert all(len(open_store(part)) for part in parts)

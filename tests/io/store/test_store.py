@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tests.refusal import refused
 from tests.stopping import stopped_at_removal
 
 from wildshape.errors import BadInputError
@@ -143,10 +144,8 @@ def test_half_written_stores_are_refused(track: Track, tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         stop()
     assert is_store(path)
-    with pytest.raises(BadInputError, match="half-written"):
-        open_store(path)
-    with pytest.raises(BadInputError, match=r"half-written.*--overwrite"):
-        StoreWriter(path, {})
+    refused(open_store, path, match="half-written")
+    refused(StoreWriter, path, {}, match=r"half-written.*--overwrite")
     with StoreWriter(path, {}, overwrite=True) as writer:
         writer.add(track)
     assert len(open_store(path)) == 1
@@ -162,8 +161,7 @@ def test_a_removal_that_was_stopped_is_repeated(
     with stopped_at_removal(removed, monkeypatch):
         StoreWriter(store.path, {}, overwrite=True)
     if removed:
-        with pytest.raises(BadInputError, match="half-written"):
-            open_store(store.path)
+        refused(open_store, store.path, match="half-written")
     else:
         open_store(store.path).verify()  # nothing was removed yet
     with StoreWriter(store.path, {}, overwrite=True) as writer:
@@ -172,13 +170,11 @@ def test_a_removal_that_was_stopped_is_repeated(
 
 
 def test_output_that_exists_is_refused(store: Store, tmp_path: Path, track: Track) -> None:
-    with pytest.raises(BadInputError, match="--overwrite"):
-        StoreWriter(store.path, {})
+    refused(StoreWriter, store.path, {}, match="--overwrite")
     assert len(open_store(store.path)) == 4
     (tmp_path / "notes").mkdir()
     (tmp_path / "notes" / "thesis.txt").write_text("")
-    with pytest.raises(BadInputError, match="no packed store"):
-        StoreWriter(tmp_path / "notes", {}, overwrite=True)
+    refused(StoreWriter, tmp_path / "notes", {}, overwrite=True, match="no packed store")
     assert (tmp_path / "notes" / "thesis.txt").exists()
 
 
@@ -187,8 +183,7 @@ def test_a_store_has_one_writer_at_a_time(track: Track, tmp_path: Path) -> None:
     first = StoreWriter(path, {})
     first.add(track)
     for overwrite in (False, True):
-        with pytest.raises(BadInputError, match="another writer of this process"):
-            StoreWriter(path, {}, overwrite=overwrite)
+        refused(StoreWriter, path, {}, overwrite=overwrite, match="another writer of this process")
     first.close()
     assert open_store(path).names == ("car-1",)
     with pytest.raises(ZeroDivisionError), StoreWriter(path, {}, overwrite=True):
@@ -203,8 +198,7 @@ def test_a_store_has_one_writer_at_a_time(track: Track, tmp_path: Path) -> None:
 
 def test_bad_tracks_and_empty_stores_are_refused(track: Track, tmp_path: Path) -> None:
     writer = StoreWriter(tmp_path / "store", {})
-    with pytest.raises(BadInputError, match="no track"):
-        writer.close()
+    refused(writer.close, match="no track")
     with pytest.raises(BadInputError, match="3 scans, 2 names"):
         writer.add(replace(track, scan_names=("a", "b")))
     with pytest.raises(BadInputError, match="2 poses"):
@@ -212,8 +206,7 @@ def test_bad_tracks_and_empty_stores_are_refused(track: Track, tmp_path: Path) -
     with pytest.raises(BadInputError, match="0 scans"):
         writer.add(replace(track, scans=(), scan_names=(), T_sensor_object=None))
     writer.add(track)
-    with pytest.raises(BadInputError, match="two tracks are named 'car-1'"):
-        writer.add(track)
+    refused(writer.add, track, match="two tracks are named 'car-1'")
     writer.close()
     assert len(open_store(tmp_path / "store")) == 1
 
@@ -242,8 +235,7 @@ def test_what_no_reader_would_take_is_refused_and_the_rest_is_kept(
     bad = Track("bad", track.scans, track.scan_names)
     vars(bad).update(changes)  # past the types, which are checked under pytest alone
     with StoreWriter(tmp_path / "store", {}) as writer:
-        with pytest.raises(BadInputError, match=f"^track bad: .*{said}"):
-            writer.add(bad)
+        refused(writer.add, bad, match=f"^track bad: .*{said}")
         writer.add(track)
     assert open_store(tmp_path / "store").names == ("car-1",)
     open_store(tmp_path / "store").track(0)
@@ -279,20 +271,16 @@ def _rewrite(path: Path, **changes) -> None:
 )
 def test_other_versions_and_damaged_manifests(changes: dict, said: str, store: Store) -> None:
     _rewrite(store.path, **changes)
-    with pytest.raises(BadInputError, match=said):
-        open_store(store.path)
+    refused(open_store, store.path, match=said)
 
 
 def test_truncation_is_seen_on_opening(store: Store) -> None:
     shard = store.path / "points-00000.safetensors"
     shard.write_bytes(shard.read_bytes()[:-100])
-    with pytest.raises(BadInputError, match=r"points-00000\.safetensors: expected \d+ bytes"):
-        open_store(store.path)
+    refused(open_store, store.path, match=r"points-00000\.safetensors: expected \d+ bytes")
     shard.unlink()
-    with pytest.raises(BadInputError, match="found 0"):
-        open_store(store.path)
+    refused(open_store, store.path, match="found 0")
 
 
 def test_no_store(tmp_path: Path) -> None:
-    with pytest.raises(BadInputError, match="no packed store"):
-        open_store(tmp_path)
+    refused(open_store, tmp_path, match="no packed store")

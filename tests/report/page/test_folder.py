@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import torch
 from tests.cars import poses_of
+from tests.refusal import refused
 
-from wildshape.errors import BadInputError
 from wildshape.evaluation.drives.found import Found, FoundDrive
 from wildshape.evaluation.drives.labels import Counting, Label, LabelledDrive, LabelledFrame
 from wildshape.evaluation.drives.overlap import UprightBox
@@ -130,8 +130,7 @@ def test_probabilities_of_the_least_sure_scan_are_shown(tmp_path: Path) -> None:
         ("box right", "0.95"),
     )
     (tmp_path / "car" / "objects.json").write_text(json.dumps({"scans": [{"p_pose": "high"}]}))
-    with pytest.raises(BadInputError, match=r"objects\.json"):
-        report_from_folder(tmp_path)
+    refused(report_from_folder, tmp_path, match=r"objects\.json")
 
 
 def test_an_evaluation_s_objects_by_our_error(tmp_path: Path) -> None:
@@ -237,8 +236,7 @@ def test_metrics_and_log_become_table_and_curves(tmp_path: Path) -> None:
 def test_folder_without_anything_to_report_is_refused(tmp_path: Path, content: str | None) -> None:
     if content is not None:
         (tmp_path / "metrics.json").write_text(content, encoding="utf-8")
-    with pytest.raises(BadInputError, match=tmp_path.name):
-        report_from_folder(tmp_path)
+    refused(report_from_folder, tmp_path, match=tmp_path.name)
 
 
 def test_an_evaluation_of_drives_has_the_figures_of_its_table(tmp_path: Path) -> None:
@@ -259,12 +257,10 @@ def test_an_evaluation_of_drives_has_the_figures_of_its_table(tmp_path: Path) ->
 def test_scans_that_are_named_must_be_there(tmp_path: Path) -> None:
     _completed(tmp_path / "0007", _track(), {"scans": [_entry(name) for name in NAMES]})
     for read in (report_from_folder, from_results):
-        with pytest.raises(BadInputError, match="absent"):
-            read(tmp_path, tmp_path / "absent")
+        refused(read, tmp_path, tmp_path / "absent", match="absent")
         for damaged in ({"settings": 3}, {"settings": {"unit": {}}}):
             (tmp_path / "wildshape.json").write_text(json.dumps(damaged), encoding="utf-8")
-            with pytest.raises(BadInputError, match=r"wildshape\.json"):
-                read(tmp_path, tmp_path / "absent")
+            refused(read, tmp_path, tmp_path / "absent", match=r"wildshape\.json")
         (tmp_path / "wildshape.json").unlink()
 
 
@@ -283,8 +279,7 @@ def test_the_middle_scan_against_itself_says_nothing_of_poses(tmp_path: Path) ->
 
 
 def test_missing_folder_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadInputError, match="no such folder"):
-        report_from_folder(tmp_path / "absent")
+    refused(report_from_folder, tmp_path / "absent", match="no such folder")
 
 
 @pytest.mark.parametrize(
@@ -294,8 +289,7 @@ def test_missing_folder_is_refused(tmp_path: Path) -> None:
 def test_damaged_objects_are_named(tmp_path: Path, scans: object) -> None:
     objects = {"input": str(tmp_path / "gone"), "scans": scans}
     _completed(tmp_path / "0007", _track(), objects)
-    with pytest.raises(BadInputError, match=r"objects\.json"):
-        report_from_folder(tmp_path)
+    refused(report_from_folder, tmp_path, match=r"objects\.json")
 
 
 @pytest.mark.parametrize("value", ["null", "[1]", '"x"', "1" + "0" * 400, "NaN", "[0.5, null]"])
@@ -312,8 +306,7 @@ def test_a_log_s_foreign_values_are_left_out(tmp_path: Path, value: str) -> None
 def test_a_damaged_record_of_a_command_is_named(tmp_path: Path, made: object) -> None:
     _completed(tmp_path / "0007", _track(), {"scans": []})
     (tmp_path / "wildshape.json").write_text(json.dumps({"provenance": made}), encoding="utf-8")
-    with pytest.raises(BadInputError, match=r"wildshape\.json: expected what a command says"):
-        report_from_folder(tmp_path)
+    refused(report_from_folder, tmp_path, match=r"wildshape\.json: expected what a command says")
 
 
 def test_the_curve_of_the_loss_shows_the_terms_of_any_objective(tmp_path: Path) -> None:

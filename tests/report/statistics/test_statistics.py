@@ -60,13 +60,7 @@ def test_sides_ranges_and_counts_come_from_the_index(tmp_path):
 
 def test_azimuth_is_the_side_that_is_seen(tmp_path):
     """From the left (+90 degrees of the object's own frame), 30 degrees above."""
-    one = around(scans=4, distance=10.0, height=5.0)
-    left = replace(
-        one,
-        scans=one.scans[1:2],
-        scan_names=one.scan_names[1:2],
-        T_sensor_object=one.T_sensor_object[1:2],  # pyright: ignore[reportOptionalSubscript]
-    )
+    left = around(scans=4, distance=10.0, height=5.0).part([1])
     _, by = described(packed(tmp_path / "store", [left]))
     assert by["azimuth"].tally.mean == pytest.approx(90.0)
     assert by["elevation"].tally.mean == pytest.approx(30.0)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.refusal import refused
 from tests.report.viewer.shown import perfect, track
 
-from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import stack
 from wildshape.io.poses import write_poses
 from wildshape.io.scans.writers import write_ply
@@ -111,10 +111,8 @@ def test_worst_objects_come_first(tmp_path: Path) -> None:
     assert [name for name, _ in found] == ["b", "a"]
     assert found[1][1] == pytest.approx(0.3)
     path.write_text("{}", encoding="utf-8")
-    with pytest.raises(BadInputError, match=r"scores\.json"):
-        worst_first(path, "wildshape")
+    refused(worst_first, path, "wildshape", match=r"scores\.json")
 
 
 def test_a_folder_without_results_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadInputError, match=r"no objects\.json"):
-        from_results(tmp_path)
+    refused(from_results, tmp_path, match=r"no objects\.json")

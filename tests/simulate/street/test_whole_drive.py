@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.refusal import refused
 
-from wildshape.errors import BadInputError
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.sensor import HDL32, SENSORS
 from wildshape.simulate.street.sweep import cast_turn
@@ -162,11 +162,9 @@ def test_the_ground_is_not_flat_and_the_road_falls_to_its_sides(raw: WholeDrive)
     ],
 )
 def test_bad_settings(changed: dict, said: str) -> None:
-    with pytest.raises(BadInputError, match=said):
-        replace(CLEAN, **changed)
+    refused(replace, CLEAN, **changed, match=said)
 
 
 def test_a_lidar_that_is_added_is_named_where_one_is_needed(monkeypatch) -> None:
     monkeypatch.setitem(SENSORS, "added", replace(HDL32, name="added"))
-    with pytest.raises(BadInputError, match="hdl64, hdl32, os1-128, added"):
-        replace(CLEAN, sensor="depth-camera")
+    refused(replace, CLEAN, sensor="depth-camera", match="hdl64, hdl32, os1-128, added")
