@@ -34,6 +34,22 @@ def test_completion_error_by_hand():
     assert error.cd == pytest.approx(5 / 3 + 1 / 2)
 
 
+def test_completion_error_ignores_rigid_motion_and_order():
+    rng = np.random.default_rng(3)
+    predicted, truth = rng.normal(size=(2, 200, 3)).astype(np.float32)
+    T = random_pose(1, seed=4)[0]
+    moved = completion_error(T.apply_numpy(predicted[::-1].copy()), T.apply_numpy(truth))
+    assert moved.cd == pytest.approx(completion_error(predicted, truth).cd, rel=1e-4)
+
+
+def test_whole_prediction_counts():
+    truth = np.zeros((4, 3), np.float32)
+    near = np.zeros((4, 3), np.float32)
+    far = np.concatenate((near, np.full((4, 3), 9, np.float32)))
+    assert completion_error(near, truth).cd == 0
+    assert completion_error(far, truth).precision == pytest.approx(9 * math.sqrt(3) / 2)
+
+
 def test_registration_error_by_hand():
     # The object stands 10 m ahead in both scans; the method answers with 90 degrees of yaw about
     # the sensor, so the object's origin lands 10 sqrt(2) m away.
@@ -60,6 +76,14 @@ def test_half_turn_is_forgiven_by_the_symmetric_error_only():
     error = registration_error(predicted, T_sensor_object, T_sensor_object[2])
     assert torch.allclose(error.rotation_deg, torch.full((5,), 180.0).double(), atol=1e-4)
     assert error.rotation_sym_deg.max() < 1e-4
+    assert error.translation_m.max() < 1e-9
+
+
+def test_no_error_without_error():
+    T_sensor_object = random_pose(6, seed=5)
+    predicted = T_sensor_object[3] @ T_sensor_object.inverse()
+    error = registration_error(predicted, T_sensor_object, T_sensor_object[3])
+    assert error.rotation_deg.max() < 1e-5
     assert error.translation_m.max() < 1e-9
 
 

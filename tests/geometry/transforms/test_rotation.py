@@ -93,6 +93,11 @@ def test_angle_keeps_its_digits_near_zero_and_near_the_half_turn(axis, angle):
     assert found == pytest.approx(math.pi - angle, abs=1e-9)
 
 
+def test_angle_of_350_degrees_is_10():
+    R = rotation_about((0.0, 0.0, 1.0), math.radians(350))
+    assert math.degrees(float(rotation_angle(R))) == pytest.approx(10)
+
+
 @given(rotations, rotations)
 def test_angle_is_the_paper_formula_with_the_absolute_value(R, S):
     """`2 acos |<q, q'>|` (METHOD 8); without the bars half of all pairs come out too large."""

@@ -98,6 +98,14 @@ def test_dead_units():
     assert_same(net, clouds(9, 3, 50, 3), net)
 
 
+def test_training_and_inference_give_the_same_code():
+    net = encoder(4).float()
+    points = clouds(10, 4, 300, 3).float()
+    with torch.no_grad():
+        dense = net(points)
+    torch.testing.assert_close(encode_winners(net, points).detach(), dense, atol=1e-5, rtol=1e-5)
+
+
 def test_weights_that_are_not_finite_give_a_code_that_is_not():
     net = encoder(5)
     with torch.no_grad():
