@@ -79,6 +79,18 @@ def test_what_stands_is_found_in_one_place_and_tells_the_sense(sense):
         assert found.shown(frames, stood) == pytest.approx(boxes, abs=0.01)
 
 
+@pytest.mark.parametrize("sense", [1, -1])
+def test_of_every_second_scan_a_turn_takes_half_of_the_time_between_them(sense):
+    kept = np.arange(0, FRAMES, 2)
+    seen = [shown(lambda _, box=box: box, sense)[0][kept] for box in STANDING]
+    frames = tuple(range(len(kept)))
+    fewer = Turns(frames, sensor(kept))
+    found = with_sense(fewer, iter([(frames, boxes) for boxes in seen]), TurnConfig())
+    assert found.sense == sense / 2
+    for box, boxes in zip(STANDING, seen):
+        assert np.abs(found.met(frames, boxes)[0] - box).max() < 0.03
+
+
 @pytest.mark.parametrize("timed", [True, False])
 def test_a_sense_is_looked_for_where_no_scan_has_times_not_where_the_first_is_empty(
     timed, tmp_path
@@ -150,6 +162,8 @@ def test_turns_of_a_finished_drive_are_checked(tmp_path):
     (tmp_path / TURNS).write_text('{"sense": -1, "ticks": [0, 1, 4]}')
     found = Turns.read(tmp_path / TURNS, T)
     assert (found.sense, found.ticks) == (-1, (0, 1, 4))
+    (tmp_path / TURNS).write_text('{"sense": 0.5, "ticks": [0, 1, 4]}')
+    assert Turns.read(tmp_path / TURNS, T).sense == 0.5
     for wrong in ('{"sense": 2, "ticks": [0, 1, 4]}', '{"sense": 1, "ticks": [0, 4, 1]}', "[]"):
         (tmp_path / TURNS).write_text(wrong)
         refused(Turns.read, tmp_path / TURNS, T, match="turns of a sensor")

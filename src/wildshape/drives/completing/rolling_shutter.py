@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """When the beam of a turning sensor meets a vehicle, and where the vehicle then stands.
 
-A turn takes as long as there is between two scans. Where points have no times, a scan shows
-everything as if it were met at the turn's middle, when the beam faces forward. What is beside the
-sensor is met a quarter of a turn before or after, and the sensor has moved by then.
+A turn takes as long as there is between two scans, or half as long where every second scan was
+left out. Where points have no times, a scan shows everything as if it were met at the turn's
+middle, when the beam faces forward. What is beside the sensor is met a quarter of a turn before or
+after, and the sensor has moved by then.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,7 +24,8 @@ TURNS = "turns.json"
 """File of a drive's stages: what is known of its turns."""
 _LATEST = 2**53  # scans
 _STEPS = 3  # where a box is shown depends on when it is met, and the reverse
-_SENSES = (0, 1, -1)
+_WHOLE, _HALF = (0, 1, -1), (0, 0.5, -0.5)
+_SENSES = _WHOLE + _HALF
 
 _Boxes = Float[np.ndarray, "k 4"]
 _Frames = Sequence[int] | Int[np.ndarray, "k"]
@@ -37,13 +39,14 @@ class Turns:
         ticks: of their middles.
         T_level_sensor: at their middles.
         sense: 1: the beam comes from behind over the right side and the front, counterclockwise
-            from above; -1: over the left side; 0: points are as seen at the turn's middle.
+            from above; -1: over the left side; 0: points are as seen at the turn's middle. 0.5 and
+            -0.5: the turn takes half of the time between two scans.
         breaks: frames whose place is guessed from the frame before.
     """
 
     ticks: tuple[int, ...]
     T_level_sensor: SE3
-    sense: int = 0
+    sense: int | float = 0
     breaks: tuple[int, ...] = ()
 
     @classmethod
@@ -61,7 +64,7 @@ class Turns:
             rising = all(before < after <= _LATEST for before, after in pairwise((-1, *ticks)))
             if said["sense"] not in _SENSES or len(ticks) != len(T_level_sensor) or not rising:
                 raise ValueError(f"sense {said['sense']!r}, {len(ticks)} scans")
-            return cls(ticks, T_level_sensor, int(said["sense"]))
+            return cls(ticks, T_level_sensor, said["sense"])
 
     def unbroken(self, first: int, last: int) -> range:
         """Two frames and all around them, up to the next breaks."""
@@ -128,23 +131,38 @@ def with_sense(
 ) -> Turns:
     """The turns in the sense in which what stands stays most nearly in one place.
 
-    An object counts as much as its place depends on the sense.
+    Half turns are tried where whole ones tell nothing.
 
     Args:
         turns: without a sense.
         objects: frames of each, and its boxes where they show it.
         config: see there.
     """
-    every = [replace(turns, sense=sense) for sense in _SENSES]
+    seen = [one for one in objects if len(one[0]) >= config.fewest_scans]
+    whole = _clearest(turns, seen, _WHOLE, config.clearer, config)
+    return whole if whole.sense else _clearest(turns, seen, _HALF, config.half_clearer, config)
+
+
+def _clearest(
+    turns: Turns,
+    objects: Sequence[tuple[_Frames, _Boxes]],
+    senses: Sequence[int | float],
+    clearer: float,
+    config: TurnConfig,
+) -> Turns:
+    """The turns in the best of some senses, the first of which is 0.
+
+    An object counts as much as its place depends on the sense.
+    """
+    every = [replace(turns, sense=sense) for sense in senses]
     total = np.zeros(len(every))
     for frames, shown in objects:
-        if len(frames) >= config.fewest_scans:
-            met = [one.met(frames, shown)[0] for one in every]
-            spread = np.array([_spread(boxes) for boxes in met])
-            if spread.min() < config.standing_m:
-                total += _spread(met[1] - shown) * spread
+        met = [one.met(frames, shown)[0] for one in every]
+        spread = np.array([_spread(boxes) for boxes in met])
+        if spread.min() < config.standing_m:
+            total += _spread(met[1] - shown) * spread
     best = int(total.argmin())
-    return every[best] if total[best] < config.clearer * total[0] else turns
+    return every[best] if total[best] < clearer * total[0] else turns
 
 
 def _spread(boxes: _Boxes) -> float:
