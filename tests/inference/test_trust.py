@@ -12,7 +12,7 @@ from tests.models import CONFIG, SETTINGS, scan
 
 from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.confidence import odds_of
+from wildshape.inference.confidence import features_of, odds_of
 from wildshape.inference.predictor import Predictor, load
 from wildshape.method.checkpoint import save_checkpoint
 from wildshape.method.network import Poses, ShapePoseNet
@@ -40,6 +40,13 @@ def trusting(bias=1.0):
     torch.manual_seed(0)
     settings = dataclasses.replace(FACING, trust=trust)
     return Predictor(ShapePoseNet(CONFIG).eval(), settings)
+
+
+def test_more_points_than_any_calibration_saw_say_no_more():
+    """A vehicle of 300,000 points was one with 0.6, the same with 2,000 with 0.98."""
+    dense = np.tile(scan(0), (1 + 80_000 // len(scan(0)), 1))
+    known, denser = (features_of(some, 0.1, torch.zeros(6)) for some in (dense[:40_000], dense))
+    assert denser.log_points == known.log_points == pytest.approx(math.log(40_000))
 
 
 def test_the_confidence_is_the_product_and_says_what_is_unsure(tmp_path):

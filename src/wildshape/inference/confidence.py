@@ -39,6 +39,7 @@ from wildshape.records import Completion, Points, Registration, Sensor
 _RULE = ReasonRule()
 _LEAST_ODDS, _MOST_ODDS = 1e-3, 49.0
 _FEWEST_HEIGHTS = 4
+_DENSEST = 40_000  # points: no calibration has seen more, and what it saw falls with them
 _OF_RESULT = ("poor_fit", "low_confidence", "unsure_heading", "unsure_box", "other_kind")
 
 
@@ -86,7 +87,7 @@ def features_of(scan: Points, cost: float, seen: Float[Tensor, "6"]) -> Confiden
         entropy=entropy,
         margin=margin,
         spread=spread,
-        log_points=math.log(len(scan)),
+        log_points=math.log(min(len(scan), _DENSEST)),
         log_range=math.log(max(away, SMALLEST_M)),
         log_extent=math.log(max(extent(scan), SMALLEST_M)),
         covered=covered,
