@@ -82,9 +82,9 @@ def street(frames=10, speed=0.7):
     return Street(scans, places, cars, sizes)
 
 
-def scan(solids: list[Solid], place, seed):
+def scan(solids: list[Solid], place, seed, beams_deg=HDL64.elevation_deg):
     """One turn of the sensor."""
-    up = np.deg2rad(np.asarray(HDL64.elevation_deg))
+    up = np.deg2rad(np.asarray(beams_deg))
     around = np.deg2rad(np.arange(0, 360, STEP_DEG))
     e, a = (grid.ravel() for grid in np.meshgrid(up, around, indexing="ij"))
     rays = np.column_stack((np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)))

@@ -112,9 +112,10 @@ class GroundConfig:
         below_m: what lies lower than this under the ground at the sensor is a reflection.
         steepest: it may lie lower by so much a metre of range; no road falls faster.
         reflected: reflections are left out where they are more than this share of a scan's points.
-        beside: within so many of the sensor's heights,
-        rise: no ground lies higher than this share of it above the ground at the sensor. Too near
-            for the lowest beam to meet the road, a roof is the lowest flat thing that is seen.
+        beside: within so many of the sensor's heights ground must be low: too near for the lowest
+            beam to meet the road, a bonnet is the lowest flat thing that is seen.
+        rise: it lies no higher above the ground at the sensor than this share of these heights,
+        slope: or this share of its range.
     """
 
     range_m: float = 80.0
@@ -123,8 +124,9 @@ class GroundConfig:
     below_m: float = 1.0
     steepest: float = 0.3
     reflected: float = 0.001
-    beside: float = 3.0
+    beside: float = 4.0
     rise: float = 0.25
+    slope: float = 0.1
 
 
 @dataclass(frozen=True)

@@ -47,8 +47,9 @@ def height_above_ground(
     near = points.compress(seen, axis=0)  # four times as fast as points[seen]
     ground = np.zeros(len(near), bool)
     ground[_ground_rows(near, sensor_height_m, config)] = True
-    beside = away[seen] < config.beside * sensor_height_m
-    ground &= ~(beside & (near[:, 2] > (config.rise - 1) * sensor_height_m))
+    reach = away[seen]
+    highest = np.maximum(config.rise * sensor_height_m, config.slope * reach) - sensor_height_m
+    ground &= (near[:, 2] < highest) | (reach > config.beside * sensor_height_m)
     floor = _floor(near, near.compress(ground, axis=0), sensor_height_m, config)
     heights[seen] = np.where(ground, 0.0, near[:, 2] - floor)
     return heights
