@@ -23,6 +23,7 @@ from wildshape.drives.pipeline import Pipeline
 from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.tracking.sightings import read_sightings
 from wildshape.drives.writing import outputs
+from wildshape.drives.writing.finished import read_finished
 from wildshape.inference.predictor import Predictor
 from wildshape.io.boxes.table import read_box_table
 from wildshape.io.tracks import read_track
@@ -154,15 +155,15 @@ def moved_to(out, source):
 
 def test_what_is_missing_of_a_group_is_completed_as_it_was(found, recording, tmp_path, monkeypatch):
     """From the scans and the rays beside the object, whole tracks alone."""
-    of, stages = DriveConfig(), found.out / "stages"
+    stages = found.out / "stages"
     completer = Completer(
         wildshape.load(config=INFERENCE),
         open_drive(recording),
         stages / "clusters",
         tmp_path,
         None,
-        of.completion,
-        of.vehicles,
+        read_finished(found.out).T_level_sensor,
+        DriveConfig(),
     )
     objects = read_sightings(stages / "tracks.json")
     (group, *_) = completer.missing(objects)

@@ -13,6 +13,7 @@ from wildshape.drives.object_config import (
     BoxConfig,
     CarveConfig,
     CompletionConfig,
+    DrivingConfig,
     MergeConfig,
     OwnVehicleConfig,
     SurroundingsConfig,
@@ -263,6 +264,7 @@ class DriveConfig:
     tracks: LinkConfig = field(default_factory=LinkConfig)
     standing: StandConfig = field(default_factory=StandConfig)
     completion: CompletionConfig = field(default_factory=CompletionConfig)
+    driving: DrivingConfig = field(default_factory=DrivingConfig)
     turns: TurnConfig = field(default_factory=TurnConfig)
     vehicles: VehicleConfig = field(default_factory=VehicleConfig)
     own_vehicle: OwnVehicleConfig = field(default_factory=OwnVehicleConfig)

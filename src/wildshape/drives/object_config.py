@@ -51,6 +51,25 @@ class CompletionConfig:
 
 
 @dataclass(frozen=True)
+class DrivingConfig:
+    """What drives by its points alone (`driving.py`), and is completed whatever a look says of it.
+
+    Attributes:
+        fewest_scans: of those to complete.
+        way_m: that it gets.
+        m_per_tick: how fast, at least: 3 m/s at 10 Hz.
+        steady: in each step it goes ahead by more than this share of its speed.
+        tall_m: in the middle one of its scans.
+    """
+
+    fewest_scans: int = 3
+    way_m: float = 5.0
+    m_per_tick: float = 0.3
+    steady: float = 0.3
+    tall_m: float = 1.0
+
+
+@dataclass(frozen=True)
 class VehicleConfig:
     """Which completed tracks are vehicles (`vehicles.py`).
 

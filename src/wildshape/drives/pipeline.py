@@ -126,12 +126,12 @@ class Pipeline:
         self.cut(mounting)
         T_level_sensor = level_poses(T_world_sensor, mounting)
         objects = self.tracks(T_level_sensor)
-        self.complete("completion", objects, mounting)
+        self.complete("completion", objects, mounting, T_level_sensor)
         turns = self.turns(objects, T_level_sensor)
         places = Places(turns, self.config.merging, self.config.boxes)
         completed = self.completed(objects, turns)
         parts = self.merged(completed, places)
-        self.complete("merging", parts, mounting)
+        self.complete("merging", parts, mounting, T_level_sensor)
         completed += self.completed(parts, turns)
         vehicles = self.vehicles([*objects, *parts], completed, places)
         return DriveResult(
@@ -227,12 +227,20 @@ class Pipeline:
         """Of a completed object."""
         return self.completing / "objects" / seen.name
 
-    def complete(self, stage: str, objects: list[Sightings], mounting: Mounting) -> None:
+    def complete(
+        self, stage: str, objects: list[Sightings], mounting: Mounting, T_level_sensor: SE3
+    ) -> None:
         """Shapes of the objects that are not completed yet."""
-        level = mounting.levelling() if mounting.is_tilted else None
-        config = self.config.completion, self.config.vehicles
-        folder = self.completing / "objects"
-        completer = Completer(self.predictor, self.drive, self.cuts, folder, level, *config)
+        tilt = mounting.levelling() if mounting.is_tilted else None
+        completer = Completer(
+            self.predictor,
+            self.drive,
+            self.cuts,
+            self.completing / "objects",
+            tilt,
+            T_level_sensor if tilt is None else T_level_sensor @ tilt.inverse(),
+            self.config,
+        )
         self.spread(stage, completer, completer.missing(objects), len(completer.groups(objects)))
 
     def turns(self, objects: list[Sightings], T_level_sensor: SE3) -> Turns:

@@ -3,7 +3,8 @@
 """Complete shapes of the objects of a drive.
 
 Of each some scans are chosen, spread over the track. The network looks at the fullest ones first;
-what costs too much or has no size of a vehicle is left there. The others are completed together.
+what costs too much or has no size of a vehicle is left there, unless it drives. The others are
+completed together.
 """
 
 import time
@@ -14,10 +15,13 @@ from itertools import islice
 from pathlib import Path
 
 import numpy as np
+import torch
 
 from wildshape.drives.completing.batched_inference import box_of, completed, looks_at
+from wildshape.drives.completing.driving import drives
 from wildshape.drives.completing.vehicles import shape_nats, vehicle_sized
-from wildshape.drives.object_config import CompletionConfig, VehicleConfig
+from wildshape.drives.config import DriveConfig
+from wildshape.drives.object_config import CompletionConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.rays import RayCutter
 from wildshape.drives.tracking.sightings import Sightings
@@ -103,6 +107,7 @@ class Completer:
         cuts: folder of the clusters.
         folder: where a folder of each object is written.
         T_level_sensor: of a tilted sensor; None for one held level, as networks expect it.
+        T_world_level: of every frame, from the frame that networks see to the level world.
     """
 
     predictor: Predictor
@@ -110,8 +115,8 @@ class Completer:
     cuts: Path
     folder: Path
     T_level_sensor: SE3 | None
-    config: CompletionConfig
-    vehicles: VehicleConfig
+    T_world_level: SE3
+    config: DriveConfig
 
     @cached_property
     def rays(self) -> RayCutter:
@@ -135,9 +140,9 @@ class Completer:
         """Write objects as `complete --track` does, or `ruled_out.json`: what the looks said.
 
         The network is asked of the fullest scan of each, then of some spread over its time, then of
-        all where these do not speak against a vehicle.
+        all where these do not speak against a vehicle, or it drives.
         """
-        began, of = time.perf_counter(), self.config
+        began, of = time.perf_counter(), self.config.completion
         every = [self._candidate(seen) for seen in group]
         for count, cost_m, nats in (
             (1, of.hopeless_cost_m, of.hopeless_nats),
@@ -145,8 +150,9 @@ class Completer:
         ):
             self._look(every, count)
             every = [one for one in every if self._may_be_a_vehicle(one, cost_m, nats)]
-        self._look([one for one in every if one.said >= of.doubtful_nats], None)
-        if self.config.rays:
+        sure = (one for one in every if one.said >= of.doubtful_nats or self._drives(one))
+        self._look(list(sure), None)
+        if of.rays:
             self._cut_rays([one for one in every if len(one.looks) > 1])
         alone = {single: self._completed(every, single) for single in (False, True)}
         together = [self._together(alone[one.single], one) for one in every]
@@ -155,8 +161,8 @@ class Completer:
             self._write(one.looked_at, [replace(scan, seconds=seconds) for scan in done])
 
     def _candidate(self, seen: Sightings) -> _Candidate:
-        chosen = keyframes(seen, self.config)
-        order = order_of_looks(chosen, self.config.looks)
+        chosen = keyframes(seen, self.config.completion)
+        order = order_of_looks(chosen, self.config.completion.looks)
         return _Candidate(len(seen.frames), chosen, self._clouds(chosen), order)
 
     def _completed(self, every: list[_Candidate], single: bool) -> Iterator[Completion]:
@@ -168,7 +174,7 @@ class Completer:
         """The next of those completed alone are of this object."""
         done = list(islice(alone, len(one.looks)))
         scans = [look.scans[0] for look in one.in_time]
-        rays = [one.rays.get(i) for i in one.places] if self.config.rays else ()
+        rays = [one.rays.get(i) for i in one.places] if self.config.completion.rays else ()
         return list(self.predictor.put_together(done, scans, rays))
 
     def _look(self, every: list[_Candidate], count: int | None) -> None:
@@ -199,21 +205,31 @@ class Completer:
             if one.said >= least_nats:
                 return True
             said["nats"] = one.said
+        if self._drives(one):
+            self._listen(one)
+            return True
         write_json(self.folder / one.chosen.name / RULED_OUT, said)
         return False
 
+    def _drives(self, one: _Candidate) -> bool:
+        frames = list(one.chosen.frames)
+        ticks = np.take(self.drive.ticks, frames)
+        T_world_level = self.T_world_level[torch.tensor(frames)]
+        return drives(one.clouds, T_world_level, ticks, self.config.driving)
+
     def _is_solid(self, one: _Candidate) -> bool:
         """Whether its own points are of a vehicle's size, long enough to be believed."""
-        if one.scans < self.config.solid_scans or one.cost > self.config.solid_cost_m:
+        of = self.config.completion
+        if one.scans < of.solid_scans or one.cost > of.solid_cost_m:
             return False
-        return vehicle_sized(one.clouds, self.vehicles)
+        return vehicle_sized(one.clouds, self.config.vehicles)
 
     def _listen(self, one: _Candidate) -> None:
         """What the looks say for a vehicle, of those that were not asked yet."""
         for look in one.looks[len(one.nats) :]:
             cost, size = float(look.found.cost), box_of(look, self.predictor).size
-            said = shape_nats(cost, size, self.vehicles)
-            one.nats.append(max(said, self.config.worst_nats))
+            said = shape_nats(cost, size, self.config.vehicles)
+            one.nats.append(max(said, self.config.completion.worst_nats))
 
     def _write(self, chosen: Sightings, done: list[Completion]) -> None:
         if self.T_level_sensor is not None:

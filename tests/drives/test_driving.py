@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 The Wildshape developers
+# SPDX-License-Identifier: Apache-2.0
+"""What drives by its points alone, and what does not."""
+
+import numpy as np
+import pytest
+import torch
+
+from wildshape.drives.completing.driving import drives
+from wildshape.drives.object_config import DrivingConfig
+from wildshape.geometry.transforms.rotation import rotation_z
+from wildshape.geometry.transforms.se3 import SE3
+
+TICKS = np.arange(0, 40, 4)
+CONFIG = DrivingConfig()
+
+
+def rear(height):
+    """Of a lorry, as behind it: a wall of 2.2 m across the road."""
+    return np.random.default_rng(0).uniform((0, -1.1, -1), (0.1, 1.1, height - 1), (80, 3))
+
+
+def seen(ways, sensor_m=0.0, turn=0.0, height=2.4):
+    """The clouds and `T_level_cloud` of something that is so far along x in each scan."""
+    at = sensor_m * np.arange(len(ways))
+    R = rotation_z(torch.full((len(ways),), turn, dtype=torch.float64))
+    places = np.column_stack((at, 0 * at, 0 * at))
+    T_level_cloud = SE3(R, torch.from_numpy(places))
+    T_cloud_level = T_level_cloud.inverse()
+    wall = rear(height)
+    clouds = [
+        T_cloud_level[i].apply_numpy((wall + np.array((way, 5.0, 0.0))).astype(np.float32))
+        for i, way in enumerate(ways)
+    ]
+    return clouds, T_level_cloud
+
+
+@pytest.mark.parametrize("sensor_m", [0.0, 3.0])
+@pytest.mark.parametrize("turn", [0.0, 2.0])
+def test_what_goes_on_and_on_drives_however_the_sensor_moves(sensor_m, turn):
+    assert drives(*seen(0.8 * TICKS, sensor_m, turn), TICKS, CONFIG)
+    assert drives(*seen(20 - 0.8 * TICKS, sensor_m, turn), TICKS, CONFIG)
+
+
+@pytest.mark.parametrize(
+    ("ways", "height"),
+    [
+        (0 * TICKS, 2.4),
+        (0.15 * TICKS, 2.4),
+        (0.8 * TICKS, 0.8),
+        (np.where(TICKS < 20, 0.0, 20.0), 2.4),
+        (0.8 * np.abs(TICKS - 12), 2.4),
+    ],
+    ids=["stands", "is slow", "is low", "jumps once", "turns back"],
+)
+def test_what_else_does_not(ways, height):
+    assert not drives(*seen(ways, 1.0, height=height), TICKS, CONFIG)
+
+
+def test_two_scans_tell_nothing():
+    clouds, T_level_cloud = seen(np.array((0.0, 20.0)))
+    assert not drives(clouds, T_level_cloud, np.array((0, 20)), CONFIG)
