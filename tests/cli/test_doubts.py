@@ -124,6 +124,15 @@ def test_figures_on_what_a_model_was_trained_on_are_doubted(wildshape, tmp_path,
     assert "was trained on" not in done.err
 
 
+def test_shipped_weights_were_not_trained_in_the_folder_one_stands_in(
+    wildshape, tmp_path, monkeypatch
+):
+    wildshape("simulate", tmp_path / "tracks", "--tracks", "1", "--scans", "2")
+    monkeypatch.chdir(tmp_path / "tracks")
+    words = ("--baselines", "none", "--raw", "--out", tmp_path / "out")
+    assert "was trained on" not in wildshape("evaluate", ".", *words).err
+
+
 def test_figures_of_two_kinds_of_sensor_are_doubted(wildshape, tmp_path):
     """The first track's sensor is that of the weights; the second's was mixed in without a word."""
     (tmp_path / "tracks").mkdir()

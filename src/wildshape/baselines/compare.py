@@ -271,7 +271,7 @@ def _seen_in_training(data: Path, models: Mapping[str, Model]) -> list[str]:
         f"{name}: was trained on {data}; these figures say little of objects that it never saw"
         for name, of in made.items()
         if packed == of.get("identity", {}).get("data", "")
-        or data.resolve() == Path(of.get("data", "")).resolve()
+        or ("data" in of and data.resolve() == Path(of["data"]).resolve())
     ]
 
 
