@@ -126,7 +126,7 @@ def compare(
             " frame and of the scans' unit, label_size_m is length, width, height in metres"
         )
     models = load_models(options.models, options.device, raw=options.raw)
-    for told in (*_other_sensors(source, models), *_seen_in_training(data, models)):
+    for told in _other_sensors(source, models):
         progress.say(told)
     keep_apart(out, data, *map(weights_file, options.models))
     identity = options.identity(data)
@@ -148,7 +148,7 @@ def compare(
             for seed, rows in enumerate(evaluated)
         ]
         workers = helpers.worked
-    for told in (*source.doubts, *_of_two_kinds(source)):
+    for told in (*source.doubts, *_of_two_kinds(source), *_seen_in_training(data, models)):
         progress.say(told)
     if pooled:
         runs = _with_selected(runs, models)
