@@ -16,7 +16,7 @@ from wildshape.drives.completing.cluster_association import associate
 from wildshape.drives.completing.completion import fullest_of_parts, keyframes, order_of_looks
 from wildshape.drives.completing.level_frame import on_ground
 from wildshape.drives.completing.merging import Places
-from wildshape.drives.completing.surroundings import Surroundings
+from wildshape.drives.completing.surroundings import crowded
 from wildshape.drives.completing.vehicles import (
     judge,
     stated,
@@ -24,7 +24,6 @@ from wildshape.drives.completing.vehicles import (
     vehicle_confidence,
     vehicle_sized,
 )
-from wildshape.drives.completing.whole_scans import show_scans
 from wildshape.drives.config import (
     BoxConfig,
     CompletionConfig,
@@ -143,9 +142,7 @@ def test_a_doubtful_vehicle_is_none_where_a_wall_goes_on_beyond_its_box():
 
     def names(*parts):
         scan = np.concatenate(parts)
-        around = Surroundings([one], still(2), SurroundingsConfig())
-        show_scans(lambda _: scan, still(2), around)
-        return around.crowded()
+        return crowded(lambda _: scan, [one], still(2), SurroundingsConfig())
 
     assert names(car, ground) == set()
     assert names(car, ground, wall) == {"a"}
@@ -286,7 +283,7 @@ def test_boxes_reach_down_to_the_ground_under_the_clusters_that_are_left(tmp_pat
     found = on_ground(on_two, tmp_path, still(3), BoxConfig())
     assert found.size == pytest.approx((4.0, 1.8, 1.65))
     assert found.boxes[:, 2] == pytest.approx([-0.175] * 3)
-    assert found.moved_m == pytest.approx((0.0, 0.0, -0.075))
+    assert found.raised_m == pytest.approx(-0.075)
     unknown = replace(one, boxes=np.full_like(one.boxes, math.nan))
     assert on_ground(unknown, tmp_path, still(3), BoxConfig()) is unknown
     nowhere = replace(one, seen=one.seen.part([]))

@@ -71,10 +71,10 @@ def test_the_shape_of_one_turned_around_is_turned_with_its_box(tmp_path):
     said = {"track": "a", "sensor": "lidar", "category": "car", "scans": [scan]}
     (tmp_path / "objects.json").write_text(json.dumps(said), encoding="utf-8")
     one = completed([(5.0, 4.0, 0.0, 0.0)])
-    for turned, expected in ((True, (1.4, 0.2, 0.3)), (False, (-1.6, -0.2, 0.3))):
+    for turned, expected in ((True, (1.5, 0.2, 0.2)), (False, (-1.5, -0.2, 0.2))):
         write_shape(
             tmp_path / f"{turned}.ply",
             tmp_path,
-            replace(one, turned=turned, moved_m=(0.1, 0.0, 0.0)),
+            replace(one, turned=turned, raised_m=0.1),
         )
         assert read_points(tmp_path / f"{turned}.ply")[0] == pytest.approx(expected, abs=1e-5)

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from wildshape.drives.object_config import (
     AssociationConfig,
     BoxConfig,
-    CarveConfig,
     CompletionConfig,
     DrivingConfig,
     MergeConfig,
@@ -271,6 +270,5 @@ class DriveConfig:
     merging: MergeConfig = field(default_factory=MergeConfig)
     association: AssociationConfig = field(default_factory=AssociationConfig)
     surroundings: SurroundingsConfig = field(default_factory=SurroundingsConfig)
-    carving: CarveConfig = field(default_factory=CarveConfig)
     boxes: BoxConfig = field(default_factory=BoxConfig)
     rays: bool = False

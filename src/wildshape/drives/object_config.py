@@ -204,38 +204,6 @@ class SurroundingsConfig:
 
 
 @dataclass(frozen=True)
-class CarveConfig:
-    """Where rays say that a vehicle ends (`free_space_length.py`).
-
-    Attributes:
-        slab_m: a box is looked at in slabs of this thickness, from each end inwards.
-        reach_m: so far inwards.
-        low_m: above the box's floor; lower rays pass under a vehicle.
-        high_m: above the box's floor; higher ones pass over a bonnet.
-        strip_m: rays are counted in this depth behind the side that the sensor sees: less is a
-            corner's rounding, of more nothing is seen.
-        behind_m: a ray passes where it goes on so far.
-        fewest_rays: through an empty slab.
-        corner_m: a vehicle reaches so far beyond where a side seen begins to turn.
-        far_corner_m: the same where the end itself looks away from the sensor.
-        most_m: no end is moved farther: some vehicles have pointed ends.
-        strays: share of a vehicle's points that may be left outside.
-    """
-
-    slab_m: float = 0.05
-    reach_m: float = 0.6
-    low_m: float = 0.3
-    high_m: float = 1.0
-    strip_m: tuple[float, float] = (0.15, 0.6)
-    behind_m: float = 0.3
-    fewest_rays: int = 3
-    corner_m: float = 0.1
-    far_corner_m: float = 0.25
-    most_m: float = 0.25
-    strays: float = 0.002
-
-
-@dataclass(frozen=True)
 class TurnConfig:
     """Which way the beam turns (`rolling_shutter.py`).
 
@@ -279,4 +247,4 @@ class BoxConfig:
     stray_m: float = 0.6
     stray_ticks: float = 8.0
     longest_gap: int = 10
-    ground_gap_m: float = 0.5
+    ground_gap_m: float = 1.0

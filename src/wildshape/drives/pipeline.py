@@ -24,6 +24,7 @@ from wildshape.drives.completing.level_frame import (
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.own_vehicle import carries_sensor
 from wildshape.drives.completing.rolling_shutter import TURNS, Turns, with_sense
+from wildshape.drives.completing.surroundings import crowded
 from wildshape.drives.completing.vehicles import (
     Judged,
     judge,
@@ -33,7 +34,6 @@ from wildshape.drives.completing.vehicles import (
     surer_if_driving,
     write_judged,
 )
-from wildshape.drives.completing.whole_scans import held_against
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.recording_checks import clock_told, count_told, rate_told
 from wildshape.drives.result import DriveResult
@@ -287,15 +287,15 @@ class Pipeline:
             said = judge(others, places, self.config.vehicles)
             kept = {one.name: one.confidence for one in said if not one.reasons}
             found = [one for one in completed if one.seen.name in kept]
-            parts, doubtful = {}, []
+            parts, crowd = dict[str, str](), set[str]()
             if not self.tracked:
                 found.sort(key=lambda one: -kept[one.seen.name])
                 associated = associate(found, self.cuts, turns, self.config)
                 found, parts = associated.vehicles, associated.parts
-                sure = self.config.surroundings.sure
-                doubtful = [one for one in found if stated(one, kept) < sure]
-            known = found, doubtful, turns, self.config
-            found, crowd = held_against(self.drive.scan, *known, self.helpers.in_order)
+                around = self.config.surroundings
+                doubtful = [one for one in found if stated(one, kept) < around.sure]
+                crowd = crowded(self.drive.scan, doubtful, turns, around, self.helpers.in_order)
+                found = [one for one in found if one.seen.name not in crowd]
             said = refused(said, parts | dict.fromkeys(crowd, "crowded"))
             said += [Judged(name, 0.0, ("own_vehicle",)) for name in sorted(own)]
             write_judged(self.completing / "vehicles.json", objects, said)

@@ -39,8 +39,7 @@ class Completed:
         cost_m: label-free cost, the middle one of its scans, the fuller the heavier.
         confidence: of the completions, 0 to 1.
         p_kind: probability that it is a vehicle; None for weights that state none.
-        moved_m: how far the boxes' middle was moved from that of the completed shape: forward, to
-            the left, upward.
+        raised_m: how far the boxes' middle was moved up from that of the completed shape.
         phases: `(k,)` when the beam met it, in turns since the middle of each frame's.
         turned: the front of the boxes is the rear of the completed shape.
     """
@@ -52,7 +51,7 @@ class Completed:
     cost_m: float
     confidence: float
     p_kind: float | None = None
-    moved_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    raised_m: float = 0.0
     phases: Float[np.ndarray, "k"] | float = 0.0
     turned: bool = False
 
@@ -121,12 +120,11 @@ def on_ground(one: Completed, cuts: Path, turns: Turns, config: BoxConfig) -> Co
     gap = float(np.median(gaps))
     if not abs(gap) <= config.ground_gap_m:  # far off, or not known at all
         return one
-    ahead, aside, up = one.moved_m
     return replace(
         one,
         boxes=one.boxes - (0.0, 0.0, gap / 2, 0.0),
         size=(length, width, height + gap),
-        moved_m=(ahead, aside, up - gap / 2),
+        raised_m=-gap / 2,
     )
 
 

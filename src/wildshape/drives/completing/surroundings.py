@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What stands close around a vehicle that may be none: walls and hedges go on beyond their box."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -15,20 +17,45 @@ from wildshape.records import Points
 
 _Box = Float[np.ndarray, "4"]
 
+InOrder = Callable[[Callable[[int], Any], Iterable[int]], Iterable[Any]]
+"""`map`, or what does the same by several processes (`parallel/processes.py`)."""
 
-class Surroundings:
-    """What whole scans show of vehicles and around them."""
 
-    def __init__(
-        self, vehicles: Sequence[Completed], turns: Turns, config: SurroundingsConfig
-    ) -> None:
-        """`vehicles`: doubtful ones; `turns`: of the drive's sensor."""
-        self.vehicles, self.turns, self.config = vehicles, turns, config
-        self.frames = frozenset(frame for one in vehicles for frame in one.frames)
-        self._counts = {one.seen.name: np.zeros(2) for one in vehicles}
+def crowded(
+    read: Callable[[int], Points],
+    doubtful: Sequence[Completed],
+    turns: Turns,
+    config: SurroundingsConfig,
+    in_order: InOrder = map,
+) -> set[str]:
+    """Names of those whose completed scans show much close around them.
 
-    def counted(self, frame: int, scan: Points) -> dict[str, tuple[int, int]]:
-        """Points of a scan, level world, in the boxes of vehicles and around them."""
+    Args:
+        read: the whole scan of a frame, sensor frame, metres; each is read once.
+        doubtful: vehicles that are asked.
+        turns: of the drive's sensor.
+        config: see there.
+        in_order: looks at the scans.
+    """
+    counts = {one.seen.name: np.zeros(2) for one in doubtful}
+    frames = sorted({frame for one in doubtful for frame in one.frames})
+    for said in in_order(_Counter(read, doubtful, turns, config), frames):
+        for name, inside_and_around in said.items():
+            counts[name] += inside_and_around
+    return {name for name, (own, around) in counts.items() if around > config.share * own}
+
+
+@dataclass(frozen=True)
+class _Counter:
+    """Counts points of a scan in the boxes of vehicles and around them, by their names."""
+
+    read: Callable[[int], Points]
+    vehicles: Sequence[Completed]
+    turns: Turns
+    config: SurroundingsConfig
+
+    def __call__(self, frame: int) -> dict[str, tuple[int, int]]:
+        scan = self.turns.T_level_sensor[frame].apply_numpy(self.read(frame))
         found = {}
         for one in self.vehicles:
             if frame in one.frames:
@@ -36,16 +63,6 @@ class Surroundings:
                 (box,) = self.turns.shown([frame], one.boxes[place : place + 1])
                 found[one.seen.name] = _inside_and_around(scan, box, one.size, self.config)
         return found
-
-    def add(self, counted: dict[str, tuple[int, int]]) -> None:
-        """Keep what one scan shows."""
-        for name, inside_and_around in counted.items():
-            self._counts[name] += inside_and_around
-
-    def crowded(self) -> set[str]:
-        """Names of those whose completed scans show much close around them."""
-        share = self.config.share
-        return {name for name, (own, around) in self._counts.items() if around > share * own}
 
 
 def _inside_and_around(

@@ -155,7 +155,7 @@ def write_shape(path: Path, folder: Path, one: Completed) -> None:
     Args:
         path: file to write.
         folder: of the completed object; all its scans have one shape.
-        one: where the box was moved, and turned, since.
+        one: where the box was raised, and turned, since.
     """
     if path.is_file():
         return
@@ -165,7 +165,7 @@ def write_shape(path: Path, folder: Path, one: Completed) -> None:
     placed = pose_of(first.box).inverse().apply_numpy(points)
     if one.turned:
         placed = placed * np.array((-1, -1, 1), placed.dtype)
-    write_ply(path, placed - np.array(one.moved_m, placed.dtype))
+    write_ply(path, placed - np.array((0.0, 0.0, one.raised_m), placed.dtype))
 
 
 def boxes_of(vehicle: Vehicle, turns: Turns) -> list[tuple[int, Box]]:
