@@ -150,7 +150,7 @@ def test_poses_that_do_not_fit_the_scans_are_said():
         assert (told or "") in "".join(found)
 
 
-def test_poses_whose_z_looks_down_are_said():
+def test_poses_whose_z_looks_down_or_whose_frame_is_turned_are_said():
     """On a nearly straight way what the near scans show hardly differs."""
     seen = street(frames=10)
     angle = torch.tensor(math.radians(1.5), dtype=torch.float64)
@@ -159,7 +159,12 @@ def test_poses_whose_z_looks_down_are_said():
     path = path_of(seen.places) @ T_sensor_car.inverse()
     turn = torch.diag(torch.tensor((1.0, -1.0, -1.0), dtype=torch.float64))
     axes = SE3(turn, torch.zeros(3, dtype=torch.float64))
-    for poses, told in ((path, []), (axes @ path @ axes, ["y and z reversed"])):
+    turned = SE3(rotation_z(torch.tensor(math.radians(4.0)).double()), torch.zeros(3).double())
+    for poses, told in (
+        (path, []),
+        (axes @ path @ axes, ["y and z reversed"]),
+        (path @ turned, ["turned by 4 degrees about"]),
+    ):
         drive = replace(drive_of(scans), T_world_sensor=poses)
         found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
         assert len(found) == len(told)
