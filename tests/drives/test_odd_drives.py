@@ -150,7 +150,23 @@ def test_poses_that_do_not_fit_the_scans_are_said():
         assert (told or "") in "".join(found)
 
 
-def test_poses_whose_z_looks_down_are_said():
+def test_right_poses_amid_traffic_are_not_doubted():
+    """Half of what is seen drives elsewhere; half a metre beside less fits."""
+    seen = street(frames=8)
+    path = path_of(seen.places)
+    low, high = (-28.0, -28.0, -1.0), (28.0, 28.0, 8.0)
+    driving = np.random.default_rng(0).uniform(low, high, size=(20_000, 3)).astype(np.float32)
+    ahead = np.array((1.3, 0.0, 0.0), np.float32)
+    scans = [np.concatenate((scan, driving + i * ahead)) for i, scan in enumerate(seen.scans)]
+    half = SE3(path.rotation, path.translation / 2)
+    for poses, told in ((path, []), (half, ["a wrong scale, order or frame"])):
+        drive = replace(drive_of(scans), T_world_sensor=poses)
+        found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
+        assert len(found) == len(told)
+        assert all(word in said for word, said in zip(told, found))
+
+
+def test_poses_whose_z_looks_down_or_whose_frame_is_turned_are_said():
     """On a nearly straight way what the near scans show hardly differs."""
     seen = street(frames=10)
     angle = torch.tensor(math.radians(1.5), dtype=torch.float64)
@@ -159,7 +175,12 @@ def test_poses_whose_z_looks_down_are_said():
     path = path_of(seen.places) @ T_sensor_car.inverse()
     turn = torch.diag(torch.tensor((1.0, -1.0, -1.0), dtype=torch.float64))
     axes = SE3(turn, torch.zeros(3, dtype=torch.float64))
-    for poses, told in ((path, []), (axes @ path @ axes, ["y and z reversed"])):
+    turned = SE3(rotation_z(torch.tensor(math.radians(4.0)).double()), torch.zeros(3).double())
+    for poses, told in (
+        (path, []),
+        (axes @ path @ axes, ["y and z reversed"]),
+        (path @ turned, ["turned by 4 degrees about"]),
+    ):
         drive = replace(drive_of(scans), T_world_sensor=poses)
         found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
         assert len(found) == len(told)

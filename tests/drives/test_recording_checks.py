@@ -64,7 +64,7 @@ def test_times_of_points_that_cannot_be_used_in_any_scan_are_told_of(tmp_path, f
 
 def test_only_recordings_of_few_scans_a_second_are_told_to_lose_fast_vehicles():
     def told(scan_s):
-        return rate_told(scan_s, LinkConfig())
+        return rate_told(scan_s, 0.0, LinkConfig())
 
     assert told(None) == told(0.1) == told(0.05) == told(0.2) == []
     assert "at 2 scans a second" in told(0.5)[0]

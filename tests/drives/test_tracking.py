@@ -24,7 +24,7 @@ from wildshape.drives.tracking.mounting import Mounting, ground_plane
 from wildshape.drives.tracking.segmentation import Cutter
 from wildshape.drives.tracking.sightings import Sightings, merged
 from wildshape.drives.tracking.tracks import Seen, link
-from wildshape.drives.tracking.trajectory import jumps
+from wildshape.drives.tracking.trajectory import jumps, usual_step_m
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Turn
 from wildshape.simulate.sensor import HDL64
@@ -249,6 +249,16 @@ def test_of_few_scans_a_second_what_drives_and_what_stands_are_followed():
     assert [one.rows for one in found[:2]] == [[0] * 8, [1] * 8]
 
 
+def test_where_the_sensor_is_fast_so_is_what_goes_along_and_comes_towards_it():
+    """36 m/s at 10 Hz; where it is slow no gate is wider."""
+    scans = [seen(i, (20.0 + 3.6 * i, 3.0), (90.0 - 3.6 * i, 7.0)) for i in range(12)]
+    config = LinkConfig()
+    assert len(link(scans, config)) > 2
+    found = link(scans, config, config.wider(0.1, step_m=3.6))
+    assert [one.frames for one in found] == [list(range(12))] * 2
+    assert config.wider(0.1, step_m=2.0) == config.wider(None, step_m=2.0) == 1.0
+
+
 def test_an_object_of_which_less_is_seen_stays_the_same():
     """A lorry of 8 m, and then its rear alone: its middle jumps, its rear does not."""
     lengths = [8.0] * 5 + [0.4] * 5
@@ -277,5 +287,7 @@ def test_a_jump_is_counted_and_a_missing_scan_is_none():
         return SE3(torch.eye(3, dtype=torch.float64).expand(len(at), 3, 3), at)
 
     assert list(jumps(poses(steady), (0, 1, 2, 5, 6, 7), config)) == []
+    assert usual_step_m(poses(steady), (0, 1, 2, 5, 6, 7)) == pytest.approx(0.8)
+    assert usual_step_m(poses(steady[:1]), (0,)) == 0.0
     leap = [*steady[:4], *((x + 30.0, y, z) for x, y, z in steady[4:])]
     assert 4 in jumps(poses(leap), (0, 1, 2, 5, 6, 7), config)

@@ -202,6 +202,7 @@ class LinkConfig:
         usual_s: from a scan to the next, for which the gates are made.
         slow: from so many times as much on, clusters left over are looked for again, with gates
             that are wider by as much.
+        traffic: of the sensor's own speed, which others may have; past `slow` it widens them, too.
         widest: the gates grow by no more.
         like_m: and only among clusters whose size differs by less.
     """
@@ -215,12 +216,19 @@ class LinkConfig:
     fewest_scans: int = 4
     usual_s: float = 0.1
     slow: float = 1.5
+    traffic: float = 2.0
     widest: float = 3.0
     like_m: float = 1.0
 
-    def wider(self, scan_s: float | None) -> float:
-        """How much wider the second gates are, 1 where there are none; seconds a scan, if known."""
+    def wider(self, scan_s: float | None, step_m: float = 0.0) -> float:
+        """How much wider the second gates are, 1 where there are none.
+
+        Args:
+            scan_s: from a scan to the next, seconds, if known.
+            step_m: that the sensor goes meanwhile.
+        """
         times = 1.0 if scan_s is None else scan_s / self.usual_s
+        times = max(times, self.traffic * step_m / self.first_gate_m)
         return 1.0 if times < self.slow else min(times, self.widest)
 
 

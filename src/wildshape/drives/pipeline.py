@@ -45,7 +45,13 @@ from wildshape.drives.tracking.segmentation import Cutter, read_cuts
 from wildshape.drives.tracking.sightings import Sightings, read_sightings, write_sightings
 from wildshape.drives.tracking.static_tracks import joined_where_they_stand
 from wildshape.drives.tracking.tracks import linked_clusters
-from wildshape.drives.tracking.trajectory import FIRST_SCANS, Breaks, find_trajectory, jumps
+from wildshape.drives.tracking.trajectory import (
+    FIRST_SCANS,
+    Breaks,
+    find_trajectory,
+    jumps,
+    usual_step_m,
+)
 from wildshape.drives.writing.folder import BOXES, FRAMES, TRAJECTORY
 from wildshape.drives.writing.outputs import (
     RayWriter,
@@ -213,7 +219,8 @@ class Pipeline:
             config = replace(config, longest_gap=config.longest_gap * self.detections.every)
         ticks = self.breaks.ticks(self.drive.ticks, config)
         known = self.cuts, T_level_sensor
-        found = linked_clusters(*known, ticks, config, config.wider(self.seen_s))
+        wider = config.wider(self.seen_s, self.step_m(T_level_sensor))
+        found = linked_clusters(*known, ticks, config, wider)
         return joined_where_they_stand(found, *known, self.config.standing, self.breaks.frames)
 
     @property
@@ -222,6 +229,11 @@ class Pipeline:
         if self.detections is None or self.detections.every == 1:
             return self.drive.scan_s
         return (self.drive.scan_s or self.config.tracks.usual_s) * self.detections.every
+
+    def step_m(self, T_world_sensor: SE3) -> float:
+        """How far the sensor goes meanwhile."""
+        every = 1 if self.detections is None else self.detections.every
+        return every * usual_step_m(T_world_sensor, self.drive.ticks)
 
     def folder(self, seen: Sightings) -> Path:
         """Of a completed object."""
@@ -338,7 +350,7 @@ class Pipeline:
         found += clock_told(self.drive)
         found += count_told(len(points) - points.count(0))
         if not self.tracked:
-            found += rate_told(self.seen_s, self.config.tracks)
+            found += rate_told(self.seen_s, self.step_m(T_world_sensor), self.config.tracks)
         if self.detections is not None:
             found += self.detections.told(kept)
         if leaps := list(jumps(T_world_sensor, self.drive.ticks, self.config.trajectory)):

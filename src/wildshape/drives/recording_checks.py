@@ -48,11 +48,17 @@ def count_told(scans: int) -> list[str]:
     return [f"{counted(scans, 'scan')} with points: too few to tell which vehicles move"]
 
 
-def rate_told(scan_s: float | None, config: LinkConfig) -> list[str]:
-    """A sentence where scans are so far apart in time, seconds, that fast vehicles are lost."""
+def rate_told(scan_s: float | None, step_m: float, config: LinkConfig) -> list[str]:
+    """A sentence where scans are so far apart in time that fast vehicles are lost.
+
+    Args:
+        scan_s: from a scan to the next, seconds, if known.
+        step_m: that the sensor goes meanwhile.
+        config: how vehicles are followed.
+    """
     if scan_s is None or scan_s < _SLOW_S:
         return []
-    fastest = config.wider(scan_s) * config.first_gate_m / scan_s
+    fastest = config.wider(scan_s, step_m) * config.first_gate_m / scan_s
     return [
         f"at {1 / scan_s:.2g} scans a second fast vehicles are often lost, those above"
         f" {fastest:.0f} m/s always"

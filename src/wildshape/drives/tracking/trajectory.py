@@ -251,8 +251,19 @@ def _landmarks_of(turn: Turn, mounting: Mounting, config: DriveConfig) -> Turn:
     return landmarks(turn, heights, mounting, config)
 
 
+def usual_step_m(T_world_sensor: SE3, ticks: tuple[int, ...]) -> float:
+    """How far the sensor goes from a scan to the next, the median."""
+    if len(ticks) < 2:
+        return 0.0
+    return float(np.median(np.linalg.norm(_steps(T_world_sensor, ticks), axis=1)))
+
+
 def jumps(T_world_sensor: SE3, ticks: tuple[int, ...], config: TrajectoryConfig) -> Iterator[int]:
     """The frames that no vehicle reaches from the two before them."""
-    steps = np.diff(T_world_sensor.translation.numpy(), axis=0) / np.diff(ticks)[:, None]
-    changes = np.linalg.norm(np.diff(steps, axis=0), axis=1)
+    changes = np.linalg.norm(np.diff(_steps(T_world_sensor, ticks), axis=0), axis=1)
     yield from (np.flatnonzero(changes > config.jump_m) + 2).tolist()
+
+
+def _steps(T_world_sensor: SE3, ticks: tuple[int, ...]) -> Float[np.ndarray, "m 3"]:
+    """From each frame to the next, metres a tick."""
+    return np.diff(T_world_sensor.translation.numpy(), axis=0) / np.diff(ticks)[:, None]
