@@ -248,6 +248,25 @@ def test_output_of_other_settings_is_not_mixed_in(refused, dataset, trained, tmp
     assert "with other settings" in refused(*command)
 
 
+@pytest.mark.parametrize("command", ["complete", "convert"])
+def test_work_on_scans_that_changed_is_not_gone_on_with(
+    wildshape, refused, dataset, trained, tmp_path, command
+):
+    data, out = shutil.copytree(dataset, tmp_path / "data"), tmp_path / "out"
+    line = {
+        "complete": ("complete", data, "--out", out, "--model", trained),
+        "convert": ("convert", "folder", data, out, "--layout", "folders", "--workers", 1),
+    }[command]
+    assert wildshape(*line).code == 0
+    marker = out / "wildshape.json"
+    marker.write_text(marker.read_text().replace('"finished"', '"running"'))
+    scan = next(data.glob("*/scans/*.ply"))
+    cloud = bytearray(scan.read_bytes())
+    cloud[cloud.index(b"end_header\n") + 11 :] = bytes(len(cloud) - cloud.index(b"end_header") - 11)
+    scan.write_bytes(cloud)  # as large as it was
+    assert "of other data; repeat" in refused(*line)
+
+
 def test_full_disk(wildshape, dataset, trained, tmp_path, monkeypatch):
     write = complete_folder.write_cloud
 
