@@ -121,6 +121,11 @@ def check_sum(
         raise BadInputError(f"{path}: the checksum is wrong, the file is damaged; {_CURE}.")
 
 
+def unsummed(metadata: Mapping[str, str]) -> dict[str, str]:
+    """The metadata as given to `packed`."""
+    return {name: value for name, value in metadata.items() if name != _CHECKSUM}
+
+
 def _settings(path: Path, metadata: dict[str, str], form: Format[Any, Settings]) -> Settings:
     found = f"{metadata.get('format', 'no format')} version {metadata.get('version', 'none')}"
     if found != f"{form.name} version {form.version}":
