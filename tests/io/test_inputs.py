@@ -193,7 +193,8 @@ def test_one_scan_of_a_track_has_its_unit_and_sensor(dataset: Path) -> None:
 
 
 def test_scans_beside_tracks_are_not_passed_over(dataset: Path) -> None:
-    (dataset / "notes" / "splits.txt").write_text("a b")
+    for text in ("splits.txt", "README.TXT"):
+        (dataset / "notes" / text).write_text("a b")
     assert open_tracks(dataset).names == ("a", "b")
     (dataset / "b" / "scans").rename(dataset / "c")
     (dataset / "b").rename(dataset / ".b")

@@ -33,6 +33,7 @@ from wildshape.io.tracks import (
 from wildshape.records import Sensor, SensorKind, Track, as_text
 
 _NO_SCANS = ("poses.txt", "times.txt", "timestamps.txt", "shape.ply")  # beside scans, not scans
+_TEXT = (".txt", ".csv")  # may be anything
 _CURE = (
     "pass a scan file, a TRACK folder (with scans/), a DATASET folder of such tracks, a folder of "
     "scan files, or a packed store"
@@ -344,7 +345,7 @@ def _folder(path: Path, coordinates: Coordinates) -> TrackSource:
     folders = folders or sorted(one.parent for one in path.glob("[!.]*/tracks/[!.]*/scans"))
     if folders:
         for other in (entry for entry in shown if entry.is_dir() and entry not in folders):
-            if any(is_scan_file(f) and f.suffix not in (".txt", ".csv") for f in other.iterdir()):
+            if any(is_scan_file(f) and f.suffix.lower() not in _TEXT for f in other.iterdir()):
                 raise BadInputError(f"{other}: has points, but no scans/; move its scans there.")
         names = tuple(as_text("_".join(one.relative_to(path).parts[::2])) for one in folders)
         return TrackSource(

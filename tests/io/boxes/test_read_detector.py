@@ -78,8 +78,8 @@ def test_every_format_says_the_same_box(name, mark, tmp_path):
 
 
 def test_a_folder_is_read_file_by_file(tmp_path):
-    for name in ("000005", "000004"):
-        written(tmp_path / f"{name}.txt", f"{LABEL.format(turn=0)}\nDontCare {'-1 ' * 14}\n")
+    for name in ("000005.TXT", "000004.txt"):
+        written(tmp_path / name, f"{LABEL.format(turn=0)}\nDontCare {'-1 ' * 14}\n")
     written(tmp_path / "README", "no boxes")
     written(tmp_path / "._000004.txt", "left by macOS")
     assert [one.scan for one in read(tmp_path)] == ["000004", "000005"]
