@@ -188,8 +188,7 @@ def _set_up(
 ) -> Run:
     learns = isinstance(weights.teacher, Path)
     leads = int(os.environ.get("RANK", "0")) == 0
-    truth = doubts_of_truth(store) if weights.teacher == "truth" else []
-    for doubt in (*doubts_of(store, recipe), *truth) if leads else ():
+    for doubt in (*doubts_of(store, recipe), *doubts_of_truth(store)) if leads else ():
         progress.say(doubt)
     with (progress if learns and leads else SILENT).bar("fusing tracks", 0) as bar:
         return setup(
