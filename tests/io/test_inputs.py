@@ -13,7 +13,7 @@ from tests.refusal import refused
 
 from wildshape.errors import BadInputError
 from wildshape.io.inputs import open_tracks
-from wildshape.io.scans.points import Coordinates
+from wildshape.io.scans.points import Coordinates, read_points
 from wildshape.io.scans.writers import write_ply
 from wildshape.io.tracks import NoUsableScanError, write_track
 from wildshape.records import Track
@@ -122,6 +122,17 @@ def test_numbers_without_leading_zeros_are_doubted(
     (told,) = source.doubts
     assert told.startswith(f"a: {names[-1]}.ply is sorted before {names[0]}.ply")
     assert "1 more track likewise" in told
+
+
+def test_a_scan_in_two_formats_is_told(dataset: Path) -> None:
+    scans = dataset / "a" / "scans"
+    (dataset / "a" / "poses.txt").unlink()
+    first = min(scans.iterdir())
+    np.savetxt(scans / f"{first.stem}.xyz", read_points(first))
+    source = open_tracks(dataset)
+    assert len(next(iter(source)).scans) == len(list(scans.iterdir()))
+    (told,) = source.doubts
+    assert told.startswith(f"a: {first.name} and {first.stem}.xyz are taken for two scans;")
 
 
 def test_names_that_do_not_count_are_not_doubted(tmp_path: Path, cloud: np.ndarray) -> None:

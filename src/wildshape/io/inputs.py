@@ -84,7 +84,7 @@ class TrackSource:
         self._read = read
         self._skipped: dict[str, tuple[tuple[str, str], ...]] = {}  # by track
         self._dropped: dict[str, int] = {}
-        self._out_of_order: dict[str, tuple[str, ...]] = {}
+        self._odd: dict[str, str] = {}
         self._kinds: set[SensorKind] = set()
 
     @property
@@ -109,23 +109,18 @@ class TrackSource:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """A sentence each on points that were not finite, and on scans that are out of order."""
+        """A sentence each on points that were not finite, and on names of scans that are odd."""
         told = []
         if self._dropped:
             points = counted(sum(self._dropped.values()), "point")
             scans = counted(len(self._dropped), "scan")
             told.append(f"dropped {points} with NaN or infinity in {scans}")
-        if self._out_of_order:
-            name, (one, other) = next(iter(self._out_of_order.items()))
-            told.append(
-                f"{name}: {one} is sorted before {other}, for names are sorted as text"
-                f"{self._and_more()}; if they count time, write their numbers with leading zeros"
-            )
+        if self._odd:
+            name, odd = next(iter(self._odd.items()))
+            more = len(self._odd) - 1
+            others = f" ({counted(more, 'more track')} likewise)" if more else ""
+            told.append(f"{name}: {odd}{others}")
         return tuple(told)
-
-    def _and_more(self) -> str:
-        more = len(self._out_of_order) - 1
-        return f" ({counted(more, 'more track')} likewise)" if more else ""
 
     @property
     def dropped_nonfinite(self) -> tuple[tuple[str, int], ...]:
@@ -155,8 +150,8 @@ class TrackSource:
         self._skipped[name] = found.skipped
         self._kinds.add(found.track.sensor.kind)
         self._dropped |= {f"{name}/{scan}": count for scan, count in found.dropped_nonfinite}
-        if found.out_of_order:
-            self._out_of_order[name] = found.out_of_order
+        if found.doubt:
+            self._odd[name] = found.doubt
         return found.track
 
     def __iter__(self) -> Iterator[Track]:
