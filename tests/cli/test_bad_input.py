@@ -237,6 +237,16 @@ def test_output_that_exists(wildshape, refused, dataset, trained, tmp_path):
     assert "exists" in refused("simulate", foreign, "--tracks", 1)
 
 
+@pytest.mark.parametrize("verb", ["complete", "register"])
+def test_an_output_stays_where_nothing_can_replace_it(wildshape, refused, dataset, tmp_path, verb):
+    out = tmp_path / "out"
+    command = (verb, dataset, "--out", out)
+    assert wildshape(*command).code == 0
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    assert "--unit mm" in refused(*command, "--overwrite", "--unit", "mm")
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
 def test_output_of_other_settings_is_not_mixed_in(refused, dataset, trained, tmp_path):
     out = tmp_path / "c"
     out.mkdir()
