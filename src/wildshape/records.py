@@ -308,12 +308,12 @@ class Completion:
 
         return las_cloud(self.points)
 
-    def mesh(self, scan: Points | None = None) -> "trimesh.Trimesh":
+    def mesh(self, scan: object = None) -> "trimesh.Trimesh":
         """A closed triangle mesh of the shape, sensor frame, metres; made when asked for.
 
         Args:
-            scan: the points completed, sensor frame; the mesh is then coloured by confidence, and
-                has the vertex attribute `confidence` (`geometry/meshing.py`).
+            scan: the points completed, `(n, 3)`, sensor frame; the mesh is then coloured by
+                confidence, and has the vertex attribute `confidence` (`geometry/meshing.py`).
         """
         from wildshape.geometry.meshing import closed_mesh, colour_by_confidence
 

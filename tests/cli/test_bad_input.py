@@ -237,6 +237,16 @@ def test_output_that_exists(wildshape, refused, dataset, trained, tmp_path):
     assert "exists" in refused("simulate", foreign, "--tracks", 1)
 
 
+@pytest.mark.parametrize("verb", ["complete", "register"])
+def test_an_output_stays_where_nothing_can_replace_it(wildshape, refused, dataset, tmp_path, verb):
+    out = tmp_path / "out"
+    command = (verb, dataset, "--out", out)
+    assert wildshape(*command).code == 0
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    assert "--unit mm" in refused(*command, "--overwrite", "--unit", "mm")
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
 def test_output_of_other_settings_is_not_mixed_in(refused, dataset, trained, tmp_path):
     out = tmp_path / "c"
     out.mkdir()
@@ -246,6 +256,25 @@ def test_output_of_other_settings_is_not_mixed_in(refused, dataset, trained, tmp
     assert "unfinished output" in refused(*command)
     (out / "wildshape.json").write_text(json.dumps(marker | {"status": "finished"}))
     assert "with other settings" in refused(*command)
+
+
+@pytest.mark.parametrize("command", ["complete", "convert"])
+def test_work_on_scans_that_changed_is_not_gone_on_with(
+    wildshape, refused, dataset, trained, tmp_path, command
+):
+    data, out = shutil.copytree(dataset, tmp_path / "data"), tmp_path / "out"
+    line = {
+        "complete": ("complete", data, "--out", out, "--model", trained),
+        "convert": ("convert", "folder", data, out, "--layout", "folders", "--workers", 1),
+    }[command]
+    assert wildshape(*line).code == 0
+    marker = out / "wildshape.json"
+    marker.write_text(marker.read_text().replace('"finished"', '"running"'))
+    scan = next(data.glob("*/scans/*.ply"))
+    cloud = bytearray(scan.read_bytes())
+    cloud[cloud.index(b"end_header\n") + 11 :] = bytes(len(cloud) - cloud.index(b"end_header") - 11)
+    scan.write_bytes(cloud)  # as large as it was
+    assert "of other data; repeat" in refused(*line)
 
 
 def test_full_disk(wildshape, dataset, trained, tmp_path, monkeypatch):

@@ -107,19 +107,18 @@ def test_weights_of_another_sensor_are_doubted_in_a_comparison(wildshape, tmp_pa
     assert "trained on" not in done.err
 
 
-@pytest.mark.parametrize("packed", [False, True])
-def test_figures_on_what_a_model_was_trained_on_are_doubted(wildshape, tmp_path, packed):
+@pytest.mark.parametrize("trained", ["tracks", "packed"])
+def test_figures_on_what_a_model_was_trained_on_are_doubted(wildshape, tmp_path, trained):
     data, other, run = (tmp_path / name for name in ("tracks", "others", "run"))
     for out, seed in ((data, "1"), (other, "2")):
         wildshape("simulate", out, "--tracks", "2", "--scans", "4", "--seed", seed)
-    if packed:
-        wildshape("convert", "folder", data, tmp_path / "packed")
-        data = tmp_path / "packed"
-    wildshape("train", data, "--out", run, "--preset", "tiny", "--steps", "2")
+    wildshape("convert", "folder", data, tmp_path / "packed")
+    wildshape("train", tmp_path / trained, "--out", run, "--preset", "tiny", "--steps", "2")
     words = ("--baselines", "none", "--raw", "--max-scans", "1", "--model", run, "--out")
-    done = wildshape("evaluate", data, *words, tmp_path / "same")
-    assert done.code == 0, done.err
-    assert f"run: was trained on {data}; these figures say little" in done.err
+    for measured in (data, tmp_path / "packed"):
+        done = wildshape("evaluate", measured, *words, tmp_path / f"of-{measured.name}")
+        assert done.code == 0, done.err
+        assert f"run: was trained on {measured}; these figures say little" in done.err
     done = wildshape("evaluate", other, *words, tmp_path / "else")
     assert "was trained on" not in done.err
 

@@ -310,6 +310,23 @@ def test_points_around_a_box_are_its_own_unless_they_are_in_another():
     assert points_in_boxes(points, [], DetectionConfig()).shape == (0, 6)
 
 
+@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize("named", ["{}", "scan_{:04d}"])
+def test_boxes_numbered_from_one_more_or_less_are_said_to_be(street, tmp_path, first, named):
+    """Names that are no numbers are counted from 0, whatever they end in."""
+    counted = 0 if named.startswith("scan") else first
+    drive = replace(street.drive, scan_names=tuple(named.format(first + i) for i in range(SCANS)))
+    car = {"boxes_lidar": [[9.0, 0, 0, 4, 2, 1, 0]], "name": ["Car"]}
+    for start in {0, 1}:
+        scans = [{**car, "frame_id": start + i} for i in range(SCANS)]
+        (tmp_path / "boxes.json").write_text(json.dumps(scans))
+        told = find_detections(DetectionFile(tmp_path / "boxes.json"), drive).warnings
+        if start == counted:
+            assert told == ()
+        else:
+            assert told[0].endswith(f"numbered from {start}, number them from {counted}")
+
+
 def test_boxes_of_other_scans_or_in_another_frame_are_refused(street, tmp_path):
     one = {"frame_id": "000000", "boxes_lidar": [[900.0, 0, 0, 4, 2, 1, 0]], "name": ["Car"]}
     path = tmp_path / "one.json"

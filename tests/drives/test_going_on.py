@@ -143,7 +143,9 @@ def test_a_finished_drive_is_not_taken_for_that_of_a_changed_recording(
         (source / change).write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * len(files))
     else:
         files[-1].write_bytes(files[-1].read_bytes()[:-160])
-    refused(wildshape.drive, source, out, match="with other settings; pass --overwrite")
+    refused(
+        wildshape.drive, source, out, match="with other settings or of other data; pass --overwrite"
+    )
 
 
 def moved_to(out, source):

@@ -45,6 +45,12 @@ def test_points_that_are_none_measured_nothing():
             place_confidence(places, none, confidence=0.8)
 
 
+@pytest.mark.parametrize("wrong", [np.ones((20, 4)), np.ones(20), "scan.ply", [[1.0, 2.0], [3.0]]])
+def test_what_is_no_scan_is_refused(wrong):
+    with pytest.raises(BadInputError, match=r"scan: .*\(n, 3\)"):
+        place_confidence(np.ones((5, 3)), wrong, confidence=0.8)
+
+
 @pytest.mark.parametrize("radius", [1.0, 0.05])
 def test_the_half_not_seen_is_less_sure(radius):
     """Also of a small object, of which nothing is half a metre from anything."""

@@ -13,7 +13,7 @@ from tests.refusal import refused
 
 from wildshape.errors import BadInputError
 from wildshape.io.inputs import open_tracks
-from wildshape.io.scans.points import Coordinates
+from wildshape.io.scans.points import Coordinates, read_points
 from wildshape.io.scans.writers import write_ply
 from wildshape.io.tracks import NoUsableScanError, write_track
 from wildshape.records import Track
@@ -124,6 +124,17 @@ def test_numbers_without_leading_zeros_are_doubted(
     assert "1 more track likewise" in told
 
 
+def test_a_scan_in_two_formats_is_told(dataset: Path) -> None:
+    scans = dataset / "a" / "scans"
+    (dataset / "a" / "poses.txt").unlink()
+    first = min(scans.iterdir())
+    np.savetxt(scans / f"{first.stem}.xyz", read_points(first))
+    source = open_tracks(dataset)
+    assert len(next(iter(source)).scans) == len(list(scans.iterdir()))
+    (told,) = source.doubts
+    assert told.startswith(f"a: {first.name} and {first.stem}.xyz are taken for two scans;")
+
+
 def test_names_that_do_not_count_are_not_doubted(tmp_path: Path, cloud: np.ndarray) -> None:
     for name in ("2011-10-9", "2011-9-10", "car", "10"):
         write_ply(tmp_path / f"{name}.ply", cloud)
@@ -193,7 +204,8 @@ def test_one_scan_of_a_track_has_its_unit_and_sensor(dataset: Path) -> None:
 
 
 def test_scans_beside_tracks_are_not_passed_over(dataset: Path) -> None:
-    (dataset / "notes" / "splits.txt").write_text("a b")
+    for text in ("splits.txt", "README.TXT"):
+        (dataset / "notes" / text).write_text("a b")
     assert open_tracks(dataset).names == ("a", "b")
     (dataset / "b" / "scans").rename(dataset / "c")
     (dataset / "b").rename(dataset / ".b")

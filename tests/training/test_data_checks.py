@@ -95,7 +95,10 @@ def test_a_training_says_so(cars, tmp_path):
     assert [text for text in heard if "no track has two scans" in text]
 
 
-def test_true_poses_the_wrong_way_round_are_told_before_the_oracle_learns(cars, tmp_path):
+@pytest.mark.parametrize("teacher", ["truth", None])
+def test_true_poses_the_wrong_way_round_are_told(cars, tmp_path, teacher):
+    """An oracle would learn from them, and every validation measures by them."""
+
     class Heard(Silent):
         def say(self, text):
             heard.append(text)
@@ -104,7 +107,7 @@ def test_true_poses_the_wrong_way_round_are_told_before_the_oracle_learns(cars, 
     poses = cars[0].T_sensor_object
     for name, T in (("sound", poses), ("turned", poses.inverse())):
         packed(tmp_path / name, [replace(cars[0], T_sensor_object=T)])
-        options = TrainingOptions("tiny", steps=1, teacher="truth")
+        options = TrainingOptions("tiny", steps=1, teacher=teacher)
         train(tmp_path / name, tmp_path / f"{name}.run", options, Heard())
     (said,) = (text for text in heard if "true poses" in text)
     assert said.startswith(f"{tmp_path / 'turned'}: ")

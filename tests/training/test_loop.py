@@ -144,6 +144,7 @@ def test_resume_refuses_what_is_no_state(car_store, undisturbed, tmp_path, conte
         ("adam.99.step", lambda _: torch.zeros(())),
         ("anchors", lambda _: torch.zeros(2, 3, 3)),
         ("network.pose.bias2", lambda t: t.int()),
+        ("adam.0.exp_avg", lambda t: t + 1e-6),
     ],
 )
 def test_resume_refuses_a_state_that_does_not_fit(car_store, undisturbed, tmp_path, name, change):
@@ -154,8 +155,22 @@ def test_resume_refuses_a_state_that_does_not_fit(car_store, undisturbed, tmp_pa
     save_file(
         tensors if changed is None else {**tensors, name: changed}, tmp_path / STATE, metadata
     )
-    with pytest.raises(BadInputError, match=r"state\.safetensors: .*(fit|no numbers)"):
+    with pytest.raises(BadInputError, match=r"state\.safetensors: .*(fit|no numbers|checksum)"):
         setup(SMALLEST, car_store, tmp_path, seed=3, resume=True)
+
+
+def test_resume_refuses_a_step_that_was_changed_and_takes_states_without_a_checksum(
+    car_store, undisturbed, tmp_path
+):
+    with safe_open(undisturbed / STATE, framework="pt") as file:
+        metadata = file.metadata()
+    path, tensors = tmp_path / STATE, load_file(undisturbed / STATE)
+    save_file(tensors, path, metadata | {"step": "15"})
+    with pytest.raises(BadInputError, match="checksum is wrong"):
+        setup(SMALLEST, car_store, tmp_path, seed=3, resume=True)
+    del metadata["sha256"]  # as older versions wrote them
+    save_file(tensors, path, metadata)
+    assert setup(SMALLEST, car_store, tmp_path, seed=3, resume=True).state.step == 75
 
 
 def test_the_checkpoint_says_what_it_is(undisturbed):

@@ -167,6 +167,8 @@ def test_weights_are_not_removed_by_the_run_that_reads_them(folders, tmp_path):
         {"start": "shipped"},
         {"teacher": "two/scan.npy"},
         {"preset": "dpc-lidar-small", "data": "nowhere"},
+        {"preset": "dpc-small"},
+        {"preset": "paper-views"},
     ],
     ids=str,
 )
@@ -182,4 +184,19 @@ def test_a_finished_run_stays_where_the_one_to_replace_it_is_refused(folders, tm
     begin = train_dpc if options.preset.startswith("dpc") else train
     with pytest.raises(BadInputError):
         begin(tmp_path / wrong.get("data", "one"), run, options)
+    assert sorted(path.name for path in run.iterdir()) == before
+
+
+@pytest.mark.parametrize("preset", ["tiny", "dpc-lidar-small"])
+def test_a_finished_run_stays_where_several_processes_cannot_replace_it(
+    folders, tmp_path, preset, monkeypatch
+):
+    run = tmp_path / "run"
+    train(folders[0], run, OPTIONS)
+    before = sorted(path.name for path in run.iterdir())
+    monkeypatch.setenv("WORLD_SIZE", "2")
+    options = replace(OPTIONS, preset=preset, overwrite=True)
+    begin = train_dpc if preset.startswith("dpc") else train
+    with pytest.raises(BadInputError, match="process"):
+        begin(folders[0], run, options)
     assert sorted(path.name for path in run.iterdir()) == before

@@ -3,6 +3,7 @@
 """Models and baselines measured beside each other on one data set, and written (METHOD 8)."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -271,8 +272,20 @@ def _seen_in_training(data: Path, models: Mapping[str, Model]) -> list[str]:
         f"{name}: was trained on {data}; these figures say little of objects that it never saw"
         for name, of in made.items()
         if packed == of.get("identity", {}).get("data", "")
-        or ("data" in of and data.resolve() == Path(of["data"]).resolve())
+        or ("data" in of and _are_one(data.resolve(), Path(of["data"]).resolve()))
     ]
+
+
+def _are_one(data: Path, other: Path) -> bool:
+    """Whether two places are one, or one is a store that was made of all of the other."""
+    return data == other or data == _root_of(other) or other == _root_of(data)
+
+
+def _root_of(path: Path) -> Path | None:
+    """What a packed store was converted from, if it is there and says so."""
+    with suppress(BadInputError, KeyError, TypeError):
+        return Path(open_store(path).provenance["settings"]["root"])
+    return None
 
 
 def _first_with_poses(source: TrackSource) -> Track:

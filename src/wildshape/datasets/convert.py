@@ -19,6 +19,7 @@ from wildshape.datasets.tracks.conversion import Conversion, Part, PartResult
 from wildshape.datasets.tracks.source import Source
 from wildshape.datasets.tracks.truth import TruthBuilder
 from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.io.fingerprint import fingerprint_of
 from wildshape.io.progress import SILENT, Progress, counted
 from wildshape.io.store.layout import PARTS
 from wildshape.io.write_tracks import Layout
@@ -112,15 +113,17 @@ def _identity(
 ) -> dict[str, Any]:
     """All that decides the output: the reader with all its options, the default ones included.
 
-    Parts are in it, lest a data set grows between two runs.
+    Parts and files are in it, lest a data set grows or changes between two runs.
     """
     known = [f.name for f in fields(cast("Any", source)) if f.init and f.name != "root"]
     values = {field: getattr(source, field) for field in known}
     values = {n: asdict(cast("Any", v)) if is_dataclass(v) else v for n, v in values.items()}
     names = "\n".join(part.name for part in parts).encode("utf-8", "surrogatepass")
+    root = Path(getattr(source, "root", name)).resolve()
     return {
         "source": name,
-        "root": str(Path(getattr(source, "root", name)).resolve()),
+        "root": str(root),
+        "files": fingerprint_of(root),  # of tracks; what is published hardly changes
         **values,
         "layout": options.layout,
         "truth": asdict(options.truth) if options.truth else None,

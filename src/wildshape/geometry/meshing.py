@@ -233,7 +233,7 @@ def share_colours(shares: Float[np.ndarray, "n"]) -> UInt8[np.ndarray, "n 3"]:
 
 def place_confidence(
     places: Float[np.ndarray, "n 3"],
-    scan: Float[np.ndarray, "m 3"],
+    scan: object,
     confidence: float,
     *,
     guessed_m: float = _GUESSED_M,
@@ -249,15 +249,20 @@ def place_confidence(
 
     Args:
         places: in the scan's frame, metres.
-        scan: the points measured; NaN are none.
+        scan: the points measured, whatever numpy makes `(n, 3)` of; NaN are none.
         confidence: of the whole completion.
         guessed_m: from any measured point, beyond which a place is a guess, metres.
         guessed: the chance of a guess, times the completion's confidence.
 
     Raises:
-        BadInputError: no point of the scan is finite; those that are not measured nothing.
+        BadInputError: not `(n, 3)`, or no point of the scan is finite; the others measured nothing.
     """
-    measured = np.asarray(scan, np.float64)
+    try:
+        measured = np.asarray(scan, np.float64)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise BadInputError(f"scan: no array of numbers ({error}); pass (n, 3).") from error
+    if measured.ndim != 2 or measured.shape[1] != 3:
+        raise BadInputError(f"scan: expected points (n, 3), found {measured.shape}; pass x, y, z.")
     measured = measured[np.isfinite(measured).all(1)]
     if not len(measured):
         raise BadInputError("scan: no finite point; hand in the points that were completed.")
@@ -268,9 +273,7 @@ def place_confidence(
     return 1.0 - (1.0 - guessed * confidence) * np.minimum(apart / guessed_m, 1.0)
 
 
-def colour_by_confidence(
-    mesh: "trimesh.Trimesh", scan: Float[np.ndarray, "m 3"], confidence: float
-) -> None:
+def colour_by_confidence(mesh: "trimesh.Trimesh", scan: object, confidence: float) -> None:
     """Colour a mesh's vertices, blue for 1 to orange for 0; they get the attribute `confidence`.
 
     Of objects smaller than vehicles the distances are as much smaller (`unit_of`).

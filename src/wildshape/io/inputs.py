@@ -33,6 +33,7 @@ from wildshape.io.tracks import (
 from wildshape.records import Sensor, SensorKind, Track, as_text
 
 _NO_SCANS = ("poses.txt", "times.txt", "timestamps.txt", "shape.ply")  # beside scans, not scans
+_TEXT = (".txt", ".csv")  # may be anything
 _CURE = (
     "pass a scan file, a TRACK folder (with scans/), a DATASET folder of such tracks, a folder of "
     "scan files, or a packed store"
@@ -83,7 +84,7 @@ class TrackSource:
         self._read = read
         self._skipped: dict[str, tuple[tuple[str, str], ...]] = {}  # by track
         self._dropped: dict[str, int] = {}
-        self._out_of_order: dict[str, tuple[str, ...]] = {}
+        self._odd: dict[str, str] = {}
         self._kinds: set[SensorKind] = set()
 
     @property
@@ -108,23 +109,18 @@ class TrackSource:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """A sentence each on points that were not finite, and on scans that are out of order."""
+        """A sentence each on points that were not finite, and on names of scans that are odd."""
         told = []
         if self._dropped:
             points = counted(sum(self._dropped.values()), "point")
             scans = counted(len(self._dropped), "scan")
             told.append(f"dropped {points} with NaN or infinity in {scans}")
-        if self._out_of_order:
-            name, (one, other) = next(iter(self._out_of_order.items()))
-            told.append(
-                f"{name}: {one} is sorted before {other}, for names are sorted as text"
-                f"{self._and_more()}; if they count time, write their numbers with leading zeros"
-            )
+        if self._odd:
+            name, odd = next(iter(self._odd.items()))
+            more = len(self._odd) - 1
+            others = f" ({counted(more, 'more track')} likewise)" if more else ""
+            told.append(f"{name}: {odd}{others}")
         return tuple(told)
-
-    def _and_more(self) -> str:
-        more = len(self._out_of_order) - 1
-        return f" ({counted(more, 'more track')} likewise)" if more else ""
 
     @property
     def dropped_nonfinite(self) -> tuple[tuple[str, int], ...]:
@@ -154,8 +150,8 @@ class TrackSource:
         self._skipped[name] = found.skipped
         self._kinds.add(found.track.sensor.kind)
         self._dropped |= {f"{name}/{scan}": count for scan, count in found.dropped_nonfinite}
-        if found.out_of_order:
-            self._out_of_order[name] = found.out_of_order
+        if found.doubt:
+            self._odd[name] = found.doubt
         return found.track
 
     def __iter__(self) -> Iterator[Track]:
@@ -344,7 +340,7 @@ def _folder(path: Path, coordinates: Coordinates) -> TrackSource:
     folders = folders or sorted(one.parent for one in path.glob("[!.]*/tracks/[!.]*/scans"))
     if folders:
         for other in (entry for entry in shown if entry.is_dir() and entry not in folders):
-            if any(is_scan_file(f) and f.suffix not in (".txt", ".csv") for f in other.iterdir()):
+            if any(is_scan_file(f) and f.suffix.lower() not in _TEXT for f in other.iterdir()):
                 raise BadInputError(f"{other}: has points, but no scans/; move its scans there.")
         names = tuple(as_text("_".join(one.relative_to(path).parts[::2])) for one in folders)
         return TrackSource(

@@ -223,7 +223,7 @@ def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: 
         )
     same = record.get("command") == command and record.get("settings") == settings
     if record.get("status") == "finished":
-        other = "" if same else " with other settings"
+        other = "" if same else " with other settings or of other data"
         raise BadInputError(
             f"{path}: holds the output of an earlier `{record.get('command')}`{other}; pass"
             " --overwrite to replace it, or choose another --out."
@@ -231,7 +231,8 @@ def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: 
     if not same:
         raise BadInputError(
             f"{path}: holds the unfinished output of `{record.get('command')}` with other"
-            " settings; repeat it as it was, pass --overwrite, or choose another --out."
+            " settings or of other data; repeat it as it was, pass --overwrite, or choose another"
+            " --out."
         )
     return True
 

@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, get_args
 
@@ -46,13 +47,13 @@ class TrackFile:
         track: the usable scans, with their truth if there is any.
         skipped: file name and reason of each scan that could not be used.
         dropped_nonfinite: file name and number of the points that were NaN or infinite.
-        out_of_order: the first two files whose numbers go back, or nothing.
+        doubt: what is odd about the files' names, or nothing.
     """
 
     track: Track
     skipped: Skipped = ()
     dropped_nonfinite: tuple[tuple[str, int], ...] = ()
-    out_of_order: tuple[str, ...] = ()
+    doubt: str = ""
 
 
 class NoUsableScanError(BadInputError):
@@ -104,7 +105,7 @@ def read_track_file(
         label_size_m=info["label_size_m"],
         shape_kind=info["shape_kind"],
     )
-    return TrackFile(track, skipped, dropped, _out_of_order(files))
+    return TrackFile(track, skipped, dropped, _doubt_of(files))
 
 
 def track_of_files(
@@ -117,12 +118,23 @@ def track_of_files(
     """
     kept, skipped, dropped = _read_scans(files, files[0].parent, coordinates)
     track = Track(name, tuple(kept.values()), _stems(list(kept)))
-    return TrackFile(track, skipped, dropped, _out_of_order(files))
+    return TrackFile(track, skipped, dropped, _doubt_of(files))
 
 
-def _out_of_order(files: list[Path]) -> tuple[str, ...]:
+def _doubt_of(files: list[Path]) -> str:
     row = out_of_order([file.stem for file in files])
-    return () if row is None else (files[row].name, files[row + 1].name)
+    if row is not None:
+        return (
+            f"{files[row].name} is sorted before {files[row + 1].name}, for names are sorted as"
+            " text; if they count time, write their numbers with leading zeros"
+        )
+    for one, other in pairwise(files):
+        if one.stem == other.stem:
+            return (
+                f"{one.name} and {other.name} are taken for two scans; if they are one in two"
+                " formats, remove one"
+            )
+    return ""
 
 
 def folder_name(folder: Path) -> str:

@@ -70,7 +70,7 @@ def load_network(path: Path, form: Format[Net, Settings]) -> tuple[Net, Settings
         raise BadInputError(f"{path}: not a readable safetensors file ({said}).") from error
     weights = {name: values.to(expected[name].dtype) for name, values in stored.items()}
     check_numbers(path, weights)
-    _check_sum(path, stored, metadata)
+    check_sum(path, stored, metadata["settings"], metadata)
     with torch.device("cpu"), torch.random.fork_rng(devices=()), _Undrawn():
         network = form.build(settings).float()
     network.load_state_dict(weights)
@@ -93,21 +93,37 @@ class _Undrawn(TorchFunctionMode):
 
 def packed_network(weights: Mapping[str, Tensor], metadata: dict[str, str]) -> bytes:
     """A safetensors file of weights on the CPU and of its metadata, with their checksum."""
-    return save(dict(weights), metadata | {_CHECKSUM: _sum_of(weights, metadata)})
+    return packed(weights, metadata["settings"], metadata)
 
 
-def _sum_of(weights: Mapping[str, Tensor], metadata: Mapping[str, str]) -> str:
-    found = hashlib.sha256(metadata["settings"].encode())
-    for name in sorted(weights):
+def packed(tensors: Mapping[str, Tensor], said: str, metadata: dict[str, str]) -> bytes:
+    """The same of any tensors; `said`: what of the metadata is summed with them."""
+    return save(dict(tensors), metadata | {_CHECKSUM: _sum_of(tensors, said)})
+
+
+def _sum_of(tensors: Mapping[str, Tensor], said: str) -> str:
+    found = hashlib.sha256(said.encode())
+    for name in sorted(tensors):
         found.update(name.encode())
-        found.update(weights[name].contiguous().flatten().view(torch.uint8).numpy().data)
+        found.update(tensors[name].contiguous().flatten().view(torch.uint8).numpy().data)
     return found.hexdigest()
 
 
-def _check_sum(path: Path, weights: Mapping[str, Tensor], metadata: Mapping[str, str]) -> None:
-    """Files of older versions have no checksum."""
-    if metadata.get(_CHECKSUM) not in (None, _sum_of(weights, metadata)):
+def check_sum(
+    path: Path, tensors: Mapping[str, Tensor], said: str, metadata: Mapping[str, str]
+) -> None:
+    """Compare with the checksum of `packed`; files of older versions have none.
+
+    Raises:
+        BadInputError: they are not what was written.
+    """
+    if metadata.get(_CHECKSUM) not in (None, _sum_of(tensors, said)):
         raise BadInputError(f"{path}: the checksum is wrong, the file is damaged; {_CURE}.")
+
+
+def unsummed(metadata: Mapping[str, str]) -> dict[str, str]:
+    """The metadata as given to `packed`."""
+    return {name: value for name, value in metadata.items() if name != _CHECKSUM}
 
 
 def _settings(path: Path, metadata: dict[str, str], form: Format[Any, Settings]) -> Settings:

@@ -55,10 +55,13 @@ def doubts_of(store: Store, recipe: Recipe) -> list[str]:
 
 
 def doubts_of_truth(store: Store) -> list[str]:
-    """Where the first track's true poses do not put its scans onto its shape; for the oracle."""
+    """Where the first track's true poses do not put its scans onto its shape."""
     first = store.track(0)
     odd = "" if first.T_sensor_object is None else misplaced(first)
-    cure = "check unit, frame and direction of the poses before the oracle learns from them"
+    cure = (
+        "check unit, frame and direction of the poses: figures validation/truth_... rest on them,"
+        " and all that an oracle learns"
+    )
     return [f"{store.named}: {first.name}: {odd}; {cure}"] if odd else []
 
 

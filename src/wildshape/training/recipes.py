@@ -3,6 +3,7 @@
 """The presets: functions that return a `Recipe`. Change one with `dataclasses.replace`."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -193,6 +194,28 @@ def sensor_kind(store: Store) -> SensorKind:
     return kinds.pop()
 
 
+def only_sensor(recipe: Recipe) -> SensorKind | None:
+    """The sensor that a preset of the paper was made for; others take either."""
+    return recipe.views.sensor if recipe.name.startswith("paper-") else None
+
+
+def refuse_other_sensor(
+    named: Path, found: SensorKind, only: SensorKind | None, preset: str
+) -> None:
+    """Refuse scans of another sensor than the only one that a preset is for.
+
+    Raises:
+        BadInputError: they are.
+    """
+    if only in (None, found):
+        return
+    others = {"lidar": "dpc-lidar", "camera": "dpc or dpc-dagger"}
+    other = others[found] if preset.startswith("dpc") else "another preset"
+    raise BadInputError(
+        f"{named}: holds {found} scans, but preset {preset} is for {only} scans; choose {other}."
+    )
+
+
 def recipe_for(store: Store, preset: str, steps: int | None) -> Recipe:
     """The preset, for the kind of sensor in the store, stretched to other steps if asked.
 
@@ -202,12 +225,8 @@ def recipe_for(store: Store, preset: str, steps: int | None) -> Recipe:
     """
     recipe = recipe_named(preset)
     kind = sensor_kind(store)
+    refuse_other_sensor(store.named, kind, only_sensor(recipe), preset)
     if kind != recipe.views.sensor:
-        if preset.startswith("paper-"):
-            raise BadInputError(
-                f"{store.named}: holds {kind} scans, but preset {preset} is for"
-                f" {recipe.views.sensor} scans; choose another preset."
-            )
         recipe = replace(recipe, views=replace(recipe.views, sensor=kind))
     if steps is None:
         return recipe

@@ -20,7 +20,9 @@ from wildshape.io.output import MARKER, Output, begin, keep_apart, remove_leftov
 from wildshape.io.progress import SILENT, Progress
 from wildshape.io.store.store import Store, is_finished_store, is_store, open_store
 from wildshape.io.write_tracks import write_tracks
+from wildshape.records import SensorKind
 from wildshape.training.options import TrainingOptions
+from wildshape.training.recipes import refuse_other_sensor, sensor_kind
 from wildshape.training.state import STATE
 
 _PACKED = "data.store"
@@ -38,14 +40,25 @@ _FILES = (
 
 @contextmanager
 def begun_run(
-    data: Path, out: Path, options: TrainingOptions, weights: Sequence[Path] = ()
+    data: Path,
+    out: Path,
+    options: TrainingOptions,
+    weights: Sequence[Path] = (),
+    only: SensorKind | None = None,
 ) -> Iterator[None]:
     """The marker of a run; of a new one nothing stays if what is done in here is refused.
 
+    Args:
+        data: a packed store, or a DATASET folder.
+        out: folder of the run.
+        options: how it is trained.
+        weights: that are read.
+        only: the sensor that the preset is for; None: any.
+
     Raises:
-        BadInputError: another run is there, or something else.
+        BadInputError: another run is there, or something else; or data that cannot be trained on.
     """
-    output = _begin(data, out, options, weights)
+    output = _begin(data, out, options, weights, only)
     if output is None:
         yield
         return
@@ -58,7 +71,11 @@ def begun_run(
 
 
 def _begin(
-    data: Path, out: Path, options: TrainingOptions, weights: Sequence[Path]
+    data: Path,
+    out: Path,
+    options: TrainingOptions,
+    weights: Sequence[Path],
+    only: SensorKind | None,
 ) -> Output | None:
     """None where a run is gone on with, and to processes that do not lead."""
     if int(os.environ.get("RANK", "0")) > 0:
@@ -78,8 +95,27 @@ def _begin(
             f"{out}: a run is there already; pass --resume to go on with it, --overwrite"
             " to replace it, or choose another --out."
         )
-    next(iter(open_tracks(data, options.coordinates)))  # else refused once an earlier run is gone
+    _refuse_untrainable(data, options, only)  # before an earlier run is gone
     return begin(out, "train", settings, _FILES, overwrite=options.overwrite)
+
+
+def _refuse_untrainable(data: Path, options: TrainingOptions, only: SensorKind | None) -> None:
+    """Look at a store as a whole, of track folders at the first track alone."""
+    kind = next(iter(open_tracks(data, options.coordinates))).sensor.kind
+    if is_store(data):
+        kind = sensor_kind(open_store(data))
+    else:
+        _refuse_processes(data)
+    refuse_other_sensor(data, kind, only, options.preset)
+
+
+def _refuse_processes(data: Path) -> None:
+    """Several processes cannot all pack track folders."""
+    if int(os.environ.get("WORLD_SIZE", "1")) > 1:
+        raise BadInputError(
+            f"{data}: several processes need a packed store; make one first by"
+            f" `wildshape convert folder {data} OUT`."
+        )
 
 
 def _record_of_run(out: Path) -> dict[str, Any] | None:
@@ -115,11 +151,7 @@ def open_training_data(
     if is_store(data):
         refuse_other_coordinates(data, options.coordinates)
         return open_store(data)
-    if int(os.environ.get("WORLD_SIZE", "1")) > 1:
-        raise BadInputError(
-            f"{data}: several processes need a packed store; make one first by"
-            f" `wildshape convert folder {data} OUT`."
-        )
+    _refuse_processes(data)
     packed = out / _PACKED
     place = {"input": str(data.resolve()), **asdict(options.coordinates)}
     origin = {**place, _FILES_SEEN: fingerprint_of(data)}

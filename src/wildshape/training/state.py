@@ -12,12 +12,11 @@ from typing import Generic, TypeVar
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
 from torch import nn
 
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import atomic_write
-from wildshape.method.saved_network import check_numbers, check_shapes
+from wildshape.method.saved_network import check_numbers, check_shapes, check_sum, packed
 
 _MOST_STEPS = 1 << 53
 _FADED, _LOOK_EVERY = 1e-30, 100  # steps; a tenth less each, a moment stays far from 1e-38
@@ -60,7 +59,7 @@ def save_state(folder: Path, state: TrainState, identity: dict[str, str]) -> Non
     tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
     metadata = {"step": str(state.step), "identity": json.dumps(identity)}
     with atomic_write(folder / STATE, flush=True) as file:
-        file.write(save(tensors, metadata))
+        file.write(packed(tensors, _said(metadata), metadata))
 
 
 def load_state(folder: Path, state: TrainState, identity: dict[str, str], scans: int) -> None:
@@ -87,6 +86,7 @@ def load_state(folder: Path, state: TrainState, identity: dict[str, str], scans:
             f"{path}: cannot be resumed from ({error!r}); choose a new --out."
         ) from error
     check_numbers(path, tensors)
+    check_sum(path, tensors, _said(metadata), metadata)
     for name, network in (("network.", state.network), ("mean.", state.mean)):
         network.load_state_dict(_under(tensors, name))
     described = state.optimiser.state_dict()
@@ -96,6 +96,11 @@ def load_state(folder: Path, state: TrainState, identity: dict[str, str], scans:
             described["state"][index] = moments
     state.optimiser.load_state_dict(described)
     state.step, state.anchors = step, tensors.get("anchors")
+
+
+def _said(metadata: dict[str, str]) -> str:
+    """What is summed with the tensors."""
+    return metadata["step"] + metadata["identity"]
 
 
 def _expected(found: set[str], state: TrainState, scans: int) -> dict[str, torch.Tensor]:

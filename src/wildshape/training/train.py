@@ -23,7 +23,13 @@ from wildshape.training.config import Recipe
 from wildshape.training.data_checks import doubts_of, doubts_of_truth
 from wildshape.training.loop import Run, StopRequested, fit, setup
 from wildshape.training.options import TrainingOptions
-from wildshape.training.recipes import recipe_for, recipe_named, with_encoder, with_rays
+from wildshape.training.recipes import (
+    only_sensor,
+    recipe_for,
+    recipe_named,
+    with_encoder,
+    with_rays,
+)
 from wildshape.training.run_folder import begun_run, finish_run, open_training_data
 from wildshape.training.runtime.profiler import PROFILE
 from wildshape.training.runtime.torchrun import launched
@@ -97,7 +103,8 @@ def train(
     """
     device, weights = choose_device(options.device), _Weights.named_in(options)
     weights.refuse_misfits(options)
-    with begun_run(data, out, options, weights.files), _resumable(options):
+    only = only_sensor(recipe_named(options.preset))
+    with begun_run(data, out, options, weights.files, only), _resumable(options):
         store = open_training_data(data, out, options, progress)
         recipe = weights.suited(recipe_for(store, options.preset, options.steps), options)
         run = _set_up(recipe, store, data, out, options, weights, device, progress)
@@ -181,8 +188,7 @@ def _set_up(
 ) -> Run:
     learns = isinstance(weights.teacher, Path)
     leads = int(os.environ.get("RANK", "0")) == 0
-    truth = doubts_of_truth(store) if weights.teacher == "truth" else []
-    for doubt in (*doubts_of(store, recipe), *truth) if leads else ():
+    for doubt in (*doubts_of(store, recipe), *doubts_of_truth(store)) if leads else ():
         progress.say(doubt)
     with (progress if learns and leads else SILENT).bar("fusing tracks", 0) as bar:
         return setup(

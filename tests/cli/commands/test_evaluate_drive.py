@@ -81,6 +81,10 @@ def _but_of_the_first(words):
     return [] if words[0] == "0" else words
 
 
+def _one_later(words):
+    return [str(int(words[0]) + 1), *words[1:]] if int(words[0]) < SCANS - 1 else []
+
+
 def _same(words):
     return words
 
@@ -91,6 +95,7 @@ def _same(words):
         (_same, ""),
         (_exchanged, "no box found lies on a label"),
         (_from_the_middle, "at other heights"),
+        (_one_later, "in a scan fits the labels of the one after it better"),
         (_but_of_the_first, "1 of 3 scans without a label, the first 000000.bin"),
     ],
 )

@@ -119,6 +119,16 @@ def test_long_sequences_and_gaps_make_several_tracks(tmp_path):
     assert len(tracks(tmp_path, gap=0)) == 4
 
 
+def test_masks_of_no_object_are_counted(tmp_path):
+    """All of a sequence's masks were empty, and nothing said why no track came of it."""
+    write_sequence(tmp_path / "kitchen", count=2)
+    for file in (tmp_path / "kitchen" / "masks").glob("*.png"):
+        write_png(file, np.zeros((CAMERA["height"], CAMERA["width"]), np.uint8))
+    source = Rgbd(tmp_path)
+    assert list(all_tracks(source)) == []
+    assert source.rejected == {"mask: empty": 2}
+
+
 def test_images_that_are_counted_without_leading_zeros_are_refused(tmp_path):
     """They were taken in the order 0, 1, 10, 11, 2, and so were the poses."""
     write_sequence(tmp_path / "kitchen", count=1)

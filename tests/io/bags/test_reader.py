@@ -57,6 +57,14 @@ def test_every_scan_comes_back_in_time(written, kind, packed):
 
 
 @every_kind
+def test_a_suffix_in_capitals_is_the_same_suffix(written, kind):
+    path = written(kind, {TOPIC: scans()})
+    loud = path.rename(path.with_suffix(path.suffix.upper()))
+    for source in (loud, loud if kind == "bag" else loud.parent):
+        assert np.array_equal(open_drive(source).scan(4), scans()[4])
+
+
+@every_kind
 @pytest.mark.parametrize("fields", [Fields("f8"), Fields("f4", big=True), Fields("i2", rows=4)])
 def test_fields_are_found_by_name_type_and_order_of_bytes(written, kind, fields):
     whole = [np.rint(scan) for scan in scans(2)] if fields.kind == "i2" else scans(2)

@@ -77,9 +77,15 @@ def test_every_format_says_the_same_box(name, mark, tmp_path):
     assert axes[:, 2] == pytest.approx((0, 0, 1), abs=1e-6)
 
 
+def test_halves_of_characters_are_spelt_out_as_in_names_of_tracks(tmp_path):
+    said = nuscenes(detection_name="car \ud83d", tracking_id="\ud83d")
+    (one,) = read(written(tmp_path / "half.json", said))
+    assert (one.category, one.track) == (r"car \ud83d", r"\ud83d")
+
+
 def test_a_folder_is_read_file_by_file(tmp_path):
-    for name in ("000005", "000004"):
-        written(tmp_path / f"{name}.txt", f"{LABEL.format(turn=0)}\nDontCare {'-1 ' * 14}\n")
+    for name in ("000005.TXT", "000004.txt"):
+        written(tmp_path / name, f"{LABEL.format(turn=0)}\nDontCare {'-1 ' * 14}\n")
     written(tmp_path / "README", "no boxes")
     written(tmp_path / "._000004.txt", "left by macOS")
     assert [one.scan for one in read(tmp_path)] == ["000004", "000005"]

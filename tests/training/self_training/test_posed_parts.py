@@ -70,5 +70,7 @@ def test_parts_of_another_run_or_damaged_ones_are_not_taken(sampler, stopped):
     assert not PosedParts(None, IDENTITY).found(scans_of)
     assert not PosedParts(stopped, IDENTITY).found([scans[1:] for scans in scans_of])
     only = next(stopped.iterdir())
-    only.write_bytes(only.read_bytes()[:-8])
-    assert not PosedParts(stopped, IDENTITY).found(scans_of)
+    whole = only.read_bytes()
+    for damaged in (whole[:-8], whole[:-8] + bytes([whole[-8] ^ 1]) + whole[-7:]):
+        only.write_bytes(damaged)
+        assert not PosedParts(stopped, IDENTITY).found(scans_of)

@@ -57,8 +57,11 @@ def test_targets_of_another_run_or_damaged_ones_are_made_anew(car_store, targets
     save_targets(tmp_path, targets, IDENTITY | {"headings": "ghi"})
     assert load_targets(tmp_path, IDENTITY, *known) is None
     path = tmp_path / TARGETS
-    path.write_bytes(path.read_bytes()[:-100])
-    assert load_targets(tmp_path, IDENTITY, *known) is None
+    save_targets(tmp_path, targets, IDENTITY)
+    whole = path.read_bytes()
+    for damaged in (whole[:-100], whole[:-100] + bytes([whole[-100] ^ 1]) + whole[-99:]):
+        path.write_bytes(damaged)
+        assert load_targets(tmp_path, IDENTITY, *known) is None
     for name in ("rotation", "translation", "shapes", "sensors"):
         for bad in (getattr(targets, name) * torch.nan, getattr(targets, name)[1:]):
             save_targets(tmp_path, targets._replace(**{name: bad}), IDENTITY)

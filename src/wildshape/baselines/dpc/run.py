@@ -24,7 +24,7 @@ from wildshape.io.store.store import Store
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.config import learning_rate
 from wildshape.training.loop import MODEL, Loop, Progress, run_to_end
-from wildshape.training.recipes import sensor_kind
+from wildshape.training.recipes import refuse_other_sensor, sensor_kind
 from wildshape.training.runtime.log import RunLog
 from wildshape.training.runtime.running_mean import Meter
 from wildshape.training.setup import split_tracks
@@ -144,13 +144,7 @@ def _save(run: DpcRun) -> dict[str, Any]:
 
 def _refuse_unseen(recipe: DpcRecipe, store: Store, sampler: ViewSampler) -> None:
     """DPC knows neither other sensors nor where an object is."""
-    wanted, found = recipe.views.sensor, sensor_kind(store)
-    if wanted != found:
-        other = "dpc-lidar" if found == "lidar" else "dpc or dpc-dagger"
-        raise BadInputError(
-            f"{store.named}: holds {found} scans, but preset {recipe.name} is for {wanted} scans;"
-            f" choose {other}."
-        )
+    refuse_other_sensor(store.named, sensor_kind(store), recipe.views.sensor, recipe.name)
     volume = recipe.network.volume
     rng = np.random.default_rng(0)
     rows = rng.choice(np.concatenate(sampler.scans_of), size=_LOOKED_AT)

@@ -37,14 +37,15 @@ def train_dpc(
         StopRequested: `stopping` said so, the state is saved; its text says how to go on.
     """
     _refuse_foreign(options)
-    began = time.monotonic()
-    with begun_run(data, out, options):
+    began, recipe = time.monotonic(), dpc_recipe(options)
+    device = choose_device(options.device)
+    with begun_run(data, out, options, only=recipe.views.sensor):
         run = setup_dpc(
-            dpc_recipe(options),
+            recipe,
             open_training_data(data, out, options, progress),
             out,
             seed=options.seed,
-            device=choose_device(options.device),
+            device=device,
             resume=options.resume,
             provenance={**provenance(command_line()), "data": str(data)},
         )

@@ -84,7 +84,7 @@ def run(settings: Settings) -> None:
         output = _begin(settings)
         with nullcontext() if output is None else output.abandoned_if_refused():
             scores = evaluate_drives(found, labelled, lambda rows: bar.at(len(found) + rows))
-    for told in doubts_of(labelled, scores):
+    for told in doubts_of(found, labelled, scores):
         say(told)
     if settings.range != Counting.range_m and any(one.view is None for one in labelled):
         say(f"--range {settings.range:g} is no limit where labels are of all around, as these are")

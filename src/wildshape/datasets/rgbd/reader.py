@@ -136,6 +136,8 @@ class Rgbd:
         for instance, file in files:
             mask = read_png(file, "a PNG mask of one channel")
             sequence.check_size(mask, file)
+            if not mask.any():
+                self.rejected["mask: empty"] += 1
             for number, inside in instances_of(mask, instance):
                 category = sequence.categories.get(number, "")
                 if self.selection.categories and category not in self.selection.categories:

@@ -7,7 +7,7 @@ tracks keep them.
 """
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -165,7 +165,8 @@ def find_detections(file: DetectionFile, drive: Drive) -> Detections:
         warnings.append(f"detections that are no vehicles are left out: {listed}")
     if placed < len(vehicles):
         left = len(vehicles) - placed
-        warnings.append(f"{left} detections belong to scans that the drive does not have")
+        told = f"{left} detections belong to scans that the drive does not have"
+        warnings.append(told + _shift_told(vehicles, frames, frame_numbers(drive.scan_names)))
     without = sum(box.track is None for row in frames for box in row)
     if not without:
         _check_tracks(file.path, frames)
@@ -212,6 +213,21 @@ def _frame(scan: str | int, names: dict[str, int], numbers: dict[int, int]) -> i
         if name in names:
             return names[name]
     return numbers.get(number_of(path.stem, -1))
+
+
+def _shift_told(
+    boxes: list[DetectorBox], frames: Sequence[Sequence[DetectorBox]], numbers: list[int]
+) -> str:
+    """What else to say where boxes lie one scan off: they begin and end one after the drive."""
+    theirs = [number_of(PurePosixPath(str(one.scan)).stem, -1) for one in boxes]
+    late = not frames[0] and max(theirs) == numbers[-1] + 1
+    early = not frames[-1] and min(theirs) == numbers[0] - 1 >= 0
+    if not (late or early):
+        return ""
+    return (
+        f", and scan {numbers[0] if late else numbers[-1]} has none: if they are numbered from"
+        f" {numbers[0] + (1 if late else -1)}, number them from {numbers[0]}"
+    )
 
 
 def _untracked_told(without: int, placed: int) -> list[str]:

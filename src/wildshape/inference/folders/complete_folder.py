@@ -19,6 +19,7 @@ from wildshape.inference.folders.box_files import BOX_FILES, BoxFiles
 from wildshape.inference.predictor import BATCH, Predictor, load
 from wildshape.inference.registration import to_middle
 from wildshape.io.atomic import write_json
+from wildshape.io.fingerprint import fingerprint_of
 from wildshape.io.guard import reading
 from wildshape.io.inputs import Part, TrackSource, open_tracks, with_rays
 from wildshape.io.output import Output, begin, file_name, keep_apart, remove_leftovers
@@ -83,7 +84,7 @@ class FolderOptions:
     def identity(self, source: Path) -> dict[str, Any]:
         """What decides the output's content, as JSON values."""
         found = {"input": str(source.resolve()), **asdict(self.coordinates)}
-        found["model"] = fingerprint(self.model)
+        found |= {"files": fingerprint_of(source), "model": fingerprint(self.model)}
         uses = {"uses": "track"} if self.track else {}
         uses |= {"rays": str(self.rays.resolve())} if self.rays else {}
         clouds = {} if self.clouds == "ply" else {"clouds": self.clouds}
@@ -152,6 +153,7 @@ def complete_folder(
         tracks = with_rays(tracks, options.rays, options.coordinates)
     predictor = load(options.model, options.device)
     keep_apart(out, source, weights_file(options.model), options.rays)
+    next(iter(tracks))  # else refused once an earlier output is gone
     command, identity = "register" if registers else "complete", options.identity(source)
     output = begin(out, command, identity, FILES, overwrite=options.overwrite, progress=progress)
     with output.abandoned_if_refused():

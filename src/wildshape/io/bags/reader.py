@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 
 from wildshape.errors import BadInputError, MissingExtraError
 from wildshape.io.bags.clouds import Cloud, cloud_of, frame_name, message_types, stamp
-from wildshape.io.bags.storages import CLOUD, STORAGES, Key, Message
+from wildshape.io.bags.storages import CLOUD, STORAGES, Key, Message, storage_of
 from wildshape.io.guard import first_line, reading
 from wildshape.io.scans.point_times import seconds_since, unusable_told
 from wildshape.io.scans.points import check_near
@@ -88,7 +88,7 @@ class Bag:
 
     @staticmethod
     def _cloud(scan: _Scan) -> Cloud:
-        return cloud_of(STORAGES[scan.file.suffix](scan.file).data(scan.key), cdr=scan.cdr)
+        return cloud_of(storage_of(scan.file).data(scan.key), cdr=scan.cdr)
 
 
 def bag_files(path: Path) -> list[Path]:
@@ -97,11 +97,11 @@ def bag_files(path: Path) -> list[Path]:
     Empty if it is none.
     """
     if path.is_file():
-        return [path] if path.suffix in STORAGES else []
+        return [path] if path.suffix.lower() in STORAGES else []
     if not path.is_dir():
         return []
     files = (file for file in path.iterdir() if not file.name.startswith("."))
-    return sorted(file for file in files if file.suffix in (".db3", ".mcap"))
+    return sorted(file for file in files if file.suffix.lower() in (".db3", ".mcap"))
 
 
 def open_bag(path: Path, topic: str | None = None) -> Bag:
@@ -123,7 +123,7 @@ def open_bag(path: Path, topic: str | None = None) -> Bag:
     topics: dict[str, str] = {}
     damaged = []
     for file in files:
-        storage = STORAGES[file.suffix](file)
+        storage = storage_of(file)
         try:
             for message in storage.clouds():
                 found.setdefault(message.topic, []).append(_listed(message, file))

@@ -323,3 +323,8 @@ def _fields(data: bytes) -> dict[str, bytes]:
 
 STORAGES: dict[str, type[Storage]] = {".db3": Sqlite, ".mcap": Mcap, ".bag": Ros1}
 """By suffix."""
+
+
+def storage_of(file: Path) -> Storage:
+    """What reads a file whose suffix is one of `STORAGES`."""
+    return STORAGES[file.suffix.lower()](file)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from wildshape.records import Box
+from wildshape.records import Box, as_text
 
 MOST_TURN = 4 * math.pi
 """Radians; what is more than two turns counts degrees."""
@@ -30,6 +30,12 @@ class DetectorBox:
     track: str | None
     box: Box
     score: float | None = None
+
+    def __post_init__(self) -> None:
+        """JSON may hold halves of characters, which no file can (`as_text`)."""
+        for name in ("scan", "category", "track"):
+            if isinstance(given := getattr(self, name), str):
+                object.__setattr__(self, name, as_text(given))
 
 
 def checked(box: Box) -> Box:

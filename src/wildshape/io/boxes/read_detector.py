@@ -82,7 +82,7 @@ def _files(path: Path) -> list[Path]:
     if not path.is_dir():
         raise BadInputError(f"{path}: no such file or folder; --detections takes {_FORMATS}.")
     shown = (file for file in path.iterdir() if not file.name.startswith("."))
-    files = sorted(file for file in shown if file.suffix in (".txt", ".json"))
+    files = sorted(file for file in shown if file.suffix.lower() in (".txt", ".json"))
     if not files:
         raise BadInputError(f"{path}: holds no .txt and no .json; --detections takes {_FORMATS}.")
     return files

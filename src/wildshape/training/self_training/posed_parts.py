@@ -12,13 +12,12 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int64
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
 from torch import Tensor
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import atomic_write
-from wildshape.method.saved_network import check_numbers
+from wildshape.method.saved_network import check_numbers, check_sum, packed, unsummed
 from wildshape.training.self_training.headings import PosedTrack
 
 Posed = tuple[PosedTrack, Float[Tensor, "V"]]
@@ -73,7 +72,7 @@ class PosedParts:
             "middle_x": torch.tensor([track.middle_x for track, _ in part], dtype=torch.float64),
         }
         with atomic_write(path, flush=True) as file:
-            file.write(save({k: v.contiguous() for k, v in tensors.items()}, self._identity))
+            file.write(packed({k: v.contiguous() for k, v in tensors.items()}, "", self._identity))
 
     def _read(self, path: Path, scans_of: Sequence[Int64[np.ndarray, "_"]]) -> list[Posed] | None:
         """None if there is no such file, or one that is damaged or of another run."""
@@ -81,10 +80,12 @@ class PosedParts:
             return None
         try:
             with safe_open(path, framework="pt") as file:
-                if (file.metadata() or {}) != self._identity:
+                metadata = file.metadata() or {}
+                if unsummed(metadata) != self._identity:
                     return None
                 tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
             check_numbers(path, tensors)
+            check_sum(path, tensors, "", metadata)
             sizes = [len(scans) for scans in scans_of]
             rotation, translation, votes = (
                 tensors[name].split(sizes) for name in ("rotation", "translation", "votes")

@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
 from torch import Tensor
 
 from wildshape.datasets.tracks.truth import whole_shape
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import atomic_write
-from wildshape.method.saved_network import check_numbers, check_shapes
+from wildshape.method.saved_network import check_numbers, check_shapes, check_sum, packed, unsummed
 from wildshape.training.batches.fused import FusedTargets
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.self_training.fused_shape import FusionConfig, exactly, sensors_of
@@ -86,7 +85,8 @@ def save_targets(folder: Path, targets: FusedTargets, identity: dict[str, str]) 
     """Keep the targets beside a run, so that it can be resumed without making them again."""
     tensors = {k: v.contiguous() for k, v in targets._asdict().items() if isinstance(v, Tensor)}
     with atomic_write(folder / TARGETS, flush=True) as file:
-        file.write(save(tensors, {**identity, "complete": str(targets.complete)}))
+        complete = str(targets.complete)
+        file.write(packed(tensors, complete, {**identity, "complete": complete}))
 
 
 def load_targets(
@@ -98,14 +98,15 @@ def load_targets(
         return None
     try:
         with safe_open(path, framework="pt") as file:
-            found = file.metadata() or {}
-            complete = found.pop("complete", "") == "True"
-            if found != identity:
+            metadata = file.metadata() or {}
+            complete = metadata.get("complete", "")
+            if unsummed(metadata) != {**identity, "complete": complete}:
                 return None
             check_shapes(path, file, _shapes_of(scans, tracks, file))
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         check_numbers(path, {k: v for k, v in tensors.items() if k != "view_top"})
-        return FusedTargets(**tensors, complete=complete)
+        check_sum(path, tensors, complete, metadata)
+        return FusedTargets(**tensors, complete=complete == "True")
     except (SafetensorError, OSError, ValueError, IndexError):
         return None
 
