@@ -131,6 +131,15 @@ def test_values_of_every_list_may_stand_with_commas_or_spaces(wildshape, command
         assert f"{option} " in wildshape(command, "--help").out
 
 
+@pytest.mark.parametrize(("command", "name"), [(c, n) for c in LISTS for n in sorted(LISTS[c])])
+def test_a_list_given_twice_is_refused_not_cut(refused, command, name):
+    """Only the last counted: `--model run0 --model run1` measured run1 alone."""
+    option = f"--{name.replace('_', '-')}"
+    said = refused(command, option, "2,50", f"{option}=3,60", *NEEDED[command])
+    assert f"{command}: {option} is given more than once" in said
+    assert "is given" in refused(command, f"--{name}", "2,50", option, "3,60", *NEEDED[command])
+
+
 def test_a_file_whose_name_holds_a_comma_is_one_model(tmp_path):
     (tmp_path / "a,b.safetensors").touch()
     models = (str(tmp_path / "a,b.safetensors"), "car,chair")

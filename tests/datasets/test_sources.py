@@ -23,16 +23,19 @@ from wildshape.io.tracks import write_track
 def test_folder_yields_tracks_in_order_and_counts_bad_scans(tmp_path):
     for name in ("b", "a"):
         write_track(tmp_path / name, drive_by(name, scans=3, points=50))
-    (tmp_path / "a" / "scans" / "000001.ply").write_bytes(b"ply\nbroken")
+    broken = tmp_path / "a" / "scans" / "000001.ply"
+    broken.write_bytes(b"ply\nbroken")
     (tmp_path / "c" / "scans").mkdir(parents=True)
-    (tmp_path / "c" / "scans" / "0.npy").write_bytes(b"")
+    empty = [tmp_path / "c" / "scans" / name for name in ("0.npy", "1.npy")]
+    for file in empty:
+        file.write_bytes(b"")
     source = Folder(tmp_path)
     tracks = list(all_tracks(source))
     assert [track.name for track in tracks] == ["a", "b"]
     assert tracks[0].scan_names == ("000000", "000002")
     assert source.rejected == {
-        "scan: the PLY header line 'broken' makes no sense; write it again.": 1,
-        "scan: is empty (0 bytes); write or copy it again.": 1,
+        f"scan: {broken}: the PLY header line 'broken' makes no sense; write it again.": 1,
+        f"scan: {empty[0]}: is empty (0 bytes); write or copy it again.": 2,  # the first is named
         "object: no scan that can be used": 1,
     }
     assert [track.name for track in all_tracks(Folder(tmp_path / "b"))] == ["b"]

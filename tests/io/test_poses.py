@@ -28,6 +28,12 @@ def test_row_major_order(tmp_path: Path) -> None:
     assert pose.apply(point).tolist() == [[5, 7, 7]]
 
 
+def test_poses_in_a_map_may_be_in_millimetres(tmp_path: Path) -> None:
+    """A northing of UTM is up to 1e10 mm; `--unit mm --origin` brings it to the sensor."""
+    (tmp_path / "a.txt").write_text("1 0 0 4e8 0 1 0 9.9e9 0 0 1 1e5\n")
+    assert read_poses(tmp_path / "a.txt").translation.tolist() == [[4e8, 9.9e9, 1e5]]
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -11,6 +11,7 @@ from contextlib import contextmanager, redirect_stderr
 from io import StringIO
 from pathlib import Path
 from types import ModuleType
+from typing import get_type_hints
 
 from wildshape.cli.commands import module_of
 from wildshape.cli.terminal import Terminated, say, terminable
@@ -162,6 +163,7 @@ def _parse(module: ModuleType, command: str, arguments: list[str]) -> object:
             f"{command}: an argument is empty, and would mean this folder; is a variable of the"
             " shell not set? Name what is meant, or leave it away."
         )
+    _refuse_repeated_lists(module, command, arguments)
     said = StringIO()
     try:
         with redirect_stderr(said):
@@ -177,6 +179,18 @@ def _parse(module: ModuleType, command: str, arguments: list[str]) -> object:
         lines = ("", "examples:", *(f"  {line}" for line in module.EXAMPLES))
         print("\n".join(lines), flush=True)
         raise
+
+
+def _refuse_repeated_lists(module: ModuleType, command: str, arguments: list[str]) -> None:
+    """Of an option that is repeated tyro takes the last: all values before it would be lost."""
+    given = [word.partition("=")[0].replace("_", "-") for word in arguments]
+    for name, kind in get_type_hints(module.Settings).items():
+        option = f"--{name.replace('_', '-')}"
+        if "tuple" in str(kind) and given.count(option) > 1:
+            raise BadInputError(
+                f"{command}: {option} is given more than once; give it once, with commas between"
+                " its values."
+            )
 
 
 def _framed(text: str, command: str) -> str:

@@ -228,7 +228,7 @@ class Predictor:
     def register(
         self, source: object, target: object, sensor: Sensor | None = None, *, rays: Each = ()
     ) -> Registration:
-        """`T_target_source = T_target_can inv(T_source_can)` (METHOD 7); `rays`: of both."""
+        """`T_target_source` of two scans `(n, 3)`, sensor frames, metres; `rays`: of both."""
         point_inputs.check_sensor(sensor)
         pair = point_inputs.as_points(source, "source"), point_inputs.as_points(target, "target")
         known = point_inputs.rays_of_each(rays, pair)

@@ -26,7 +26,7 @@ from wildshape.io.atomic import write_json, write_text
 from wildshape.io.guard import reading
 
 _ORTHONORMAL = 1e-3
-_FARTHEST_M = 1e9  # no drive goes farther, and squares of far larger numbers overflow
+_FARTHEST = 1e12  # a map may be in millimetres; squares of far larger numbers overflow
 _WHAT = "T_sensor_canonical of each scan: the object as the sensor of that scan sees it, metres"
 
 
@@ -58,7 +58,7 @@ def _parse(line: str, number: int, path: Path) -> np.ndarray:
         values = np.array([float(word) for word in line.replace(",", " ").split()])
     except ValueError:
         values = np.empty(0)
-    if len(values) != 12 or not (np.abs(values) < _FARTHEST_M).all():
+    if len(values) != 12 or not (np.abs(values) < _FARTHEST).all():
         raise BadInputError(
             f"{path}, line {number}: expected 12 finite numbers (3x4 row-major), found "
             f"'{line.strip()[:60]}'; write one pose a line."

@@ -67,7 +67,9 @@ def load_network(path: Path, form: Format[Net, Settings]) -> tuple[Net, Settings
         raise
     except (SafetensorError, OSError, ValueError) as error:
         said = first_line(error)
-        raise BadInputError(f"{path}: not a readable safetensors file ({said}).") from error
+        raise BadInputError(
+            f"{path}: not a readable safetensors file ({said}); {form.source}."
+        ) from error
     weights = {name: values.to(expected[name].dtype) for name, values in stored.items()}
     check_numbers(path, weights)
     check_sum(path, stored, metadata["settings"], metadata)
@@ -157,7 +159,7 @@ def check_shapes(path: Path, file: Any, expected: dict[str, Tensor]) -> None:
     if missing or extra or wrong:
         raise BadInputError(
             f"{path}: weights do not fit the network; missing {_few(missing)}, unexpected"
-            f" {_few(extra)}, of another shape {_few(wrong)}."
+            f" {_few(extra)}, of another shape {_few(wrong)}; {_CURE}."
         )
 
 

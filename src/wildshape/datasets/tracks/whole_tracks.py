@@ -72,8 +72,10 @@ class Folder:
                 yield track
         damage.settle()
         self.doubts = source.doubts
+        named: dict[str, str] = {}  # of each reason, the first file
         for _, reason in source.skipped:
-            self.rejected[f"scan: {reason.partition(': ')[2] or reason}"] += 1
+            why = reason.partition(": ")[2] or reason
+            self.rejected[named.setdefault(why, f"scan: {reason}")] += 1
 
     def _source(self) -> TrackSource:
         return open_tracks(self.root, Coordinates(self.unit, self.origin))
