@@ -256,14 +256,16 @@ def test_a_scan_is_read_once_for_the_way_and_its_clusters(recording, tmp_path):
     assert np.array_equal(cut.points, drive.scan(3)[cut.rows])
 
 
-def test_three_scans_an_empty_and_a_damaged_one_are_warnings(recording, tmp_path):
+def test_three_scans_an_empty_and_a_damaged_one_are_warnings(recording, tmp_path, monkeypatch):
     folder = tmp_path / "few"
     folder.mkdir()
     for name in ("000000.npy", "000001.npy", "000002.npy"):
         shutil.copy(recording / name, folder)
     np.save(folder / "000003.npy", np.empty((0, 3), np.float32))
     (folder / "000005.npy").write_bytes(b"damaged")
-    few = wildshape.drive(folder, tmp_path / "out")
+    monkeypatch.chdir(tmp_path)
+    few = wildshape.drive("few")
+    assert few.out.resolve() == tmp_path / "found"
     assert few.frames == 5
     assert few.warnings == (
         "1 scan missing between the others",

@@ -30,7 +30,7 @@ _LONG = 20  # scans take longer than a helper's start
 
 def drive(
     source: Path | str,
-    out: Path | str,
+    out: Path | str = "found",
     config: DriveConfig = _DEFAULT,
     *,
     topic: str | None = None,
@@ -49,7 +49,7 @@ def drive(
     Args:
         source: a folder of full scans, a drive of a published data set or a recording of ROS
             (`recordings`).
-        out: folder to write (docs/drive.md).
+        out: folder to write (docs/drive.md); by default `found` where Python runs.
         config: the numbers of every stage.
         topic: of point clouds, for a recording of ROS that holds several.
         predictor: by default the shipped weights.
