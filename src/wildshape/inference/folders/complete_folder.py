@@ -84,7 +84,9 @@ class FolderOptions:
     def identity(self, source: Path) -> dict[str, Any]:
         """What decides the output's content, as JSON values."""
         found = {"input": str(source.resolve()), **asdict(self.coordinates)}
-        found |= {"files": fingerprint_of(source), "model": fingerprint(self.model)}
+        found["model"] = fingerprint(self.model)
+        if source.is_dir():  # one scan is done or not
+            found["files"] = fingerprint_of(source)
         uses = {"uses": "track"} if self.track else {}
         uses |= {"rays": str(self.rays.resolve())} if self.rays else {}
         clouds = {} if self.clouds == "ply" else {"clouds": self.clouds}
@@ -153,7 +155,8 @@ def complete_folder(
         tracks = with_rays(tracks, options.rays, options.coordinates)
     predictor = load(options.model, options.device)
     keep_apart(out, source, weights_file(options.model), options.rays)
-    next(iter(tracks))  # else refused once an earlier output is gone
+    if options.overwrite:
+        next(iter(tracks))  # else refused once an earlier output is gone
     command, identity = "register" if registers else "complete", options.identity(source)
     output = begin(out, command, identity, FILES, overwrite=options.overwrite, progress=progress)
     with output.abandoned_if_refused():
