@@ -158,10 +158,10 @@ def test_what_drives_where_it_looks_is_a_vehicle_whatever_its_shape():
         assert (found.confidence > one.confidence) == (found.p_kind > p_kind)
         return found.p_kind
 
-    assert kind(0.5, 0.1, 0.2) == kind(0.5, math.pi, 0.2) == config.driving_kind
-    assert kind(0.5, math.pi / 2, 0.2) == 0.2  # sideways
-    assert kind(0.0, 0.1, 0.2) == 0.2
-    assert kind(0.5, 0.1, 0.02) == 0.02
+    assert kind(0.5, 0.1, 0.5) == kind(0.5, math.pi, 0.5) == config.driving_kind
+    assert kind(0.5, math.pi / 2, 0.5) == 0.5  # sideways
+    assert kind(0.0, 0.1, 0.5) == 0.5
+    assert kind(0.5, 0.1, 0.3) == 0.3
 
 
 def test_points_of_a_lorry_are_as_large_as_a_vehicle_and_those_of_a_wall_are_not():
