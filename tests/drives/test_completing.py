@@ -14,7 +14,7 @@ from tests.drives.objects import completed, still
 from wildshape.drives.completing.boxes import moves, smooth
 from wildshape.drives.completing.cluster_association import associate
 from wildshape.drives.completing.completion import fullest_of_parts, keyframes, order_of_looks
-from wildshape.drives.completing.level_frame import on_ground
+from wildshape.drives.completing.level_frame import on_ground, on_ground_of_each
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.surroundings import crowded
 from wildshape.drives.completing.vehicles import (
@@ -272,12 +272,17 @@ def test_vehicles_beside_each_other_are_not_joined_by_what_lies_between():
     assert found.name == "0+1"
 
 
-def test_boxes_reach_down_to_the_ground_under_the_clusters_that_are_left(tmp_path):
-    for frame, ground in enumerate((-1.0, -1.0, 9.0)):
-        with cut_file(tmp_path, frame).open("wb") as file:
+def write_grounds(folder, grounds):
+    """Cuts of one cluster each, and the ground's z under it."""
+    for frame, ground in enumerate(grounds):
+        with cut_file(folder, frame).open("wb") as file:
             known = {"points": np.zeros((4, 3), np.float32), "rows": np.arange(4)}
             known |= {"counts": np.array([4]), "grounds": np.array([[0.0, 0.0, ground]])}
             np.savez(file, **known, scanned=4, tracks=np.array([], str))
+
+
+def test_boxes_reach_down_to_the_ground_under_the_clusters_that_are_left(tmp_path):
+    write_grounds(tmp_path, (-1.0, -1.0, 9.0))
     one = completed([(0.0, 0.0, -0.1, 0.0)] * 3)
     on_two = replace(one, seen=one.seen.part([0, 1]))
     found = on_ground(on_two, tmp_path, still(3), BoxConfig())
@@ -290,6 +295,28 @@ def test_boxes_reach_down_to_the_ground_under_the_clusters_that_are_left(tmp_pat
     assert on_ground(nowhere, tmp_path, still(3), BoxConfig()) is nowhere
     lifted = replace(one, boxes=np.add(one.boxes, (0.0, 0.0, 1.0, 0.0)))
     assert on_ground(lifted, tmp_path, still(3), BoxConfig()) is lifted
+
+
+def test_boxes_follow_the_ground_that_frames_show_where_poses_are_wrong(tmp_path):
+    ground = -1 + 0.01 * np.arange(12)
+    seen = ground.copy()
+    seen[6] = 1.0  # a part of a lorry
+    write_grounds(tmp_path, seen)
+    frames, shown = tuple(range(12)), np.tile((9.0, 2.0, -0.25, 0.3), (12, 1))
+    one = completed(shown, frames=frames)
+
+    def floors(one, shown=shown):
+        found = on_ground_of_each(frames, shown, one, tmp_path, still(12), BoxConfig())
+        assert (found[:, (0, 1, 3)] == shown[:, (0, 1, 3)]).all()
+        return found[:, 2] - one.size[2] / 2
+
+    assert floors(one) == pytest.approx(ground, abs=0.011)
+    partly = replace(one, seen=one.seen.part([0, 1, 2, 9, 10, 11]))
+    assert floors(partly) == pytest.approx(ground, abs=0.021)
+    hidden = replace(one, seen=one.seen.part([]))
+    assert (floors(hidden) == -1).all()
+    on_a_bridge = np.add(shown, (0.0, 0.0, 5.0, 0.0))
+    assert (floors(one, on_a_bridge) == 4).all()
 
 
 def test_clusters_in_the_box_of_a_vehicle_are_its_own(tmp_path):

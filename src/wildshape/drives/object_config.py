@@ -238,6 +238,10 @@ class BoxConfig:
         stray_ticks: around, standard deviation.
         longest_gap: ticks in which a vehicle was not seen and still has boxes.
         ground_gap_m: boxes that end so near the ground, above or below, end there.
+        ground_ticks: in each frame a box's height above the ground is the middle one of those up
+            to so many ticks before and after it.
+        ground_stray_m: ground so far from the middle one of those around it is a part of a vehicle.
+        ground_stray_ticks: around, before and after.
     """
 
     moving_m: float = 1.0
@@ -249,3 +253,6 @@ class BoxConfig:
     stray_ticks: float = 8.0
     longest_gap: int = 10
     ground_gap_m: float = 1.0
+    ground_ticks: int = 2
+    ground_stray_m: float = 0.3
+    ground_stray_ticks: int = 12

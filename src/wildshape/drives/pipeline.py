@@ -331,7 +331,8 @@ class Pipeline:
             self.spread("rays", writer, sorted(writer.files), len(writer.files))
         folders, rows = self.completing / "objects", list[BoxRow]()
         with self.clock.stage("outputs", len(vehicles)) as at:
-            write = VehicleWriter(self.results, folders, self.cuts, self.drive, turns)
+            known = self.cuts, self.drive, turns, self.config.boxes
+            write = VehicleWriter(self.results, folders, *known)
             for number, found in enumerate(self.helpers.in_order(write, vehicles), 1):
                 rows += found
                 at(number)

@@ -5,12 +5,13 @@
 The world is the sensor frame of the first frame; the level world is it with z vertical.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.object_config import BoxConfig
@@ -25,6 +26,8 @@ from wildshape.inference.folders.complete_folder import OBJECTS
 from wildshape.io.boxes.detections import detections_of, poses_of
 from wildshape.io.guard import read_json
 from wildshape.records import Box, Points
+
+_UPPER = 0.75  # what is taken for ground lies too high: it is a lorry's, not below a car
 
 
 @dataclass(frozen=True)
@@ -106,18 +109,11 @@ def on_ground(one: Completed, cuts: Path, turns: Turns, config: BoxConfig) -> Co
 
     What a scan holds of wheels is cut with the ground, and so are the shapes that networks learn.
     """
-    rows = dict(zip(one.seen.frames, one.seen.rows))
     length, width, height = one.size
-    gaps = []
-    for frame, box in zip(one.frames, one.boxes):
-        if frame not in rows:  # its cluster there belongs to another vehicle
-            continue
-        grounds = read_cut(cuts, frame).grounds[list(rows[frame])]
-        ground = turns.T_level_sensor[frame].apply_numpy(grounds)[:, 2]
-        gaps.append(box[2] - height / 2 - np.median(ground))
-    if not gaps:
+    gaps = one.boxes[:, 2] - height / 2 - _ground(one.seen, one.frames, cuts, turns)
+    if np.isnan(gaps).all():
         return one
-    gap = float(np.median(gaps))
+    gap = float(np.nanmedian(gaps))
     if not abs(gap) <= config.ground_gap_m:  # far off, or not known at all
         return one
     return replace(
@@ -126,6 +122,67 @@ def on_ground(one: Completed, cuts: Path, turns: Turns, config: BoxConfig) -> Co
         size=(length, width, height + gap),
         raised_m=-gap / 2,
     )
+
+
+def on_ground_of_each(
+    frames: Sequence[int],
+    shown: Float[np.ndarray, "f 4"],
+    one: Completed,
+    cuts: Path,
+    turns: Turns,
+    config: BoxConfig,
+) -> Float[np.ndarray, "f 4"]:
+    """A vehicle's boxes, each on the ground that its frame and those around it show there.
+
+    A wrong pitch of one pose in `T_level_sensor` lifts what is 30 m away by decimetres.
+
+    Args:
+        frames: rising.
+        shown: its boxes where these frames show them, level world.
+        one: the vehicle.
+        cuts: folder of the clusters.
+        turns: of the drive's sensor.
+        config: see there.
+    """
+    ticks = np.take(turns.ticks, frames)
+    gaps = shown[:, 2] - one.size[2] / 2 - _ground(one.seen, frames, cuts, turns)
+    usual = _around(ticks, gaps, config.ground_stray_ticks, _UPPER)
+    gaps = np.where(np.abs(gaps - usual) <= config.ground_stray_m, gaps, np.nan)
+    gaps = _around(ticks, gaps, config.ground_ticks, 0.5)
+    known = ~np.isnan(gaps)
+    if not known.any() or abs(np.median(gaps[known])) > config.ground_gap_m:
+        return shown
+    gaps = np.interp(ticks, ticks[known], gaps[known])
+    return shown - gaps[:, None] * (0.0, 0.0, 1.0, 0.0)
+
+
+def _ground(
+    seen: Sightings, frames: Sequence[int], cuts: Path, turns: Turns
+) -> Float[np.ndarray, "f"]:
+    """Z of the ground under an object's clusters, level world.
+
+    NaN in frames without one, as where its cluster belongs to another vehicle.
+    """
+    rows, ground = dict(zip(seen.frames, seen.rows)), np.full(len(frames), np.nan)
+    places = [i for i, frame in enumerate(frames) if frame in rows]
+    if places:
+        of = [frames[i] for i in places]
+        under = [np.median(read_cut(cuts, f).grounds[list(rows[f])], axis=0) for f in of]
+        T_level_sensor = turns.T_level_sensor[torch.tensor(of)]
+        level = T_level_sensor.apply(torch.from_numpy(np.stack(under))[:, None])
+        ground[places] = level[:, 0, 2].numpy()
+    return ground
+
+
+def _around(
+    ticks: Int[np.ndarray, "f"], values: Float[np.ndarray, "f"], reach: int, quantile: float
+) -> Float[np.ndarray, "f"]:
+    """A quantile of the values up to so many ticks before and after each; NaN are left out."""
+    known = np.flatnonzero(~np.isnan(values))
+    first = np.searchsorted(ticks[known], ticks - reach, "left")
+    last = np.searchsorted(ticks[known], ticks + reach, "right")
+    around = (values[known[a:b]] for a, b in zip(first, last))
+    return np.array([np.quantile(some, quantile) if len(some) else np.nan for some in around])
 
 
 def _mean(values: list[float | None]) -> float | None:

@@ -14,8 +14,13 @@ import torch
 
 from wildshape.drives.completing.boxes import Way
 from wildshape.drives.completing.completion import CATEGORY
-from wildshape.drives.completing.level_frame import Completed, boxes_in_scans
+from wildshape.drives.completing.level_frame import (
+    Completed,
+    boxes_in_scans,
+    on_ground_of_each,
+)
 from wildshape.drives.completing.rolling_shutter import Turns
+from wildshape.drives.object_config import BoxConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.rays import RayCutter
 from wildshape.drives.tracking.sightings import Sightings
@@ -112,6 +117,7 @@ class VehicleWriter:
         out: folder of the results.
         folders: of the completed objects.
         cuts: folder of the clusters.
+        config: of the boxes.
     """
 
     out: Path
@@ -119,6 +125,7 @@ class VehicleWriter:
     cuts: Path
     drive: Drive
     turns: Turns
+    config: BoxConfig
 
     def __call__(self, one: Vehicle) -> list[BoxRow]:
         """The vehicle's lines of `boxes.csv`."""
@@ -126,7 +133,15 @@ class VehicleWriter:
         write_vehicle_track(self.out / TRACKS, one.completed.seen, self.cuts, self.drive)
         copy_object(folder, self.out / "objects" / one.name)
         write_shape(self.out / SHAPES / f"{one.name}.ply", folder, one.completed)
-        return rows_of(one, boxes_of(one, self.turns), self.drive)
+        return rows_of(one, self._boxes(one), self.drive)
+
+    def _boxes(self, one: Vehicle) -> list[tuple[int, Box]]:
+        """Frame and box in that frame's sensor frame, of all frames of a vehicle."""
+        frames, vehicle = one.way.frames, one.completed
+        shown = self.turns.shown(frames, one.way.boxes)
+        placed = on_ground_of_each(frames, shown, vehicle, self.cuts, self.turns, self.config)
+        T_level_sensor = self.turns.T_level_sensor[torch.tensor(frames)]
+        return list(zip(frames, boxes_in_scans(placed, vehicle.size, T_level_sensor)))
 
 
 def write_vehicle_track(out: Path, seen: Sightings, cuts: Path, drive: Drive) -> None:
@@ -166,14 +181,6 @@ def write_shape(path: Path, folder: Path, one: Completed) -> None:
     if one.turned:
         placed = placed * np.array((-1, -1, 1), placed.dtype)
     write_ply(path, placed - np.array((0.0, 0.0, one.raised_m), placed.dtype))
-
-
-def boxes_of(vehicle: Vehicle, turns: Turns) -> list[tuple[int, Box]]:
-    """Frame and box in that frame's sensor frame, of all frames of a vehicle."""
-    frames = vehicle.way.frames
-    boxes = turns.shown(frames, vehicle.way.boxes)
-    T_level_sensor = turns.T_level_sensor[torch.tensor(frames)]
-    return list(zip(frames, boxes_in_scans(boxes, vehicle.completed.size, T_level_sensor)))
 
 
 def rows_of(vehicle: Vehicle, boxes: list[tuple[int, Box]], drive: Drive) -> list[BoxRow]:
