@@ -12,7 +12,7 @@ from tests.datasets.write_argoverse2 import STAMPS, write_log
 from tests.datasets.write_kitti_raw import write_drive
 from tests.datasets.write_nuscenes import Scene, Thing, write_nuscenes
 from tests.datasets.write_nuscenes import off_surface as off_box
-from tests.datasets.write_pandaset import write_scene
+from tests.datasets.write_pandaset import AGO, write_scene
 from tests.datasets.write_waymo import PERIOD, SEGMENT, START, write_waymo
 from tests.datasets.write_waymo import Thing as WaymoThing
 from tests.refusal import refused
@@ -82,6 +82,25 @@ def test_pandaset_scenes(tmp_path):
     for number in range(3):
         (scene / "lidar" / f"{number:02d}.pkl.gz").unlink()
     refused(open_drive, drives[0], match=r"lidar: holds none of 00\.pkl\.gz to 79\.pkl\.gz")
+
+
+def test_rays_begin_where_the_sensor_was_when_it_took_them(tmp_path):
+    """Points are given as seen at one moment; the sensor goes 2 m, Waymo's 1.65 m, in a turn."""
+    log = write_log(tmp_path / "log", SCENE)
+    scene = write_scene(tmp_path / "pandaset" / "001", SCENE)
+    left = WaymoThing("left", start=(854.4, 1508.3, -50.2))  # met a quarter of a turn before
+    split = write_waymo(tmp_path / "waymo" / "training", [left], frames=2)
+    expected = {
+        log: 0.2 * np.arange(11),
+        scene: [2.0 * ago / 0.1 for ago in (*AGO.values(), 0.05)],
+        split / SEGMENT: [0.4, 0.5],
+    }
+    for path, places in expected.items():
+        full = pickle.loads(pickle.dumps(open_drive(path))).full_scan(0)
+        assert full.origins is not None
+        assert full.origins.shape == full.points.shape
+        found = np.unique(np.linalg.norm(full.origins[:, :2], axis=1).round(1))
+        assert found == pytest.approx(np.sort(places), abs=0.051)
 
 
 def test_a_release_that_names_no_scene_is_refused(tmp_path):
