@@ -92,15 +92,19 @@ class Turn:
     Attributes:
         points: each from where the sensor was when it was taken, sensor frame, metres.
         seconds: `(n,)` when each was taken, since the scan's own time; None if that is unknown.
+        origins: `(n, 3)` where the ray of each began, where a data set has already moved the
+            points to where they would be seen from the sensor's place at the scan's time.
     """
 
     points: Points
     seconds: Float[np.ndarray, "_"] | None = None
+    origins: Points | None = None
 
     @property
     def nbytes(self) -> int:
         """Memory that it takes."""
-        return self.points.nbytes + (0 if self.seconds is None else self.seconds.nbytes)
+        known = (self.points, self.seconds, self.origins)
+        return sum(one.nbytes for one in known if one is not None)
 
     def carried(self, motion: Twist) -> Points:
         """The points where they would be seen from the sensor's place at the scan's time.

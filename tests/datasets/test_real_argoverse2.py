@@ -14,6 +14,7 @@ from wildshape.baselines.icp import LocalIcp
 from wildshape.datasets.argoverse2.log import (
     LABELS,
     read_boxes,
+    read_city_poses,
     read_sensor_pose,
     read_sweep,
     taken_by,
@@ -49,7 +50,7 @@ def test_every_box_holds_as_many_points_as_its_label_says():
     for log in find_logs(ROOT):
         boxes, own = read_boxes(log), feather.read_table(log / LABELS)["num_interior_pts"]
         for sweep in (log / "sensors" / "lidar").glob("*.feather"):
-            cloud, _ = read_sweep(sweep)
+            cloud = read_sweep(sweep).points
             for row in np.flatnonzero(boxes.timestamps == int(sweep.stem)).tolist():
                 length, width, height = boxes.sizes[row].tolist()
                 plain = Crop(margin=0.0, ground=0.0)
@@ -64,8 +65,8 @@ def test_every_box_holds_as_many_points_as_its_label_says():
 def test_beams_stand_where_the_data_sheet_has_them(lidar):
     """Only about the right origin, with the right axes, and of the right LiDAR."""
     T_sensor_ego = read_sensor_pose(LOG, lidar).inverse()
-    points, lasers = read_sweep(next((LOG / "sensors" / "lidar").glob("*.feather")))
-    cloud = T_sensor_ego.apply_numpy(points)
+    sweep = read_sweep(next((LOG / "sensors" / "lidar").glob("*.feather")))
+    cloud, lasers = T_sensor_ego.apply_numpy(sweep.points), sweep.lasers
     away = np.linalg.norm(cloud, axis=1)
     elevation = np.degrees(np.arcsin(cloud[:, 2] / away))
     near = taken_by(lidar, lasers) & (away > 3) & (away < 20)
@@ -73,6 +74,38 @@ def test_beams_stand_where_the_data_sheet_has_them(lidar):
     # down_lidar hangs upside down and leans by 0.2 degrees; the axes are up_lidar's.
     expected, close = (BEAMS, 0.05) if lidar == "up" else (np.sort(-BEAMS), 0.55)
     assert np.sort(beams) == pytest.approx(expected, abs=close)
+
+
+@pytest.mark.parametrize("lidar", ["up", "down"])
+def test_rays_begin_where_the_lidar_was_when_it_took_them(lidar):
+    """About these places beams keep their elevation; the vehicle goes 1 m/s alone.
+
+    How the elevation about the place at the sweep's time departs from a beam's own follows how far
+    the LiDAR had gone: 0 times if it had not moved, -1 times if it had come from the other side.
+    """
+    up, down = (read_sensor_pose(LOG, one) for one in ("up", "down"))
+    axes = (up if lidar == "up" else down).inverse()
+    moved, off = [], []
+    for path in (LOG / "sensors" / "lidar").glob("*.feather"):
+        sweep = read_sweep(path)
+        sweep = sweep.part(taken_by(lidar, sweep.lasers))
+        starts = read_city_poses(LOG).ray_starts(int(path.stem), sweep, (up, down))
+        still = axes.apply_numpy(sweep.points.astype(np.float64))
+        gone = still - axes.apply_numpy(starts.astype(np.float64))
+        away = np.linalg.norm(still, axis=1)
+        near, azimuth = (away > 3) & (away < 30), np.arctan2(still[:, 1], still[:, 0])
+        waves = [f(k * azimuth) for k in (1, 2, 3) for f in (np.sin, np.cos)]  # of its mounting
+        waves = np.stack([np.ones(len(azimuth)), *waves], axis=1)
+        about = [np.degrees(np.arcsin(v[:, 2] / np.linalg.norm(v, axis=1))) for v in (still, gone)]
+        for laser in np.unique(sweep.lasers):
+            rows = np.flatnonzero(near & (sweep.lasers == laser))
+            rows = rows[np.abs(about[0][rows] - np.median(about[0][rows])) < 0.3]
+            both = np.stack((about[0][rows] - about[1][rows], about[0][rows]), axis=1)
+            both -= waves[rows] @ np.linalg.lstsq(waves[rows], both, rcond=None)[0]
+            moved.append(both[:, 0])
+            off.append(both[:, 1])
+    x, y = np.concatenate(moved), np.concatenate(off)
+    assert 0.8 < (x @ y) / (x @ x) < 1.5
 
 
 def test_fifteen_vehicles_with_enough_points(tracks):

@@ -5,6 +5,7 @@
 import numpy as np
 import pyarrow as pa
 from pyarrow import feather
+from scipy.spatial.transform import Rotation, Slerp
 from tests.datasets.street import SIZE, moved, rigid, street, wxyz
 
 LOG = "0aa4e8f5-2f9a-39a1-8f80-c2fdde4405a2"
@@ -32,16 +33,28 @@ def write_log(folder, scene, category="REGULAR_VEHICLE"):
     """Write all of a log but images and maps; returns its folder."""
     write_labels(folder, scene, category)
     stamps = STAMPS[: len(scene.clouds)]
-    # The real file has poses at the cameras' times as well.
-    times = np.array([t + d for t in stamps for d in (-40_000_000, 0)], np.int64)
-    poses = [T for T in scene.T_world_ego for _ in range(2)]
-    write_table(
-        folder / "city_SE3_egovehicle.feather", {"timestamp_ns": times} | pose_columns(poses)
-    )
+    write_poses(folder, scene.T_world_ego)
     write_calibration(folder)
     for stamp, T_world_ego, cloud in zip(stamps, scene.T_world_ego, scene.clouds):
         write_sweep(folder / f"sensors/lidar/{stamp}.feather", in_ego(T_world_ego, cloud))
     return folder
+
+
+def write_poses(folder, T_world_ego):
+    """At the sweeps' times, and between them: the real file has the cameras' times as well."""
+    times = STAMPS[: len(T_world_ego)]
+    known = [T[:3, :3] for T in T_world_ego]
+    turn = Slerp(times, Rotation.from_matrix(known)) if len(times) > 1 else None
+    places = np.array([T[:3, 3] for T in T_world_ego])
+    written = np.array([t + d for t in times for d in (-40_000_000, 0)][1:], np.int64)
+    poses = []
+    for time in written:
+        T = np.eye(4)
+        T[:3, :3] = known[0] if turn is None else turn(time).as_matrix()
+        T[:3, 3] = [np.interp(time, times, places[:, i]) for i in range(3)]
+        poses.append(T)
+    columns = {"timestamp_ns": written} | pose_columns(poses)
+    write_table(folder / "city_SE3_egovehicle.feather", columns)
 
 
 def in_ego(T_world_ego, cloud):
@@ -70,13 +83,18 @@ def write_calibration(folder, names=("ring_front_center", "up_lidar", "down_lida
     )
 
 
+def offsets_ns(points):
+    """When each point was taken, since the sweep's time: the LiDARs turn once in 100 ms."""
+    return np.arange(points) * 100_000_000 // max(points, 1)
+
+
 def write_sweep(path, points):
     """Points `(n, 3)` float16, ego frame; every second one was taken by `up_lidar`."""
     index = np.arange(len(points))
     columns = {axis: points[:, i] for i, axis in enumerate("xyz")}
     columns |= {"intensity": np.full(len(points), 9, np.uint8)}
     columns |= {"laser_number": (index % 2 * 32 + index % 31).astype(np.uint8)}
-    columns |= {"offset_ns": (index * 1000).astype(np.int32)}
+    columns |= {"offset_ns": offsets_ns(len(points)).astype(np.int32)}
     write_table(path, columns)
 
 

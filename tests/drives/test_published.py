@@ -10,9 +10,9 @@ import pytest
 from tests.datasets.street import street
 from tests.datasets.write_argoverse2 import STAMPS, write_log
 from tests.datasets.write_kitti_raw import write_drive
-from tests.datasets.write_nuscenes import Scene, Thing, write_nuscenes
+from tests.datasets.write_nuscenes import Scene, Thing, write_nuscenes, write_relative
 from tests.datasets.write_nuscenes import off_surface as off_box
-from tests.datasets.write_pandaset import write_scene
+from tests.datasets.write_pandaset import AGO, write_scene
 from tests.datasets.write_waymo import PERIOD, SEGMENT, START, write_waymo
 from tests.datasets.write_waymo import Thing as WaymoThing
 from tests.refusal import refused
@@ -84,6 +84,25 @@ def test_pandaset_scenes(tmp_path):
     refused(open_drive, drives[0], match=r"lidar: holds none of 00\.pkl\.gz to 79\.pkl\.gz")
 
 
+def test_rays_begin_where_the_sensor_was_when_it_took_them(tmp_path):
+    """Points are given as seen at one moment; the sensor goes 2 m, Waymo's 1.65 m, in a turn."""
+    log = write_log(tmp_path / "log", SCENE)
+    scene = write_scene(tmp_path / "pandaset" / "001", SCENE)
+    left = WaymoThing("left", start=(854.4, 1508.3, -50.2))  # met a quarter of a turn before
+    split = write_waymo(tmp_path / "waymo" / "training", [left], frames=2)
+    expected = {
+        log: 0.2 * np.arange(11),
+        scene: [2.0 * ago / 0.1 for ago in (*AGO.values(), 0.05)],
+        split / SEGMENT: [0.4, 0.5],
+    }
+    for path, places in expected.items():
+        full = pickle.loads(pickle.dumps(open_drive(path))).full_scan(0)
+        assert full.origins is not None
+        assert full.origins.shape == full.points.shape
+        found = np.unique(np.linalg.norm(full.origins[:, :2], axis=1).round(1))
+        assert found == pytest.approx(np.sort(places), abs=0.051)
+
+
 def test_a_release_that_names_no_scene_is_refused(tmp_path):
     root = write_nuscenes(tmp_path / "nuscenes", [Scene("scene-0061", (), keys=2)])
     table = next(root.rglob("scene.json"))
@@ -108,6 +127,18 @@ def test_nuscenes_scenes(tmp_path, monkeypatch):
         rotation, place = car.pose(0.0)
         local = rotation.inv().apply(in_world(drive, frame) - place)
         assert (np.abs(off_box(local, car.size)) < 1e-3).mean() > 0.4
+
+
+def test_points_of_truckscenes_have_times(tmp_path, monkeypatch):
+    """They are as measured, by a lorry at 22 m/s: without times a turn is 2 m askew."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    scene = Scene("scene-1", (Thing("car", keys=(0, 1)),), keys=2)
+    drive = open_drive(write_relative(tmp_path / "trucks", "truckscenes", [scene]))
+    for frame in range(len(drive)):
+        seconds = drive.turn(frame).seconds
+        assert seconds is not None
+        assert seconds[[0, -1]] == pytest.approx((-0.05, 0.05), abs=1e-3)
+        assert len(seconds) == len(drive.turn(frame).points)
 
 
 def test_waymo_segments(tmp_path):

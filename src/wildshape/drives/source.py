@@ -171,7 +171,7 @@ class Drive:
         turn = self.turn(frame)
         points = self.corrected(frame, turn)
         if self.motion is None or turn.seconds is None or not len(points):
-            return FullScan(points)
+            return FullScan(points, turn.origins)
         points[~turn.points.any(1)] = 0.0  # what did not come back has no place
         return FullScan(points, _places(self.motion[frame], turn.seconds))
 

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 from tests.cars import off_surface, poses_of
 from tests.datasets.damaged import passed_over
 from tests.datasets.street import moved, street
@@ -16,6 +17,7 @@ from tests.datasets.write_argoverse2 import (
     T_EGO_UP,
     UUIDS,
     in_ego,
+    offsets_ns,
     write_calibration,
     write_log,
     write_sweep,
@@ -88,6 +90,32 @@ def test_each_lidar_took_its_own_points(log):
     counts = [len(track.scans[0]) for track in (both, up, down)]
     assert counts[0] == counts[1] + counts[2]
     assert min(counts[1:]) > 100
+
+
+@pytest.mark.parametrize("lidar", ["up", "down", "both"])
+def test_rays_begin_where_their_lidar_was(log, scene, lidar):
+    """The vehicle goes 20 m/s: 2 m while a LiDAR turns once."""
+    T_ego_sensor = T_EGO_UP.copy()
+    T_ego_sensor[:3, 3] += {"up": 0, "down": 1, "both": 0.5}[lidar] * (T_EGO_DOWN - T_EGO_UP)[:3, 3]
+    T_sensor_ego = np.linalg.inv(T_ego_sensor)
+    for track in tracks(log, lidar=lidar, rays=True):
+        for i in range(FRAMES - 1):
+            cloud = moved(T_sensor_ego, in_ego(scene.T_world_ego[i], scene.clouds[i]).astype(float))
+            rays = track.rays[i]
+            assert rays is not None
+            away, found = KDTree(cloud).query(rays.ends)
+            assert np.max(away) < 1e-4
+            rows = np.asarray(found)
+            share = (offsets_ns(len(cloud))[rows] / 1e8)[:, None]
+            ways = []
+            for T_world_ego in scene.T_world_ego[i : i + 2]:
+                T = T_sensor_ego @ np.linalg.inv(scene.T_world_ego[i]) @ T_world_ego
+                up, down = ((T @ T_ego_lidar)[:3, 3] for T_ego_lidar in (T_EGO_UP, T_EGO_DOWN))
+                ways.append(np.where(rows[:, None] % 2 == 0, up, down))
+            expected = (1 - share) * ways[0] + share * ways[1]
+            assert np.abs(rays.starts - expected).max() < 0.11  # a step of 10 ms
+            assert np.ptp(rays.starts[:, 0]) > 0.5
+    # The last sweep's motion is not known: no pose comes after it.
 
 
 def test_parked_and_moving_by_their_place_in_the_city(log):

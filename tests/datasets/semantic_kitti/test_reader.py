@@ -69,6 +69,17 @@ def test_points_land_back_on_the_parked_car(sequence, scene):
         )
 
 
+def test_rays_begin_where_the_sensor_was(sequence, scene):
+    """It goes 2 m a turn, which is behind over the left side; scans are as of the turn's middle."""
+    places = velo_poses(scene)
+    rays = tracks(sequence, rays=True)[PARKED].rays[4]
+    assert rays is not None
+    share = -np.arctan2(rays.ends[:, 1], rays.ends[:, 0])[:, None] / (2 * np.pi)
+    there = moved(np.linalg.inv(places[4]), np.array([places[3][:3, 3], places[5][:3, 3]]))
+    assert share.mean() < -0.1
+    assert np.abs(rays.starts - share * (there[1] - there[0]) / 2).max() < 0.051 * 2
+
+
 def test_the_chosen_frame_is_that_of_the_car_but_for_front_and_back(sequence, scene):
     """Half of it is seen: the rear, the side, the roof; so the box knows all three lengths."""
     track = tracks(sequence)[PARKED]

@@ -96,6 +96,31 @@ def test_the_pose_of_each_pixel_matters(split):
     assert np.linalg.norm(right - wrong, axis=1).max() > 0.3
 
 
+def test_rays_begin_where_the_sensor_was(split):
+    """It goes 1.6 m during a turn; by the writer's own columns and poses."""
+    first = next(iter(frames(tables(split), read_boxes(tables(split)["lidar_box"]))))
+    full, seen = first.scan(rays=True), first.image[..., 0] > 0
+    rotation, place = as_pose(vehicle_pose(0.0))
+    matrix = mount()
+    shares = np.arange(seen.shape[1]) / seen.shape[1] - 0.5
+    turns, places = as_pose(vehicle_pose(shares))
+    starts = turns.apply(matrix[:3, 3]) + places
+    starts = (rotation.inv().apply(starts - place) - matrix[:3, 3]) @ matrix[:3, :3]
+    assert full.origins is not None
+    assert full.lost is not None
+    columns = np.concatenate((np.nonzero(seen)[1], np.nonzero(~seen)[1]))
+    assert np.abs(full.origins - starts[columns]).max() < 0.051
+    assert np.ptp(full.origins, axis=0).max() > 1
+    azimuth = np.pi - 2 * np.pi * (shares + 0.5 + 0.5 / seen.shape[1])
+    azimuth -= np.arctan2(matrix[1, 0], matrix[0, 0])
+    up = first.calibration.inclinations(len(seen))[::-1][np.nonzero(~seen)[0]]
+    level, across = np.cos(up), azimuth[np.nonzero(~seen)[1]]
+    rays = np.stack((level * np.cos(across), level * np.sin(across), np.sin(up)), axis=1)
+    rays = (turns.as_matrix()[np.nonzero(~seen)[1]] @ (rays @ matrix[:3, :3].T)[:, :, None])[..., 0]
+    rays = rotation.inv().apply(rays) @ matrix[:3, :3]
+    assert full.lost == pytest.approx(rays, abs=1e-5)
+
+
 def test_points_lie_on_their_rays_where_the_vehicle_stands(split):
     """A plain check of the geometry: the middle column looks along the vehicle's x axis."""
     first = next(iter(frames(tables(split), read_boxes(tables(split)["lidar_box"]))))

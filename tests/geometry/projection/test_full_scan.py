@@ -78,4 +78,8 @@ def test_rays_that_did_not_come_back_and_where_rays_began_are_kept():
     assert moved.origins is not None
     assert moved.origins.tolist() == [[0, 1, 0], [0, 1, 0]]
     assert np.allclose(moved.ends, points[[1, 2]])
+    both = sight_lines(FullScan(points, starts[[0] * 5], lost), own)
+    assert both is not None
+    assert both.starts.tolist() == [[0, 1, 0]] * 3
+    assert np.allclose(both.directions[2], lost[0] / np.linalg.norm(lost[0]))
     assert sight_lines(FullScan(points), own[:0]) is None

@@ -18,7 +18,7 @@ from wildshape.io.guard import check_unpacked, reading
 Columns = dict[str, np.ndarray]
 _QUATERNION, _TRANSLATION = ("qw", "qx", "qy", "qz"), ("tx_m", "ty_m", "tz_m")
 POSE = _QUATERNION + _TRANSLATION
-_WHOLE = ("timestamp_ns", "laser_number")
+_WHOLE = ("timestamp_ns", "laser_number", "offset_ns")
 _MAGIC_BYTES = 8
 _TEXTS = ("track_uuid", "category", "sensor_name")
 

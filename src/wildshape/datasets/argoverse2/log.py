@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+import torch
 from jaxtyping import Bool, Float, Int64, UInt8
 
 from wildshape.datasets.argoverse2.feather import POSE, poses, read_feather
 from wildshape.datasets.tracks.labelled_boxes import check_boxes
 from wildshape.datasets.tracks.selection import measured
 from wildshape.errors import BadInputError
-from wildshape.geometry.transforms.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3, between
 from wildshape.records import Points
 
 Lidar = Literal["both", "up", "down"]
@@ -26,6 +27,8 @@ _CITY = "city_SE3_egovehicle.feather"
 _CALIBRATION = "calibration/egovehicle_SE3_sensor.feather"
 _SIZE = ("length_m", "width_m", "height_m")
 _LASERS = 32  # a LiDAR; up_lidar's come first
+# Rays that begin within a step have one place: they are looked at together.
+_STEP_NS, _MOST_STEPS = 10_000_000, 100
 
 
 @dataclass(frozen=True)
@@ -63,30 +66,95 @@ def read_boxes(log: Path) -> Boxes:
     return Boxes(stamps, tracks, categories, sizes, T_ego_object)
 
 
-def read_sweep(path: Path) -> tuple[Points, UInt8[np.ndarray, " n"]]:
-    """Points `(n, 3)` in the egovehicle frame, metres, and the number of each one's laser.
+@dataclass(frozen=True)
+class Sweep:
+    """One turn of both LiDARs.
 
     The file's own type is float16: a step is 8 mm between 8 and 16 m along an axis, 16 mm up to
     32 m, 31 mm up to 64 m. Ego motion during the sweep is undone in the file.
 
+    Attributes:
+        points: `(n, 3)` in the egovehicle frame at the sweep's time, metres.
+        lasers: the number of each one's laser.
+        offsets_ns: when each was taken, since the sweep's time.
+    """
+
+    points: Points
+    lasers: UInt8[np.ndarray, " n"]
+    offsets_ns: Int64[np.ndarray, " n"]
+
+    def part(self, rows: Bool[np.ndarray, " n"]) -> "Sweep":
+        """Some of the points."""
+        return Sweep(self.points[rows], self.lasers[rows], self.offsets_ns[rows])
+
+
+def read_sweep(path: Path) -> Sweep:
+    """A sweep's points that were measured.
+
     Raises:
         BadInputError: the file is corrupt.
     """
-    table = read_feather(path, ("x", "y", "z", "laser_number"), _BRINGS)
+    table = read_feather(path, ("x", "y", "z", "laser_number", "offset_ns"), _BRINGS)
     points = np.stack([table[name] for name in "xyz"], axis=-1).astype(np.float32)
-    kept = measured(points)
-    return points[kept], table["laser_number"][kept]
+    offsets_ns = table["offset_ns"].astype(np.int64)
+    return Sweep(points, table["laser_number"], offsets_ns).part(measured(points))
 
 
-def read_city_poses(log: Path) -> dict[int, SE3]:
-    """`T_city_ego` by timestamp, nanoseconds.
+@dataclass(frozen=True)
+class CityPoses:
+    """Where the vehicle was, at the times of all its sensors.
+
+    Attributes:
+        stamps: nanoseconds, rising.
+        T_city_ego: one pose a stamp.
+    """
+
+    stamps: Int64[np.ndarray, " t"]
+    T_city_ego: SE3
+
+    def __contains__(self, stamp: int) -> bool:
+        return stamp in self.stamps
+
+    def at(self, stamp: int) -> SE3:
+        """The pose at a time, between those beside it; the first before all, the last after."""
+        after = min(int(self.stamps.searchsorted(stamp)), len(self.stamps) - 1)
+        before = max(after - 1, 0)
+        start, end = self.stamps[[before, after]].tolist()
+        share = min(max((stamp - start) / max(end - start, 1), 0.0), 1.0)
+        return between(self.T_city_ego[before], self.T_city_ego[after], share)
+
+    def ray_starts(
+        self, stamp: int, sweep: Sweep, T_ego_lidars: tuple[SE3, SE3]
+    ) -> Float[np.ndarray, "n 3"]:
+        """Where the ray of each point began, in the egovehicle frame at the sweep's time, metres.
+
+        The LiDARs go on with the vehicle while they turn.
+
+        Args:
+            stamp: of the sweep.
+            sweep: its points.
+            T_ego_lidars: of up_lidar and of down_lidar.
+        """
+        T_stamp_city = self.at(stamp).inverse()
+        steps = np.clip(np.rint(sweep.offsets_ns / _STEP_NS), -_MOST_STEPS, _MOST_STEPS)
+        starts = np.empty_like(sweep.points)
+        for step in np.unique(steps):
+            T_stamp_ego = T_stamp_city @ self.at(stamp + int(step) * _STEP_NS)
+            up, down = ((T_stamp_ego @ T).translation.numpy() for T in T_ego_lidars)
+            rows = steps == step
+            starts[rows] = np.where(taken_by("up", sweep.lasers[rows])[:, None], up, down)
+        return starts
+
+
+def read_city_poses(log: Path) -> CityPoses:
+    """The poses of a log.
 
     Raises:
         BadInputError: the file is missing or corrupt.
     """
     table = read_feather(log / _CITY, ("timestamp_ns", *POSE), _BRINGS)
-    T_city_ego = poses(table, log / _CITY)
-    return {int(stamp): T_city_ego[i] for i, stamp in enumerate(table["timestamp_ns"])}
+    stamps, first = np.unique(table["timestamp_ns"].astype(np.int64), return_index=True)
+    return CityPoses(stamps, poses(table, log / _CITY)[torch.from_numpy(first)])
 
 
 def read_sensor_pose(log: Path, lidar: Lidar) -> SE3:

@@ -13,6 +13,7 @@ import numpy as np
 from wildshape.datasets.argoverse2.log import (
     LABELS,
     Boxes,
+    CityPoses,
     Lidar,
     read_boxes,
     read_city_poses,
@@ -108,7 +109,7 @@ class _Frames:
 
     log: Path
     T_sensor_ego: SE3
-    T_city_ego: dict[int, SE3]
+    city: CityPoses
     boxes: Boxes
     lidar: Lidar
 
@@ -133,22 +134,19 @@ class _Frames:
         path = self.log / _SWEEPS / f"{stamp}.feather"
         if not path.is_file():
             return None
-        points, lasers = read_sweep(path)
-        taken = taken_by(self.lidar, lasers)
-        cloud = self.T_sensor_ego.apply_numpy(points[taken])
-        if self.lidar != "both":
-            return FullScan(cloud)
-        starts = (self.T_sensor_ego @ read_sensor_pose(self.log, one) for one in ("up", "down"))
-        up, down = (T.translation.numpy().astype(np.float32) for T in starts)
-        return FullScan(cloud, np.where(taken_by("up", lasers[taken])[:, None], up, down))
+        sweep = read_sweep(path)
+        sweep = sweep.part(taken_by(self.lidar, sweep.lasers))
+        T_ego_lidars = (read_sensor_pose(self.log, "up"), read_sensor_pose(self.log, "down"))
+        starts = self.city.ray_starts(stamp, sweep, T_ego_lidars)
+        return FullScan(*map(self.T_sensor_ego.apply_numpy, (sweep.points, starts)))
 
     def _city_pose(self, stamp: int) -> SE3:
-        if stamp not in self.T_city_ego:
+        if stamp not in self.city:
             raise BadInputError(
                 f"{self.log}: city_SE3_egovehicle.feather has no pose for the labelled sweep "
                 f"{stamp}; the two are of different logs or releases, copy the log again."
             )
-        return self.T_city_ego[stamp]
+        return self.city.at(stamp)
 
 
 def find_logs(root: Path) -> list[Path]:

@@ -141,7 +141,7 @@ class SemanticKitti:
         if found is None:
             return
         labels, points = found
-        full = FullScan(points)
+        full = FullScan(points, sequence.ray_starts(frame, points) if self.rays else None)
         for visit in wanted:
             poses = sequence.T_velo_world
             pose = None if poses is None or sequence.kind(visit).moved else poses[frame]

@@ -26,6 +26,7 @@ from wildshape.io.scans.arrays import read_rows
 from wildshape.records import Points
 
 _SCANS = "velodyne"
+_PLACES = 10  # of the sensor in a turn: rays of one place are looked at together
 _CALIBRATION_CURE = "KITTI odometry's calibration archive (data_odometry_calib.zip) brings it"
 
 
@@ -93,6 +94,21 @@ class Sequence:
         points = raw[index]
         kept = measured(points)
         return labels[index[kept]], points[kept]
+
+    def ray_starts(self, frame: int, points: Points) -> Points | None:
+        """Where the ray of each point of a whole scan began, sensor frame, metres, if it is known.
+
+        KITTI odometry gives points as seen at the turn's middle. The beam comes from behind over
+        the left side and the front, and the sensor goes on meanwhile.
+        """
+        T = self.T_velo_world
+        if T is None:
+            return None
+        before, after = max(frame - 1, 0), min(frame + 1, len(T) - 1)
+        first, last = ((T[frame] @ T[i].inverse()).translation.numpy() for i in (before, after))
+        turn = -np.arctan2(points[:, 1], points[:, 0]) / (2 * np.pi)  # since its middle
+        turn = np.rint(turn * _PLACES) / _PLACES
+        return (turn[:, None] * (last - first) / max(after - before, 1)).astype(np.float32)
 
 
 def open_sequence(folder: Path, name: str, labels: str, kinds: dict[int, Kind]) -> Sequence:

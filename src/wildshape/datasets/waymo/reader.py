@@ -36,9 +36,9 @@ from wildshape.datasets.waymo.tables import (
 from wildshape.errors import BadInputError
 from wildshape.geometry.projection.full_scan import FullScan
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.records import Points, Sensor, Track
+from wildshape.records import Points, Sensor, Track, Turn
 
-_FAR_M = 900.0
+_PLACE_M = 0.1  # rays that begin so near each other have one place: they are looked at together
 TOP = Sensor(kind="lidar", resolution_deg=(0.136, 0.31))
 _LAYOUT = f"<root>/<split>/{{{','.join(COMPONENTS)}}}/<segment>.parquet"
 
@@ -87,7 +87,7 @@ class Waymo:
             unseen.remove(frame.microseconds)
             objects = [frame.object(box, part, number) for box in frame.boxes]
             name = str(frame.microseconds)
-            read = partial(frame.scan, lost=self.rays)
+            read = partial(frame.scan, rays=self.rays)
             crop_objects(objects, name, read, self.crop, gathering)
         for time in unseen:
             gathering.reject("scan: the frame has no range image of TOP", len(boxes[time]))
@@ -126,26 +126,45 @@ class Frame:
             place=(self.T_world_vehicle @ box.T_vehicle_object).translation.numpy(),
         )
 
-    def scan(self, *, lost: bool = False) -> FullScan:
-        """All points in the sensor's frame at the frame's time; if asked, what was lost, too."""
-        points, ranges = self.points(), self.image[..., 0]
-        if not lost:
-            return FullScan(points)
-        # So far away that where the sensor stood meanwhile does not turn them.
-        ends = self._points(np.where((ranges > 0) & (ranges < np.inf), 0.0, _FAR_M))
-        return FullScan(points, lost=ends / np.linalg.norm(ends, axis=1, keepdims=True))
+    def scan(self, *, rays: bool = False) -> FullScan:
+        """All points in the sensor's frame at the frame's time; if asked, all rays, too."""
+        if not rays:
+            return FullScan(self.points())
+        ranges = self.image[..., 0]
+        points, origins = self._rays(ranges)
+        seen = (ranges > 0) & (ranges < np.inf)
+        ends, starts = self._rays(np.where(seen, 0.0, 1.0))
+        return FullScan(points, _places(np.concatenate((origins, starts))), lost=ends - starts)
+
+    def turn(self) -> Turn:
+        """All points in the sensor's frame at the frame's time, and where their rays began."""
+        points, origins = self._rays(self.image[..., 0])
+        return Turn(points, origins=_places(origins))
 
     def points(self) -> Points:
         """All points `(n, 3)` in the sensor's frame at the frame's time, metres."""
-        return self._points(self.image[..., 0])
+        moved = self._moved(*self._pixels(self.image[..., 0]))
+        return moved[measured(moved)].astype(np.float32)
 
-    def _points(self, ranges: np.ndarray) -> Points:
+    def _rays(self, ranges: np.ndarray) -> tuple[Points, Points]:
+        """The points of some ranges, and where the sensor was when it took each of them."""
+        points, poses = self._pixels(ranges)
+        moved, starts = (self._moved(one, poses) for one in (points, np.zeros_like(points)))
+        kept = measured(moved)
+        return moved[kept].astype(np.float32), starts[kept].astype(np.float32)
+
+    def _pixels(self, ranges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         T_vehicle_sensor = self.calibration.T_vehicle_sensor
         inclinations = self.calibration.inclinations(len(ranges))
         seen, points = points_of_pixels(ranges, inclinations, T_vehicle_sensor)
-        poses = self.pixel_poses[seen]
-        moved = at_frame_time(points, poses, T_vehicle_sensor, self.T_world_vehicle)
-        return moved[measured(moved)].astype(np.float32)
+        return points, self.pixel_poses[seen]
+
+    def _moved(self, points: np.ndarray, poses: np.ndarray) -> np.ndarray:
+        return at_frame_time(points, poses, self.calibration.T_vehicle_sensor, self.T_world_vehicle)
+
+
+def _places(origins: Points) -> Points:
+    return np.rint(origins / _PLACE_M).astype(np.float32) * np.float32(_PLACE_M)
 
 
 def frames(tables: dict[str, Path], boxes: dict[int, list[Labelled]]) -> Iterator[Frame]:

@@ -5,7 +5,12 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from wildshape.datasets.argoverse2.log import read_city_poses, read_sensor_pose, read_sweep
+from wildshape.datasets.argoverse2.log import (
+    CityPoses,
+    read_city_poses,
+    read_sensor_pose,
+    read_sweep,
+)
 from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3, stack
@@ -21,10 +26,16 @@ class _Sweeps:
 
     files: tuple[Path, ...]
     T_sensor_ego: SE3
+    T_ego_lidars: tuple[SE3, SE3]
+    city: CityPoses | None
 
     def __call__(self, frame: int) -> Turn:
-        points, _ = read_sweep(self.files[frame])
-        return Turn(self.T_sensor_ego.apply_numpy(points))
+        sweep = read_sweep(self.files[frame])
+        points = self.T_sensor_ego.apply_numpy(sweep.points)
+        if self.city is None:
+            return Turn(points)
+        starts = self.city.ray_starts(int(self.files[frame].stem), sweep, self.T_ego_lidars)
+        return Turn(points, origins=self.T_sensor_ego.apply_numpy(starts))
 
 
 def find_logs(root: Path) -> list[Path]:
@@ -50,15 +61,20 @@ def open_log(path: Path) -> Drive:
         raise BadInputError(f"{path / _SWEEPS}: holds no sweeps; copy the log again.")
     stamps = [int(file.stem) for file in files]
     T_ego_sensor = read_sensor_pose(path, "both")
-    T_city_ego = read_city_poses(path)
-    lacking = sum(stamp not in T_city_ego for stamp in stamps)
+    city = read_city_poses(path)
+    lacking = sum(stamp not in city for stamp in stamps)
     told = f"{_POSES} lacks {lacking} of {len(stamps)} sweeps; none of its poses are taken"
     return Drive.of(
         name=path.resolve().name,
         scan_names=[file.stem for file in files],
-        read=_Sweeps(tuple(files), T_ego_sensor.inverse()),
+        read=_Sweeps(
+            tuple(files),
+            T_ego_sensor.inverse(),
+            (read_sensor_pose(path, "up"), read_sensor_pose(path, "down")),
+            None if lacking else city,
+        ),
         times=[stamp / 1e9 for stamp in stamps],
-        T_world_sensor=None if lacking else stack([T_city_ego[t] for t in stamps]) @ T_ego_sensor,
+        T_world_sensor=None if lacking else stack([city.at(t) for t in stamps]) @ T_ego_sensor,
         warnings=(told,) if lacking else (),
         files=files,
     )

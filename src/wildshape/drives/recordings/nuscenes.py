@@ -12,17 +12,22 @@ from wildshape.datasets.nuscenes.table_index import cache_folder, index_of, lida
 from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import stack
+from wildshape.io.scans.turns import read_turn
 from wildshape.records import Turn
 
 
 @dataclass(frozen=True)
 class _Sweeps:
-    """Reads a frame's sweep."""
+    """Reads a frame's sweep; TruckScenes' points have times."""
 
     files: tuple[Path, ...]
+    times: tuple[float, ...]
 
     def __call__(self, frame: int) -> Turn:
-        return Turn(read_sweep(self.files[frame]))
+        file = self.files[frame]
+        if file.suffix == ".pcd":
+            return read_turn(file, self.times[frame])
+        return Turn(read_sweep(file))
 
 
 def find_scenes(root: Path) -> list[Path]:
@@ -55,11 +60,12 @@ def open_scene(path: Path) -> Drive:
     there = [(frame, file) for frame, file in there if file.is_file()]
     if not there:
         raise BadInputError(f"{path}: none of its {channel} files is here; unpack their blobs.")
+    times = tuple(frame.microseconds / 1e6 for frame, _ in there)
     return Drive.of(
         name=path.name,
         scan_names=[frame.name for frame, _ in there],
-        read=_Sweeps(tuple(file for _, file in there)),
-        times=[frame.microseconds / 1e6 for frame, _ in there],
+        read=_Sweeps(tuple(file for _, file in there), times),
+        times=times,
         T_world_sensor=stack([frame.T_global_sensor for frame, _ in there]),
         files=[file for _, file in there],
     )

@@ -7,22 +7,40 @@ from pathlib import Path
 
 import numpy as np
 
-from wildshape.datasets.pandaset.scene import FILE, SWEEPS, frame_files, read_drive, read_sweep
+from wildshape.datasets.pandaset.scene import (
+    FILE,
+    SWEEPS,
+    frame_files,
+    read_drive,
+    read_sweep,
+)
+from wildshape.datasets.pandaset.scene import Drive as Poses
 from wildshape.drives.source import Drive
-from wildshape.geometry.transforms.se3 import SE3, stack
+from wildshape.geometry.transforms.se3 import stack
 from wildshape.records import Turn
+
+_STEP_S, _MOST_STEPS = 0.01, 100  # rays of one place are looked at together
 
 
 @dataclass(frozen=True)
 class _Sweeps:
     """Reads a frame's sweep, whose points lie in the world frame."""
 
-    files: tuple[Path, ...]
-    T_world_sensor: SE3
+    files: dict[int, Path]
+    poses: Poses
 
     def __call__(self, frame: int) -> Turn:
-        points, _ = read_sweep(self.files[frame])
-        return Turn(self.T_world_sensor[frame].inverse().apply_numpy(points).astype(np.float32))
+        number, path = list(self.files.items())[frame]
+        points, times = read_sweep(path)
+        stamp = self.poses.stamps[number]
+        T_sensor_world = self.poses.sensor_pose(number, stamp).inverse()
+        steps = np.clip(np.rint((times - stamp) / _STEP_S), -_MOST_STEPS, _MOST_STEPS)
+        places = np.empty(points.shape)
+        for step in np.unique(steps):
+            T_world_then = self.poses.sensor_pose(number, stamp + float(step) * _STEP_S)
+            places[steps == step] = T_world_then.translation.numpy()
+        seen, origins = (T_sensor_world.apply_numpy(one) for one in (points, places))
+        return Turn(seen.astype(np.float32), origins=origins.astype(np.float32))
 
 
 def find_pandaset(root: Path) -> list[Path]:
@@ -48,7 +66,7 @@ def open_pandaset(path: Path) -> Drive:
     return Drive.of(
         name=path.resolve().name,
         scan_names=[f"{frame:02d}" for frame in files],
-        read=_Sweeps(tuple(files.values()), T),
+        read=_Sweeps(files, drive),
         times=stamps,
         T_world_sensor=T,
         files=files.values(),

@@ -53,7 +53,7 @@ class _Frames:
 
     def __call__(self, frame: int) -> Turn:
         found = _reader(self.root, self.segment).at(self.times[frame])
-        return Turn(np.empty((0, 3), np.float32) if found is None else found.points())
+        return Turn(np.empty((0, 3), np.float32)) if found is None else found.turn()
 
 
 def find_segments(root: Path) -> list[Path]:

@@ -28,8 +28,8 @@ class FullScan:
 
     Attributes:
         points: `(s, 3)` its returns.
-        origins: `(s, 3)` where the ray of each began, where several sensors are merged, or one
-            that moved.
+        origins: where the ray of each began, and then that of each that is lost, where several
+            sensors are merged, or one that moved.
         lost: `(k, 3)` unit directions of rays of which the sensor's grid says that nothing came
             back; only of a single sensor.
     """
@@ -87,9 +87,12 @@ def sight_lines(
     if not len(rows):
         return None
     near = full.near(rows, most)
+    ends, lost = full.ends[near], near >= len(full.points)
     origins = None if full.origins is None else full.origins[near]
-    rays = SightLines.of_returns(full.ends[near], origins)
-    rays.ranges[near >= len(full.points)] = np.inf
+    if origins is not None:
+        ends[lost] += origins[lost]
+    rays = SightLines.of_returns(ends, origins)
+    rays.ranges[lost] = np.inf
     return rays
 
 
