@@ -91,7 +91,7 @@ def test_a_worse_model_is_refused(out, predictor, tmp_path, monkeypatch):
     measured(monkeypatch, replace(GOOD, cost_m=0.11))
     found = adapt_to([out], tmp_path, predictor, FEW)
     assert found.model is None
-    assert "not kept, for its shapes cost more; the first pass stays" in found.sentence
+    assert "not kept, for its shapes cost more; what was found stays" in found.sentence
     assert not (tmp_path / "adapted" / "model.safetensors").exists()
 
 

@@ -115,7 +115,7 @@ def test_too_few_vehicles_to_adapt_to_are_said(found, recording, tmp_path, capsy
     main(["drive", str(recording), "--out", str(out), "--adapt", "--no-report"])
     text = capsys.readouterr().out
     assert text.startswith("not adapted: ")
-    assert "are too few; the first pass stays" in text
+    assert "are too few; what was found stays" in text
     assert "found 4 vehicles" in text
     assert json.loads((out / "adapted.json").read_text("utf-8"))["kept"] is False
     assert wildshape.drive(recording, out, adapt=AdaptConfig()).vehicles == found.vehicles

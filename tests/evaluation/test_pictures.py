@@ -90,7 +90,10 @@ def test_examples_and_figures(tmp_path):
     paths = write_figures(tmp_path, results, examples)
     assert [p.name for p in paths] == ["errors.png", "examples.png"]
     assert all(p.read_bytes()[:4] == b"\x89PNG" for p in paths)
-    assert len(draw_examples(examples).axes) == 3 * 4
+    axes = draw_examples(examples).axes
+    assert len(axes) == 3 * 4
+    titles = [ax.get_title() for ax in axes[:4]]
+    assert titles == ["one scan", "truth", "m, completed", "m, fused"]
     icp, scan = Chained(LocalIcp()), OneScan()
     beside = gather(
         tracks, results, "m", Method(), fused_by={"ICP": icp}, completed_by={"scan": scan}

@@ -28,6 +28,7 @@ class Example:
         completed: `(m, 3)`, from the middle scan alone.
         fused: `(f, 3)`, all scans moved by the method; None if it does not register, or refuses.
         rivals: what other methods made of it, by the title of the picture.
+        method: the row of the evaluation that made it.
     """
 
     label: str
@@ -38,6 +39,7 @@ class Example:
     completed: Points
     fused: Points | None
     rivals: dict[str, Points | None] = field(default_factory=dict)
+    method: str = ""
 
 
 def pick(scores: MethodScores) -> dict[str, tuple[str, float]]:
@@ -82,7 +84,7 @@ def gather(
     }
     made = ((_example(label, cd, cases[t], method), cases[t]) for label, (t, cd) in chosen.items())
     return [
-        replace(example, rivals=_rivals(case, fused_by, completed_by))
+        replace(example, rivals=_rivals(case, fused_by, completed_by), method=name)
         for example, case in made
         if example is not None
     ]

@@ -44,9 +44,9 @@ def draw_examples(examples: Sequence[Example]) -> Figure:
     """A row an object: scan, truth, what its rivals made, the completion, the fused track."""
     from matplotlib.figure import Figure
 
-    rivals = tuple(examples[0].rivals) if examples else ()
-    made = tuple(f"ours, {title}" for title in _MADE) if rivals else _MADE
-    panels = (*_SEEN, *rivals, *made)
+    rivals = tuple(examples[0].rivals)
+    whose = "ours" if rivals else examples[0].method
+    panels = (*_SEEN, *rivals, *(f"{whose}, {title}" for title in _MADE))
     figure = Figure(figsize=(3.2 * len(panels), 2.5 * len(examples)), layout="constrained")
     axes = figure.subplots(len(examples), len(panels), squeeze=False)
     for row, example in zip(axes, examples, strict=True):

@@ -82,6 +82,15 @@ def test_without_the_recording_the_vehicles_are_drawn_alone(found, tmp_path):
     refused(report_from_drive, out, tmp_path / "few", match="1 scans")
 
 
+def test_a_page_says_that_an_adapted_model_made_it(found, tmp_path):
+    out = shutil.copytree(found.out, tmp_path / "found")
+    said = json.loads((out / "wildshape.json").read_text())
+    (out / "wildshape.json").write_text(json.dumps({**said, "adapted": "4e07bcce7285b479"}))
+    first, second = (report_from_drive(folder).notes for folder in (found.out, out))
+    (note,) = set(second) - set(first)
+    assert "are of a model adapted" in note
+
+
 def test_a_page_says_which_vehicle_s_scans_are_lost(found, tmp_path):
     out = shutil.copytree(found.out, tmp_path / "found")
     lost, whole = CARS

@@ -107,11 +107,12 @@ def test_without_truth_the_least_confident_come_first(tmp_path: Path) -> None:
 
 def test_what_is_not_to_be_trusted_says_why(tmp_path: Path) -> None:
     entries = [_entry(name) for name in NAMES]
+    entries[1] |= {"confidence": 0.4, "reasons": ["low_confidence"]}
     entries[2] |= {"confidence": 0.01, "reasons": ["poor_fit", "low_confidence"]}
     _completed(tmp_path / "wall", _track(), {"input": "", "scans": entries})
     report = report_from_folder(tmp_path)
-    assert report.index[0].rows[0][-1] == "poor fit, low confidence"
-    assert any("Results not to be trusted: 1;" in line for line in report.findings)
+    assert report.index[0].rows[0][-2:] == ("0.01", "poor fit, low confidence")
+    assert any("Results not to be trusted: 2;" in line for line in report.findings)
 
 
 def test_probabilities_of_the_least_sure_scan_are_shown(tmp_path: Path) -> None:
@@ -221,7 +222,7 @@ def test_metrics_and_log_become_table_and_curves(tmp_path: Path) -> None:
     assert "rot, deg" not in row
     series = {c.title: [name for name, _, _ in c.series] for c in report.curves}
     assert series["Loss"] == ["loss", "observation"]
-    assert series["Cycle consistency on held-out tracks"] == ["cycle"]
+    assert series["Validation, cycle consistency"] == ["cycle"]
     against = {title: names for title, names in series.items() if "against truth" in title}
     assert list(against.values()) == [["truth_cd"], ["truth_rot_median"]]
     assert report.provenance == {"evaluation/metrics.json": {"commit": "abc"}}

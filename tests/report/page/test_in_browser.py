@@ -54,7 +54,10 @@ def _report() -> Report:
         title="In a browser",
         tables=(metrics_table(_metrics()),),
         index=(_index(),),
-        curves=(Curve("Loss", "step", "metres", (("loss", [1, 2, 3], [1.0, 0.5, 0.2]),), True),),
+        curves=tuple(
+            Curve(title, "step", "metres", (("loss", [1, 2, 3], values),), log_y=True)
+            for title, values in (("Loss", [1.0, 0.5, 0.2]), ("Flat", [0.091, 0.08, 0.0755]))
+        ),
         objects=(
             ReportObject("a <b>", clouds=both, scans=scans),
             ReportObject("b", clouds=both[1:]),
@@ -80,7 +83,9 @@ def test_page_draws_turns_and_stays_silent(page: Page, tmp_path: Path) -> None:
     write_report(_report(), tmp_path / "report.html")
     page.open((tmp_path / "report.html").as_uri())
     page.wait("document.querySelectorAll('.plot canvas').length >= 2")
-    page.wait("document.querySelectorAll('.curve .main-svg').length >= 1")
+    page.wait("document.querySelectorAll('.curve .main-svg').length >= 2")
+    ticks = "[...document.querySelectorAll('.curve')].map(c => c.querySelectorAll('.ytick').length)"
+    assert min(page.ask(ticks)) >= 2
     page.ask("document.querySelector('#panels').scrollIntoView({ block: 'center' })")
     for panel in (0, 1):
         eventually(partial(page.picture, panel), lambda p: colourful(p) > 300, f"{panel} is blank")

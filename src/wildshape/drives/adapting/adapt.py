@@ -63,10 +63,10 @@ class Adaptation:
         if self.before is None or self.after is None:
             clear, unclear = counted(self.trained, "vehicle track"), f"{self.unclear} unclear"
             return (
-                f"not adapted: {clear} to learn from ({unclear}) are too few; the first pass stays"
+                f"not adapted: {clear} to learn from ({unclear}) are too few; what was found stays"
             )
         if self.worse:
-            end = f"not kept, for {' and '.join(self.worse)}; the first pass stays"
+            end = f"not kept, for {' and '.join(self.worse)}; what was found stays"
         else:
             end = f"kept; the weights are {self.model}"
         return (

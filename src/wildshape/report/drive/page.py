@@ -31,6 +31,10 @@ _SHOWN_S = 0.05  # less of a stage reads 0.0
 _NOTES = (
     "Drift can be told only where true poses are known: wildshape evaluate-drive measures it.",
 )
+_ADAPTED = (
+    "Boxes and shapes are of a model adapted to what was found (--adapt); those of the model it"
+    " began with are in first/.",
+)
 _COLUMNS = (
     "vehicle",
     "",
@@ -74,6 +78,7 @@ def drive_report(found: FinishedDrive, drive: Drive | None) -> Report:
     """The page's content; without the recording the scene shows no scans."""
     said = found.record.get("result") or {}
     gone = () if drive is not None else (f"{found.source} cannot be read: no scans are drawn.",)
+    adapted = _ADAPTED if "adapted" in found.record else ()
     shown = found.vehicles[:MOST_OBJECTS]
     scans = drawn_scans(found, drive)
     return Report(
@@ -83,7 +88,7 @@ def drive_report(found: FinishedDrive, drive: Drive | None) -> Report:
         index=(_index(found),) if found.vehicles else (),
         objects=tuple(_object(found, one) for one in shown),
         cost=tuple(_cost(said.get("seconds") or {})),
-        notes=(*gone, *map(str, said.get("warnings") or ()), *_NOTES),
+        notes=(*gone, *adapted, *map(str, said.get("warnings") or ()), *_NOTES),
         provenance=found.record.get("provenance") or {},
     )
 

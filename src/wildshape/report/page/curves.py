@@ -25,15 +25,15 @@ def training_curves(log: Path) -> tuple[Curve, ...]:
     entries = list(whole_entries(log))
     terms = _terms(entries)
     unit = "no unit" if "silhouette" in terms else "metres"  # DPC's count pixels
-    held_out = _series(entries, tuple(f"{_VALIDATION}{k}" for k in ("observation", "projection")))
+    validated = _series(entries, tuple(f"{_VALIDATION}{k}" for k in ("observation", "projection")))
     cycle = _series(entries, (f"{_VALIDATION}cycle_deg",))
     curves = (
         Curve("Loss", "step", unit, _series(entries, terms), log_y=True),
         Curve("Share of each pose branch", "step", "share", _shares(entries)),
-        Curve("Held-out tracks, without truth", "step", "metres", held_out, log_y=True),
-        Curve("Cycle consistency on held-out tracks", "step", "degrees", cycle),
+        Curve("Validation, without truth", "step", "metres", validated, log_y=True),
+        Curve("Validation, cycle consistency", "step", "degrees", cycle),
         *(
-            Curve(f"Held-out tracks against truth: {what}", "step", unit, series)
+            Curve(f"Validation against truth: {what}", "step", unit, series)
             for key, (what, unit) in _TRUTH.items()
             for series in (_series(entries, (f"{_VALIDATION}truth_{key}",)),)
         ),

@@ -51,14 +51,17 @@ class Judged:
     @property
     def chances(self) -> dict[str, float]:
         """What the least confident of its scans states, by the words for it."""
-        entries = sorted(self.result.entries, key=_confidence)
-        return chances_of(entries[:1])
+        return chances_of(self._least_sure_first[:1])
 
     @property
     def warning(self) -> str:
-        """Why the first of its scans that is in doubt is not to be trusted, or nothing."""
-        doubts = map(doubt_of, self.result.entries)
+        """Why the least confident of its scans in doubt is not to be trusted, or nothing."""
+        doubts = map(doubt_of, self._least_sure_first)
         return next(filter(None, doubts), "")
+
+    @property
+    def _least_sure_first(self) -> list[dict[str, Any]]:
+        return sorted(self.result.entries, key=_confidence)
 
 
 def judge(result: TrackResult) -> Judged:

@@ -304,13 +304,16 @@
         zeroline: false, linecolor: ink("--line"), automargin: true });
       const lines = curve.series.map((s) => ({ type: "scatter", mode: s.x.length > 1 ? "lines" : "markers",
         x: s.x, y: s.y, name: plain(s.name), line: { color: dark.matches ? mix(s.color, "#ffffff", 0.3) : s.color, width: 2 } }));
+      const heights = curve.series.flatMap((s) => s.y);
+      const [low, high] = [Math.min, Math.max].map((of) => heights.reduce((a, b) => of(a, b)));
+      const wide = high > 5 * low; // of 1, 2, 5, 10 a narrower span may hold none
       Plotly.react("curve" + i, lines, { margin: { l: 56, r: 12, t: 8, b: 44 }, hovermode: "x unified",
         paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", dragmode: false,
         hoverlabel: { bgcolor: ink("--card"), font: { color: ink("--ink") } },
         font: { color: ink("--ink"), family: "system-ui, sans-serif", size: 12 },
         showlegend: curve.series.length > 1, legend: { orientation: "h", y: 1.02, yanchor: "bottom" },
         xaxis: axis(curve.x_label), yaxis: { ...axis(curve.y_label), type: curve.log_y ? "log" : "linear",
-          dtick: curve.log_y ? "D2" : undefined, tickformat: "~g" } }, bare);
+          dtick: curve.log_y && wide ? "D2" : undefined, tickformat: "~g" } }, bare);
     });
   }
 
