@@ -229,6 +229,31 @@ def test_scans_without_their_ground_and_scans_in_feet_are_said(scans):
     assert "5.6 m below the sensor, higher than on any vehicle" in told
 
 
+def test_ground_that_was_cut_off_at_a_height_is_said():
+    """What is lowest of vehicles and pavements passes for ground: boxes were 0.27 m too high."""
+    rng = np.random.default_rng(0)
+    whole = []
+    for _ in range(4):
+        road, walls, verge = rng.uniform(-14.0, 14.0, (3, 30_000, 3)).astype(np.float32)
+        road[:, 2] = -1.7 - 0.001 * road[:, 1] ** 2 + rng.normal(scale=0.02, size=len(road))
+        verge[:, 2] = -1.5 + rng.normal(scale=0.03, size=len(verge))
+        walls[:, 1:] = np.abs(walls[:, 1:]) / (200.0, 4.0) + (9.0, -1.8)
+        road = road[np.hypot(road[:, 0], road[:, 1]) > 3]
+        whole.append(np.concatenate((road, walls, verge[verge[:, 1] > 6])))
+    for cut, told in ((-1.65, 1), (-1.55, 1), (-2.1, 0), (-9.0, 0)):
+        scans = [scan[scan[:, 2] > cut] for scan in whole]
+        found = find_mounting(drive_of(scans), MountingConfig()).told()
+        assert len(found) == told
+        assert all(f"lower than {-cut:.2f} m below the sensor" in one for one in found)
+
+
+def test_ground_that_most_of_was_taken_away_is_said():
+    found = Mounting(1.4, 0.0, (0.0, 0.0, 1.0), ground=0.1, spread_m=0.5)
+    (told,) = found.told()
+    assert "differs by 0.5 m from scan to scan" in told
+    assert replace(found, spread_m=0.03).told() == []
+
+
 def test_scans_in_one_common_frame_are_said():
     seen = street(frames=5, speed=6.0)
     places = np.column_stack((seen.places, np.zeros(5))).astype(np.float32)

@@ -25,6 +25,10 @@ _OFF_UNIT = 1e-3
 _LOWEST_M = 0.15  # no sensor that sees vehicles sits lower
 _HIGHEST_M = 4.5  # nor higher, on a vehicle
 _LEAST_GROUND = 0.05  # of the points near the sensor; less is what a removal of ground leaves
+_SPREAD_M = 0.2  # no more differ the heights found, on streets 0.03; without ground 0.07 and more
+_EDGE_SCANS, _EDGE_POINTS = 3, 20
+_EDGE_M, _EDGE_THICK_M = 2e-3, 5e-3  # scans cut off at a height end alike to 1 mm, others to 5
+_EDGE_BELOW_M = 0.2  # what is cut off so far below the ground is none of it
 _SOON = (5, 10, 20)  # frames that are looked at beside those of the config
 _BELOW_M, _BELOW_POINTS, _BELOW_SCANS = 1.0, 10, 2  # ground seen right below the sensor
 _UPSIDE_DOWN = np.array((1.0, -1.0, -1.0), np.float32)
@@ -42,6 +46,8 @@ class Mounting:
         up: `(3,)` the vertical in the sensor frame, unit length; (0, 0, 1) for one held level.
         ground: share of the points near the sensor that lie on the ground.
         common: whether scans seem to be in one frame, that of the first.
+        spread_m: of the heights found in single scans, from the lower to the upper quartile.
+        cut_m: so far below the sensor scans seem to be cut off, at the ground or above it; 0: not.
     """
 
     height_m: float
@@ -49,6 +55,8 @@ class Mounting:
     up: tuple[float, float, float]
     ground: float = 1.0
     common: bool = False
+    spread_m: float = 0.0
+    cut_m: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what is no vertical.
@@ -81,6 +89,16 @@ class Mounting:
             told.append(
                 f"hardly any ground is seen, {100 * self.ground:.0f} % of the points near the"
                 " sensor: give scans with their ground"
+            )
+        elif self.cut_m:
+            told.append(
+                f"no scan shows anything lower than {self.cut_m:.2f} m below the sensor, as if its"
+                " ground were cut off: boxes may be too high; give scans with their ground"
+            )
+        elif self.spread_m > _SPREAD_M:
+            told.append(
+                f"the ground's height differs by {self.spread_m:.1f} m from scan to scan, as if"
+                " most of it were taken away: give scans with their ground"
             )
         if self.common:
             told.append(
@@ -142,7 +160,32 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
     if tilt < config.level_deg:
         up = np.array((0.0, 0.0, 1.0))
     x, y, z = up.tolist()
-    return Mounting(height, tilt, (x, y, z), share, _in_common(drive, chosen, config))
+    return Mounting(
+        height,
+        tilt,
+        (x, y, z),
+        share,
+        _in_common(drive, chosen, config),
+        float(np.subtract(*np.percentile(found[:, 3], (75, 25)))),
+        _cut_off(scans, height, config),
+    )
+
+
+def _cut_off(scans: list[Points], height_m: float, config: MountingConfig) -> float:
+    """How far below the sensor all scans end alike, at the ground found or above it; else 0."""
+    every = [near[:, 2] for near in (_near(scan, config) for scan in scans) if len(near)]
+    lowest = [float(z.min()) for z in every]
+    at_edge = [int((z < low + _EDGE_THICK_M).sum()) for z, low in zip(every, lowest)]
+    if len(every) < _EDGE_SCANS or np.median(at_edge) < _EDGE_POINTS:
+        return 0.0
+    below_m = -min(lowest)
+    alike = max(lowest) - min(lowest) < _EDGE_M
+    return below_m if alike and height_m > below_m - _EDGE_BELOW_M else 0.0
+
+
+def _near(points: Points, config: MountingConfig) -> Points:
+    """Those around the sensor."""
+    return points[(points[:, :2] ** 2).sum(1) < config.reach_m**2]
 
 
 def _in_common(drive: Drive, chosen: Int[np.ndarray, "k"], config: MountingConfig) -> bool:
@@ -184,7 +227,7 @@ def _on_ground(scans: list[Points], planes: list[Plane | None], config: Mounting
     """The share of the points around the sensor that lie on the ground, of the middle scan."""
     shares = []
     for points, plane in zip(scans, planes):
-        near = points[(points[:, :2] ** 2).sum(1) < config.reach_m**2]
+        near = _near(points, config)
         away = near[:0] if plane is None else np.abs(near @ plane[:3] + plane[3])
         shares.append(float((away < config.thick_m).sum()) / max(len(near), 1))
     return float(np.median(shares))
@@ -196,7 +239,7 @@ def ground_plane(points: Points, config: MountingConfig) -> Plane | None:
     None where a scan shows no ground: hardly any points, or no plane that is level enough.
     """
     rng = np.random.default_rng(0)
-    near = points[(points[:, :2] ** 2).sum(1) < config.reach_m**2].astype(np.float64)
+    near = _near(points, config).astype(np.float64)
     near = near[rng.permutation(len(near))[:_MOST_POINTS]]
     if len(near) < _FEWEST_POINTS:
         return None
