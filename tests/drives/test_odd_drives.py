@@ -180,11 +180,23 @@ def test_poses_whose_z_looks_down_or_whose_frame_is_turned_are_said():
         (path, []),
         (axes @ path @ axes, ["y and z reversed"]),
         (path @ turned, ["turned by 4 degrees about"]),
+        (drifting(path, 0.4), ["turned by 0.4 degrees more each scan"]),
+        (drifting(path, -0.2), ["turned by 0.2 degrees more each scan"]),
     ):
         drive = replace(drive_of(scans), T_world_sensor=poses)
         found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
         assert len(found) == len(told)
         assert all(word in said for word, said in zip(told, found))
+
+
+def drifting(path, degrees):
+    """Each step turned so much too far."""
+    turn = rotation_z(torch.tensor(math.radians(degrees)).double())
+    poses = [path[0]]
+    for frame in range(1, len(path)):
+        step = path[frame - 1].inverse() @ path[frame]
+        poses.append(poses[-1] @ step @ SE3(turn, torch.zeros(3).double()))
+    return SE3.from_matrix(torch.stack([pose.matrix for pose in poses]))
 
 
 def path_of(places):
