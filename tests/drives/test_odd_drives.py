@@ -224,6 +224,19 @@ def test_a_sensor_upside_down_is_refused_and_a_tilted_one_is_not(scans, tmp_path
     assert tilted.tilt_deg == pytest.approx(20, abs=0.5)
 
 
+def test_a_sensor_under_a_low_ceiling_does_not_hang():
+    """Of 16 beams more meet the ceiling than the floor: a car park was refused as upside down."""
+    rng = np.random.default_rng(0)
+    floor, ceiling, cars = rng.uniform(-14.0, 14.0, (3, 8000, 3)).astype(np.float32)
+    floor[:, 2], ceiling[:, 2] = -1.7, 0.5
+    cars[:, 2] = rng.uniform(-1.5, 0.0, size=len(cars))
+    scan = np.concatenate((floor[:2500], ceiling, cars[np.abs(cars[:, 1]) > 5]))
+    scan += rng.normal(scale=0.01, size=scan.shape).astype(np.float32)
+    found = find_mounting(drive_of([scan]), MountingConfig())
+    assert found.height_m == pytest.approx(1.7, abs=0.05)
+    assert 0.1 < found.ground < 0.2
+
+
 def test_scans_in_the_frame_of_a_vehicle_are_said(scans):
     """Its origin lies on the road: what a ray passed is not what the sensor looked through."""
     of_vehicle = [scan + np.array((1.0, 0.0, 1.7), np.float32) for scan in scans]

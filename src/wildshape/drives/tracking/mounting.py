@@ -8,7 +8,7 @@ slope.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -26,9 +26,10 @@ _LOWEST_M = 0.15  # no sensor that sees vehicles sits lower
 _HIGHEST_M = 4.5  # nor higher, on a vehicle
 _LEAST_GROUND = 0.05  # of the points near the sensor; less is what a removal of ground leaves
 _SPREAD_M = 0.2  # no more differ the heights found, on streets 0.03; without ground 0.07 and more
-_EDGE_SCANS, _EDGE_POINTS = 3, 20
-_EDGE_M, _EDGE_THICK_M = 2e-3, 5e-3  # scans cut off at a height end alike to 1 mm, others to 5
+_EDGE_SCANS, _EDGE_M, _EDGE_POINTS = 3, 5e-3, 20
+_EDGE_ALIKE = 10.0  # scans cut off at a height end up to 4 points' distances apart, others 22
 _EDGE_BELOW_M = 0.2  # what is cut off so far below the ground is none of it
+_HARDER, _HANGING = 10, 0.1  # no more of scans upside down lies on what looks like ground
 _SOON = (5, 10, 20)  # frames that are looked at beside those of the config
 _BELOW_M, _BELOW_POINTS, _BELOW_SCANS = 1.0, 10, 2  # ground seen right below the sensor
 _UPSIDE_DOWN = np.array((1.0, -1.0, -1.0), np.float32)
@@ -138,10 +139,14 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
     planes = [ground_plane(scan, config) for scan in scans]
     share = _on_ground(scans, planes, config)
     if share <= config.ground and _hangs(scans, share, config):
-        raise BadInputError(
-            f"{drive.name}: the ground lies above the sensor, as if it hung upside down; turn the"
-            " scans by 180 degrees about x, so that z points up."
-        )
+        harder = replace(config, trials=_HARDER * config.trials)  # a floor under a ceiling is small
+        planes = [ground_plane(scan, harder) for scan in scans]
+        share = _on_ground(scans, planes, config)
+        if share <= _HANGING:
+            raise BadInputError(
+                f"{drive.name}: the ground lies above the sensor, as if it hung upside down; turn"
+                " the scans by 180 degrees about x, so that z points up."
+            )
     found = np.array([plane for plane in planes if plane is not None])
     if not len(found):
         drive.read(int(chosen[0]))  # says why if it cannot be read
@@ -175,11 +180,11 @@ def _cut_off(scans: list[Points], height_m: float, config: MountingConfig) -> fl
     """How far below the sensor all scans end alike, at the ground found or above it; else 0."""
     every = [near[:, 2] for near in (_near(scan, config) for scan in scans) if len(near)]
     lowest = [float(z.min()) for z in every]
-    at_edge = [int((z < low + _EDGE_THICK_M).sum()) for z, low in zip(every, lowest)]
-    if len(every) < _EDGE_SCANS or np.median(at_edge) < _EDGE_POINTS:
+    at_edge = float(np.median([(z < low + _EDGE_M).sum() for z, low in zip(every, lowest)]))
+    if len(every) < _EDGE_SCANS or at_edge < _EDGE_POINTS:
         return 0.0
     below_m = -min(lowest)
-    alike = max(lowest) - min(lowest) < _EDGE_M
+    alike = max(lowest) - min(lowest) < _EDGE_ALIKE * _EDGE_M / at_edge
     return below_m if alike and height_m > below_m - _EDGE_BELOW_M else 0.0
 
 
