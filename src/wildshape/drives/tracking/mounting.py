@@ -29,6 +29,7 @@ _SPREAD_M = 0.2  # no more differ the heights found, on streets 0.03; without gr
 _EDGE_SCANS, _EDGE_M, _EDGE_POINTS = 3, 5e-3, 20
 _EDGE_ALIKE = 10.0  # scans cut off at a height end up to 4 points' distances apart, others 22
 _EDGE_BELOW_M = 0.2  # what is cut off so far below the ground is none of it
+_EVEN_M = 0.02  # an even floor's noise ends so near below it
 _HARDER, _HANGING = 10, 0.1  # no more of scans upside down lies on what looks like ground
 _SOON = (5, 10, 20)  # frames that are looked at beside those of the config
 _BELOW_M, _BELOW_POINTS, _BELOW_SCANS = 1.0, 10, 2  # ground seen right below the sensor
@@ -185,7 +186,8 @@ def _cut_off(scans: list[Points], height_m: float, config: MountingConfig) -> fl
         return 0.0
     below_m = -min(lowest)
     alike = max(lowest) - min(lowest) < _EDGE_ALIKE * _EDGE_M / at_edge
-    return below_m if alike and height_m > below_m - _EDGE_BELOW_M else 0.0
+    lower_m = below_m - height_m
+    return below_m if alike and lower_m < _EDGE_BELOW_M and abs(lower_m) > _EVEN_M else 0.0
 
 
 def _near(points: Points, config: MountingConfig) -> Points:
