@@ -180,11 +180,23 @@ def test_poses_whose_z_looks_down_or_whose_frame_is_turned_are_said():
         (path, []),
         (axes @ path @ axes, ["y and z reversed"]),
         (path @ turned, ["turned by 4 degrees about"]),
+        (drifting(path, 0.4), ["turned by 0.4 degrees more each scan"]),
+        (drifting(path, -0.2), ["turned by 0.2 degrees more each scan"]),
     ):
         drive = replace(drive_of(scans), T_world_sensor=poses)
         found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
         assert len(found) == len(told)
         assert all(word in said for word, said in zip(told, found))
+
+
+def drifting(path, degrees):
+    """Each step turned so much too far."""
+    turn = rotation_z(torch.tensor(math.radians(degrees)).double())
+    poses = [path[0]]
+    for frame in range(1, len(path)):
+        step = path[frame - 1].inverse() @ path[frame]
+        poses.append(poses[-1] @ step @ SE3(turn, torch.zeros(3).double()))
+    return SE3.from_matrix(torch.stack([pose.matrix for pose in poses]))
 
 
 def path_of(places):
@@ -212,6 +224,19 @@ def test_a_sensor_upside_down_is_refused_and_a_tilted_one_is_not(scans, tmp_path
     assert tilted.tilt_deg == pytest.approx(20, abs=0.5)
 
 
+def test_a_sensor_under_a_low_ceiling_does_not_hang():
+    """Of 16 beams more meet the ceiling than the floor: a car park was refused as upside down."""
+    rng = np.random.default_rng(0)
+    floor, ceiling, cars = rng.uniform(-14.0, 14.0, (3, 8000, 3)).astype(np.float32)
+    floor[:, 2], ceiling[:, 2] = -1.7, 0.5
+    cars[:, 2] = rng.uniform(-1.5, 0.0, size=len(cars))
+    scan = np.concatenate((floor[:2500], ceiling, cars[np.abs(cars[:, 1]) > 5]))
+    scan += rng.normal(scale=0.01, size=scan.shape).astype(np.float32)
+    found = find_mounting(drive_of([scan]), MountingConfig())
+    assert found.height_m == pytest.approx(1.7, abs=0.05)
+    assert 0.1 < found.ground < 0.2
+
+
 def test_scans_in_the_frame_of_a_vehicle_are_said(scans):
     """Its origin lies on the road: what a ray passed is not what the sensor looked through."""
     of_vehicle = [scan + np.array((1.0, 0.0, 1.7), np.float32) for scan in scans]
@@ -227,6 +252,31 @@ def test_scans_without_their_ground_and_scans_in_feet_are_said(scans):
     feet = [scan / np.float32(0.3048) for scan in scans]
     (told,) = find_mounting(drive_of(feet), MountingConfig()).told()
     assert "5.6 m below the sensor, higher than on any vehicle" in told
+
+
+def test_ground_that_was_cut_off_at_a_height_is_said():
+    """What is lowest of vehicles and pavements passes for ground: boxes were 0.27 m too high."""
+    rng = np.random.default_rng(0)
+    whole = []
+    for _ in range(4):
+        road, walls, verge = rng.uniform(-14.0, 14.0, (3, 30_000, 3)).astype(np.float32)
+        road[:, 2] = -1.7 - 0.001 * road[:, 1] ** 2 + rng.normal(scale=0.02, size=len(road))
+        verge[:, 2] = -1.5 + rng.normal(scale=0.03, size=len(verge))
+        walls[:, 1:] = np.abs(walls[:, 1:]) / (200.0, 4.0) + (9.0, -1.8)
+        road = road[np.hypot(road[:, 0], road[:, 1]) > 3]
+        whole.append(np.concatenate((road, walls, verge[verge[:, 1] > 6])))
+    for cut, told in ((-1.65, 1), (-1.55, 1), (-2.1, 0), (-9.0, 0)):
+        scans = [scan[scan[:, 2] > cut] for scan in whole]
+        found = find_mounting(drive_of(scans), MountingConfig()).told()
+        assert len(found) == told
+        assert all(f"lower than {-cut:.2f} m below the sensor" in one for one in found)
+
+
+def test_ground_that_most_of_was_taken_away_is_said():
+    found = Mounting(1.4, 0.0, (0.0, 0.0, 1.0), ground=0.1, spread_m=0.5)
+    (told,) = found.told()
+    assert "differs by 0.5 m from scan to scan" in told
+    assert replace(found, spread_m=0.03).told() == []
 
 
 def test_scans_in_one_common_frame_are_said():

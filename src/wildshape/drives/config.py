@@ -42,7 +42,7 @@ class MountingConfig:
         steepest_deg: no sensor is mounted with more tilt.
         below: share of the points that may lie below the ground: reflections, ditches.
         ground: a larger share of the points nearby lies on the ground: on real and simulated
-            streets 0.28 and more; of scans upside down less than 0.1 lies on what looks like it.
+            streets 0.28 and more.
         object_m: scans that are smaller are of an object; the longest lorries are as long.
         level_deg: less tilt than this is the road's, not the sensor's, and is left alone.
     """

@@ -72,6 +72,24 @@ def test_times_are_read_from_packed_clouds_and_from_records_too(tmp_path, kind):
     assert turn.seconds == pytest.approx(TURN, abs=1e-6)
 
 
+@pytest.mark.parametrize("began", [0.0, 259_200.0, 4.2e8])  # of the scan, the week, less 1e9
+@pytest.mark.parametrize("kind", [".las", ".laz"])
+def test_times_are_read_from_las_too(tmp_path, kind, began):
+    """They were left out of it without a word; points of zeros have none."""
+    import laspy
+
+    cloud = laspy.create(point_format=6, file_version="1.4")
+    cloud.header.scales = np.full(3, 1e-3)
+    cloud.x, cloud.y = np.arange(200) / 8, np.full(200, 5.0)
+    cloud.write(tmp_path / f"none{kind}")
+    assert read_turn(tmp_path / f"none{kind}", began).seconds is None
+    cloud.gps_time = began + TURN
+    cloud.write(tmp_path / f"scan{kind}")
+    turn = read_turn(tmp_path / f"scan{kind}", began)
+    assert turn.points[:, 0] == pytest.approx(np.arange(200) / 8, abs=1e-3)
+    assert turn.seconds == pytest.approx(TURN, abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("name", "head"),
     [

@@ -31,12 +31,13 @@ _BESIDE_M, _PEAK = 0.5, 0.05
 _JUMP_M = 0.5  # a smaller change of step a scan may be the driver's
 _FAR_M = (5.0, 12.0)  # scans so far apart tell a way that is a twentieth too long
 _TIMES = (0.85, 0.9, 0.95, 1.05, 1.1, 1.15)
-_TURNS_DEG = (-8, -6, -4, -2, 2, 4, 6, 8)  # of what is turned more too little fits
+_TURNS_DEG = (-8.0, -6.0, -4.0, -2.0, 2.0, 4.0, 6.0, 8.0)  # of what is turned more too little fits
+_DRIFTS_DEG = (-0.4, -0.2, -0.1, 0.1, 0.2, 0.4)  # a scan
 _CAP_M, _CLOSER_M = 0.5, 0.03
 
 _WITHOUT = (
     "the poses do not fit the scans, which lie better on each other without them: give"
-    " T_world_sensor in metres, and scans as the sensor saw them"
+    " T_world_sensor in metres, not a camera's poses, and scans as the sensor saw them"
 )
 _STILL = (
     "by the poses the sensor hardly moves, but its scans do not lie on each other: give"
@@ -59,8 +60,12 @@ _AXES = (
     " the scans, z up"
 )
 _TURNED = (
-    "the poses fit the scans better turned by {} degrees about the sensor's z: give T_world_sensor,"
-    " not the poses of another frame of the vehicle"
+    "the poses fit the scans better turned by {:g} degrees about the sensor's z: give"
+    " T_world_sensor, not the poses of another frame of the vehicle"
+)
+_DRIFTS = (
+    "the poses fit the scans better turned by {} degrees more each scan: their heading drifts; mend"
+    " T_world_sensor, or leave it out"
 )
 _INVERSE = (
     "the inverse of the poses fits the scans better: give T_world_sensor, not its inverse, in the"
@@ -82,9 +87,9 @@ def misfit(drive: Drive, mounting: Mounting, config: DriveConfig) -> str:
     leaves 0.27.
 
     Scans farther apart are also laid on each other by ways that are longer or shorter, in axes
-    turned about z, and with y and z reversed, as z may look down. On seven drives none of these
-    came as close as the right poses; ways 5 % wrong were 3 cm worse than right ones at the least,
-    reversed axes 7 cm, on six drives a turn of 2 degrees 10 cm.
+    turned about z, with y and z reversed, as z may look down, and turned more each scan. On seven
+    drives none of these came as close as the right poses; ways 5 % wrong were 3 cm worse than right
+    ones at the least, reversed axes 7 cm, on six drives a turn of 2 degrees 10 cm.
     """
     T = drive.T_world_sensor
     if T is None:
@@ -131,25 +136,42 @@ def _beside(T_target_source: SE3) -> list[SE3]:
 
 
 def _otherwise(drive: Drive, T: SE3, mounting: Mounting, config: DriveConfig) -> str:
-    """A sentence if the poses fit clearly better at another scale, or in other axes."""
-    axes = torch.diag(torch.tensor((1.0, -1.0, -1.0), dtype=torch.float64))
-    turns = [axes, *(rotation_z(torch.tensor(angle).double().deg2rad()) for angle in _TURNS_DEG)]
+    """A sentence if the poses fit clearly better at another scale, in other axes or less turned."""
     told = [_AXES, *(_TURNED.format(abs(angle)) for angle in _TURNS_DEG)]
     told += [_TIMES_WRONG.format(times) for times in _TIMES]
+    told += [_DRIFTS.format(abs(angle)) for angle in _DRIFTS_DEG]
     rows = []
     for start, end in _far_pairs(T):
         source, target = (_standing(drive, at, mounting, config) for at in (start, end))
         if min(len(source), len(target)) >= _FEWEST_POINTS:
             given = T[end].inverse() @ T[start]
-            frames = [SE3(turn, torch.zeros(3, dtype=torch.float64)) for turn in turns]
-            turned = [frame @ given @ frame.inverse() for frame in frames]
-            motions = (given, *turned, *(given.scaled(times) for times in _TIMES))
+            motions = (given, *_others(given, drive.ticks[end] - drive.ticks[start]))
             rows.append([float(_away(source, target, one).mean()) for one in motions])
     if not rows:
         return ""
     given_m, *others_m = np.median(rows, axis=0).tolist()
     best = int(np.argmin(others_m))
     return told[best] if others_m[best] < given_m - _CLOSER_M else ""
+
+
+def _others(T_target_source: SE3, ticks: int) -> list[SE3]:
+    """The same motion in the other axes, at the other scales, and without each drift so long."""
+    axes = torch.diag(torch.tensor((1.0, -1.0, -1.0), dtype=torch.float64))
+    frames = [_turned(axes), *(_turned(rotation_z(turn)) for turn in _radians(_TURNS_DEG))]
+    halves = [_turned(rotation_z(ticks / 2 * turn)) for turn in _radians(_DRIFTS_DEG)]
+    return [
+        *(frame @ T_target_source @ frame.inverse() for frame in frames),
+        *(T_target_source.scaled(times) for times in _TIMES),
+        *(half @ T_target_source @ half for half in halves),
+    ]
+
+
+def _radians(degrees: Sequence[float]) -> torch.Tensor:
+    return torch.tensor(degrees, dtype=torch.float64).deg2rad()
+
+
+def _turned(rotation: torch.Tensor) -> SE3:
+    return SE3(rotation, torch.zeros(3, dtype=torch.float64))
 
 
 def _jump(drive: Drive, T_world_sensor: SE3, mounting: Mounting, config: DriveConfig) -> str:

@@ -8,7 +8,7 @@ slope.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -25,6 +25,12 @@ _OFF_UNIT = 1e-3
 _LOWEST_M = 0.15  # no sensor that sees vehicles sits lower
 _HIGHEST_M = 4.5  # nor higher, on a vehicle
 _LEAST_GROUND = 0.05  # of the points near the sensor; less is what a removal of ground leaves
+_SPREAD_M = 0.2  # no more differ the heights found, on streets 0.03; without ground 0.07 and more
+_EDGE_SCANS, _EDGE_M, _EDGE_POINTS = 3, 5e-3, 20
+_EDGE_ALIKE = 10.0  # scans cut off at a height end up to 4 points' distances apart, others 22
+_EDGE_BELOW_M = 0.2  # what is cut off so far below the ground is none of it
+_EVEN_M = 0.02  # an even floor's noise ends so near below it
+_HARDER, _HANGING = 10, 0.1  # no more of scans upside down lies on what looks like ground
 _SOON = (5, 10, 20)  # frames that are looked at beside those of the config
 _BELOW_M, _BELOW_POINTS, _BELOW_SCANS = 1.0, 10, 2  # ground seen right below the sensor
 _UPSIDE_DOWN = np.array((1.0, -1.0, -1.0), np.float32)
@@ -42,6 +48,8 @@ class Mounting:
         up: `(3,)` the vertical in the sensor frame, unit length; (0, 0, 1) for one held level.
         ground: share of the points near the sensor that lie on the ground.
         common: whether scans seem to be in one frame, that of the first.
+        spread_m: of the heights found in single scans, from the lower to the upper quartile.
+        cut_m: so far below the sensor scans seem to be cut off, at the ground or above it; 0: not.
     """
 
     height_m: float
@@ -49,6 +57,8 @@ class Mounting:
     up: tuple[float, float, float]
     ground: float = 1.0
     common: bool = False
+    spread_m: float = 0.0
+    cut_m: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what is no vertical.
@@ -81,6 +91,16 @@ class Mounting:
             told.append(
                 f"hardly any ground is seen, {100 * self.ground:.0f} % of the points near the"
                 " sensor: give scans with their ground"
+            )
+        elif self.cut_m:
+            told.append(
+                f"no scan shows anything lower than {self.cut_m:.2f} m below the sensor, as if its"
+                " ground were cut off: boxes may be too high; give scans with their ground"
+            )
+        elif self.spread_m > _SPREAD_M:
+            told.append(
+                f"the ground's height differs by {self.spread_m:.1f} m from scan to scan, as if"
+                " most of it were taken away: give scans with their ground"
             )
         if self.common:
             told.append(
@@ -120,10 +140,14 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
     planes = [ground_plane(scan, config) for scan in scans]
     share = _on_ground(scans, planes, config)
     if share <= config.ground and _hangs(scans, share, config):
-        raise BadInputError(
-            f"{drive.name}: the ground lies above the sensor, as if it hung upside down; turn the"
-            " scans by 180 degrees about x, so that z points up."
-        )
+        harder = replace(config, trials=_HARDER * config.trials)  # a floor under a ceiling is small
+        planes = [ground_plane(scan, harder) for scan in scans]
+        share = _on_ground(scans, planes, config)
+        if share <= _HANGING:
+            raise BadInputError(
+                f"{drive.name}: the ground lies above the sensor, as if it hung upside down; turn"
+                " the scans by 180 degrees about x, so that z points up."
+            )
     found = np.array([plane for plane in planes if plane is not None])
     if not len(found):
         drive.read(int(chosen[0]))  # says why if it cannot be read
@@ -142,7 +166,33 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
     if tilt < config.level_deg:
         up = np.array((0.0, 0.0, 1.0))
     x, y, z = up.tolist()
-    return Mounting(height, tilt, (x, y, z), share, _in_common(drive, chosen, config))
+    return Mounting(
+        height,
+        tilt,
+        (x, y, z),
+        share,
+        _in_common(drive, chosen, config),
+        float(np.subtract(*np.percentile(found[:, 3], (75, 25)))),
+        _cut_off(scans, height, config),
+    )
+
+
+def _cut_off(scans: list[Points], height_m: float, config: MountingConfig) -> float:
+    """How far below the sensor all scans end alike, at the ground found or above it; else 0."""
+    every = [near[:, 2] for near in (_near(scan, config) for scan in scans) if len(near)]
+    lowest = [float(z.min()) for z in every]
+    at_edge = float(np.median([(z < low + _EDGE_M).sum() for z, low in zip(every, lowest)]))
+    if len(every) < _EDGE_SCANS or at_edge < _EDGE_POINTS:
+        return 0.0
+    below_m = -min(lowest)
+    alike = max(lowest) - min(lowest) < _EDGE_ALIKE * _EDGE_M / at_edge
+    lower_m = below_m - height_m
+    return below_m if alike and lower_m < _EDGE_BELOW_M and abs(lower_m) > _EVEN_M else 0.0
+
+
+def _near(points: Points, config: MountingConfig) -> Points:
+    """Those around the sensor."""
+    return points[(points[:, :2] ** 2).sum(1) < config.reach_m**2]
 
 
 def _in_common(drive: Drive, chosen: Int[np.ndarray, "k"], config: MountingConfig) -> bool:
@@ -184,7 +234,7 @@ def _on_ground(scans: list[Points], planes: list[Plane | None], config: Mounting
     """The share of the points around the sensor that lie on the ground, of the middle scan."""
     shares = []
     for points, plane in zip(scans, planes):
-        near = points[(points[:, :2] ** 2).sum(1) < config.reach_m**2]
+        near = _near(points, config)
         away = near[:0] if plane is None else np.abs(near @ plane[:3] + plane[3])
         shares.append(float((away < config.thick_m).sum()) / max(len(near), 1))
     return float(np.median(shares))
@@ -196,7 +246,7 @@ def ground_plane(points: Points, config: MountingConfig) -> Plane | None:
     None where a scan shows no ground: hardly any points, or no plane that is level enough.
     """
     rng = np.random.default_rng(0)
-    near = points[(points[:, :2] ** 2).sum(1) < config.reach_m**2].astype(np.float64)
+    near = _near(points, config).astype(np.float64)
     near = near[rng.permutation(len(near))[:_MOST_POINTS]]
     if len(near) < _FEWEST_POINTS:
         return None

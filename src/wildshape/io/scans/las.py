@@ -5,17 +5,21 @@
 import os
 import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
 from threading import Lock
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
 
 from wildshape.errors import BadInputError
 from wildshape.io.guard import check_promise, check_unpacked
+
+if TYPE_CHECKING:
+    import laspy
 
 _PIECE_BYTES = 16_000_000
 _MOST_RECORDS = 10_000
@@ -41,14 +45,31 @@ def read_las(path: Path) -> Float[np.ndarray, "n 3"]:
     """
     _check_header(path)
     with without_traces():
-        return _read(path)
+        return _read(path, "xyz")
 
 
-def _read(path: Path) -> Float[np.ndarray, "n 3"]:
+def read_las_field(path: Path, names: tuple[str, ...]) -> Float[np.ndarray, "n"] | None:
+    """The first of these fields of the points of a file that `read_las` reads.
+
+    None without, or if it holds zeros alone: newer kinds of points have room for all times.
+    """
+    with without_traces():
+        with _opened(path) as reader:
+            kinds = set(reader.header.point_format.dimension_names)
+        found = [name for name in names if name in kinds]
+        values = _read(path, found[:1]) if found else np.empty((0, 1))
+    return values[:, 0] if values.any() else None
+
+
+def _opened(path: Path) -> "laspy.LasReader":
     import laspy
 
     backend = laspy.LazBackend.Lazrs  # not the parallel one, which allocates whole chunks
-    with laspy.open(path, laz_backend=backend, read_evlrs=False) as reader:  # pyright: ignore[reportCallIssue]
+    return laspy.open(path, laz_backend=backend, read_evlrs=False)  # pyright: ignore[reportCallIssue]
+
+
+def _read(path: Path, names: Sequence[str]) -> Float[np.ndarray, "n k"]:
+    with _opened(path) as reader:
         header = reader.header
         count, present = header.point_count, path.stat().st_size - header.offset_to_point_data
         packed = header.are_points_compressed
@@ -56,14 +77,14 @@ def _read(path: Path) -> Float[np.ndarray, "n 3"]:
         check_promise(path, "points", count, least, max(present, 0))
         if packed:
             check_unpacked(path, count * header.point_format.size, max(present, 0))
-            record = header.vlrs.get("LasZipVlr")[0].record_data
+            record = header.vlrs.get("LasZipVlr")[0].record_data  # pyright: ignore[reportAttributeAccessIssue]
             _check_compressed(
                 path, header.offset_to_point_data, count, header.point_format.size, record
             )
-        pieces = [np.empty((0, 3))]
+        pieces = [np.empty((0, len(names)))]
         rows = max(1, _PIECE_BYTES // header.point_format.size)
         for piece in reader.chunk_iterator(min(rows, max(count, 1))):
-            pieces.append(np.stack([np.asarray(piece[axis]) for axis in "xyz"], -1))
+            pieces.append(np.stack([np.asarray(piece[name]) for name in names], -1))
     points = np.concatenate(pieces)
     if len(points) != count:
         raise _truncated(path, count, len(points))

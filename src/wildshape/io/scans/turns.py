@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from wildshape.io.scans.arrays import read_npy_field
+from wildshape.io.scans.las import read_las_field
 from wildshape.io.scans.pcd import read_pcd_field
 from wildshape.io.scans.ply import read_ply_property
 from wildshape.io.scans.point_times import TIME_FIELDS, seconds_since
@@ -19,12 +20,18 @@ from wildshape.io.scans.points import (
 )
 from wildshape.records import Turn
 
-FIELDS = {".ply": read_ply_property, ".pcd": read_pcd_field, ".npy": read_npy_field}
+FIELDS = {
+    ".ply": read_ply_property,
+    ".pcd": read_pcd_field,
+    ".npy": read_npy_field,
+    ".las": read_las_field,
+    ".laz": read_las_field,
+}
 """By suffix: what reads a field of each point."""
 
 
 def read_turn(path: Path, scan_time: float | None) -> Turn:
-    """A whole scan, and when its points were taken, if a PLY, PCD or .npy says so.
+    """A whole scan, and when its points were taken, if a PLY, PCD, LAS, LAZ or .npy says so.
 
     Args:
         path: as of `read_points`.
