@@ -237,10 +237,12 @@ def test_output_that_exists(wildshape, refused, dataset, trained, tmp_path):
     assert "exists" in refused("simulate", foreign, "--tracks", 1)
 
 
-@pytest.mark.parametrize("verb", ["complete", "register"])
+@pytest.mark.parametrize("verb", ["complete", "register", "convert", "evaluate"])
 def test_an_output_stays_where_nothing_can_replace_it(wildshape, refused, dataset, tmp_path, verb):
     out = tmp_path / "out"
     command = (verb, dataset, "--out", out)
+    if verb == "convert":
+        command = (verb, "folder", dataset, out, "--layout", "folders")
     assert wildshape(*command).code == 0
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
     assert "--unit mm" in refused(*command, "--overwrite", "--unit", "mm")

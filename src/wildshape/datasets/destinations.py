@@ -37,6 +37,11 @@ Done = list[tuple[Path, PartResult]]
 class Destination(Protocol):
     """An output; parts that are finished wait for the others in its folder `PARTS`."""
 
+    @property
+    def replaces(self) -> bool:
+        """Whether an earlier output is set aside until this one is finished."""
+        ...
+
     def begin(self) -> list[PartResult] | None:
         """Start, or go on; returns the results if there is nothing left to convert.
 
@@ -54,7 +59,7 @@ class Destination(Protocol):
         ...
 
     def abandon(self) -> None:
-        """Leave no trace."""
+        """Leave no trace, or what was set aside."""
         ...
 
 
@@ -91,6 +96,8 @@ class _Folder:
 
 class PackedStore(_Folder):
     """One packed store; an older one in its place stays until the new one is whole."""
+
+    replaces = False
 
     def begin(self) -> list[PartResult] | None:
         """See `Destination`."""
@@ -150,6 +157,11 @@ class PackedStore(_Folder):
 
 class TrackFolders(_Folder):
     """A DATASET folder; each track appears in it whole, but for what `place_track` says."""
+
+    @property
+    def replaces(self) -> bool:
+        """See `Destination`."""
+        return self._output.replaces
 
     def begin(self) -> list[PartResult] | None:
         """See `Destination`."""

@@ -10,7 +10,7 @@ from itertools import islice
 from typing import Any, TypeVar
 from uuid import uuid4
 
-from wildshape.errors import BadInputError, load_library
+from wildshape.errors import BadInputError, LostWorkersError, load_library
 from wildshape.parallel.helper import guarded
 
 Item = TypeVar("Item")
@@ -97,7 +97,7 @@ class RayCluster:
         try:
             made = self._ray.get(done)
         except self._ray.exceptions.RayError as lost:
-            raise BadInputError(
+            raise LostWorkersError(
                 f"{item}: the Ray workers that worked on it were lost {_RETRIES + 1} times"
                 f" ({type(lost).__name__}); look at the cluster's logs, then repeat the command."
             ) from lost
