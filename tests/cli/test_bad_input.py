@@ -276,7 +276,7 @@ def test_work_on_scans_that_changed_is_not_gone_on_with(
     cloud = bytearray(scan.read_bytes())
     cloud[cloud.index(b"end_header\n") + 11 :] = bytes(len(cloud) - cloud.index(b"end_header") - 11)
     scan.write_bytes(cloud)  # as large as it was
-    assert "of other data; repeat" in refused(*line)
+    assert "of other data (not as it was: files); repeat" in refused(*line)
 
 
 def test_full_disk(wildshape, dataset, trained, tmp_path, monkeypatch):

@@ -21,6 +21,7 @@ from wildshape.io.output import (
     provenance,
     remove_leftovers,
     unfinished,
+    unlike,
 )
 from wildshape.io.progress import SILENT, Progress
 from wildshape.io.store.join import finish_join, is_joining, join_stores
@@ -148,7 +149,8 @@ class PackedStore(_Folder):
         if not self.overwrite and self._writing().get("made_by") == _COMMAND:
             raise BadInputError(
                 f"{self.path}: holds an unfinished conversion with other settings or of other"
-                " data; repeat it as it was, pass --overwrite, or choose another OUT."
+                f" data{unlike(self._writing(), self.settings)}; repeat it as it was, pass"
+                " --overwrite, or choose another OUT."
             )
         check_room(self.path, overwrite=self.overwrite)
         (self.path / JOINING_JSON).unlink(missing_ok=True)

@@ -175,6 +175,14 @@ def is_output(path: Path) -> bool:
     return any((path / name).is_file() for name in MARKERS)
 
 
+def unlike(record: dict[str, Any], settings: dict[str, Any]) -> str:
+    """The names of settings that are not as a record has them, in brackets."""
+    known = record.get("settings")
+    known = known if isinstance(known, dict) else {}
+    names = [name for name in settings if name in known and known[name] != settings[name]]
+    return f" (not as it was: {', '.join(names)})" if names else ""
+
+
 def remove_leftovers(path: Path) -> None:
     """Remove what a process left that was killed while writing; no other may be at work."""
     for leftover in path.rglob(_LEFTOVER):
@@ -240,9 +248,9 @@ def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: 
         )
     if not same:
         raise BadInputError(
-            f"{path}: holds the unfinished output of `{record.get('command')}` with other"
-            " settings or of other data; repeat it as it was, pass --overwrite, or choose another"
-            " --out."
+            f"{path}: holds the unfinished output of `{record.get('command')}` with other settings"
+            f" or of other data{unlike(record, settings)}; repeat it as it was, pass --overwrite,"
+            " or choose another --out."
         )
     return True
 
