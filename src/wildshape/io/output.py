@@ -69,7 +69,8 @@ class Output:
 
     def finish(self, **more: object) -> None:
         """Say that everything is there; what it replaces goes."""
-        forget(self.path)
+        if self.replaces:
+            forget(self.path)
         write_json(self.path / MARKER, {**self.record, **more, "status": "finished"})
 
 
