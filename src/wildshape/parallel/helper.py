@@ -18,7 +18,7 @@ from queue import SimpleQueue
 from threading import Lock, Thread
 from typing import Any, BinaryIO, cast
 
-from wildshape.errors import LostWorkersError
+from wildshape.errors import BadInputError, LostWorkersError
 
 _ATTEMPTS = 3
 _LOST = (EOFError, BrokenPipeError, pickle.UnpicklingError, ValueError)
