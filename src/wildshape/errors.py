@@ -26,6 +26,10 @@ class SharedInputError(BadInputError):
     """What all parts of a data set need cannot be used: going on to the next one is in vain."""
 
 
+class LostWorkersError(BadInputError):
+    """Work ended for lack of workers, not for its input: what is finished is gone on with."""
+
+
 class MissingExtraError(ImportError):
     """An optional library is absent; the message names the extra that brings it."""
 

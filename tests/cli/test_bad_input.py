@@ -237,10 +237,12 @@ def test_output_that_exists(wildshape, refused, dataset, trained, tmp_path):
     assert "exists" in refused("simulate", foreign, "--tracks", 1)
 
 
-@pytest.mark.parametrize("verb", ["complete", "register"])
+@pytest.mark.parametrize("verb", ["complete", "register", "convert", "evaluate"])
 def test_an_output_stays_where_nothing_can_replace_it(wildshape, refused, dataset, tmp_path, verb):
     out = tmp_path / "out"
     command = (verb, dataset, "--out", out)
+    if verb == "convert":
+        command = (verb, "folder", dataset, out, "--layout", "folders")
     assert wildshape(*command).code == 0
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
     assert "--unit mm" in refused(*command, "--overwrite", "--unit", "mm")
@@ -274,7 +276,7 @@ def test_work_on_scans_that_changed_is_not_gone_on_with(
     cloud = bytearray(scan.read_bytes())
     cloud[cloud.index(b"end_header\n") + 11 :] = bytes(len(cloud) - cloud.index(b"end_header") - 11)
     scan.write_bytes(cloud)  # as large as it was
-    assert "of other data; repeat" in refused(*line)
+    assert "of other data (not as it was: files); repeat" in refused(*line)
 
 
 def test_full_disk(wildshape, dataset, trained, tmp_path, monkeypatch):

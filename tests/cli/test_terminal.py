@@ -6,6 +6,8 @@ import io
 import json
 import signal
 import sys
+import time
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -71,6 +73,22 @@ def test_what_a_library_makes_of_a_signal_leaves_as_the_signal(number, stopped, 
     with pytest.raises(stopped) as left, terminable():
         blame(number, error)
     assert left.type is stopped
+
+
+def test_a_signal_waits_for_the_end_of_an_import(tmp_path, monkeypatch):
+    """In torch's it ended in an abort, or was dropped, and the command went on."""
+    lines = "import signal\nsignal.raise_signal(signal.SIGINT)\nwhole = True\n"
+
+    def work():
+        import_module("stopped_import")
+        time.sleep(60)
+
+    (tmp_path / "stopped_import.py").write_text(lines)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(KeyboardInterrupt), terminable():
+        work()
+    assert sys.modules.pop("stopped_import").whole
+    assert signal.getitimer(signal.ITIMER_REAL)[0] == 0
 
 
 def test_without_a_signal_an_error_stays_as_it_is():

@@ -1,15 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from tests.refusal import refused
-from tests.stopping import stopped_at_removal
+from tests.stopping import stopped_at
 
-from wildshape.io.output import MARKER, begin, finished, provenance
+from wildshape.errors import BadInputError, LostWorkersError
+from wildshape.io.earlier import EARLIER
+from wildshape.io.output import MARKER, Output, begin, finished, provenance
 
 
 def test_says_what_is_needed_to_do_it_again() -> None:
@@ -27,21 +30,56 @@ def test_does_not_import_torch() -> None:
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
-@pytest.mark.parametrize("removed", range(3))
-def test_a_removal_that_was_stopped_is_repeated(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, removed: int
+def _written(out: Path, setting: int, *, overwrite: bool = False) -> Output:
+    """An output of two files, not finished yet, among a file of somebody else's."""
+    output = begin(out, "complete", {"a": setting}, ["**/*.ply"], overwrite=overwrite)
+    (out / "deep").mkdir(exist_ok=True)
+    for name in ("0.ply", "deep/1.ply", "notes.txt"):
+        (out / name).write_text(f"{setting}")
+    return output
+
+
+def _content(out: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("moved", range(3))
+def test_a_replacement_that_was_stopped_is_repeated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moved: int
 ) -> None:
     """What was left was of no command's making, and `--overwrite` was refused for good."""
     out = tmp_path / "out"
-    begin(out, "complete", {"a": 1}, ["*.ply"]).finish()
-    for name in ("0.ply", "1.ply", "notes.txt"):
-        (out / name).write_text("")
-    with stopped_at_removal(removed, monkeypatch):
-        begin(out, "complete", {"a": 2}, ["*.ply"], overwrite=True)
-    if removed < 2:
-        assert not (out / MARKER).exists()
-        for settings in ({"a": 1}, {"a": 2}):
-            assert finished(out, "complete", settings, parts=()) is None
-            refused(begin, out, "complete", settings, ["*.ply"], match="pass --overwrite again")
-    assert not begin(out, "complete", {"a": 2}, ["*.ply"], overwrite=True).resumed
-    assert sorted(file.name for file in out.iterdir()) == ["notes.txt", MARKER]
+    _written(out, 1).finish()
+    with stopped_at(shutil, "move", moved, monkeypatch):
+        begin(out, "complete", {"a": 2}, ["**/*.ply"], overwrite=True)
+    assert not (out / MARKER).exists()
+    for settings in ({"a": 1}, {"a": 2}):
+        assert finished(out, "complete", settings, parts=()) is None
+        refused(begin, out, "complete", settings, ["*.ply"], match="pass --overwrite again")
+    again = begin(out, "complete", {"a": 2}, ["**/*.ply"], overwrite=True)
+    assert not again.resumed
+    assert sorted(file.name for file in out.iterdir()) == [EARLIER, "notes.txt", MARKER]
+    again.abandon()
+    assert finished(out, "complete", {"a": 1}, parts=("0.ply", "deep/1.ply")) is not None
+    assert not (out / EARLIER).exists()
+
+
+def test_what_is_replaced_is_kept_until_the_new_is_finished(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    _written(out, 1).finish()
+    (out / "notes.txt").write_text("mine")
+    before = _content(out)
+    begin(out, "complete", {"a": 2}, ["*.ply"], overwrite=True)
+    (out / "2.ply").write_text("of a command that was killed")
+    output = begin(out, "complete", {"a": 2}, ["*.ply"], overwrite=True)
+    (out / "2.ply").write_text("half")
+    with pytest.raises(BadInputError), output.abandoned_if_refused():
+        raise BadInputError("a wrong unit")
+    assert _content(out) == before
+    output = _written(out, 3, overwrite=True)
+    with pytest.raises(LostWorkersError), output.abandoned_if_refused():
+        raise LostWorkersError("no memory")
+    assert begin(out, "complete", {"a": 3}, ["**/*.ply"]).resumed
+    output.finish()
+    assert not (out / EARLIER).exists()
+    assert {path.read_text() for path in out.rglob("*.ply")} == {"3"}

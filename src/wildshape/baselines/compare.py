@@ -130,8 +130,6 @@ def compare(
     for told in _other_sensors(source, models):
         progress.say(told)
     keep_apart(out, data, *map(weights_file, options.models))
-    identity = options.identity(data)
-    output = begin(out, "evaluate", identity, FILES, overwrite=options.overwrite, progress=progress)
     pooled = options.as_seeds and len(models) > 1
     for told in _unlike_trainings(models) if pooled else ():
         progress.say(told)
@@ -142,7 +140,9 @@ def compare(
         if pooled
         else [_rows(models, track=options.track)] * _useful_seeds(options, progress)
     )
-    with team(options.workers, options.ray) as helpers:
+    identity = options.identity(data)
+    output = begin(out, "evaluate", identity, FILES, overwrite=options.overwrite, progress=progress)
+    with output.abandoned_if_refused(), team(options.workers, options.ray) as helpers:
         measure = partial(evaluate_once, progress=progress, helpers=helpers)
         runs = [
             measure(source, {**baselines, **rows}, options.rotate, seed, options.max_scans)

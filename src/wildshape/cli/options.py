@@ -114,7 +114,7 @@ Origin = Annotated[
     ),
 ]
 AT_ORIGIN: Place = (0.0, 0.0, 0.0)
-Overwrite = Annotated[bool, arg(help="replace an earlier output")]
+Overwrite = Annotated[bool, arg(help="replace an earlier output, once there is a new one")]
 AsJson = Annotated[bool, arg(name="json", help="one JSON object on stdout, for machines")]
 Device = Annotated[
     Literal["auto", "cpu", "cuda"], arg(help="auto takes the GPU where there is one")

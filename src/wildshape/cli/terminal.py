@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 Handler = Callable[[int, FrameType | None], None]
 
 _EVERY_SECONDS = 10.0
+_MOMENT_S = 0.05
+_ALARM = (signal.SIGALRM,) if hasattr(signal, "setitimer") else ()  # Windows has none
+_IMPORTER = "<frozen importlib._bootstrap>"
 _LISTED = 20
 
 
@@ -199,22 +202,52 @@ def terminable() -> Iterator[None]:
 
     A library that the signal met in its native code may raise an error of its own instead. Left
     alone it would blame a sound file: whatever is raised after a signal leaves as the signal.
+    An import is waited for: inside one torch's native code aborts, and Python may drop what is
+    raised.
     """
-    came: list[int] = []
-
-    def receive(number: int, frame: FrameType | None) -> None:
-        came.append(number)
-        _raise(number, frame)
-
-    with _handled(receive, signal.SIGINT, signal.SIGTERM):
+    signals = _Signals()
+    with _handled(signals.receive, signal.SIGINT, signal.SIGTERM, *_ALARM):
         try:
             yield
+            if signals.waiting:
+                signals.leave()
         except (KeyboardInterrupt, SystemExit):
             raise
         except BaseException:  # a panic of native code is no Exception
-            if came:
-                _raise(came[-1], None)
+            signals.leave()
             raise
+        finally:
+            if signals.waiting:
+                signal.setitimer(signal.ITIMER_REAL, 0)
+
+
+class _Signals:
+    """Those that came; the last may wait for the end of an import."""
+
+    def __init__(self) -> None:
+        self.came: list[int] = []
+        self.waiting = False
+
+    def receive(self, number: int, frame: FrameType | None) -> None:
+        """The signal handler; an alarm is of what waits."""
+        if number not in _ALARM:
+            self.came.append(number)
+        self.waiting = bool(_ALARM) and _imports(frame)
+        if self.waiting:
+            signal.setitimer(signal.ITIMER_REAL, _MOMENT_S)
+        else:
+            self.leave()
+
+    def leave(self) -> None:
+        """Raise what came last, if anything did."""
+        if self.came:
+            _raise(self.came[-1], None)
+
+
+def _imports(frame: FrameType | None) -> bool:
+    while frame is not None and frame.f_code.co_filename != _IMPORTER:
+        frame = frame.f_back
+    return frame is not None
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from wildshape.datasets.destinations import (
 from wildshape.datasets.tracks.conversion import Conversion, Part, PartResult
 from wildshape.datasets.tracks.source import Source
 from wildshape.datasets.tracks.truth import TruthBuilder
-from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.errors import BadInputError, LostWorkersError, MissingExtraError
 from wildshape.io.fingerprint import fingerprint_of
 from wildshape.io.progress import SILENT, Progress, counted
 from wildshape.io.store.layout import PARTS
@@ -97,14 +97,14 @@ def convert(
     task = Conversion(source, (out / PARTS).absolute(), options.layout, options.truth)
     try:
         found = _all_parts(task, parts, options, f"converting {name}", progress)
-    except (BadInputError, MissingExtraError):
-        if not any(task.finished(part) for part in parts):
+        if not any(result.tracks for result in found.parts):
+            raise BadInputError(_nothing(settings["root"], found.parts))
+        destination.finish([(task.place(part), result) for part, result in zip(parts, found.parts)])
+    except (BadInputError, MissingExtraError) as error:
+        made = any(done.tracks for part in parts if (done := task.finished(part)))
+        if not made or (destination.replaces and not isinstance(error, LostWorkersError)):
             destination.abandon()
         raise
-    if not any(result.tracks for result in found.parts):
-        destination.abandon()
-        raise BadInputError(_nothing(settings["root"], found.parts))
-    destination.finish([(task.place(part), result) for part, result in zip(parts, found.parts)])
     return found
 
 

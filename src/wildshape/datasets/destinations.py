@@ -21,6 +21,7 @@ from wildshape.io.output import (
     provenance,
     remove_leftovers,
     unfinished,
+    unlike,
 )
 from wildshape.io.progress import SILENT, Progress
 from wildshape.io.store.join import finish_join, is_joining, join_stores
@@ -36,6 +37,11 @@ Done = list[tuple[Path, PartResult]]
 @runtime_checkable
 class Destination(Protocol):
     """An output; parts that are finished wait for the others in its folder `PARTS`."""
+
+    @property
+    def replaces(self) -> bool:
+        """Whether an earlier output is set aside until this one is finished."""
+        ...
 
     def begin(self) -> list[PartResult] | None:
         """Start, or go on; returns the results if there is nothing left to convert.
@@ -54,7 +60,7 @@ class Destination(Protocol):
         ...
 
     def abandon(self) -> None:
-        """Leave no trace."""
+        """Leave no trace, or what was set aside."""
         ...
 
 
@@ -91,6 +97,8 @@ class _Folder:
 
 class PackedStore(_Folder):
     """One packed store; an older one in its place stays until the new one is whole."""
+
+    replaces = False
 
     def begin(self) -> list[PartResult] | None:
         """See `Destination`."""
@@ -141,7 +149,8 @@ class PackedStore(_Folder):
         if not self.overwrite and self._writing().get("made_by") == _COMMAND:
             raise BadInputError(
                 f"{self.path}: holds an unfinished conversion with other settings or of other"
-                " data; repeat it as it was, pass --overwrite, or choose another OUT."
+                f" data{unlike(self._writing(), self.settings)}; repeat it as it was, pass"
+                " --overwrite, or choose another OUT."
             )
         check_room(self.path, overwrite=self.overwrite)
         (self.path / JOINING_JSON).unlink(missing_ok=True)
@@ -150,6 +159,11 @@ class PackedStore(_Folder):
 
 class TrackFolders(_Folder):
     """A DATASET folder; each track appears in it whole, but for what `place_track` says."""
+
+    @property
+    def replaces(self) -> bool:
+        """See `Destination`."""
+        return self._output.replaces
 
     def begin(self) -> list[PartResult] | None:
         """See `Destination`."""

@@ -83,7 +83,7 @@ def drive(
     if done is None:
         output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
         soon = Pipeline if len(recording) >= _LONG else None
-        with team(workers, soon=soon) as helpers, output.abandoned_if_refused():
+        with output.abandoned_if_refused(), team(workers, soon=soon) as helpers:
             clock = run.clock.going_on(run.stages / SECONDS)
             found = replace(run, helpers=helpers, clock=clock).perform()
         output.finish(result={**asdict(found), "out": str(out)})

@@ -3,7 +3,8 @@
 """An output folder and its `wildshape.json`: how it was made, and whether it is finished.
 
 An existing output is refused; a half-finished one of the same command and settings is gone on
-with; two are never mixed; `--overwrite` removes what the earlier command wrote and nothing else.
+with; two are never mixed; `--overwrite` removes what the earlier command wrote and nothing else,
+once there is what replaces it.
 """
 
 import json
@@ -20,12 +21,11 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from wildshape.errors import BadInputError
+from wildshape.errors import BadInputError, LostWorkersError, MissingExtraError
 from wildshape.io.atomic import lock_folder, write_json
+from wildshape.io.earlier import EARLIER, MARKER, MARKERS, MOVED, forget, put_back, set_aside
 from wildshape.io.progress import SILENT, Progress
 
-MARKER = "wildshape.json"
-_REMOVED = "wildshape-removed.json"  # the marker of an output while it is removed
 _LONGEST_BYTES, _SHOWN = 251, 60  # of a name before `.ply`; file systems end at 255
 _LEFTOVER = ".*.part"  # as `io/atomic.py` names what it has not finished
 
@@ -43,23 +43,34 @@ class Output:
     record: dict[str, Any]
     resumed: bool = False
 
+    @property
+    def replaces(self) -> bool:
+        """Whether an earlier output is set aside for it."""
+        return (self.path / EARLIER).is_dir()
+
     def abandon(self) -> None:
-        """Leave no trace of a command that was refused before it wrote anything."""
+        """Put back what was replaced; else leave no trace of what wrote nothing yet."""
+        if put_back(self.path, self.record["files"]):
+            return
         if [entry.name for entry in self.path.iterdir()] == [MARKER]:
             (self.path / MARKER).unlink()
             self.path.rmdir()
 
     @contextmanager
     def abandoned_if_refused(self) -> Iterator[None]:
-        """`abandon`, where what is done in here ends in a `BadInputError`."""
+        """`abandon`, where what is done in here is refused, but not for lack of workers."""
         try:
             yield
-        except BadInputError:
+        except LostWorkersError:
+            raise
+        except (BadInputError, MissingExtraError):
             self.abandon()
             raise
 
     def finish(self, **more: object) -> None:
-        """Say that everything is there."""
+        """Say that everything is there; what it replaces goes."""
+        if self.replaces:
+            forget(self.path)
         write_json(self.path / MARKER, {**self.record, **more, "status": "finished"})
 
 
@@ -80,7 +91,7 @@ def begin(
         command: for example `complete`.
         settings: JSON values; whatever changes the content of the output.
         files: patterns of the files that the command may write below `path`.
-        overwrite: remove an earlier output first.
+        overwrite: replace an earlier output, which stays aside until the new one is finished.
         progress: is told that an earlier run is gone on with.
         line: how the output comes about, as a user would type it again; by default the command
             line of this process.
@@ -107,7 +118,7 @@ def begin(
         "provenance": provenance(line or command_line()),
     }
     write_json(path / MARKER, record)
-    (path / _REMOVED).unlink(missing_ok=True)
+    (path / MOVED).unlink(missing_ok=True)
     return Output(path, record, resumed)
 
 
@@ -162,7 +173,15 @@ def is_begun(path: Path) -> bool:
 
 def is_output(path: Path) -> bool:
     """Whether a folder is itself an output, whole or not; those below it do not make it one."""
-    return any((path / name).is_file() for name in (MARKER, _REMOVED))
+    return any((path / name).is_file() for name in MARKERS)
+
+
+def unlike(record: dict[str, Any], settings: dict[str, Any]) -> str:
+    """The names of settings that are not as a record has them, in brackets."""
+    known = record.get("settings")
+    known = known if isinstance(known, dict) else {}
+    names = [name for name in settings if name in known and known[name] != settings[name]]
+    return f" (not as it was: {', '.join(names)})" if names else ""
 
 
 def remove_leftovers(path: Path) -> None:
@@ -211,10 +230,10 @@ def refuse_file(path: Path, *, overwrite: bool) -> None:
 
 
 def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: bool) -> bool:
-    """Whether the output there is to be gone on with; with `overwrite` it is removed."""
+    """Whether the output there is to be gone on with; with `overwrite` it is set aside."""
     record = _read(path)
     if overwrite:
-        _remove(path, record.get("files", []))
+        set_aside(path, record.get("files", []))
         return False
     if not (path / MARKER).is_file():
         raise BadInputError(
@@ -230,15 +249,15 @@ def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: 
         )
     if not same:
         raise BadInputError(
-            f"{path}: holds the unfinished output of `{record.get('command')}` with other"
-            " settings or of other data; repeat it as it was, pass --overwrite, or choose another"
-            " --out."
+            f"{path}: holds the unfinished output of `{record.get('command')}` with other settings"
+            f" or of other data{unlike(record, settings)}; repeat it as it was, pass --overwrite,"
+            " or choose another --out."
         )
     return True
 
 
 def _read(path: Path) -> dict[str, Any]:
-    marker = next((path / n for n in (MARKER, _REMOVED) if (path / n).is_file()), None)
+    marker = next((path / name for name in MARKERS if (path / name).is_file()), None)
     if marker is None:
         raise BadInputError(
             f"{path}: is not empty and was not written by this command; choose another --out."
@@ -248,23 +267,6 @@ def _read(path: Path) -> dict[str, Any]:
     except ValueError as error:
         raise BadInputError(f"{marker}: damaged; choose another --out.") from error
     return record if isinstance(record, dict) else {}
-
-
-def _remove(path: Path, patterns: Sequence[str]) -> None:
-    """Remove our files and the folders that are empty then.
-
-    The marker is renamed first, so that nobody takes the output for whole, and stays under that
-    name until there is a new one, so that a removal that was stopped is repeated.
-    """
-    if (path / MARKER).is_file():
-        (path / MARKER).replace(path / _REMOVED)
-    for file in [file for pattern in patterns for file in path.glob(pattern)]:
-        if file.is_file() and file != path / _REMOVED:
-            file.unlink()
-    folders = sorted((f for f in path.rglob("*") if f.is_dir()), reverse=True)
-    for folder in folders:
-        if not any(folder.iterdir()):
-            folder.rmdir()
 
 
 def provenance(command: str) -> dict[str, Any]:

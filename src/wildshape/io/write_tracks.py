@@ -136,18 +136,15 @@ def _folders(tracks: Iterable[Track], wanted: _Output) -> Iterator[Track]:
     output = begin(out, command, settings, FILES, overwrite=overwrite, progress=progress)
     unfinished = out / _UNFINISHED
     shutil.rmtree(unfinished, ignore_errors=True)
-    try:
+    with output.abandoned_if_refused():
         first, tracks = _first(tracks)
-    except BadInputError:
-        output.abandon()
-        raise
-    if not first:
-        return output.abandon()
-    for track in chain(first, tracks):
-        folder = out / file_name(track.name)
-        if not is_placed(folder):
-            write_track(unfinished / track.name, track)
-            place_track(unfinished / track.name, folder)
-        yield track
+        if not first:
+            return output.abandon()
+        for track in chain(first, tracks):
+            folder = out / file_name(track.name)
+            if not is_placed(folder):
+                write_track(unfinished / track.name, track)
+                place_track(unfinished / track.name, folder)
+            yield track
     shutil.rmtree(unfinished, ignore_errors=True)
     output.finish()

@@ -18,7 +18,7 @@ from queue import SimpleQueue
 from threading import Lock, Thread
 from typing import Any, BinaryIO, cast
 
-from wildshape.errors import BadInputError
+from wildshape.errors import BadInputError, LostWorkersError
 
 _ATTEMPTS = 3
 _LOST = (EOFError, BrokenPipeError, pickle.UnpicklingError, ValueError)
@@ -59,7 +59,7 @@ class Helper:
         """The task's result.
 
         Raises:
-            BadInputError: the process died over this item again and again.
+            LostWorkersError: the process died over this item again and again.
             Exception: what the task raised.
         """
         for _ in range(_ATTEMPTS):
@@ -72,7 +72,7 @@ class Helper:
             if isinstance(made, Exception):
                 raise made
             return made
-        raise BadInputError(
+        raise LostWorkersError(
             f"{item}: the process that worked on it ended early {_ATTEMPTS} times, perhaps for"
             " lack of memory; see its message above, or use fewer --workers."
         )

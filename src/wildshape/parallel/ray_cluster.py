@@ -3,6 +3,8 @@
 """Work spread over a Ray cluster, as `processes` spreads it over the processes of one machine."""
 
 import os
+import signal
+import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -10,7 +12,7 @@ from itertools import islice
 from typing import Any, TypeVar
 from uuid import uuid4
 
-from wildshape.errors import BadInputError, load_library
+from wildshape.errors import BadInputError, LostWorkersError, load_library
 from wildshape.parallel.helper import guarded
 
 Item = TypeVar("Item")
@@ -97,7 +99,7 @@ class RayCluster:
         try:
             made = self._ray.get(done)
         except self._ray.exceptions.RayError as lost:
-            raise BadInputError(
+            raise LostWorkersError(
                 f"{item}: the Ray workers that worked on it were lost {_RETRIES + 1} times"
                 f" ({type(lost).__name__}); look at the cluster's logs, then repeat the command."
             ) from lost
@@ -119,13 +121,29 @@ def _work(name: str, shared: list[Any], item: Any) -> Any:
     return guarded(_task_of[name], item)
 
 
+@contextmanager
+def _signals_kept() -> Iterator[None]:
+    """Ray takes SIGTERM for itself: it ends the program with a dump of the stack."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            if handler is not None:  # set by native code
+                signal.signal(number, handler)
+
+
 def _connect(ray: Any, address: str, workers: int | None) -> None:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # Ray would tell its makers
     how: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
     if address == "local":
         how |= {"num_cpus": workers, "include_dashboard": False}
     try:
-        ray.init(address=address, **how)
+        with _signals_kept():
+            ray.init(address=address, **how)
     except (ConnectionError, ValueError, RuntimeError) as error:
         raise BadInputError(
             f"--ray {address}: no Ray cluster answers there ({error}); start one by"

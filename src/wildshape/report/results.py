@@ -118,8 +118,8 @@ class Inputs:
 
 
 def find(folder: Path, name: str) -> list[Path]:
-    """Files of that name in a folder and two levels below."""
-    found = {path for depth in ("", "*/", "*/*/") for path in folder.glob(f"{depth}{name}")}
+    """Files of that name in a folder and two levels below; not what is set aside there."""
+    found = {path for depth in ("", "[!.]*/", "[!.]*/*/") for path in folder.glob(f"{depth}{name}")}
     return sorted(found)
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import lock_folder, write_json
+from wildshape.io.earlier import forget
 from wildshape.io.fingerprint import fingerprint_of
 from wildshape.io.guard import read_json, reading
 from wildshape.io.inputs import open_tracks, refuse_other_coordinates
@@ -68,6 +69,7 @@ def begun_run(
         except BadInputError:
             shutil.rmtree(out / _PACKED, ignore_errors=True)
             raise
+    forget(out)  # an earlier run
 
 
 def _begin(
@@ -195,5 +197,6 @@ def _packed_before(packed: Path, data: Path, origin: dict[str, Any]) -> Store:
 
 def finish_run(out: Path) -> None:
     """Say in the run's folder that it is finished."""
+    forget(out)
     marker = out / MARKER
     write_json(marker, {**json.loads(marker.read_text("utf-8")), "status": "finished"})

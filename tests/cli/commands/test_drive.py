@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from wildshape.cli.commands.drive import Settings, _folders
+from wildshape.drives.result import FILES
+from wildshape.drives.writing.folder import BOXES
 from wildshape.errors import BadInputError
+from wildshape.io.output import begin
 
 CALIBRATION = "R0_rect: 1 0 0 0 1 0 0 0 1\nTr_velo_to_cam: 0 -1 0 0 0 0 -1 0 1 0 0 0\n"
 
@@ -48,6 +51,15 @@ def test_detections_in_the_output_are_refused(recording, tmp_path, refused):
     given = ("drive", recording, "--out", tmp_path / "out", "--overwrite", "--detections", labels)
     assert "holds the input" in refused(*given)
     assert labels.exists()
+
+
+def test_what_was_found_stays_where_nothing_can_replace_it(recording, tmp_path, refused):
+    out = tmp_path / "out"
+    begin(out, "drive", {}, FILES).finish()
+    (out / BOXES).write_text("earlier")
+    before = {path: path.read_bytes() for path in out.iterdir()}
+    refused("drive", recording, "--out", out, "--overwrite", "--workers", "1")
+    assert {path: path.read_bytes() for path in out.iterdir()} == before
 
 
 def test_drives_of_one_name_are_told_apart_by_the_folders_above(tmp_path):

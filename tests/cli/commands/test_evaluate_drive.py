@@ -124,6 +124,17 @@ def test_a_place_that_cannot_be_written_is_refused_before_anything_is_measured(
     assert not new.exists()
 
 
+def test_an_evaluation_stays_where_nothing_can_replace_it(
+    wildshape, refused, street, found, tmp_path
+):
+    out = tmp_path / "out"
+    command = ("evaluate-drive", found, "--labels", street, "--out", out)
+    assert wildshape(*command).code == 0
+    before = {path: path.read_bytes() for path in out.iterdir()}
+    assert "no label counts" in refused(*command, "--overwrite", "--points", "1000000")
+    assert {path: path.read_bytes() for path in out.iterdir()} == before
+
+
 def test_half_a_drive_is_not_measured_against_all_labels(wildshape, street, found):
     poses = (found / "trajectory.txt").read_text().splitlines(keepends=True)
     (found / "trajectory.txt").write_text("".join(poses[:-1]))

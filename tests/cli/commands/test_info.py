@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -86,6 +87,17 @@ def test_a_damaged_record_does_not_hide_the_tracks(wildshape, dataset, tmp_path)
         (folder / name).write_text("[1, 2")
     (folder / INDEX_JSON).unlink()
     assert wildshape("info", folder).code == 0
+
+
+def test_the_first_file_that_cannot_be_read_is_named(wildshape, dataset, tmp_path):
+    data = tmp_path / "data"
+    shutil.copytree(dataset, data)
+    scan = next((data / "000001" / "scans").iterdir())
+    scan.write_bytes(scan.read_bytes()[:300])
+    found = wildshape("info", data)
+    assert found.code == 0
+    assert f"first: {scan}: the header promises" in found.err
+    assert "copy or write it again" in found.err
 
 
 def test_a_sample_below_nothing_is_refused(refused, store):

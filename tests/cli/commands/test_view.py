@@ -46,6 +46,12 @@ def test_what_cannot_be_shown_is_refused(refused, tmp_path):
     assert "no scans" in refused("view", tmp_path)
 
 
+def test_the_drive_is_named_where_its_figures_are_given(refused, tmp_path):
+    said = {"methods": {"wildshape": {}}, "provenance": {"settings": {"folder": "found"}}}
+    (tmp_path / "metrics.json").write_text(json.dumps(said))
+    assert "name what `drive` wrote: found." in refused("view", tmp_path)
+
+
 @pytest.mark.parametrize("said", [{"methods": {}}, {"methods": {"a": {}}, "provenance": [1]}])
 def test_what_evaluate_did_not_write_is_refused(refused, store, tmp_path, said):
     (tmp_path / "metrics.json").write_text(json.dumps(said))

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import torch
 from tests.refusal import refused
-from tests.stopping import stopped_at_removal
+from tests.stopping import stopped_at
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
@@ -158,7 +158,7 @@ def test_a_removal_that_was_stopped_is_repeated(
     store: Store, track: Track, monkeypatch: pytest.MonkeyPatch, removed: int
 ) -> None:
     """What was left was no store, and `--overwrite` was refused for good."""
-    with stopped_at_removal(removed, monkeypatch):
+    with stopped_at(Path, "unlink", removed, monkeypatch):
         StoreWriter(store.path, {}, overwrite=True)
     if removed:
         refused(open_store, store.path, match="half-written")

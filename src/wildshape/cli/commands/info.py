@@ -64,7 +64,8 @@ def run(settings: Settings) -> None:
     )
     unusable = found.statistics.unusable
     if unusable:
-        say(f"{len(unusable)} tracks or scans cannot be read; --json lists them")
+        first = next(iter(unusable.values())).rstrip(".")
+        say(f"{len(unusable)} tracks or scans cannot be read (--json lists them), first: {first}.")
     text = table_text(found.title, found.statistics)
     text += "".join(f"\nsee {path}" for path in found.written)
     answer(text, found.data, as_json=settings.json)

@@ -167,6 +167,11 @@ def _evaluated(settings: Settings) -> "Source":
         data = settings.inputs or (Path(asked["data"]) if asked.get("data") else None)
         methods = list(said.get("methods") or {})
         ours = OURS if OURS in methods else methods[-1]
+    if "folder" in asked:
+        raise BadInputError(
+            f"{settings.input}: holds figures of a drive; name what `drive` wrote:"
+            f" {asked['folder']}."
+        )
     if data is None:
         raise BadInputError(f"{settings.input}: does not say which data it is of; add --inputs.")
     here = settings.files.coordinates

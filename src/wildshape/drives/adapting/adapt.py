@@ -137,7 +137,8 @@ def adapt_to(
             " adapt anew, what was found in the drives stays."
         )
     output = begin(place, _COMMAND, settings, ("**/*",), overwrite=overwrite)
-    found = _Adapting(outs, place, predictor, config, watch).perform()
+    with output.abandoned_if_refused():
+        found = _Adapting(outs, place, predictor, config, watch).perform()
     write_json(folder / SAID, found.data)
     output.finish(result=asdict(found))
     return found

@@ -20,7 +20,7 @@ def is_drive(out: Path) -> bool:
     """
     if _finished(out):
         return True
-    several = sorted(folder.parent for folder in out.glob(f"*/{BOXES}") if _finished(folder.parent))
+    several = sorted(box.parent for box in out.glob(f"[!.]*/{BOXES}") if _finished(box.parent))
     if several:
         raise BadInputError(f"{out}: holds drives, a folder each; name one, such as {several[0]}.")
     return False

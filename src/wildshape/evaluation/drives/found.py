@@ -60,7 +60,7 @@ def drives_of(path: Path, labels: Path) -> list[tuple[Path, Path]]:
     """
     if (path / BOXES).is_file():
         return [(path, labels)]
-    found = sorted(folder.parent for folder in path.glob(f"*/{BOXES}"))
+    found = sorted(folder.parent for folder in path.glob(f"[!.]*/{BOXES}"))
     if not found:
         raise BadInputError(
             f"{path}: no {BOXES} in it; give a folder that `wildshape drive` wrote."

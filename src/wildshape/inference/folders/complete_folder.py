@@ -155,8 +155,6 @@ def complete_folder(
         tracks = with_rays(tracks, options.rays, options.coordinates)
     predictor = load(options.model, options.device)
     keep_apart(out, source, weights_file(options.model), options.rays)
-    if options.overwrite:
-        next(iter(tracks))  # else refused once an earlier output is gone
     command, identity = "register" if registers else "complete", options.identity(source)
     output = begin(out, command, identity, FILES, overwrite=options.overwrite, progress=progress)
     with output.abandoned_if_refused():
