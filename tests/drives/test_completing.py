@@ -311,12 +311,17 @@ def test_boxes_follow_the_ground_that_frames_show_where_poses_are_wrong(tmp_path
         return found[:, 2] - one.size[2] / 2
 
     assert floors(one) == pytest.approx(ground, abs=0.011)
+    sinking = np.outer(np.arange(12), (0.0, 0.0, 0.1, 0.0))
+    assert floors(one, shown - sinking) == pytest.approx(ground, abs=0.12)
     partly = replace(one, seen=one.seen.part([0, 1, 2, 9, 10, 11]))
     assert floors(partly) == pytest.approx(ground, abs=0.021)
     hidden = replace(one, seen=one.seen.part([]))
     assert (floors(hidden) == -1).all()
     on_a_bridge = np.add(shown, (0.0, 0.0, 5.0, 0.0))
     assert (floors(one, on_a_bridge) == 4).all()
+    uphill = np.outer(np.arange(12), (0.0, 0.0, 0.2, 0.0))
+    write_grounds(tmp_path, seen + uphill[:, 2])
+    assert floors(one, shown + uphill) == pytest.approx(ground + uphill[:, 2], abs=0.011)
 
 
 def test_clusters_in_the_box_of_a_vehicle_are_its_own(tmp_path):

@@ -240,7 +240,8 @@ class BoxConfig:
         ground_gap_m: boxes that end so near the ground, above or below, end there.
         ground_ticks: in each frame a box's height above the ground is the middle one of those up
             to so many ticks before and after it.
-        ground_stray_m: ground so far from the middle one of those around it is a part of a vehicle.
+        ground_stray_m: ground so far from what is usual around it is a part of a vehicle, by its
+            height in the world and by that of the box above it.
         ground_stray_ticks: around, before and after.
     """
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.object_config import BoxConfig
@@ -27,7 +27,7 @@ from wildshape.io.boxes.detections import detections_of, poses_of
 from wildshape.io.guard import read_json
 from wildshape.records import Box, Points
 
-_UPPER = 0.75  # what is taken for ground lies too high: it is a lorry's, not below a car
+_LOWER = 0.25  # what is wrongly taken for ground lies too high: it is of a lorry
 
 
 @dataclass(frozen=True)
@@ -144,10 +144,10 @@ def on_ground_of_each(
         turns: of the drive's sensor.
         config: see there.
     """
-    ticks = np.take(turns.ticks, frames)
-    gaps = shown[:, 2] - one.size[2] / 2 - _ground(one.seen, frames, cuts, turns)
-    usual = _around(ticks, gaps, config.ground_stray_ticks, _UPPER)
-    gaps = np.where(np.abs(gaps - usual) <= config.ground_stray_m, gaps, np.nan)
+    ticks, ground = np.take(turns.ticks, frames), _ground(one.seen, frames, cuts, turns)
+    gaps = shown[:, 2] - one.size[2] / 2 - ground
+    is_ground = _usual(ticks, ground, config) | _usual(ticks, -gaps, config)
+    gaps = np.where(is_ground, gaps, np.nan)
     gaps = _around(ticks, gaps, config.ground_ticks, 0.5)
     known = ~np.isnan(gaps)
     if not known.any() or abs(np.median(gaps[known])) > config.ground_gap_m:
@@ -172,6 +172,14 @@ def _ground(
         level = T_level_sensor.apply(torch.from_numpy(np.stack(under))[:, None])
         ground[places] = level[:, 0, 2].numpy()
     return ground
+
+
+def _usual(
+    ticks: Int[np.ndarray, "f"], heights: Float[np.ndarray, "f"], config: BoxConfig
+) -> Bool[np.ndarray, "f"]:
+    """Which heights of the ground are as those around them."""
+    usual = _around(ticks, heights, config.ground_stray_ticks, _LOWER)
+    return np.abs(heights - usual) <= config.ground_stray_m
 
 
 def _around(
