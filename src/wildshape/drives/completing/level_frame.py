@@ -189,8 +189,15 @@ def _around(
     known = np.flatnonzero(~np.isnan(values))
     first = np.searchsorted(ticks[known], ticks - reach, "left")
     last = np.searchsorted(ticks[known], ticks + reach, "right")
-    around = (values[known[a:b]] for a, b in zip(first, last))
-    return np.array([np.quantile(some, quantile) if len(some) else np.nan for some in around])
+    around = (np.sort(values[known[a:b]]) for a, b in zip(first, last))
+    return np.array([_quantile(some, quantile) if len(some) else np.nan for some in around])
+
+
+def _quantile(rising: Float[np.ndarray, "k"], quantile: float) -> float:
+    """As numpy's, which takes ten times as long for a few values."""
+    low = int(quantile * (len(rising) - 1))
+    high = min(low + 1, len(rising) - 1)
+    return rising[low] + (quantile * (len(rising) - 1) - low) * (rising[high] - rising[low])
 
 
 def _mean(values: list[float | None]) -> float | None:
