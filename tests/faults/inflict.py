@@ -88,13 +88,20 @@ def starve(job: Job, out: Path, random: Random, share: float) -> str:
     most = base + int(share * max(job.peak_bytes - base, 1 << 20))
     limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (most, most))  # noqa: E731
     ended = warm(job.line(out), limit).end()
-    if ended.code in (-signal.SIGSEGV, -signal.SIGABRT):  # libraries that check no allocation
+    if _crashed_in_a_library(ended):
         resumed(job, out)
         return "crashed in a library"
     promise(ended.code in (0, 1, 2), f"exit code {ended.code} without memory: {ended.said}")
     one_sentence(ended)
     resumed(job, out)
     return "starved" if ended.code else "ended before"
+
+
+def _crashed_in_a_library(ended: Ended) -> bool:
+    """Whether code that checks no allocation ended it, or the dynamic linker, which gives up."""
+    linker = "cannot allocate memory for thread-local data: ABORT"  # glibc's dl-tls.c, with 127
+    gave_up = ended.code == 127 and ended.said.rstrip().endswith(linker)
+    return gave_up or ended.code in (-signal.SIGSEGV, -signal.SIGABRT)
 
 
 def forbid(job: Job, out: Path, random: Random, share: float) -> str:
