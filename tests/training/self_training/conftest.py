@@ -3,7 +3,7 @@
 """A teacher that learned little, and its targets."""
 
 import pytest
-from tests.training.self_training.taught import sampler_of
+from tests.training.self_training.taught import NOT_KEPT, sampler_of
 from tests.training.worker import FEW_STEPS
 
 from wildshape.training.loop import fit, setup
@@ -18,4 +18,4 @@ def teacher(car_store, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def targets(car_store, teacher):
-    return fused_targets(teacher, sampler_of(car_store))
+    return fused_targets(teacher, sampler_of(car_store), parts=NOT_KEPT)

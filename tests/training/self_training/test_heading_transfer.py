@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 from tests.cars import poses_of
-from tests.training.self_training.taught import sampler_of
+from tests.training.self_training.taught import NOT_KEPT, sampler_of
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
@@ -77,9 +77,9 @@ def test_targets_look_as_the_other_weights_say(car_store, teacher, monkeypatch):
     monkeypatch.setattr(pseudo_labels, "levelled", lambda track: track)
     sampler = sampler_of(car_store)
     monkeypatch.setattr(pseudo_labels, "transferred_signs", none)
-    plain = pseudo_labels.fused_targets(teacher, sampler, headings=teacher)
+    plain = pseudo_labels.fused_targets(teacher, sampler, headings=teacher, parts=NOT_KEPT)
     monkeypatch.setattr(pseudo_labels, "transferred_signs", every_other)
-    turned = pseudo_labels.fused_targets(teacher, sampler, headings=teacher)
+    turned = pseudo_labels.fused_targets(teacher, sampler, headings=teacher, parts=NOT_KEPT)
     assert asked == [len(scans) for scans in sampler.scans_of]
     first = torch.as_tensor(sampler.scans_of[0])
     cosine = (plain.rotation[first] * turned.rotation[first])[:, :, 0].sum(-1)

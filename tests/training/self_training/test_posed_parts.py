@@ -48,8 +48,11 @@ def stopped(sampler, teacher, tmp_path):
     return tmp_path
 
 
-def test_a_stopped_run_poses_the_other_tracks_alone(sampler, teacher, stopped, monkeypatch):
-    expected = fused_targets(teacher, sampler)
+def test_a_stopped_run_poses_the_other_tracks_alone(
+    sampler, teacher, stopped, tmp_path_factory, monkeypatch
+):
+    whole = PosedParts(tmp_path_factory.mktemp("whole"), IDENTITY)
+    expected = fused_targets(teacher, sampler, parts=whole)
     posed, pose = [], pseudo_labels.posed_together
     monkeypatch.setattr(
         pseudo_labels, "posed_together", lambda *args: posed.append(args) or pose(*args)
@@ -67,7 +70,6 @@ def test_parts_of_another_run_or_damaged_ones_are_not_taken(sampler, stopped):
     scans_of = sampler.scans_of
     assert len(PosedParts(stopped, IDENTITY).found(scans_of)) == 2
     assert not PosedParts(stopped, {"teacher": "other"}).found(scans_of)
-    assert not PosedParts(None, IDENTITY).found(scans_of)
     assert not PosedParts(stopped, IDENTITY).found([scans[1:] for scans in scans_of])
     only = next(stopped.iterdir())
     whole = only.read_bytes()

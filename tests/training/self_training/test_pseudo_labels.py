@@ -12,7 +12,7 @@ import torch
 from tests.cars import poses_of
 from tests.packed import packed
 from tests.strategies import rotation_about
-from tests.training.self_training.taught import TAUGHT, sampler_of
+from tests.training.self_training.taught import NOT_KEPT, TAUGHT, sampler_of
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
@@ -53,7 +53,7 @@ def test_targets_look_where_the_objects_are_known_to_look(car_store, teacher, ta
     fronts = targets.rotation[:, :, 0].clone()
     for scans in sampler.scans_of[::2]:
         fronts[torch.from_numpy(scans)] *= -1.0
-    told = fused_targets(teacher, sampler, fronts=fronts)
+    told = fused_targets(teacher, sampler, fronts=fronts, parts=NOT_KEPT)
     assert (told.rotation[:, :, 0] * fronts).sum(-1).min() > 0
 
 
@@ -91,8 +91,9 @@ def test_targets_do_not_depend_on_truth(cars, car_store, teacher, targets, tmp_p
     store = packed(
         tmp_path / "store", [replace(car, T_sensor_object=None, shape=None) for car in cars[:2]]
     )
-    blind = fused_targets(teacher, sampler_of(store))
-    seeing = fused_targets(teacher, sampler_of(packed(tmp_path / "known", cars[:2])))
+    blind = fused_targets(teacher, sampler_of(store), parts=NOT_KEPT)
+    known = packed(tmp_path / "known", cars[:2])
+    seeing = fused_targets(teacher, sampler_of(known), parts=NOT_KEPT)
     for one, two in zip(blind, seeing):
         assert torch.equal(torch.as_tensor(one), torch.as_tensor(two))
 
@@ -100,7 +101,7 @@ def test_targets_do_not_depend_on_truth(cars, car_store, teacher, targets, tmp_p
 def test_a_teacher_of_another_kind_of_sensor_is_refused(car_store, teacher):
     camera = ViewSampler(car_store, np.arange(2), replace(TAUGHT.views, sensor="camera"))
     with pytest.raises(BadInputError, match="lidar scans and cannot teach camera scans"):
-        fused_targets(teacher, camera)
+        fused_targets(teacher, camera, parts=NOT_KEPT)
 
 
 @pytest.fixture(scope="module")
@@ -273,12 +274,12 @@ def test_a_lidar_s_view_ends_where_its_scans_tell_and_so_does_the_roof(who, cars
         asked.extend(slopes)
         return 0.05
 
-    def closed(shape, _sensors, top, *_, **__):
+    def closed(_who, shape, _track, top):
         tops.append(top)
         return 2 * shape
 
     monkeypatch.setattr(pseudo_labels, "view_top", ends)
-    monkeypatch.setattr(pseudo_labels, "with_unseen_roof", closed)
+    monkeypatch.setattr(pseudo_labels, "with_roof", closed)
     track = true_track(cars, 1)
     shape, top = whole_shape(who, track)
     assert (top, tops) == (0.05, [0.05])

@@ -15,10 +15,16 @@ from torch import Tensor
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.centring import scan_centre
-from wildshape.geometry.projection.line_of_sight import Facing, face, roll
+from wildshape.geometry.projection.line_of_sight import Facing, roll
 from wildshape.geometry.transforms.rotation import rotation_from_uniform, rotation_z
 from wildshape.ops.counter_random import integers, random_bits, uniform
-from wildshape.training.batches.views import Batch, ViewConfig, ViewSampler, centre_turns_along
+from wildshape.training.batches.views import (
+    Batch,
+    ViewConfig,
+    ViewSampler,
+    centre_turns_along,
+    frames_of,
+)
 
 _MOST_CENTRE_POINTS = 4096  # of a scan whose centre is found anew; steps need fixed shapes
 _POINTS_AT_ONCE = 1 << 22  # decides memory alone
@@ -208,13 +214,5 @@ def _frames(
         counts = torch.from_numpy(sizes[part]).to(points.device)[:, None]
         place = torch.arange(int(sizes[part].max()), device=points.device)
         scans = points[first[part, None] + place.minimum(counts - 1)]
-        found.append(_frame(scans, place < counts, config))
+        found.append(frames_of(scans, config, place < counts))
     return Facing(*(torch.cat(columns) for columns in zip(*found)))
-
-
-def _frame(scans: Float[Tensor, "B n 3"], counted: Tensor, config: ViewConfig) -> Facing:
-    """Turned towards the object, or as recorded and about the scan's centre."""
-    if config.turn == "facing":
-        return face(scans, counted, sensor_kind=config.sensor)
-    as_recorded = torch.eye(3, device=scans.device).expand(len(scans), 3, 3)
-    return Facing(as_recorded, scan_centre(scans, config.sensor))

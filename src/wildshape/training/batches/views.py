@@ -137,7 +137,7 @@ class ViewSampler:
         """As `turned`, of scans `(B, n, 3)` that are not the store's; sensor frames."""
         config = self.config
         if config.turn == "facing":
-            frames = _frames_of(points, config)
+            frames = frames_of(points, config)
             turn, centres = _rolls(len(points), config, rng) @ frames.turn, frames.centre
         else:
             turn = _turns(len(points), config.turn, int(rng.integers(2**62)))
@@ -149,7 +149,7 @@ class ViewSampler:
         self, points: Float[Tensor, "B n 3"]
     ) -> tuple[Float[Tensor, "B n 3"], Float[Tensor, "B 3"], Float[Tensor, "B 3 3"]]:
         """Scans that are not the store's, centred and turned as `gather_as_posed` does."""
-        turn, centres = _frames_of(points, self.config)
+        turn, centres = frames_of(points, self.config)
         return points @ turn.mT - centres[:, None], centres, turn
 
     def gather_as_posed(
@@ -217,10 +217,12 @@ class ViewSampler:
         return torch.from_numpy(np.ascontiguousarray(self.store.scan_points(scan)))
 
 
-def _frames_of(points: Float[Tensor, "B n 3"], config: ViewConfig) -> Facing:
+def frames_of(
+    points: Float[Tensor, "B n 3"], config: ViewConfig, counted: Tensor | None = None
+) -> Facing:
     """Turn and centre of scans that are to be posed: towards their objects, or as they are."""
     if config.turn == "facing":
-        return face(points, sensor_kind=config.sensor)
+        return face(points, counted, sensor_kind=config.sensor)
     as_recorded = torch.eye(3, device=points.device).repeat(len(points), 1, 1)
     return Facing(as_recorded, scan_centre(points, config.sensor))
 

@@ -14,7 +14,6 @@ from wildshape.geometry.sampling import voxel_thin
 from wildshape.records import SensorKind
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.self_training.headings import PosedTrack
-from wildshape.training.self_training.unseen_roof import RoofConfig, unseen_roof
 
 
 @dataclass(frozen=True)
@@ -44,13 +43,10 @@ class FusionConfig:
         return self.lidar_voxel_m if sensor == "lidar" else self.camera_voxel_m
 
 
-_DEFAULT = FusionConfig()
-
-
 def fused_shape(
     sampler: ViewSampler,
     track: PosedTrack,
-    config: FusionConfig = _DEFAULT,
+    config: FusionConfig,
     *,
     mirror: bool,
     voxel_m: float,
@@ -77,19 +73,6 @@ def fused_shape(
     kept = thinned[_near_others(thinned, config)]
     kept = kept[~skirt(kept)] if sampler.config.sensor == "lidar" else kept
     return exactly(kept, config.points)
-
-
-def with_unseen_roof(
-    shape: Float32[np.ndarray, "G 3"],
-    sensors: Float[Tensor, "O 3"],
-    view_top: float,
-    config: RoofConfig,
-    *,
-    mirror: bool,
-) -> Float32[np.ndarray, "G 3"]:
-    """With the roof that no sensor could see, as many points as before."""
-    roof = unseen_roof(torch.from_numpy(shape), sensors, view_top, config, mirror=mirror)
-    return exactly(np.concatenate((shape, roof.numpy())), len(shape))
 
 
 def sensors_of(track: PosedTrack, count: int) -> Float[Tensor, "O 3"]:

@@ -28,15 +28,14 @@ _TRACKS = 64
 class PosedParts:
     """Keeps what is posed, and finds what was kept."""
 
-    def __init__(self, folder: Path | None = None, identity: dict[str, str] | None = None) -> None:
-        """`folder`: of the run, None keeps nothing; `identity`: which tracks, posed by what."""
-        self._folder, self._identity = folder, identity or {}
+    def __init__(self, folder: Path, identity: dict[str, str]) -> None:
+        """`folder`: of the run; `identity`: which tracks, posed by what."""
+        self._folder, self._identity = folder, identity
 
     def found(self, scans_of: Sequence[Int64[np.ndarray, "_"]]) -> list[Posed]:
         """The first of these tracks, as far as whole files of the same identity hold them."""
         known: list[Posed] = []
-        parts = len(scans_of) // _TRACKS if self._folder is not None else 0
-        for number in range(parts):
+        for number in range(len(scans_of) // _TRACKS):
             scans = scans_of[number * _TRACKS : (number + 1) * _TRACKS]
             part = self._read(self._path(number), scans)
             if part is None:
@@ -49,19 +48,17 @@ class PosedParts:
         waiting: list[Posed] = []
         for number, one in enumerate(posed, start=known + 1):
             waiting.append(one)
-            if self._folder is not None and number % _TRACKS == 0:
+            if number % _TRACKS == 0:
                 self._write(self._path(number // _TRACKS - 1), waiting)
                 waiting = []
             yield one
 
     def clear(self) -> None:
         """Remove the files."""
-        if self._folder is not None:
-            for path in self._folder.glob("posed-*.safetensors"):
-                path.unlink(missing_ok=True)  # another process may be first
+        for path in self._folder.glob("posed-*.safetensors"):
+            path.unlink(missing_ok=True)  # another process may be first
 
     def _path(self, number: int) -> Path:
-        assert self._folder is not None
         return self._folder / f"posed-{number:04d}.safetensors"
 
     def _write(self, path: Path, part: Sequence[Posed]) -> None:

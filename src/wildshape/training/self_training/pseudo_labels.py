@@ -39,9 +39,9 @@ from wildshape.training.batches.fused import DrawConfig, FusedTargets
 from wildshape.training.batches.views import ViewSampler
 from wildshape.training.self_training.fused_shape import (
     FusionConfig,
+    exactly,
     fused_shape,
     sensors_of,
-    with_unseen_roof,
 )
 from wildshape.training.self_training.heading_profiles import profile, together
 from wildshape.training.self_training.heading_transfer import (
@@ -62,7 +62,7 @@ from wildshape.training.self_training.objective import TaughtLossConfig
 from wildshape.training.self_training.pose_graph import PoseGraphConfig, refine_by_graph
 from wildshape.training.self_training.posed_parts import PosedParts
 from wildshape.training.self_training.targets import targets_of
-from wildshape.training.self_training.unseen_roof import RoofConfig
+from wildshape.training.self_training.unseen_roof import RoofConfig, unseen_roof
 
 Progress = Callable[[int, int], None]
 Fronts = Float[Tensor, "S 3"]
@@ -93,7 +93,6 @@ class SelfTrainingConfig:
 
 
 _DEFAULT = SelfTrainingConfig()
-_NOT_KEPT = PosedParts()
 
 
 @dataclass(frozen=True)
@@ -180,7 +179,7 @@ def fused_targets(
     time_ordered: bool = True,
     headings: Path | None = None,
     fronts: Fronts | None = None,
-    parts: PosedParts = _NOT_KEPT,
+    parts: PosedParts,
 ) -> FusedTargets:
     """Targets for all scans of a sampler, from a checkpoint and the scans alone.
 
@@ -309,10 +308,11 @@ def whole_shape(teacher: Teacher, track: PosedTrack) -> tuple[Float32[np.ndarray
 def with_roof(
     teacher: Teacher, shape: Float32[np.ndarray, "G 3"], track: PosedTrack, top: float
 ) -> Float32[np.ndarray, "G 3"]:
-    """With the roof that none of the track's sensors could see; `top` is where their view ended."""
+    """With the roof that no sensor could see, as many points; `top`: where their view ended."""
     config = teacher.config
     sensors = sensors_of(track, config.fusion.sensors)
-    return with_unseen_roof(shape, sensors, top, config.roof, mirror=teacher.mirror)
+    roof = unseen_roof(torch.from_numpy(shape), sensors, top, config.roof, mirror=teacher.mirror)
+    return exactly(np.concatenate((shape, roof.numpy())), len(shape))
 
 
 def view_top_of(views: ViewSampler, scans: Int64[np.ndarray, "V"]) -> float:
