@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.drives.cuts import write_cut
 from tests.drives.objects import completed, still
 
 from wildshape.drives.completing.boxes import moves, smooth
@@ -32,7 +33,6 @@ from wildshape.drives.config import (
     SurroundingsConfig,
     VehicleConfig,
 )
-from wildshape.drives.tracking.segmentation import cut_file
 from wildshape.drives.tracking.sightings import Sightings
 
 
@@ -275,10 +275,7 @@ def test_vehicles_beside_each_other_are_not_joined_by_what_lies_between():
 def write_grounds(folder, grounds):
     """Cuts of one cluster each, and the ground's z under it."""
     for frame, ground in enumerate(grounds):
-        with cut_file(folder, frame).open("wb") as file:
-            known = {"points": np.zeros((4, 3), np.float32), "rows": np.arange(4)}
-            known |= {"counts": np.array([4]), "grounds": np.array([[0.0, 0.0, ground]])}
-            np.savez(file, **known, scanned=4, tracks=np.array([], str))
+        write_cut(folder, frame, [np.zeros((4, 3))], 4, [(0.0, 0.0, ground)])
 
 
 def test_boxes_reach_down_to_the_ground_under_the_clusters_that_are_left(tmp_path):
@@ -332,17 +329,7 @@ def test_clusters_in_the_box_of_a_vehicle_are_its_own(tmp_path):
 
     front, rear, beside = piece(1.5, 0.0), piece(-1.5, 0.0), piece(0.0, 1.4)
     for frame in range(3):
-        counts, rows = np.array([20, 20, 20]), np.arange(60)
-        points = np.concatenate((beside, front, rear)).astype(np.float32)
-        with cut_file(tmp_path, frame).open("wb") as file:
-            known = {"points": points, "rows": rows, "counts": counts}
-            np.savez(
-                file,
-                **known,
-                scanned=90,
-                tracks=np.array([], str),
-                grounds=np.zeros((3, 3)),
-            )
+        write_cut(tmp_path, frame, (beside, front, rear), 90)
     at = [(0.0, 0.0, 0.0, 0.0)]
     whole = replace(completed(at, name="whole"), seen=Sightings("whole", (0,), ((1,),), (20,)))
     again = replace(completed(at, name="again"), seen=Sightings("again", (2,), ((2,),), (20,)))

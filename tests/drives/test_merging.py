@@ -6,6 +6,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from tests.drives.cuts import write_cut
 from tests.drives.objects import completed, still
 from tests.models import CONFIG, SETTINGS
 
@@ -16,7 +17,6 @@ from wildshape.drives.completing.merging import Places
 from wildshape.drives.config import BoxConfig, DriveConfig, MergeConfig
 from wildshape.drives.pipeline import Pipeline
 from wildshape.drives.source import Drive
-from wildshape.drives.tracking.segmentation import cut_file
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.drives.tracking.trajectory import Breaks
 from wildshape.inference.predictor import Predictor
@@ -50,11 +50,9 @@ def test_no_two_objects_are_one_across_a_break(kind):
 
 
 def test_no_vehicle_claims_clusters_across_a_break(tmp_path):
-    points = np.random.default_rng(0).uniform(-0.3, 0.3, (20, 3)).astype(np.float32)
+    points = np.random.default_rng(0).uniform(-0.3, 0.3, (20, 3))
     for frame in range(6):
-        with cut_file(tmp_path, frame).open("wb") as file:
-            known = {"points": points, "rows": np.arange(20), "counts": np.array([20])}
-            np.savez(file, **known, scanned=20, tracks=np.array([], str), grounds=np.zeros((1, 3)))
+        write_cut(tmp_path, frame, [points], 20)
     one = replace(completed([HERE]), seen=Sightings("a", (3,), ((0,),), (20,)))
     for breaks, frames in (((), range(6)), ((2, 5), range(2, 5)), ((3,), range(3, 6))):
         (found,) = associate([one], tmp_path, still(6, breaks), DriveConfig()).vehicles

@@ -7,12 +7,12 @@ import json
 import numpy as np
 import pytest
 import torch
+from tests.drives.cuts import write_cut
 from tests.drives.street import street, write_scans
 
 import wildshape
 from wildshape.drives.completing.own_vehicle import carries_sensor
 from wildshape.drives.config import OwnVehicleConfig
-from wildshape.drives.tracking.segmentation import cut_file
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.table import read_box_table
@@ -28,10 +28,7 @@ def carried(folder, ahead, beside, step=1.0):
     """Whether a plate so far ahead and beside in each frame is of a vehicle that goes by steps."""
     plate = np.random.default_rng(0).uniform((0, -0.9, -1), (0.6, 0.9, -0.7), (200, 3))
     for frame in range(FRAMES):
-        points = np.add(plate, (ahead[frame], beside[frame], 0)).astype(np.float32)
-        with cut_file(folder, frame).open("wb") as file:
-            known = {"points": points, "rows": np.arange(200), "counts": np.array([200])}
-            np.savez(file, **known, scanned=200, tracks=np.array([], str), grounds=np.zeros((1, 3)))
+        write_cut(folder, frame, [np.add(plate, (ahead[frame], beside[frame], 0))], 200)
     places = torch.zeros(FRAMES, 3, dtype=torch.float64)
     places[:, 0] = step * torch.arange(FRAMES)
     poses = SE3(torch.eye(3).double().expand(FRAMES, 3, 3), places)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.drives.cuts import write_cut
 
 import wildshape
 from wildshape.drives.clock import Clock, silent
@@ -14,7 +15,6 @@ from wildshape.drives.pipeline import Pipeline
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.box_cutter import cut_boxes
 from wildshape.drives.tracking.detections import DetectionFile, Detections, find_detections
-from wildshape.drives.tracking.segmentation import cut_file
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detector import DetectorBox, upright_box
 from wildshape.parallel.team import ALONE
@@ -64,29 +64,10 @@ def test_a_vehicle_detected_in_keyframes_alone_is_followed(tmp_path: Path, step)
     known = Detections(Path("boxes.json"), frames, tracked=False, warnings=())
     assert known.every == step
     for frame, row in enumerate(frames):
-        points = (
-            points_of(0.0) + np.array([speed * frame, 0, 0], np.float32)
-            if row
-            else np.empty((0, 3))
-        )
-        path = cut_file(tmp_path / "stages" / "clusters", frame)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        np.savez(
-            path,
-            points=points.astype(np.float32),
-            rows=np.arange(len(points), dtype=np.int32),
-            counts=np.full(len(row), len(points)),
-            scanned=np.array(100),
-            tracks=np.array((), np.str_),
-            grounds=np.zeros((len(row), 3)),
-        )
-    names = [f"{frame:06d}" for frame in range(scans)]
-    drive = Drive.of(
-        "street",
-        names,
-        lambda _: Turn(np.empty((0, 3), np.float32)),
-        [0.1 * f for f in range(scans)],
-    )
+        clusters = [points_of(0.0) + np.array([speed * frame, 0, 0], np.float32) for _ in row]
+        write_cut(tmp_path / "stages" / "clusters", frame, clusters, 100)
+    names, nothing = [f"{frame:06d}" for frame in range(scans)], np.empty((0, 3), np.float32)
+    drive = Drive.of("street", names, lambda _: Turn(nothing), [0.1 * f for f in range(scans)])
     predictor = wildshape.load()  # nothing is completed
     run = Pipeline(drive, tmp_path, DriveConfig(), predictor, ALONE, known, Clock(silent))
     (found,) = run.linked(SE3.identity(scans))

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tests.drives.cuts import write_cut
 
 import wildshape
 from wildshape.drives.clock import Clock, silent
@@ -15,7 +16,6 @@ from wildshape.drives.pipeline import Pipeline
 from wildshape.drives.result import DriveResult
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.rays import RayCutter
-from wildshape.drives.tracking.segmentation import cut_file
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.parallel.team import ALONE
@@ -45,16 +45,7 @@ def moving(tmp_path):
         seen = (world[frame] - places[:, None] * (1.0, 0.0, 0.0)).astype(np.float32)
         seen[-50:] = 0.0  # nothing came back
         turns.append(Turn(seen, seconds[frame]))
-        with cut_file(tmp_path, frame).open("wb") as file:
-            np.savez(
-                file,
-                points=seen[:6],
-                rows=np.arange(6, dtype=np.int32),
-                counts=np.array((3, 3)),
-                scanned=POINTS,
-                grounds=np.zeros((2, 3)),
-                tracks=np.array([], str),
-            )
+        write_cut(tmp_path, frame, (seen[:3], seen[3:6]), POINTS)
     drive = Drive.of("street", ["a", "b", "c"], turns.__getitem__, [0.0, 0.1, 0.2])
     return drive, T_world_sensor, world, seconds
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 import torch
+from tests.drives.cuts import write_cut
 
 from wildshape.drives.config import StandConfig
-from wildshape.drives.tracking.segmentation import cut_file
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.drives.tracking.static_tracks import joined_where_they_stand
 from wildshape.geometry.transforms.rotation import rotation_z
@@ -51,16 +51,7 @@ def drive(tmp_path):
 
     def joined(breaks=()):
         for frame, parts in seen.items():
-            points = np.concatenate(parts) if parts else np.empty((0, 3), np.float32)
-            known = {"points": points, "rows": np.arange(len(points)), "scanned": len(points)}
-            with cut_file(tmp_path, frame).open("wb") as file:
-                np.savez(
-                    file,
-                    **known,
-                    counts=np.array([len(part) for part in parts], int),
-                    tracks=np.array([], str),
-                    grounds=np.zeros((len(parts), 3)),
-                )
+            write_cut(tmp_path, frame, parts, sum(map(len, parts)))
         return joined_where_they_stand(tracks, tmp_path, T_level_sensor, StandConfig(), breaks)
 
     return add, joined

@@ -21,10 +21,6 @@ class RayCutter:
         self.drive, self.cuts = drive, cuts
         self._scans = FrameCache(drive.full_scan)
 
-    def __reduce__(self) -> tuple[type["RayCutter"], tuple[Drive, Path]]:
-        """Scans do not go along to another process."""
-        return RayCutter, (self.drive, self.cuts)
-
     def in_frame(self, frame: int, objects: Sequence[tuple[int, ...]]) -> list[SightLines | None]:
         """Those beside each of some objects, sensor frame; None for all if the scan is not read."""
         full, cut = self._scans(frame), read_cut(self.cuts, frame)

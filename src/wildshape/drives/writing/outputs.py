@@ -23,7 +23,6 @@ from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.object_config import BoxConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.rays import RayCutter
-from wildshape.drives.tracking.sightings import Sightings
 from wildshape.drives.writing.folder import SHAPES, TRACKS, TRAJECTORY, TUM
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import COMPLETED, OBJECTS
@@ -129,8 +128,9 @@ class VehicleWriter:
 
     def __call__(self, one: Vehicle) -> list[BoxRow]:
         """The vehicle's lines of `boxes.csv`."""
-        folder = self.folders / one.name
-        write_vehicle_track(self.out / TRACKS, one.completed.seen, self.cuts, self.drive)
+        folder, track = self.folders / one.name, self.out / TRACKS / one.name
+        if not _is_written(track):
+            write_track(track, one.completed.seen.track(self.cuts, self.drive, CATEGORY))
         copy_object(folder, self.out / "objects" / one.name)
         write_shape(self.out / SHAPES / f"{one.name}.ply", folder, one.completed)
         return rows_of(one, self._boxes(one), self.drive)
@@ -142,12 +142,6 @@ class VehicleWriter:
         placed = on_ground_of_each(frames, shown, vehicle, self.cuts, self.turns, self.config)
         T_level_sensor = self.turns.T_level_sensor[torch.tensor(frames)]
         return list(zip(frames, boxes_in_scans(placed, vehicle.size, T_level_sensor)))
-
-
-def write_vehicle_track(out: Path, seen: Sightings, cuts: Path, drive: Drive) -> None:
-    """All scans of a vehicle as a track folder, if it is not there yet."""
-    if not _is_written(out / seen.name):
-        write_track(out / seen.name, seen.track(cuts, drive, CATEGORY))
 
 
 def _is_written(track: Path) -> bool:
