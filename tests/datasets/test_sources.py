@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Track folders and the packed store as sources."""
 
+import pickle
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,6 @@ import pytest
 from tests.cars import drive_by
 from tests.fuzz.drives import TARGETS
 
-from wildshape.datasets.kitti.raw import KittiRaw
 from wildshape.datasets.sources import SOURCES, open_source
 from wildshape.datasets.tracks.source import Source, all_tracks
 from wildshape.datasets.tracks.whole_tracks import Folder, Packed
@@ -57,8 +57,11 @@ def test_packed_gives_back_what_was_written(tmp_path):
         assert np.array_equal(read.scans[1], track.scans[1])
 
 
-def test_readers_are_sources(tmp_path):
-    assert all(isinstance(kind(tmp_path), Source) for kind in (Folder, Packed, KittiRaw))
+@pytest.mark.parametrize("name", SOURCES)
+def test_every_reader_is_a_source_and_travels_to_workers(tmp_path, name):
+    source = open_source(name, tmp_path, {"every": 2})
+    assert isinstance(source, Source)
+    assert pickle.loads(pickle.dumps(source)) == source
 
 
 def test_every_data_set_is_fuzzed_and_listed():

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A sequence written here in KITTI tracking's own layout, with known cars."""
 
-import pickle
-
 import numpy as np
 import pytest
 from tests.cars import off_surface, poses_of
@@ -122,11 +120,6 @@ def test_objects_are_handed_out_right_after_their_last_frame(training):
     assert "000003" not in next(stream).scan_names
     assert list(stream) == []
     assert source.rejected == {f"scan: {scan}: no such file; check the path.": 1}
-
-
-def test_readers_can_be_sent_to_workers(training):
-    copy = pickle.loads(pickle.dumps(KittiTracking(training)))
-    assert len(list(copy.tracks_of("0001"))) == 2
 
 
 def test_dontcare_is_no_object(training):

@@ -3,7 +3,6 @@
 """A scene written here in the BOP format, of chairs whose every face is known."""
 
 import json
-import pickle
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from tests.refusal import refusal_of
 
 from wildshape.datasets.rgbd.bop import Bop
 from wildshape.datasets.tracks.selection import Selection
-from wildshape.datasets.tracks.source import Source, all_tracks
+from wildshape.datasets.tracks.source import all_tracks
 
 NAMES = ("test_000001_obj000007", "test_000001_obj000007-1")
 
@@ -66,6 +65,7 @@ def test_selection_and_counts(tmp_path):
     source = Bop(tmp_path, Selection(categories=("obj_000008",)))
     assert list(all_tracks(source)) == []
     assert source.rejected == {"scan: category obj_000007": 8}
+    assert source.parts() == ["test/000001"]
     assert [len(t.scans) for t in tracks(tmp_path, selection=Selection(every=2)).values()] == [2, 2]
 
 
@@ -84,13 +84,6 @@ def test_long_scenes_and_gaps_make_several_tracks_of_different_names(tmp_path):
         (f"{NAMES[0]}_1", ("000005", "000006", "000007")),
     ]
     assert len(tracks(tmp_path, longest=5)) == 2
-
-
-def test_it_is_a_source_and_travels_to_workers(tmp_path):
-    write_bop(tmp_path, count=1)
-    source = pickle.loads(pickle.dumps(Bop(tmp_path)))
-    assert isinstance(source, Source)
-    assert source.parts() == ["test/000001"]
 
 
 refused = refusal_of(lambda root: list(all_tracks(Bop(root))))

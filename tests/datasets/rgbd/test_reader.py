@@ -3,7 +3,6 @@
 """Frames written here in the documented layout, of chairs whose every face is known."""
 
 import json
-import pickle
 import re
 import shutil
 
@@ -19,7 +18,7 @@ from tests.refusal import refusal_of
 from wildshape.datasets.rgbd.depth_image import supported
 from wildshape.datasets.rgbd.reader import Cut, Rgbd, cut_out
 from wildshape.datasets.tracks.selection import Selection
-from wildshape.datasets.tracks.source import Source, all_tracks
+from wildshape.datasets.tracks.source import all_tracks
 from wildshape.records import Intrinsics
 
 
@@ -145,12 +144,6 @@ def test_selection(tmp_path):
     (track,) = all_tracks(source)
     assert (track.name, track.scan_names) == ("kitchen_00002", ("000000", "000002"))
     assert source.rejected == {"scan: category chair": 4}
-
-
-def test_it_is_a_source_and_travels_to_workers(tmp_path):
-    write_sequence(tmp_path / "kitchen", count=1)
-    source = pickle.loads(pickle.dumps(Rgbd(tmp_path)))
-    assert isinstance(source, Source)
     assert source.parts() == ["kitchen"]
 
 

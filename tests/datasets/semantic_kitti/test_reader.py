@@ -3,7 +3,6 @@
 """A sequence written here in SemanticKITTI's own layout, with known cars."""
 
 import math
-import pickle
 
 import numpy as np
 import pytest
@@ -218,11 +217,6 @@ def test_frames_without_a_scan_are_counted(sequence):
     source = SemanticKitti(sequence)
     assert [len(track.scans) for track in source.tracks_of("00")] == [FRAMES - 1] * 2
     assert source.rejected == {"scan: the frame has no LiDAR file": 2}
-
-
-def test_readers_can_be_sent_to_workers(sequence):
-    copy = pickle.loads(pickle.dumps(SemanticKitti(sequence, PAPER, split="all")))
-    assert [track.name for track in copy.tracks_of("00")] == [PARKED]
 
 
 refused = refusal_of(tracks)

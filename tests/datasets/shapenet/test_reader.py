@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Renders written here in DPC's layout, of a chair whose every face is known."""
 
-import pickle
-
 import numpy as np
 import pytest
 from PIL import Image
@@ -15,7 +13,7 @@ from tests.refusal import refusal_of
 
 from wildshape.datasets.shapenet.reader import ShapeNetViews
 from wildshape.datasets.tracks.selection import Selection
-from wildshape.datasets.tracks.source import Source, all_tracks
+from wildshape.datasets.tracks.source import all_tracks
 from wildshape.errors import BadInputError
 
 
@@ -87,6 +85,7 @@ def test_splits_by_their_lists(written, split):
 
 
 def test_parts_are_some_models_each(written, tmp_path):
+    assert len(ShapeNetViews(written[0]).parts()) == 3
     root = tmp_path / "data"
     write_data(root)
     write_list(root, "train", [f"m{i}" for i in range(70)])
@@ -108,12 +107,6 @@ def test_views_are_chosen_and_counted(written):
         "scan: fewer than 100000 points on the object": 5,
         "object: fewer than 1 scans left": 1,
     }
-
-
-def test_it_is_a_source_and_travels_to_workers(written):
-    source = pickle.loads(pickle.dumps(ShapeNetViews(written[0])))
-    assert isinstance(source, Source)
-    assert len(source.parts()) == 3
 
 
 refused = refusal_of(lambda root, **options: list(all_tracks(ShapeNetViews(root, **options))))
