@@ -15,6 +15,7 @@ from tests.datasets import write_kitti_tracking as tracking
 from tests.datasets.street import street
 from tests.fuzz.scans import track
 from tests.fuzz.target import Arrays, Target, numbers_of
+from tests.io.older_store import reseal
 
 from wildshape.datasets.tracks.whole_tracks import Packed
 from wildshape.evaluation.drives.found import drives_of, read_found
@@ -26,10 +27,9 @@ from wildshape.inference.folders.box_files import BoxFiles
 from wildshape.io.boxes.table import BoxRow, write_box_table
 from wildshape.io.poses import write_poses
 from wildshape.io.scans.writers import write_ply
-from wildshape.io.store.index import file_record
 from wildshape.io.store.join import finish_join
 from wildshape.io.store.layout import INDEX_JSON, JOINING_JSON, WRITING_JSON
-from wildshape.io.store.manifest import manifest_of, read_manifest, sealed
+from wildshape.io.store.manifest import read_manifest, sealed
 from wildshape.io.store.origin import origin_of
 from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.io.tracks import write_track
@@ -66,12 +66,8 @@ def _read_store(folder: Path) -> Arrays:
 
 def _read_resealed(folder: Path) -> Arrays:
     """The same where damage was done before the checksums were taken."""
-    path = folder / INDEX_JSON
     with suppress(Exception):  # it stays damaged
-        said = json.loads(path.read_text("utf-8"))
-        index, *shards = [file_record(folder / f["file"]) for f in (said["index"], *said["shards"])]
-        counts = {name: said[name] for name in ("tracks", "scans", "points")}
-        path.write_text(json.dumps(manifest_of(index, shards, counts, said["provenance"])))
+        reseal(folder)
     return _read_store(folder)
 
 

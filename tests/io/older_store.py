@@ -1,14 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Stores as versions before CRCs wrote them."""
+"""Stores whose files were changed: as versions before CRCs wrote them, or with checksums again."""
 
 import json
 from pathlib import Path
+from typing import Any
 
 from safetensors.numpy import load_file, save_file
 
 from wildshape.io.store.index import file_record
-from wildshape.io.store.layout import CRCS, INDEX_JSON, INDEX_TENSORS, FileRecord
+from wildshape.io.store.layout import CRCS, INDEX_JSON, INDEX_TENSORS
 from wildshape.io.store.manifest import manifest_of
 
 
@@ -18,14 +19,16 @@ def make_older(path: Path) -> None:
     for name in CRCS:
         del index[name]
     save_file(index, path / INDEX_TENSORS)
-    said = json.loads((path / INDEX_JSON).read_text())
-    counts = {key: said[key] for key in ("tracks", "scans", "points")}
-    record = file_record(path / INDEX_TENSORS)
-    older = manifest_of(record, shards_of(path), counts, said["provenance"])
+    older = reseal(path)
     del older["checksum"]
     (path / INDEX_JSON).write_text(json.dumps(older, indent=2))
 
 
-def shards_of(path: Path) -> list[FileRecord]:
-    """The files of points that a store lists."""
-    return [FileRecord(**shard) for shard in json.loads((path / INDEX_JSON).read_text())["shards"]]
+def reseal(path: Path) -> dict[str, Any]:
+    """Write the checksums of a store's files as they are now."""
+    said = json.loads((path / INDEX_JSON).read_text("utf-8"))
+    index, *shards = [file_record(path / f["file"]) for f in (said["index"], *said["shards"])]
+    counts = {name: said[name] for name in ("tracks", "scans", "points")}
+    manifest = manifest_of(index, shards, counts, said["provenance"])
+    (path / INDEX_JSON).write_text(json.dumps(manifest))
+    return manifest

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 from tests.cars import poses_of, shape_of
+from tests.io.store.stores import assert_same
 from tests.refusal import refused
 
 from wildshape.errors import BadInputError
@@ -20,7 +21,7 @@ def test_round_trip(track: Track, tmp_path: Path) -> None:
     write_track(tmp_path / track.name, track)
     found = read_track_file(tmp_path / track.name)
     assert found.skipped == ()
-    assert_equal(found.track, track)
+    assert_same(found.track, track)
 
 
 def test_scans_alone_are_a_complete_track(tmp_path: Path, formats: dict[str, Path]) -> None:
@@ -155,14 +156,3 @@ def test_names_that_would_not_sort_in_time_become_numbers(track: Track, tmp_path
         found = read_track(folder)
         assert found.scan_names == ("000000", "000001", "000002")
         assert [len(scan) for scan in found.scans] == [60, 20, 33]
-
-
-def assert_equal(found: Track, track: Track) -> None:
-    assert found.name == track.name
-    assert found.scan_names == track.scan_names
-    assert found.sensor == track.sensor
-    assert (found.category, found.source) == (track.category, track.source)
-    for scan, truth in zip(found.scans, track.scans, strict=True):
-        np.testing.assert_array_equal(scan, truth)
-    assert torch.equal(poses_of(found).matrix, poses_of(track).matrix)
-    np.testing.assert_array_equal(shape_of(found), shape_of(track))

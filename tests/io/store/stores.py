@@ -38,14 +38,14 @@ def assert_holds(path: Path, track: Track, names: str) -> None:
     store.verify()
     assert "".join(store.names) == names
     for found, name in zip(store, names):
-        truth = with_gaps(track, name)
-        assert (found.scan_names, found.category) == (truth.scan_names, truth.category)
-        assert found.sensor == truth.sensor
-        assert all(map(np.array_equal, found.scans, truth.scans))
-        assert_same_truth(found, truth)
+        assert_same(found, with_gaps(track, name))
 
 
-def assert_same_truth(found: Track, truth: Track) -> None:
+def assert_same(found: Track, truth: Track) -> None:
+    for what in ("name", "scan_names", "sensor", "category", "source"):
+        assert getattr(found, what) == getattr(truth, what)
+    for scan, points in zip(found.scans, truth.scans, strict=True):
+        assert np.array_equal(scan, points)
     assert (found.shape is None) == (truth.shape is None)
     if found.shape is not None and truth.shape is not None:
         assert np.array_equal(found.shape, truth.shape)

@@ -9,15 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from safetensors.numpy import load_file, save_file
-from tests.io.older_store import make_older, shards_of
+from tests.io.older_store import make_older, reseal
 from tests.io.store.stores import assert_holds, content, make_parts, with_gaps
 
 from wildshape.errors import BadInputError
 from wildshape.io.store import checks as store_checks
-from wildshape.io.store.index import file_record
 from wildshape.io.store.join import join_stores
 from wildshape.io.store.layout import INDEX_JSON, INDEX_TENSORS
-from wildshape.io.store.manifest import manifest_of
 from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.records import Track
 
@@ -136,9 +134,6 @@ def test_points_that_are_no_numbers_are_refused_where_there_are_no_crcs(track, t
     data = bytearray(shard.read_bytes())
     data[256:260] = np.float32(np.nan).tobytes()
     shard.write_bytes(data)
-    said = json.loads((tmp_path / "store" / INDEX_JSON).read_text())
-    said["shards"] = [vars(file_record(shard))]
-    (tmp_path / "store" / INDEX_JSON).write_text(json.dumps(said))
     make_older(tmp_path / "store")
     with pytest.raises(BadInputError, match="the points of scan 0"):
         open_store(tmp_path / "store").track(0)
@@ -163,10 +158,7 @@ def test_an_index_made_to_mislead_is_refused_though_all_checksums_fit(path: Path
     index = load_file(path / INDEX_TENSORS)
     index[name] = np.asarray(CRAFTED[name], index[name].dtype)
     save_file(index, path / INDEX_TENSORS)
-    said = json.loads((path / INDEX_JSON).read_text())
-    record = file_record(path / INDEX_TENSORS)
-    counts = {key: said[key] for key in ("tracks", "scans", "points")}
-    (path / INDEX_JSON).write_text(json.dumps(manifest_of(record, shards_of(path), counts, {})))
+    reseal(path)
     with pytest.raises(BadInputError, match=r"index\.safetensors") as refused:
         list(content(open_store(path)))
     assert "\n" not in str(refused.value)
@@ -179,10 +171,7 @@ def test_an_index_off_the_grid_of_its_numbers_is_read(path: Path) -> None:
     header = 8 + int.from_bytes(data[:8], "little")
     shifted = (header - 7).to_bytes(8, "little") + data[8:header] + b" " + data[header:]
     (path / INDEX_TENSORS).write_bytes(shifted)
-    said = json.loads((path / INDEX_JSON).read_text())
-    counts = {key: said[key] for key in ("tracks", "scans", "points")}
-    record = file_record(path / INDEX_TENSORS)
-    (path / INDEX_JSON).write_text(json.dumps(manifest_of(record, shards_of(path), counts, {})))
+    reseal(path)
     _, *after = content(open_store(path))
     assert after == before
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tests.io.store.stores import assert_same
 from tests.refusal import refused
 from tests.stopping import stopped_at
 
@@ -41,22 +42,7 @@ def test_round_trip(store: Store, track: Track) -> None:
     assert len(store) == 4
     assert store.names == ("car-1", "bare", "sparse scan", "again")
     for found, truth in zip(store, _tracks(track), strict=True):
-        assert found.name == truth.name
-        assert found.scan_names == truth.scan_names
-        assert found.sensor == truth.sensor
-        assert (found.category, found.source) == (truth.category, truth.source)
-        for scan, points in zip(found.scans, truth.scans, strict=True):
-            np.testing.assert_array_equal(scan, points)
-        _assert_same_truth(found, truth)
-
-
-def _assert_same_truth(found: Track, truth: Track) -> None:
-    assert (found.shape is None) == (truth.shape is None)
-    if found.shape is not None and truth.shape is not None:
-        np.testing.assert_array_equal(found.shape, truth.shape)
-    assert (found.T_sensor_object is None) == (truth.T_sensor_object is None)
-    if found.T_sensor_object is not None and truth.T_sensor_object is not None:
-        assert torch.equal(found.T_sensor_object.matrix, truth.T_sensor_object.matrix)
+        assert_same(found, truth)
 
 
 def test_global_scan_index(store: Store, track: Track) -> None:
