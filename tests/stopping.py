@@ -9,6 +9,10 @@ from typing import Any
 import pytest
 
 
+class Killed(BaseException):
+    """A process is killed here."""
+
+
 @contextmanager
 def stopped_at(
     owner: Any, call: str, number: int, monkeypatch: pytest.MonkeyPatch

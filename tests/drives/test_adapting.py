@@ -15,6 +15,7 @@ import torch
 from tests.drives.finished_drive import CARS, finished_drive
 from tests.models import CONFIG, SETTINGS
 from tests.refusal import refused
+from tests.stopping import Killed
 
 from wildshape.drives.adapting import adapt, second_pass
 from wildshape.drives.adapting.adapt import adapt_to
@@ -33,10 +34,6 @@ FEW = AdaptConfig(
     steps=3, fewest_held=1, fewest_trained=1, scans=3, fewest_scans=2, clear=0.0, save_every=2
 )
 GOOD = Measures(0.1, (0.1, 0.1, 0.1), 0.9)
-
-
-class Killed(BaseException):
-    pass
 
 
 @pytest.fixture(scope="module")

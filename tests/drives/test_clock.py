@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 from tests.refusal import refused
+from tests.stopping import Killed
 
 from wildshape.drives import clock
 from wildshape.drives.clock import Clock, silent
@@ -19,10 +20,6 @@ def at(monkeypatch):
     now = SimpleNamespace(s=100.0)
     monkeypatch.setattr(clock.time, "perf_counter", lambda: now.s)
     return now
-
-
-class Killed(BaseException):
-    pass
 
 
 def test_stages_of_a_run_that_goes_on_count_on(at, tmp_path: Path):

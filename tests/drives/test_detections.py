@@ -22,6 +22,7 @@ from tests.drives.detector_files import (
     table,
 )
 from tests.refusal import refused
+from tests.stopping import Killed
 
 import wildshape
 from wildshape.drives import pipeline
@@ -178,10 +179,6 @@ def test_given_tracks_are_kept(street, tmp_path):
             assert count < FULL or owner_of(street, frame, points) == int(one.name)
     full = {str(track) for frame in range(SCANS) for track in full_vehicles(street, frame)}
     assert full <= {one.name for one in objects}
-
-
-class Killed(BaseException):
-    pass
 
 
 def stopped_after_tracks(street, out, detections, monkeypatch):

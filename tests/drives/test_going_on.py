@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.refusal import refused
+from tests.stopping import Killed
 
 import wildshape
 from wildshape.cli.main import main
@@ -38,9 +39,6 @@ def test_a_run_killed_at_any_stage_goes_on_to_the_same_boxes(
 ):
     """The stages are stopped one after the other; each next run begins where the last stopped."""
     config = DriveConfig(rays=True)
-
-    class Killed(BaseException):
-        pass
 
     def killed(*_, **__):
         raise Killed
