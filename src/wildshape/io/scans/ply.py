@@ -206,7 +206,10 @@ def _walk(
                     offset += value * item
             offset += size
         if offset > len(body):
-            _check_end(offset, body, path)
+            raise BadInputError(
+                f"{path}: the PLY header promises {offset} bytes or more, {len(body)} follow it: "
+                "truncated; copy it again."
+            )
     return offset
 
 
@@ -222,11 +225,3 @@ def _step(
         read = Struct(order + _CODES[prop.type]).unpack_from
         return read, size, 0, AXES.index(prop.name)
     return None, size, 0, -1
-
-
-def _check_end(end: int, body: bytes, path: Path) -> None:
-    if end > len(body):
-        raise BadInputError(
-            f"{path}: the PLY header promises {end} bytes or more, {len(body)} follow it: "
-            "truncated; copy it again."
-        )
