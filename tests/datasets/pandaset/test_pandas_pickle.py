@@ -37,6 +37,13 @@ def written(tmp_path, data, name="00.pkl.gz"):
     return path
 
 
+def of_blocks(axes, *blocks):
+    """A data frame of blocks, values and places each."""
+    state = {"axes": axes, "blocks": [{"values": v, "mgr_locs": place} for v, place in blocks]}
+    manager = Made(MANAGER, state=([], [], [], {"0.14.1": state}), new=True)
+    return Made(FRAME, state={"_data": manager}, new=True)
+
+
 def same(table):
     assert set(table) == set(COLUMNS)
     for name, values in COLUMNS.items():
@@ -88,9 +95,7 @@ def test_numpy_is_not_given_memory_by_a_pickle(tmp_path):
     version, shape, kind, order, _ = values.state
     for claimed, data in ((kind, b"\x41" * 16), (Made(kind.by, ("V8", 0, 1)), b"\x41" * 16)):
         array = Made(values.by, values.arguments, (version, shape, claimed, order, data))
-        blocks = {"axes": [_index(["x"])], "blocks": [{"values": array, "mgr_locs": slice(0, 1)}]}
-        manager = Made(MANAGER, state=([], [], [], {"0.14.1": blocks}), new=True)
-        table = Made(FRAME, state={"_data": manager}, new=True)
+        table = of_blocks([_index(["x"])], (array, slice(0, 1)))
         refused(written(tmp_path, pickled(table)), r"found a damaged or foreign file")
 
 
@@ -160,24 +165,14 @@ def test_what_no_table_needs_is_refused(tmp_path, program):
 
 
 def test_columns_of_different_lengths_are_refused(tmp_path):
-    axes = [_index(["x", "y"]), _index([0])]
-    blocks = [{"values": np.ones((1, n)), "mgr_locs": slice(n - 1, n)} for n in (1, 2)]
-    manager = Made(
-        MANAGER, state=([], [], [], {"0.14.1": {"axes": axes, "blocks": blocks}}), new=True
-    )
-    table = Made(FRAME, state={"_data": manager}, new=True)
+    blocks = ((np.ones((1, n)), slice(n - 1, n)) for n in (1, 2))
+    table = of_blocks([_index(["x", "y"]), _index([0])], *blocks)
     refused(written(tmp_path, pickled(table)), "columns of different lengths")
 
 
 def bombs():
     """Pickles of a few bytes that ask for much; each is gzipped."""
     axes = [_index(["x"]), _index([0])]
-
-    def table(values, where):
-        blocks = {"axes": axes, "blocks": [{"values": values, "mgr_locs": where}]}
-        manager = Made(MANAGER, state=([], [], [], {"0.14.1": blocks}), new=True)
-        return pickled(Made(FRAME, state={"_data": manager}, new=True))
-
     wide = Made(
         Name("numpy.core.multiarray", "_reconstruct"),
         (Name("numpy", "ndarray"), (0,), b"b"),
@@ -185,8 +180,8 @@ def bombs():
     )
     text = b"X" + (1 << 20).to_bytes(4, "little") + b"a" * (1 << 20) + b"q\x00"
     return {
-        "slice": table(np.ones((1, 1)), slice(0, 60_000_000)),
-        "rows": table(wide, slice(0, 1 << 40)),
+        "slice": pickled(of_blocks(axes, (np.ones((1, 1)), slice(0, 60_000_000)))),
+        "rows": pickled(of_blocks(axes, (wide, slice(0, 1 << 40)))),
         "memo": b"\x80\x03Nr" + (0x4000000).to_bytes(4, "little") + b".",
         "encode": b"\x80\x03"
         + text
