@@ -3,11 +3,14 @@
 """What is no vehicle is completed, too: the commands say that it is not to be trusted, and why."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
 from tests.cars import car_surface
 
+from wildshape.io.poses import read_poses, write_poses
+from wildshape.io.scans.points import read_points
 from wildshape.io.scans.writers import write_ply
 
 
@@ -156,3 +159,33 @@ def test_scans_out_of_order_are_doubted_by_convert(wildshape, tmp_path):
     assert "car: 10.ply is sorted before 9.ply" in done.err
     (part,) = json.loads(done.out)["parts"]
     assert "car: 10.ply is sorted before 9.ply" in part["doubts"][0]
+
+
+def test_evaluate_says_that_true_poses_are_the_wrong_way_round(
+    wildshape, dataset, trained, tmp_path
+):
+    data, words = tmp_path / "data", ("--model", trained, "--baselines", "none")
+    track = shutil.copytree(dataset / "000000", data / "000000")
+    found = wildshape("evaluate", data, "--out", tmp_path / "right", *words)
+    assert found.code == 0
+    assert "true poses" not in found.err
+    write_poses(track / "poses.txt", read_poses(track / "poses.txt").inverse())
+    found = wildshape("evaluate", data, "--out", tmp_path / "wrong", *words)
+    assert "000000: by its true poses its scans lie " in found.err
+    assert "poses.txt holds T_sensor_object" in found.err
+
+
+def test_what_the_model_was_not_made_for_is_said(wildshape, dataset, trained, tmp_path):
+    scans = dataset / "000000" / "scans"
+    for i in range(2):
+        write_ply(tmp_path / "big" / f"{i}.ply", 8 * read_points(scans / f"00000{i}.ply"))
+    big = tmp_path / "big"
+    model = ("--model", trained)
+    found = wildshape("complete", big, "--out", tmp_path / "c", *model, "--json")
+    assert json.loads(found.out)["flagged"] == 2
+    objects = json.loads((tmp_path / "c" / "big" / "objects.json").read_text())
+    assert [scan["confidence"] for scan in objects["scans"]] == [0.0, 0.0]
+    assert "outside" in wildshape("fuse", big, "--out", tmp_path / "f.ply", *model).err
+    pair = wildshape("register", big / "0.ply", big / "1.ply", *model, "--json")
+    assert "outside" in pair.err
+    assert json.loads(pair.out)["confidence"] == 0.0
