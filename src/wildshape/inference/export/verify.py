@@ -44,16 +44,13 @@ class Difference(NamedTuple):
     other_cost: int
 
 
-def export_model(
-    model: Path | None, out: Path, scans: int = 24, rule: ExportRule = _RULE
-) -> Difference:
+def export_model(model: Path | None, out: Path, scans: int = 24) -> Difference:
     """Write a model as one file, compare it with torch, and keep it only if it does the same.
 
     Args:
         model: checkpoint or folder of a run; None: the shipped one.
         out: .onnx, or .pt2 for `torch.export.load`.
         scans: compared.
-        rule: how near it must come.
 
     Raises:
         BadInputError: the model cannot be exported, or the file does not do what torch does.
@@ -78,16 +75,16 @@ def export_model(
         draft = Path(folder) / f"model{suffix}"  # no file under its final name before it is checked
         write(draft, onnx.trace(predictor), onnx.describe(predictor))
         rehearsed = rehearsal_scans(predictor.settings, scans)
-        found = compare(open_exported(draft), predictor, rehearsed, rule)
-        _refuse_other(out, found, rule)
+        found = compare(open_exported(draft), predictor, rehearsed)
+        _refuse_other(out, found)
         draft.replace(out)
     return found
 
 
-def _refuse_other(path: Path, found: Difference, rule: ExportRule) -> None:
+def _refuse_other(path: Path, found: Difference) -> None:
     """Raise if an exported model does something else than torch."""
-    most = rule.other_share * found.scans
-    if found.largest_m > rule.largest_m or max(found.other_branch, found.other_cost) > most:
+    most = _RULE.other_share * found.scans
+    if found.largest_m > _RULE.largest_m or max(found.other_branch, found.other_cost) > most:
         raise BadInputError(
             f"{path}: not written, the exported model differs from torch by"
             f" {found.largest_m:.3g} m, chose another pose for {found.other_branch} of"
@@ -111,16 +108,13 @@ def open_exported(path: Path, threads: int = 0) -> Runner:
     ]
 
 
-def compare(
-    runner: Runner, predictor: Predictor, scans: Sequence[Points], rule: ExportRule = _RULE
-) -> Difference:
-    """Both complete the same scans.
+def compare(runner: Runner, predictor: Predictor, scans: Sequence[Points]) -> Difference:
+    """Both complete the same scans; costs, metres, and confidences may be as far apart as points.
 
     Args:
         runner: runs the file.
         predictor: that it was made from.
         scans: sensor frame, metres.
-        rule: its `largest_m` is how far costs, metres, and confidences may be apart, too.
     """
     largest, branches, costs = 0.0, 0, 0
     for scan, done in zip(scans, predictor.complete_many(scans)):
@@ -132,7 +126,7 @@ def compare(
             branches += 1
         else:
             largest = max(largest, *places)
-            costs += max(confidence, cost) > rule.largest_m
+            costs += max(confidence, cost) > _RULE.largest_m
     return Difference(largest, branches, len(scans), costs)
 
 

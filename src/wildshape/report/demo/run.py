@@ -8,7 +8,7 @@ from pathlib import Path
 
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.output import begin, command_line, provenance, unfinished
-from wildshape.io.progress import SILENT, Progress, duration
+from wildshape.io.progress import Progress, duration
 from wildshape.io.store.store import open_store
 from wildshape.method.checkpoint import SHIPPED
 from wildshape.ops.device import choose_device
@@ -18,13 +18,12 @@ from wildshape.report.demo.time_budget import TimeBudget
 from wildshape.report.demo.tracks import TRAIN, DemoOptions, prepare
 from wildshape.training.loop import setup
 from wildshape.training.recipes import recipe_for
-from wildshape.training.train import Stopping, fit_with_progress, never_stopped
+from wildshape.training.train import Stopping, fit_with_progress
 
 FILES = (
     "report.html",
     *(f"{d}/**/*" for d in ("data", "run", "evaluation", "completed", "fused", "drive")),
 )
-_DEFAULT = DemoOptions()
 
 
 @dataclass(frozen=True)
@@ -62,12 +61,7 @@ class _Agenda:
         return time.monotonic() - self.began
 
 
-def run_demo(
-    out: Path,
-    options: DemoOptions = _DEFAULT,
-    progress: Progress = SILENT,
-    stopping: Stopping = never_stopped,
-) -> Demo:
+def run_demo(out: Path, options: DemoOptions, progress: Progress, stopping: Stopping) -> Demo:
     """Simulate, train, evaluate, complete, register, fuse, and draw it all in `report.html`.
 
     At last a whole simulated drive, the vehicles in it found.

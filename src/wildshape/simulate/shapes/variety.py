@@ -39,35 +39,32 @@ class Variety:
 _USUAL = Variety()
 
 
-def varied(solid: Solid, rng: np.random.Generator, variety: Variety = _USUAL) -> Solid:
+def varied(solid: Solid, rng: np.random.Generator) -> Solid:
     """Another vehicle of the same build, its box centre at the origin."""
     size = np.ptp(solid.bounds, axis=0)
-    wanted = size * (1 + np.array(variety.stretch) * rng.uniform(-1, 1, 3))
+    wanted = size * (1 + np.array(_USUAL.stretch) * rng.uniform(-1, 1, 3))
     wanted[0] = max(wanted[0], min(size[0], _SHORTEST_M))
     at = (solid.vertices - solid.bounds.mean(0)) / (size / 2)  # -1 to 1
-    rounder = _rounded(at, wanted[0] / 2, variety, rng)
+    rounder = _rounded(at, wanted[0] / 2, rng)
     return replace(solid, vertices=rounder * wanted / np.ptp(rounder, axis=0)).centred()
 
 
-def _rounded(
-    at: np.ndarray, half_m: float, variety: Variety, rng: np.random.Generator
-) -> np.ndarray:
+def _rounded(at: np.ndarray, half_m: float, rng: np.random.Generator) -> np.ndarray:
     """Vertices `(v, 3)` in a box from -1 to 1, drawn in at its ends, its roof and its corners.
 
     Args:
         at: vertices.
         half_m: half of the vehicle's length, metres.
-        variety: how far.
         rng: the only source of chance.
     """
     x, y, z = at.T
-    taper, belly, cabin = rng.uniform(0, (variety.taper, variety.belly, variety.cabin))
+    taper, belly, cabin = rng.uniform(0, (_USUAL.taper, _USUAL.belly, _USUAL.cabin))
     begins, widest = rng.uniform((0.3, -0.4), (0.7, 0.1))
     narrow = 1 - taper * np.clip((np.abs(x) - begins) / (1 - begins), 0, 1)
     narrow = narrow - belly * (z - widest) ** 2 - cabin * np.clip(z, 0, 1) ** 2
     back = np.zeros_like(x)
     for end in (-1, 1):
-        round_m, lean_m = rng.uniform((0, -variety.lean_m), (variety.end_m, variety.lean_m))
+        round_m, lean_m = rng.uniform((0, -_USUAL.lean_m), (_USUAL.end_m, _USUAL.lean_m))
         lean = np.abs(lean_m) * np.clip(np.sign(lean_m) * z, 0, 1)
         near = np.clip(end * x, 0, 1) ** 2
         back += end * near * (round_m * np.abs(y) ** 2.5 + lean)

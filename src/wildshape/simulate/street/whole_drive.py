@@ -6,7 +6,7 @@ Scan i depends on (config, seed, i) alone, so that an interrupted drive goes on 
 """
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -136,21 +136,6 @@ class DriveScan:
     T_world_sensor: np.ndarray
 
 
-@dataclass(frozen=True)
-class FromMeshes:
-    """Draws one of the user's meshes."""
-
-    files: tuple[Path, ...]
-
-    def __call__(self, rng: np.random.Generator) -> Solid:
-        """A vehicle.
-
-        Raises:
-            BadInputError: the mesh cannot be used.
-        """
-        return read_mesh(self.files[int(rng.integers(len(self.files)))], metres=True)
-
-
 class WholeDrive:
     """A street with all that is on it, and the scans taken there."""
 
@@ -165,7 +150,8 @@ class WholeDrive:
             raise BadInputError(f"seed is {seed}, expected 0 or more.")
         self.config, self.seed = config, seed
         seconds = config.scans * PERIOD_S
-        vehicles = FromMeshes(mesh_files(config.meshes)) if config.meshes else random_vehicle
+        files = mesh_files(config.meshes) if config.meshes else None
+        vehicles = partial(_drawn_mesh, files) if files else random_vehicle
         self.street = random_street(seed, seconds, config.speed, vehicles)
         end = float(self.street.ego.at(seconds)) + LEAD_M
         self.actors = traffic(self.street, end, seconds, seed)
@@ -291,6 +277,11 @@ class WholeDrive:
     def _circle(self, actor: Actor) -> np.ndarray:
         x, y = self.street.pose(actor, np.zeros(1))[0, :2, 3]
         return np.array(((x, y, np.hypot(*actor.size[:2]) / 2),))
+
+
+def _drawn_mesh(files: tuple[Path, ...], rng: np.random.Generator) -> Solid:
+    """One of the user's."""
+    return read_mesh(files[int(rng.integers(len(files)))], metres=True)
 
 
 def _road(street: Street, end: float) -> np.ndarray:

@@ -117,7 +117,7 @@ def refine_by_graph(
 
 
 def register_pairs(
-    clouds: list[Any], T_sensor_object: SE3, config: PoseGraphConfig = _DEFAULT
+    clouds: list[Any], T_sensor_object: SE3, config: PoseGraphConfig
 ) -> Edges | None:
     """Each scan, `_prepared`, laid on the next few, by GICP from the given poses."""
     pairs = [(i, i + step) for step in config.steps for i in range(len(clouds) - step)]
