@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`python -m wildshape`, where the command itself is not on the PATH."""
 
-from wildshape.cli.main import main
+from wildshape.cli.__main__ import main
 
 if __name__ == "__main__":
     main()

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from tests.cars import car_surface
 
+from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.io.poses import read_poses, write_poses
+from wildshape.io.rays import write_rays
 from wildshape.io.scans.points import read_points
 from wildshape.io.scans.writers import write_ply
 
@@ -146,6 +148,18 @@ def test_figures_of_two_kinds_of_sensor_are_doubted(wildshape, tmp_path):
     done = wildshape("evaluate", tmp_path / "tracks", *words, tmp_path / "both")
     assert done.code == 0, done.err
     assert "holds camera and lidar scans, and each figure is of both together" in done.err
+
+
+def test_rays_of_no_scan_are_doubted(wildshape, dataset, tmp_path):
+    track = shutil.copytree(dataset / "000000", tmp_path / "car")
+    (track / "rays").mkdir()
+    rays = SightLines(np.eye(3, dtype=np.float32), np.full(3, np.inf, np.float32))
+    write_rays(track / "rays" / "1.npz", rays)
+    done = wildshape("register", track, "--out", tmp_path / "out")
+    assert done.code == 0, done.err
+    assert "rays/1.npz and all others there are not used" in done.err
+    (track / "rays" / "1.npz").rename(track / "rays" / "000001.npz")
+    assert "not used" not in wildshape("register", track, "--out", tmp_path / "named").err
 
 
 def test_scans_out_of_order_are_doubted_by_convert(wildshape, tmp_path):

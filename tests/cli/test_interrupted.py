@@ -5,6 +5,8 @@
 import json
 import shutil
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -18,6 +20,18 @@ from wildshape.io.store.store import Store
 from wildshape.io.tracks import read_poses
 
 _COPIES = 60
+_STOPPED_IMPORT = """
+import runpy, signal, sys
+
+class Finder:
+    def find_spec(name, *_):
+        if name == "wildshape.cli.terminal":
+            signal.raise_signal(signal.SIGINT)
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.meta_path.insert(0, Finder)
+runpy.run_module(sys.argv[1], run_name="__main__")
+"""
 
 
 def test_a_killed_complete_goes_on(wildshape, dataset, trained, tmp_path):
@@ -190,3 +204,11 @@ def test_a_store_killed_while_its_first_file_was_written(wildshape, tmp_path):
     (out / ".writing.json.x1y2.part").write_text("{")
     assert wildshape("simulate", out, "--tracks", 2, "--scans", 2, "--workers", 1).code == 0
     assert not list(out.glob(".*"))
+
+
+@pytest.mark.parametrize("module", ["wildshape", "wildshape.cli"])
+def test_ctrl_c_amid_the_first_imports_leaves_no_traceback(module):
+    command = [sys.executable, "-c", _STOPPED_IMPORT, module]
+    found = subprocess.run(command, capture_output=True, text=True)
+    assert found.returncode == 130
+    assert not found.stderr

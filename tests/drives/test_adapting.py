@@ -66,6 +66,16 @@ def test_an_example_looks_where_its_boxes_look(out):
         assert fronts == pytest.approx(np.tile((np.cos(yaw), np.sin(yaw), 0.0), (3, 1)), abs=1e-6)
 
 
+def test_examples_after_a_second_pass_are_of_the_first(tmp_path):
+    out = finished_drive(tmp_path).out
+    (out / "first").mkdir()
+    for name in ("boxes.csv", "tracks"):
+        shutil.move(out / name, out / "first" / name)
+    leave_results(out, "adapted")
+    found = {one.name for one in examples_of([out], FEW)}
+    assert found == {f"found-{name}" for name in CARS}
+
+
 @pytest.mark.parametrize(
     ("after", "said"),
     [

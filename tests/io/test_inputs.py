@@ -167,7 +167,7 @@ def test_nothing_recognisable(tmp_path: Path) -> None:
     refused(open_tracks, tmp_path / "missing", match=r"no such file or folder.*pass a scan file")
     pipe = tmp_path / "pipe.ply"
     os.mkfifo(pipe)
-    refused(open_tracks, pipe, match=r"pipe\.ply: no such file or folder")
+    refused(open_tracks, pipe, match=r"pipe\.ply: a pipe; write it to a file and pass a scan")
     pipe.unlink()
     refused(open_tracks, tmp_path, match=r"an empty folder.*pass a scan file")
     (tmp_path / "a.pdf").write_text("")

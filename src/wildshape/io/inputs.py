@@ -231,8 +231,9 @@ def open_tracks(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> T
             is to be read otherwise.
     """
     path = Path(path)
-    if not (path.is_file() or path.is_dir()):  # a pipe is neither
-        raise BadInputError(f"{path}: no such file or folder; {_CURE}.")
+    if not (path.is_file() or path.is_dir()):
+        there = "a pipe; write it to a file and" if path.exists() else "no such file or folder;"
+        raise BadInputError(f"{path}: {there} {_CURE}.")
     if path.is_file():
         return _single_scan(path, coordinates)
     if is_store(path):

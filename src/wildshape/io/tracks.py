@@ -47,7 +47,7 @@ class TrackFile:
         track: the usable scans, with their truth if there is any.
         skipped: file name and reason of each scan that could not be used.
         dropped_nonfinite: file name and number of the points that were NaN or infinite.
-        doubt: what is odd about the files' names, or nothing.
+        doubt: what is odd about the names of scans or rays, or nothing.
     """
 
     track: Track
@@ -105,7 +105,8 @@ def read_track_file(
         label_size_m=info["label_size_m"],
         shape_kind=info["shape_kind"],
     )
-    return TrackFile(track, skipped, dropped, _doubt_of(files))
+    doubt = _doubt_of(files) or _doubt_of_rays(folder / "rays", files)
+    return TrackFile(track, skipped, dropped, doubt)
 
 
 def track_of_files(
@@ -135,6 +136,13 @@ def _doubt_of(files: list[Path]) -> str:
                 " formats, remove one"
             )
     return ""
+
+
+def _doubt_of_rays(folder: Path, files: list[Path]) -> str:
+    rays = {path.stem for path in folder.glob("*.npz")}
+    if not rays or rays & {name for file in files for name in (file.stem, file.name)}:
+        return ""
+    return f"rays/{min(rays)}.npz and all others there are not used; name them as the scans"
 
 
 def folder_name(folder: Path) -> str:

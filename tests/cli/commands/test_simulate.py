@@ -53,6 +53,17 @@ def test_what_makes_no_drive_is_refused(refused, tmp_path, more, said):
     assert not out.exists()
 
 
+@pytest.mark.parametrize("form", [(), ("--drive", "--scans", 1)])
+@pytest.mark.parametrize("size", [(1.7, 1.4, 4.2), (1.7, 4.2, 1.4)])
+def test_meshes_of_other_axes_are_doubted(wildshape, tmp_path, form, size):
+    (tmp_path / "meshes").mkdir()
+    trimesh.creation.box(size).export(tmp_path / "meshes" / "car.obj")
+    asked = form or ("--tracks", 1, "--scans", 2, "--workers", 1)
+    found = wildshape("simulate", tmp_path / "out", *asked, "--meshes", tmp_path / "meshes")
+    assert found.code == 0, found.err
+    assert "car.obj is 1.7 m along x" in found.err
+
+
 def test_meshes_are_called_what_the_user_says(wildshape, refused, tmp_path):
     """Not cars: nobody said so."""
     meshes = tmp_path / "meshes"

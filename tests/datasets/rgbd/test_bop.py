@@ -118,3 +118,5 @@ def test_missing_and_damaged_files_are_named(tmp_path):
     assert track.scan_names == ("000001",)
     (scene / "depth" / "000001.png").unlink()
     refused(tmp_path, r"depth/000000\.png: ")
+    (scene / "depth" / "000000.png").rename(scene / "depth" / "000000.tif")
+    refused(tmp_path, r"depth/000000\.tif: .* write it as 000000\.png")

@@ -84,3 +84,13 @@ def test_a_recording_that_has_moved_is_shown_from_where_it_is_now(found, tmp_pat
         assert page.scan is None
     with serving_drive(read_finished(out), moved=moved) as page:
         assert len(page.scan.points) > 1000
+
+
+def test_a_vehicle_that_is_gone_is_said_on_the_page(tmp_path):
+    found = finished_drive(tmp_path)
+    with serving_drive(found) as page:
+        shutil.rmtree(found.out)
+        page.picker.value = "<7>"
+        assert "no such file" in page.text.content
+        page.picker.value = NOTHING
+        assert "click a vehicle" in page.text.content

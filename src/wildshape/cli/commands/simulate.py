@@ -130,6 +130,7 @@ def _drive(settings: Settings) -> None:
         speed=settings.speed,
         compensated=settings.compensated,
     )
+    _doubt(config.meshes)
     drive = WholeDrive(config, settings.seed)
     identity = {**asdict(config), "seed": settings.seed, "point_times": settings.point_times}
     output = begin(
@@ -150,6 +151,15 @@ def _drive(settings: Settings) -> None:
     )
     data = {"out": str(settings.out), **asdict(written), "seconds": round(seconds, 3)}
     answer(text, data, as_json=settings.json)
+
+
+def _doubt(meshes: Path | None) -> None:
+    """Say which axes of a LiDAR's meshes are odd: their scans would look sound."""
+    from wildshape.cli.terminal import say
+    from wildshape.simulate.shapes.meshes import doubt_of_axes
+
+    if meshes is not None and (odd := doubt_of_axes(meshes)):
+        say(odd)
 
 
 def _tracks(settings: Settings) -> None:
@@ -173,6 +183,7 @@ def _tracks(settings: Settings) -> None:
         rays=MOST_RAYS if settings.rays else 0,
         varied=settings.varied,
     )
+    _doubt(config.meshes if config.is_lidar else None)
     identity = {**asdict(config), "seed": settings.seed}
     written = write_tracks(
         simulate_tracks(config, settings.seed, settings.workers),

@@ -28,6 +28,9 @@ def read_png(path: Path, what: str) -> Shaped[np.ndarray, "h w"]:
         BadInputError: no such file, truncated, in colour, or far larger than its file.
         MissingExtraError: Pillow is not installed.
     """
+    other = None if path.exists() else next(path.parent.glob(f"{path.stem}.*"), None)
+    if other is not None:
+        raise BadInputError(f"{other}: expected {what}; write it as {path.name}.")
     Image = load_library("PIL.Image", "depth images need Pillow", "pip install pillow")
     with reading(path, what), Image.open(path, formats=("PNG",)) as image:
         if image.mode not in _BYTES:

@@ -113,7 +113,9 @@ def open_sequence(folder: Path) -> Sequence:
     images = (file for file in (folder / "depth").glob("*.png") if not file.name.startswith("."))
     depth = tuple(sorted(images, key=lambda file: file.name))
     if not depth:
-        raise BadInputError(f"{folder / 'depth'}: no .png; a sequence keeps its depth images here.")
+        raise BadInputError(
+            f"{folder / 'depth'}: no .png; write the depth images here as 16-bit PNG."
+        )
     check_counted(depth)
     if not (folder / "masks").is_dir():
         raise BadInputError(f"{folder / 'masks'}: no such folder; a sequence keeps its masks here.")

@@ -11,6 +11,7 @@ import torch
 from jaxtyping import Float
 
 from wildshape.drives.adapting.config import AdaptConfig
+from wildshape.drives.adapting.second_pass import first_pass_of
 from wildshape.drives.completing.completion import CATEGORY
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle, read_finished
@@ -60,14 +61,14 @@ class Example:
 
 
 def examples_of(outs: Sequence[Path], config: AdaptConfig) -> list[Example]:
-    """The vehicles of finished drives that were seen well enough.
+    """The vehicles of finished drives that were seen well enough, as the first pass found them.
 
     Raises:
         BadInputError: a drive's folder is damaged.
     """
     found = []
     for out in outs:
-        drive = read_finished(out)
+        drive = read_finished(out, first_pass_of(out))
         mounting = read_record(out / "stages" / "mounting.json", "the mounting", Mounting)
         for one in drive.vehicles:
             example = _example(drive, one, mounting.levelling(), config)
@@ -85,7 +86,7 @@ def split(examples: Sequence[Example], config: AdaptConfig) -> tuple[list[Exampl
 def _example(
     drive: FinishedDrive, one: FoundVehicle, T_level_sensor: SE3, config: AdaptConfig
 ) -> Example:
-    track = read_track(drive.out / TRACKS / one.name)
+    track = read_track(first_pass_of(drive.out) / TRACKS / one.name)
     place = {name: frame for frame, name in enumerate(drive.scan_names)}
     boxes = dict(zip(one.frames, one.boxes))
     full = [

@@ -36,6 +36,11 @@ def results_of(out: Path) -> Path:
     return stages_of(out) / "found"
 
 
+def first_pass_of(out: Path) -> Path:
+    """Where the results of a drive's first pass lie."""
+    return out / FIRST if (out / FIRST / BOXES).is_file() else out
+
+
 def is_done(out: Path, model: str) -> bool:
     """Whether a drive's results are of a second pass with that model."""
     return read_json(out / MARKER, _SAYS).get("adapted") == fingerprint(Path(model))

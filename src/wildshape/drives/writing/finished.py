@@ -223,8 +223,8 @@ def _across(
     return np.divide(way, since, out=np.zeros_like(way), where=since > 0)
 
 
-def read_finished(out: Path | str) -> FinishedDrive:
-    """What `wildshape drive` left in a folder.
+def read_finished(out: Path | str, boxes_in: Path | None = None) -> FinishedDrive:
+    """What `wildshape drive` left in a folder; `boxes_in`: another than it, with its boxes.
 
     Raises:
         BadInputError: no drive, or a damaged one.
@@ -241,13 +241,14 @@ def read_finished(out: Path | str) -> FinishedDrive:
         if not rising or not all(abs(time) < _LATEST_S for time in at):
             raise BadInputError(f"{path}: its times do not rise, or are none; write it anew.")
     rows: dict[str, list[BoxRow]] = defaultdict(list)
-    for row in read_box_table(out / BOXES):
+    table = (boxes_in or out) / BOXES
+    for row in read_box_table(table):
         if not 0 <= row.frame < len(names):
-            raise BadInputError(f"{out / BOXES}: frame {row.frame} of {len(names)}; write it anew.")
+            raise BadInputError(f"{table}: frame {row.frame} of {len(names)}; write it anew.")
         file_name(row.track)
         if any(row.frame <= one.frame for one in rows[row.track][-1:]):
             raise BadInputError(
-                f"{out / BOXES}: the frames of track '{row.track}' do not rise; write it anew."
+                f"{table}: the frames of track '{row.track}' do not rise; write it anew."
             )
         rows[row.track].append(row)
     return FinishedDrive(

@@ -277,7 +277,7 @@ def check_one_object(points: Float[np.ndarray, "n 3"], name: str) -> None:
             f"{name}: {extent:.4g} m across, but a scan of one object is at most "
             f"{LARGEST_EXTENT_M:g} m: "
             "coordinates in millimetres (then pass --unit mm or cm) or degrees, or a whole scene "
-            "(then cut the object out first)."
+            "(then cut the object out first, or let `wildshape drive` find its vehicles)."
         )
 
 

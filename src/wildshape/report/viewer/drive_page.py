@@ -14,6 +14,7 @@ import numpy as np
 from wildshape.drives.source import Drive
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
 from wildshape.drives.writing.playback.moments import colour_of, readable_source
+from wildshape.errors import BadInputError
 from wildshape.geometry.sampling import thin
 from wildshape.io.boxes.detections import pose_of
 from wildshape.records import Box, Points
@@ -145,9 +146,16 @@ class DrivePage:
         with gui.add_folder("Show"):
             self.layers = {name: gui.add_checkbox(text, True) for name, text in LAYERS.items()}
         self.text = gui.add_html("")
-        self.picker.on_update(lambda _: self.choose())
+        self.picker.on_update(lambda _: self._pick())
         for control in (self.time, *self.layers.values()):
             control.on_update(lambda _: self.refresh())
+
+    def _pick(self) -> None:
+        """`choose`; what has gone since the page was opened is said on it."""
+        try:
+            self.choose()
+        except BadInputError as error:
+            self.text.content = f"<div style='padding:.8em'>{escape(str(error))}</div>"
 
     def _scene(self) -> None:
         """Everything but the scan is sent once, and afterwards only moved, shown and hidden."""

@@ -83,6 +83,22 @@ def read_mesh(path: Path, metres: bool) -> Solid:
     return solid.centred(None if metres else 1.0)
 
 
+def doubt_of_axes(folder: Path) -> str:
+    """What is odd about the first of a folder's meshes, taken for a vehicle's; or nothing.
+
+    Raises:
+        BadInputError: as `mesh_files` and `read_mesh`.
+    """
+    first = mesh_files(folder)[0]
+    length, width, height = np.ptp(read_mesh(first, metres=True).bounds, axis=0)
+    if length >= max(width, height):
+        return ""
+    return (
+        f"{first} is {length:.1f} m along x, {width:.1f} along y, {height:.1f} along z, which are"
+        " taken for forward, left and up; turn it if it is a vehicle"
+    )
+
+
 def _advice(extent: float) -> str:
     if extent > _LARGEST_M:
         return "it looks like millimetres or inches, scale it to metres"
