@@ -120,7 +120,7 @@ class HeadingVoteConfig:
     Attributes:
         neighbours: scans on either side that are compared; each one more doubles the time.
         own_alike: what a scan found for itself weighs as so many neighbours posed alike, times
-            -log(1 - p) of being right: a sensor may turn a corner between two scans.
+            -log(1 - p) of being right: a sensor may turn a corner, or pass by, between two scans.
         own_most: no scan weighs as one with a larger logarithm.
         slow_deg: tracks of which three quarters of the neighbours turn by less follow each other.
         far_m: misfits count no further than this.

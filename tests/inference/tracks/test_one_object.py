@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 from scipy.spatial import KDTree
-from tests.cars import poses_of
+from tests.cars import drive_by, poses_of
 from tests.inference.tracks.known_car import (
     BOX,
     SHAPE,
@@ -200,3 +200,14 @@ def test_how_far_off_an_end_not_seen_may_be_shrinks_with_the_objects():
         box = whole._box(size * SHAPE, [size * before], SE3.identity(1), settings, config)
         lengths.append(float(box.size[0]) / size)
     assert lengths == pytest.approx([4.2] * 2, abs=0.05)  # the scan ends 1.6 m before the shape
+
+
+def test_a_sensor_that_passed_by_between_two_scans_turns_none_that_is_sure_of_itself():
+    """Were one of them turned around, it would have stood where it was; of neighbours one is."""
+    passing, near = (drive_by(scans=2, step=step, heading=0.0, side=1.5) for step in (24.0, 2.0))
+    for track, wrong, p_pose in ((passing, set(), (0.99, 0.99)), (near, {1}, (0.99, 0.6))):
+        true = poses_of(track)
+        stated = zip(completed(turned_around(true, wrong)), p_pose)
+        own = [replace(one, p_pose=p, p_box=0.9) for one, p in stated]
+        for one, pose in zip(together(own, track.scans), true):
+            assert float(torch.rad2deg((pose.inverse() @ one.pose).angle())) < 10.0

@@ -32,6 +32,7 @@ from wildshape.inference.config import BoxConfig, InferenceConfig, ReasonRule, T
 from wildshape.inference.free_space import Rays, Sights, without_free_space
 from wildshape.inference.refine import drawn_to, padded, shown
 from wildshape.inference.tracks.heading_vote import (
+    FEWEST,
     followed_signs,
     half_turn,
     likeness_of_next,
@@ -262,7 +263,8 @@ def _voted(
         signs = followed_signs(T_sensor_can.rotation, gathered.sure, config.vote)
     else:
         gain, links = _votes(T_sensor_can, shape, middle, gathered, inputs, config)
-        signs = voted_signs(gain, links, gathered.sure, config.vote)
+        leaps = gathered.settings.sensor == "lidar" and len(gain) < FEWEST
+        signs = voted_signs(gain, links, gathered.sure, config.vote, leaps=leaps)
     turned = turned_where(T_sensor_can, signs, middle)
     between = without_outliers(turned, gathered.scans, shape, gathered.sure, config)
     if between is turned:

@@ -106,8 +106,12 @@ def followed_signs(
         weights: how sure each scan is of its own pose, 0 to 1.
         config: which neighbours are compared.
     """
-    nats = -(1 - weights).log().clamp_min(-config.own_most)
-    return continuous_signs(rotation, config.own_alike * nats, config)
+    return continuous_signs(rotation, _own_votes(weights, config), config)
+
+
+def _own_votes(weights: Float[Tensor, "V"], config: HeadingVoteConfig) -> Float[Tensor, "V"]:
+    """What each scan's own pose weighs, in neighbours posed alike."""
+    return config.own_alike * -(1 - weights).log().clamp_min(-config.own_most)
 
 
 def voted_signs(
@@ -115,6 +119,8 @@ def voted_signs(
     links: Float[Tensor, "W"],
     weights: Float[Tensor, "V"],
     config: HeadingVoteConfig = _DEFAULT,
+    *,
+    leaps: bool = False,
 ) -> Float[Tensor, "V"]:
     """The same where the scans do not follow each other.
 
@@ -124,8 +130,11 @@ def voted_signs(
             (`nearness_of_next`, `likeness_of_next`).
         weights: how sure each scan is of its own pose, 0 to 1.
         config: weights of the vote.
+        leaps: too few scans to tell that the sensor did not pass by between two: a sure one weighs
+            as much as its neighbour.
     """
     own = config.own_m * (weights + config.unsure)
+    own = config.near_m * _own_votes(weights, config) if leaps else own
     return _agreed(config.shape_votes * gain + own, links)
 
 
