@@ -279,6 +279,17 @@ def test_ground_that_most_of_was_taken_away_is_said():
     assert replace(found, spread_m=0.03).told() == []
 
 
+def test_lost_packets_are_said_and_a_sensor_that_looks_ahead_is_not(scans):
+    azimuths = [np.rad2deg(np.arctan2(scan[:, 1], scan[:, 0])) for scan in scans]
+    lossy = [scan[azimuth // 2.4 % 2 == 0] for scan, azimuth in zip(scans, azimuths)]
+    (told,) = find_mounting(drive_of(lossy), MountingConfig()).told()
+    assert "75 gaps around the sensor in which nothing is seen, as if packets were lost" in told
+    ahead = [scan[abs(azimuth) < 60] for scan, azimuth in zip(scans, azimuths)]
+    coarse = [scan[np.rint(azimuth / 0.3) % 2 == 0] for scan, azimuth in zip(scans, azimuths)]
+    assert find_mounting(drive_of(ahead), MountingConfig()).told() == []
+    assert find_mounting(drive_of(coarse), MountingConfig()).told() == []
+
+
 def test_scans_in_one_common_frame_are_said():
     seen = street(frames=5, speed=6.0)
     places = np.column_stack((seen.places, np.zeros(5))).astype(np.float32)
