@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.drives.street import HEIGHT, scan, street
+from tests.drives.street import HEIGHT, scan, street, things
 from tests.refusal import refused
 
 import wildshape
@@ -184,6 +184,21 @@ def test_poses_whose_z_looks_down_or_whose_frame_is_turned_are_said():
         (drifting(path, -0.2), ["turned by 0.2 degrees more each scan"]),
     ):
         drive = replace(drive_of(scans), T_world_sensor=poses)
+        found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
+        assert len(found) == len(told)
+        assert all(word in said for word, said in zip(told, found))
+
+
+def test_poses_of_the_scan_before_or_after_are_said():
+    """Between scans where the sensor turns by more and by less."""
+    frames = torch.arange(-1, 15).double()
+    turns = SE3(rotation_z(0.02 * torch.sin(0.8 * frames)), torch.zeros(16, 3).double())
+    places = np.column_stack((frames, 0 * frames))
+    seen = [scan(things(), place, frame) for frame, place in enumerate(places[1:-1])]
+    scans = [turn.inverse().apply_numpy(points) for turn, points in zip(turns[1:], seen)]
+    path = path_of(places) @ turns
+    for first, told in ((0, ["for the scan before it"]), (1, []), (2, ["for the scan after it"])):
+        drive = replace(drive_of(scans), T_world_sensor=path[torch.arange(first, first + 14)])
         found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
         assert len(found) == len(told)
         assert all(word in said for word, said in zip(told, found))
