@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.drives.street import HEIGHT, scan, street
+from tests.drives.street import HEIGHT, scan, street, things
 from tests.refusal import refused
 
 import wildshape
@@ -189,6 +189,21 @@ def test_poses_whose_z_looks_down_or_whose_frame_is_turned_are_said():
         assert all(word in said for word, said in zip(told, found))
 
 
+def test_poses_of_the_scan_before_or_after_are_said():
+    """Between scans where the sensor turns by more and by less."""
+    frames = torch.arange(-1, 15).double()
+    turns = SE3(rotation_z(0.02 * torch.sin(0.8 * frames)), torch.zeros(16, 3).double())
+    places = np.column_stack((frames, 0 * frames))
+    seen = [scan(things(), place, frame) for frame, place in enumerate(places[1:-1])]
+    scans = [turn.inverse().apply_numpy(points) for turn, points in zip(turns[1:], seen)]
+    path = path_of(places) @ turns
+    for first, told in ((0, ["for the scan before it"]), (1, []), (2, ["for the scan after it"])):
+        drive = replace(drive_of(scans), T_world_sensor=path[torch.arange(first, first + 14)])
+        found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
+        assert len(found) == len(told)
+        assert all(word in said for word, said in zip(told, found))
+
+
 def drifting(path, degrees):
     """Each step turned so much too far."""
     turn = rotation_z(torch.tensor(math.radians(degrees)).double())
@@ -277,6 +292,17 @@ def test_ground_that_most_of_was_taken_away_is_said():
     (told,) = found.told()
     assert "differs by 0.5 m from scan to scan" in told
     assert replace(found, spread_m=0.03).told() == []
+
+
+def test_lost_packets_are_said_and_a_sensor_that_looks_ahead_is_not(scans):
+    azimuths = [np.rad2deg(np.arctan2(scan[:, 1], scan[:, 0])) for scan in scans]
+    lossy = [scan[azimuth // 2.4 % 2 == 0] for scan, azimuth in zip(scans, azimuths)]
+    (told,) = find_mounting(drive_of(lossy), MountingConfig()).told()
+    assert "75 gaps around the sensor in which nothing is seen, as if packets were lost" in told
+    ahead = [scan[abs(azimuth) < 60] for scan, azimuth in zip(scans, azimuths)]
+    coarse = [scan[np.rint(azimuth / 0.3) % 2 == 0] for scan, azimuth in zip(scans, azimuths)]
+    assert find_mounting(drive_of(ahead), MountingConfig()).told() == []
+    assert find_mounting(drive_of(coarse), MountingConfig()).told() == []
 
 
 def test_scans_in_one_common_frame_are_said():

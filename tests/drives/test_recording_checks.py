@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wildshape.drives.config import LinkConfig
-from wildshape.drives.recording_checks import clock_told, rate_told
+from wildshape.drives.recording_checks import backwards_told, clock_told, rate_told
 from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.source import Drive
 from wildshape.records import Turn
@@ -69,3 +69,11 @@ def test_only_recordings_of_few_scans_a_second_are_told_to_lose_fast_vehicles():
     assert told(None) == told(0.1) == told(0.05) == told(0.2) == []
     assert "at 2 scans a second" in told(0.5)[0]
     assert "above 18 m/s always" in told(0.5)[0]
+
+
+def test_scans_in_reverse_order_are_said():
+    """Of three streets in reverse order 18 of 18 vehicles drove backwards, of others 3 of 134."""
+    (told,) = backwards_told([True] * 5 + [False])
+    assert told.startswith("5 of 6 moving vehicles drive backwards by their shapes: the scans are")
+    for turned in ([], [True, True], [True] * 3 + [False] * 3):
+        assert backwards_told(turned) == []

@@ -35,7 +35,7 @@ from wildshape.drives.completing.vehicles import (
     write_judged,
 )
 from wildshape.drives.config import DriveConfig
-from wildshape.drives.recording_checks import clock_told, count_told, rate_told
+from wildshape.drives.recording_checks import backwards_told, clock_told, count_told, rate_told
 from wildshape.drives.result import DriveResult
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.box_cutter import BoxCutter, check_cut
@@ -140,14 +140,15 @@ class Pipeline:
         self.complete("merging", parts, mounting, T_level_sensor)
         completed += self.completed(parts, turns)
         vehicles = self.vehicles([*objects, *parts], completed, places)
+        turned = [one.completed.turned for one in vehicles if one.way.moving]
         return DriveResult(
             out=self.out,
             frames=len(self.drive),
             candidates=len(objects),
             vehicles=tuple(one.name for one in vehicles),
             boxes=self.write(vehicles, turns),
-            moving=sum(one.way.moving for one in vehicles),
-            warnings=self.warnings(T_world_sensor, mounting),
+            moving=len(turned),
+            warnings=(*self.warnings(T_world_sensor, mounting), *backwards_told(turned)),
             seconds=self.clock.seconds,
             workers=self.helpers.worked,
         )
@@ -347,8 +348,7 @@ class Pipeline:
         found = [*self.drive.warnings, *mounting.told()]
         if empty := points.count(0):
             found.append(f"{empty} of {len(points)} scans are empty or cannot be read")
-        found += self.breaks.told()
-        found += clock_told(self.drive)
+        found += self.breaks.told() + clock_told(self.drive)
         found += count_told(len(points) - points.count(0))
         if not self.tracked:
             found += rate_told(self.seen_s, self.step_m(T_world_sensor), self.config.tracks)

@@ -67,6 +67,10 @@ _DRIFTS = (
     "the poses fit the scans better turned by {} degrees more each scan: their heading drifts; mend"
     " T_world_sensor, or leave it out"
 )
+_LATE = (
+    "the poses fit the scans better if each is taken for the scan {} it: give each scan the pose of"
+    " its own time"
+)
 _INVERSE = (
     "the inverse of the poses fits the scans better: give T_world_sensor, not its inverse, in the"
     " order of the scans"
@@ -136,22 +140,38 @@ def _beside(T_target_source: SE3) -> list[SE3]:
 
 
 def _otherwise(drive: Drive, T: SE3, mounting: Mounting, config: DriveConfig) -> str:
-    """A sentence if the poses fit clearly better at another scale, in other axes or less turned."""
+    """A sentence if the poses fit clearly better in another form, or those of scans beside."""
     told = [_AXES, *(_TURNED.format(abs(angle)) for angle in _TURNS_DEG)]
     told += [_TIMES_WRONG.format(times) for times in _TIMES]
     told += [_DRIFTS.format(abs(angle)) for angle in _DRIFTS_DEG]
-    rows = []
+    rows, gains = [], []
     for start, end in _far_pairs(T):
         source, target = (_standing(drive, at, mounting, config) for at in (start, end))
         if min(len(source), len(target)) >= _FEWEST_POINTS:
             given = T[end].inverse() @ T[start]
             motions = (given, *_others(given, drive.ticks[end] - drive.ticks[start]))
             rows.append([float(_away(source, target, one).mean()) for one in motions])
+            beside = (_away(source, target, one).mean() for one in _scan_beside(T, start, end))
+            gains.append([rows[-1][0] - float(away) for away in beside])
     if not rows:
         return ""
     given_m, *others_m = np.median(rows, axis=0).tolist()
     best = int(np.argmin(others_m))
-    return told[best] if others_m[best] < given_m - _CLOSER_M else ""
+    after, before = np.max(gains, axis=0).tolist()  # a steady way tells nothing
+    closer = {
+        told[best]: given_m - others_m[best],
+        _LATE.format("after"): after,
+        _LATE.format("before"): before,
+    }
+    likely = max(closer, key=lambda one: closer[one])
+    return likely if closer[likely] > _CLOSER_M else ""
+
+
+def _scan_beside(T_world_sensor: SE3, start: int, end: int) -> list[SE3]:
+    """The motion one scan earlier, and one later; the same where there is none."""
+    last = len(T_world_sensor) - 1
+    steps = (-min(start, 1), min(last - end, 1))
+    return [T_world_sensor[end + by].inverse() @ T_world_sensor[start + by] for by in steps]
 
 
 def _others(T_target_source: SE3, ticks: int) -> list[SE3]:

@@ -33,6 +33,10 @@ _EVEN_M = 0.02  # an even floor's noise ends so near below it
 _HARDER, _HANGING = 10, 0.1  # no more of scans upside down lies on what looks like ground
 _SOON = (5, 10, 20)  # frames that are looked at beside those of the config
 _BELOW_M, _BELOW_POINTS, _BELOW_SCANS = 1.0, 10, 2  # ground seen right below the sensor
+_DIRECTIONS = 720  # of Ouster's fewest columns, 512, two neighbours never hold none
+_MOST_GAPS = (
+    8  # what stands on the vehicle leaves fewer, and so do several sensors beside each other
+)
 _UPSIDE_DOWN = np.array((1.0, -1.0, -1.0), np.float32)
 
 Plane = Float[np.ndarray, "4"]
@@ -50,6 +54,7 @@ class Mounting:
         common: whether scans seem to be in one frame, that of the first.
         spread_m: of the heights found in single scans, from the lower to the upper quartile.
         cut_m: so far below the sensor scans seem to be cut off, at the ground or above it; 0: not.
+        gaps: around the sensor, of the middle scan, in which not even ground is seen.
     """
 
     height_m: float
@@ -59,6 +64,7 @@ class Mounting:
     common: bool = False
     spread_m: float = 0.0
     cut_m: float = 0.0
+    gaps: int = 0
 
     def __post_init__(self) -> None:
         """Refuse what is no vertical.
@@ -101,6 +107,11 @@ class Mounting:
             told.append(
                 f"the ground's height differs by {self.spread_m:.1f} m from scan to scan, as if"
                 " most of it were taken away: give scans with their ground"
+            )
+        elif self.gaps > _MOST_GAPS:
+            told.append(
+                f"scans have {self.gaps} gaps around the sensor in which nothing is seen, as if"
+                " packets were lost: vehicles there are lost or cut apart; give whole scans"
             )
         if self.common:
             told.append(
@@ -174,7 +185,16 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
         _in_common(drive, chosen, config),
         float(np.subtract(*np.percentile(found[:, 3], (75, 25)))),
         _cut_off(scans, height, config),
+        int(np.median([_gaps(scan) for scan in scans])),
     )
+
+
+def _gaps(scan: Points) -> int:
+    """In how many places around the sensor neighbouring directions hold no point."""
+    around = np.arctan2(scan[:, 1], scan[:, 0]) / (2 * np.pi) % 1.0
+    rows = (around * _DIRECTIONS).astype(int) % _DIRECTIONS
+    empty = np.bincount(rows, minlength=_DIRECTIONS) == 0
+    return int((empty & np.roll(empty, -1) & ~np.roll(empty, 1)).sum())
 
 
 def _cut_off(scans: list[Points], height_m: float, config: MountingConfig) -> float:
