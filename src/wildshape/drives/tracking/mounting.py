@@ -34,9 +34,7 @@ _HARDER, _HANGING = 10, 0.1  # no more of scans upside down lies on what looks l
 _SOON = (5, 10, 20)  # frames that are looked at beside those of the config
 _BELOW_M, _BELOW_POINTS, _BELOW_SCANS = 1.0, 10, 2  # ground seen right below the sensor
 _DIRECTIONS = 720  # of Ouster's fewest columns, 512, two neighbours never hold none
-_MOST_GAPS = (
-    8  # what stands on the vehicle leaves fewer, and so do several sensors beside each other
-)
+_MOST_GAPS = 8  # what stands on the vehicle leaves fewer, and so do sensors beside each other
 _UPSIDE_DOWN = np.array((1.0, -1.0, -1.0), np.float32)
 
 Plane = Float[np.ndarray, "4"]
