@@ -125,6 +125,17 @@ def _check_tables(page: Page) -> None:
     assert page.ask("document.querySelector('#scans table').rows.length") == 3
 
 
+def test_without_javascript_the_objects_are_pictures(page: Page, tmp_path: Path) -> None:
+    write_report(_report(), tmp_path / "report.html")
+    page.open("about:blank")
+    page.call("Emulation.setScriptExecutionDisabled", value=True)
+    page.call("Page.navigate", url=(tmp_path / "report.html").as_uri())
+    page.wait("document.querySelectorAll('.stills img').length == 2")
+    assert page.ask("document.querySelector('.stills img').offsetHeight") > 50
+    assert page.ask("document.querySelector('#show_box').offsetParent === null")
+    assert "JavaScript draws it" in page.ask("document.querySelector('.curve').innerText")
+
+
 def test_empty_page_is_silent(page: Page, tmp_path: Path) -> None:
     write_report(Report(title="Nothing yet"), tmp_path / "report.html")
     page.open((tmp_path / "report.html").as_uri())

@@ -193,7 +193,7 @@ def _tiles(tiles: tuple[tuple[str, str], ...]) -> str:
 def _curves(curves: tuple[Curve, ...]) -> str:
     panels = "".join(
         f'<figure><figcaption>{escape(curve.title)}</figcaption><div id="curve{i}" class=curve>'
-        "</div></figure>"
+        "<noscript>JavaScript draws it.</noscript></div></figure>"
         for i, curve in enumerate(curves)
     )
     return _section("Training", f"<div class=grid>{panels}</div>" if panels else "")
