@@ -54,9 +54,10 @@ def _report() -> Report:
         title="In a browser",
         tables=(metrics_table(_metrics()),),
         index=(_index(),),
-        curves=tuple(
-            Curve(title, "step", "metres", (("loss", [1, 2, 3], values),), log_y=True)
-            for title, values in (("Loss", [1.0, 0.5, 0.2]), ("Flat", [0.091, 0.08, 0.0755]))
+        curves=(
+            Curve("Loss", "step", "metres", (("loss", [1, 2, 3], [1.0, 0.5, 0.2]),), log_y=True),
+            Curve("Flat", "step", "metres", (("loss", [1, 2], [0.091, 0.0755]),), log_y=True),
+            Curve("Of one step", "step", "metres", (("cd", [26], [0.4]),)),
         ),
         objects=(
             ReportObject("a <b>", clouds=both, scans=scans),
@@ -86,6 +87,8 @@ def test_page_draws_turns_and_stays_silent(page: Page, tmp_path: Path) -> None:
     page.wait("document.querySelectorAll('.curve .main-svg').length >= 2")
     ticks = "[...document.querySelectorAll('.curve')].map(c => c.querySelectorAll('.ytick').length)"
     assert min(page.ask(ticks)) >= 2
+    assert page.ask("document.getElementById('curve2').layout.yaxis.range[0]") == 0  # no -0.5 m
+    assert page.ask("document.querySelector('#show_box').offsetParent === null")  # there is none
     page.ask("document.querySelector('#panels').scrollIntoView({ block: 'center' })")
     for panel in (0, 1):
         eventually(partial(page.picture, panel), lambda p: colourful(p) > 300, f"{panel} is blank")

@@ -197,6 +197,7 @@
     $("name").textContent = object.name;
     $("subtitle").textContent = object.subtitle;
     $("overlay_label").hidden = object.clouds.length < 2;
+    $("box_label").hidden = $("stub").hidden = !object.box.length;
     const range = object.arrow ? [["range", object.distance.toFixed(1) + " m"]] : [];
     $("details").replaceChildren(...[...range, ...object.details].map(([label, value]) => {
       const row = document.createElement("div");
@@ -312,7 +313,7 @@
         hoverlabel: { bgcolor: ink("--card"), font: { color: ink("--ink") } },
         font: { color: ink("--ink"), family: "system-ui, sans-serif", size: 12 },
         showlegend: curve.series.length > 1, legend: { orientation: "h", y: 1.02, yanchor: "bottom" },
-        xaxis: axis(curve.x_label), yaxis: { ...axis(curve.y_label), type: curve.log_y ? "log" : "linear",
+        xaxis: axis(curve.x_label), yaxis: { ...axis(curve.y_label), type: curve.log_y ? "log" : "linear", rangemode: "nonnegative",
           dtick: curve.log_y && wide ? "D2" : undefined, tickformat: "~g" } }, bare);
     });
   }
