@@ -43,17 +43,23 @@ def _index() -> Table:
     return Table("All", ("object", "CD, m", "warning"), rows, sortable=True, objects=objects)
 
 
+def _distributions() -> Table:
+    basis = "object's frame, by truth; all tracks, 174 of 175 scans"
+    columns = ("", "counted", "least", "5 %", "median", "95 %", "most", "mean", "from")
+    return Table("Distributions", columns, (("range, m", *["12.34"] * 7, basis),))
+
+
 def _report() -> Report:
     rng = np.random.default_rng(0)
     near = rng.uniform(-1, 1, (800, 3)) * (2.2, 0.9, 0.7) + (14, 5, -1)
     scan = near[near[:, 1] < 5].astype(np.float32)
     whole = near.astype(np.float32)
-    both = (Cloud("input scan", scan), Cloud("completed", whole))
+    both = (Cloud("input scan", scan), Cloud("completed, by the shipped weights", whole))
     scans = Table("Scans", ("scan", "confidence"), (("0", "0.5"), ("1", "0.9")))
     return Report(
         title="In a browser",
         tables=(metrics_table(_metrics()),),
-        index=(_index(),),
+        index=(_index(), _distributions()),
         curves=(
             Curve("Loss", "step", "metres", (("loss", [1, 2, 3], [1.0, 0.5, 0.2]),), log_y=True),
             Curve("Flat", "step", "metres", (("loss", [1, 2], [0.091, 0.0755]),), log_y=True),
@@ -102,17 +108,14 @@ def test_page_draws_turns_and_stays_silent(page: Page, tmp_path: Path) -> None:
     eventually(lambda: page.picture(0), lambda p: colourful(p) > 300, "the second object is blank")
 
     _check_tables(page)
+    _check_on_a_phone(page)
     assert page.complaints() == []
     assert [url for url in page.loads() if not url.startswith(("file:", "data:", "blob:"))] == []
 
 
 def _check_tables(page: Page) -> None:
-    page.call(
-        "Emulation.setDeviceMetricsOverride",
-        width=1300, height=900, deviceScaleFactor=1, mobile=False,
-    )  # fmt: skip
+    _resize(page, 1300)
     wide = "[...document.querySelectorAll('main > section > .scroll')]"
-    page.wait("innerWidth == 1300")
     assert page.ask(f"{wide}.every(e => e.scrollWidth <= e.clientWidth)")
 
     first = "document.querySelector('table.sortable tbody tr:not([hidden])')"
@@ -126,6 +129,26 @@ def _check_tables(page: Page) -> None:
     page.ask("document.querySelector('tr[data-object=\"0\"]').click()")
     assert page.ask("document.querySelector('#name').textContent") == "a <b>"
     assert page.ask("document.querySelector('#scans table').rows.length") == 3
+
+
+def _check_on_a_phone(page: Page) -> None:
+    _resize(page, 390)
+    names = "[...document.querySelectorAll('.panel:not([hidden]) > p span')]"
+    assert page.ask(f"{names}.map(e => e.textContent)") == [
+        "input scan",
+        "completed, by the shipped weights",
+    ]
+    assert page.ask(f"{names}.every(e => e.scrollWidth <= e.clientWidth)"), "cut off"
+    rows = "[...document.querySelectorAll('main table tbody tr')]"
+    assert page.ask(f"Math.max(...{rows}.map(e => e.offsetHeight))") < 150  # no word a line
+
+
+def _resize(page: Page, width: int) -> None:
+    page.call(
+        "Emulation.setDeviceMetricsOverride",
+        width=width, height=900, deviceScaleFactor=1, mobile=False,
+    )  # fmt: skip
+    page.wait(f"innerWidth == {width}")
 
 
 def test_without_javascript_the_objects_are_pictures(page: Page, tmp_path: Path) -> None:
