@@ -29,7 +29,8 @@ def page(tmp_path: Path):
 def _metrics() -> dict[str, Any]:
     """Everything that evaluate can say, with deviations: the widest table there is."""
     keys = ("cd", "precision", "coverage", "acc30", "rot_median_deg", "trans_median_m")
-    figures = dict.fromkeys((*keys, "acc30_sym", "rot_sym_median_deg"), 0.4444)
+    boxes = ("box_iou", "box_bev", "heading30", "heading30_sym")
+    figures = dict.fromkeys((*keys, "acc30_sym", "rot_sym_median_deg", *boxes), 0.4444)
     each = {**figures, "std": figures, "scans_counted": {"registration": 12345}}
     names = ("multi-start-icp", "wildshape", "wildshape, seed selected without labels (cars-3)")
     return {"rotate": "yaw", "seeds": [0, 1, 2], "methods": dict.fromkeys(names, each)}
@@ -109,6 +110,7 @@ def test_page_draws_turns_and_stays_silent(page: Page, tmp_path: Path) -> None:
 
     _check_tables(page)
     _check_on_a_phone(page)
+    _check_on_paper(page)
     assert page.complaints() == []
     assert [url for url in page.loads() if not url.startswith(("file:", "data:", "blob:"))] == []
 
@@ -141,6 +143,14 @@ def _check_on_a_phone(page: Page) -> None:
     assert page.ask(f"{names}.every(e => e.scrollWidth <= e.clientWidth)"), "cut off"
     rows = "[...document.querySelectorAll('main table tbody tr')]"
     assert page.ask(f"Math.max(...{rows}.map(e => e.offsetHeight))") < 150  # no word a line
+
+
+def _check_on_paper(page: Page) -> None:
+    _resize(page, 732)  # A4 between its margins, and a scroll bar
+    page.call("Emulation.setEmulatedMedia", media="print")
+    page.wait("matchMedia('print').matches")
+    tables = "[...document.querySelectorAll('main > section > .scroll > table')]"
+    assert page.ask(f"{tables}.every(e => e.offsetWidth <= e.parentElement.clientWidth)")
 
 
 def _resize(page: Page, width: int) -> None:
