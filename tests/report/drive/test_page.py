@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from tests.drives.finished_drive import CARS, FRAMES, HEIGHT, finished_drive
 from tests.refusal import refused
-from tests.report.chromium import CHROMIUM, browser, colourful, eventually, moved
+from tests.report.chromium import CHROMIUM, Page, browser, colourful, eventually, moved
 
 from wildshape.report.drive.page import report_from_drive, write_drive_report
 from wildshape.report.drive.scene import NOBODY, SceneConfig, drawn_scans, scene_data
@@ -110,7 +110,7 @@ def test_the_scene_plays_and_a_click_on_a_vehicle_opens_it(found, tmp_path):
     write_drive_report(found.out)
     with browser(tmp_path / "profile") as page:
         page.open((found.out / "report.html").as_uri())
-        page.wait("document.querySelector('#drive_now')?.textContent.includes('of 6')")
+        page.wait("document.querySelector('#drive_now')?.textContent.includes('of 0.5 s')")
         place = page.ask(
             "(({x, y, width, height}) => ({x, y, width, height}))"
             "(document.querySelector('#drive_canvas').getBoundingClientRect())"
@@ -123,8 +123,8 @@ def test_the_scene_plays_and_a_click_on_a_vehicle_opens_it(found, tmp_path):
         labels = "[...document.querySelectorAll('#drive_labels span')]"
         label = f"{labels}.find(one => one.textContent === '<7>')"
         page.wait(f"!!{label}")
-        x, y = map(float, re.findall(r"([\d.]+)px", page.ask(f"{label}.style.transform"))[:2])
-        mouse = {"x": place["x"] + x, "y": place["y"] + y, "button": "left", "clickCount": 1}
+        x, y = page.ask(f"(e => [e.left + e.width / 2, e.bottom])({label}.getBoundingClientRect())")
+        mouse = {"x": x, "y": y, "button": "left", "clickCount": 1}
         page.call("Input.dispatchMouseEvent", type="mousePressed", **mouse)
         page.call("Input.dispatchMouseEvent", type="mouseReleased", **mouse)
         page.wait("document.querySelector('#drive_card h3')?.textContent === '<7>'")
@@ -133,8 +133,26 @@ def test_the_scene_plays_and_a_click_on_a_vehicle_opens_it(found, tmp_path):
         page.ask("document.querySelectorAll('tr[data-object]')[0].click()")
         page.wait("document.querySelector('#drive_card h3').textContent === '0003'")
         page.ask("document.querySelector('#drive_play').click()")
-        page.wait(
-            "document.querySelector('#drive_now').textContent.includes('frame 5 of 6, 0.5 s')"
-        )
+        page.wait("document.querySelector('#drive_now').textContent == 'frame 5, 0.5 of 0.5 s'")
+        _check_on_a_phone(page)
         assert page.complaints() == []
         assert [url for url in page.loads() if not url.startswith(("file:", "data:"))] == []
+
+
+def _check_on_a_phone(page: Page) -> None:
+    """Scale and legend have their own places; names are whole, however near the edge."""
+    page.call(
+        "Emulation.setDeviceMetricsOverride",
+        width=390, height=800, deviceScaleFactor=1, mobile=False,
+    )  # fmt: skip
+    page.wait("innerWidth == 390")
+    place = "document.querySelector('#drive_{}').getBoundingClientRect()"
+    low, top = place.format("scale"), place.format("legend")
+    assert page.ask(f"{low}.bottom <= {top}.top || {low}.right <= {top}.left")
+    page.ask("[...document.querySelectorAll('#drive_views button')][2].click()")
+    stage = place.format("labels")
+    inside = f"(e => e.left >= {stage}.left - 1 && e.right <= {stage}.right + 1)"
+    spans = "[...document.querySelectorAll('#drive_labels span')]"
+    for _ in range(30):  # they pass the edge as the view comes closer
+        page.ask("document.querySelector('#drive_closer').click()")
+        assert page.ask(f"{spans}.every(s => {inside}(s.getBoundingClientRect()))")

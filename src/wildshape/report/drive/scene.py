@@ -141,7 +141,6 @@ def scene_data(
         "name": found.name,
         "ground": found.ground_m,
         "palette": PALETTE,
-        "total": len(found),
         "frames": [_frame(found, scan) for scan in scans],
         "vehicles": [_vehicle(found, one, frames, config) for one in found.vehicles],
         "way": found.T_level_sensor.translation.numpy().round(3).tolist(),

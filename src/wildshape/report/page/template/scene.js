@@ -155,7 +155,7 @@
       taken.push([x, y, w]);
       const label = Object.assign(document.createElement("span"), { textContent: text, className: n === chosen ? "chosen" : "" });
       label.style.color = paint;
-      label.style.transform = `translate(${x}px, ${y}px) translate(-50%, -100%)`;
+      label.style.transform = `translate(clamp(0px, ${x}px - 50%, ${canvas.clientWidth}px - 100%), ${y}px) translateY(-100%)`;
       return [label];
     }));
   }
@@ -170,7 +170,7 @@
   function write() {
     const frame = frames[now];
     $("time").value = now;
-    $("now").textContent = `frame ${frame.frame} of ${data.total}, ${frame.time.toFixed(1)} s`;
+    $("now").textContent = `frame ${frame.frame}, ${frame.time.toFixed(1)} of ${frames.at(-1).time.toFixed(1)} s`;
     card();
   }
 
