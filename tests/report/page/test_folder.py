@@ -344,11 +344,14 @@ def test_each_of_several_evaluations_is_named(tmp_path: Path) -> None:
         metrics = {"rotate": "none", "methods": {"wildshape": ours}}
         (tmp_path / name / "metrics.json").write_text(json.dumps(metrics), encoding="utf-8")
         (tmp_path / name / "errors.png").write_bytes(b"")
+        (tmp_path / name / "confidence.png").write_bytes(b"")
     report, alone = map(report_from_folder, (tmp_path, tmp_path / "cars"))
     assert ["distance of 0.100" in line for line in report.findings] == [True, False]
     for shown in (
         report.findings,
-        *([x.title for x in f] for f in (report.tables, report.figures)),
+        *([x.title for x in f] for f in (report.tables, report.figures[::2])),
     ):
         assert [text.partition(": ")[0] for text in shown] == ["cars", "trucks"]
-    assert (alone.tables[0].title, alone.figures[0].title) == ("Scans as recorded", "errors")
+    assert alone.tables[0].title == "Scans as recorded"
+    # two panels and more are read only as wide as the page
+    assert [(x.title, x.wide) for x in alone.figures] == [("confidence", False), ("errors", True)]

@@ -137,7 +137,8 @@ def _judged(folder: Path, where: Inputs) -> Judged:
 
 def _pictures(of: Evaluation) -> Iterator[Figure]:
     for file in sorted(of.path.parent.glob("*.png")):
-        yield Figure(f"{of.which}{file.stem.replace('_', ' ')}", file.read_bytes())
+        wide = file.stem != "confidence"  # several panels side by side
+        yield Figure(f"{of.which}{file.stem.replace('_', ' ')}", file.read_bytes(), wide)
 
 
 def _summary(folder: Path, evaluations: list[Evaluation], tracks: int, curves: int) -> str:
