@@ -335,6 +335,7 @@ def test_the_floor_is_said_to_be_of_random_points(tmp_path: Path) -> None:
     report = report_from_folder(tmp_path)
     assert "as many of the true surface, at random, would have 0.012 m" in report.findings[0]
     assert "drawn at random" in report.tables[0].caption
+    assert "acc 30 and heading 30 are shares within 30°" in report.tables[0].caption
 
 
 def test_each_of_several_evaluations_is_named(tmp_path: Path) -> None:
