@@ -22,6 +22,7 @@ def test_demo_on_simulated_and_on_own_scans(wildshape, refused, dataset, tmp_pat
     assert len(list(out.glob("fused/*.ply"))) > 0
     page = (out / "report.html").read_text("utf-8")
     assert 'href="drive/found/report.html"' in page
+    assert "In a simulated drive of 4 scans " in page
     assert 'id="drive_data"' in (out / "drive/found/report.html").read_text("utf-8")
     assert set(open_store(out / "data/train.store").names)
     assert "--overwrite" in refused("demo", "--out", out, *QUICK)

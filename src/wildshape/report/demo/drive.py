@@ -57,7 +57,7 @@ def find_vehicles(out: Path, scans: int, predictor: Predictor, progress: Progres
     report = report_from_drive(found.out)
     write_report(report, found.out / REPORT)
     vehicles = counted(len(found.vehicles), "vehicle")
-    sentence = f"In a simulated drive of {scans / 10:.0f} seconds {vehicles} were found"
+    sentence = f"In a simulated drive of {counted(scans, 'scan')} {vehicles} were found"
     figures = ()
     if report.scene is not None:
         title = "The drive from above: click it to play the drive and to open every vehicle"
