@@ -41,6 +41,7 @@ _LEAST_ODDS, _MOST_ODDS = 1e-3, 49.0
 _FEWEST_HEIGHTS = 4
 DENSEST = 40_000  # points: no calibration has seen more, and what it saw falls with them
 VIEW_PX = 240.0  # focal length of the camera that calibrations saw; finer ones say no more
+OFF_AXIS = 0.5  # cosine: no depth camera sees what is farther off its axis
 _OF_RESULT = ("poor_fit", "low_confidence", "unsure_heading", "unsure_box", "other_kind")
 
 
@@ -258,6 +259,12 @@ def warning_of(
         return (
             "its points lie on all sides of the origin, where no sensor can have stood: moved to"
             " its own centre? hand it in as the sensor saw it"
+        )
+    x, y, z = scan.mean(0, dtype=np.float64)
+    if settings.sensor == "camera" and z < OFF_AXIS * math.hypot(x, y, z):
+        return (
+            "it lies beside or behind the camera, whose axes are x right, y down, z forward;"
+            " turn the scan's axes to these"
         )
     low, high = settings.extent_m
     size = extent(scan)

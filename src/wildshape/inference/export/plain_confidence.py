@@ -12,7 +12,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from wildshape.inference.confidence import DENSEST, VIEW_PX
+from wildshape.inference.confidence import DENSEST, OFF_AXIS, VIEW_PX
 from wildshape.inference.config import ReasonRule
 from wildshape.inference.export.plain_scores import PlainScores
 from wildshape.method.checkpoint import ModelSettings
@@ -45,10 +45,13 @@ def confidence_plain(
     seen: Float[Tensor, "B 6"],
     settings: ModelSettings,
 ) -> Float[Tensor, "B"]:
-    """0 to 1, of scans in their sensor frames; 0 where `Completion.warning` would name the size."""
+    """0 to 1, of scans in their sensor frames; 0 where a warning would name size or axes."""
     low, high = settings.extent_m
     size = (scans.amax(1) - scans.amin(1)).norm(dim=-1)
     usual = (size >= _RULE.smallest * low) & (size <= _RULE.largest * high)
+    if settings.sensor == "camera":
+        middle = scans.mean(1)
+        usual = usual & (middle[:, 2] >= OFF_AXIS * middle.norm(dim=-1))
     return torch.where(usual, _foretold(scans, size, cost, seen, settings), 0.0)
 
 
