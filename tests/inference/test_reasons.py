@@ -14,6 +14,7 @@ from wildshape.inference.confidence import (
     reasons_of_result,
     reasons_of_scan,
     reasons_of_track,
+    warning_of,
 )
 from wildshape.records import Box, Completion, Sensor
 
@@ -46,6 +47,23 @@ def completion(cost, confidence):
 )
 def test_reasons_of_a_scan(scan, sensor, expected):
     assert reasons_of_scan(scan, sensor, SETTINGS) == expected
+
+
+@pytest.mark.parametrize(
+    ("axes", "told"),
+    [
+        ([[1, 0, 0], [0, 1, 0], [0, 0, 1]], False),
+        ([[1, 0, 0], [0, -1, 0], [0, 0, -1]], True),  # OpenGL: y up, z backward
+        ([[0, 0, 1], [-1, 0, 0], [0, -1, 0]], True),  # ROS' body: x forward, y left, z up
+    ],
+)
+def test_a_camera_that_does_not_look_along_z_is_told_its_axes(axes, told):
+    """All that was said of clouds with z up was a poor fit."""
+    camera = dataclasses.replace(SETTINGS, sensor="camera")
+    chair = np.random.default_rng(0).normal((0.8, 0.4, 4.0), 0.5, (64, 3))
+    warning = warning_of((chair @ np.transpose(axes)).astype(np.float32), None, camera)
+    assert ("x right, y down, z forward" in warning) == told
+    assert bool(warning) == told
 
 
 @pytest.mark.parametrize(

@@ -34,12 +34,14 @@ from wildshape.method.confidence import COVERED_M, SMALLEST_M, ConfidenceFeature
 from wildshape.method.hindsight import Scores
 from wildshape.method.network import Poses
 from wildshape.method.trust import Calibrator, ScanFeatures, TrackFeatures
-from wildshape.records import Completion, Points, Registration, Sensor
+from wildshape.records import Completion, Points, Registration, Sensor, SensorKind
 
 _RULE = ReasonRule()
 _LEAST_ODDS, _MOST_ODDS = 1e-3, 49.0
 _FEWEST_HEIGHTS = 4
-_DENSEST = 40_000  # points: no calibration has seen more, and what it saw falls with them
+DENSEST = 40_000  # points: no calibration has seen more, and what it saw falls with them
+VIEW_PX = 240.0  # focal length of the camera that calibrations saw; finer ones say no more
+OFF_AXIS = 0.5  # cosine: no depth camera sees what is farther off its axis
 _OF_RESULT = ("poor_fit", "low_confidence", "unsure_heading", "unsure_box", "other_kind")
 
 
@@ -76,7 +78,9 @@ def _log(values: Float[Tensor, "B"]) -> Float[Tensor, "B"]:
     return values.clamp_min(SMALLEST_M).log()
 
 
-def features_of(scan: Points, cost: float, seen: Float[Tensor, "6"]) -> ConfidenceFeatures:
+def features_of(
+    scan: Points, cost: float, seen: Float[Tensor, "6"], sensor_kind: SensorKind = "lidar"
+) -> ConfidenceFeatures:
     """All features of one completion."""
     observation, projection, entropy, margin, spread, covered = seen.tolist()
     away = float(np.linalg.norm(scan.mean(0, dtype=np.float64)))  # float32: 2 cm off of a million
@@ -87,11 +91,19 @@ def features_of(scan: Points, cost: float, seen: Float[Tensor, "6"]) -> Confiden
         entropy=entropy,
         margin=margin,
         spread=spread,
-        log_points=math.log(min(len(scan), _DENSEST)),
+        log_points=math.log(min(_seen(scan, sensor_kind), DENSEST)),
         log_range=math.log(max(away, SMALLEST_M)),
         log_extent=math.log(max(extent(scan), SMALLEST_M)),
         covered=covered,
     )
+
+
+def _seen(scan: Points, sensor_kind: SensorKind) -> int:
+    """The number of points; of a camera's as many as `VIEW_PX` would have shown at most."""
+    if sensor_kind == "lidar":
+        return len(scan)
+    across, down = np.floor(scan[:, :2] / np.maximum(scan[:, 2:], SMALLEST_M) * VIEW_PX).T
+    return len(np.unique(across + 1j * down))
 
 
 def confidence_of(features: ConfidenceFeatures, settings: ModelSettings) -> float:
@@ -133,10 +145,10 @@ def glance_of(
     What a shape pays for standing where rays passed chose among the hypotheses. Scans held out and
     calibrated on had no rays, so it is no part of the cost that is compared with theirs.
     """
-    features = features_of(scan, cost, seen)
+    features = features_of(scan, cost, seen, settings.sensor)
     fit = min(cost, math.exp(seen[0]) + settings.beta * math.exp(seen[1]))
     warning = warning_of(scan, sensor, settings, rule)
-    of_fit = features_of(scan, fit, seen)
+    of_fit = features._replace(log_cost=math.log(max(fit, SMALLEST_M)))
     return Glance(
         pose=pose,
         confidence=0.0 if warning else confidence_of(of_fit, settings),
@@ -247,6 +259,12 @@ def warning_of(
         return (
             "its points lie on all sides of the origin, where no sensor can have stood: moved to"
             " its own centre? hand it in as the sensor saw it"
+        )
+    x, y, z = scan.mean(0, dtype=np.float64)
+    if settings.sensor == "camera" and z < OFF_AXIS * math.hypot(x, y, z):
+        return (
+            "it lies beside or behind the camera, whose axes are x right, y down, z forward;"
+            " turn the scan's axes to these"
         )
     low, high = settings.extent_m
     size = extent(scan)

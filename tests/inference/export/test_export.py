@@ -69,6 +69,7 @@ OTHERS = {
             CONFIG, points=151, branches=1, spread="sphere", mirror=False, start=(0.5, 0.5, 0.5)
         ),
         "sensor": "camera",
+        "calibration": CALIBRATION,
         "projection": PixelBins(flat=True),
         "facing": True,
         "extent_m": (0.5, 1.5),
@@ -159,7 +160,7 @@ def test_costs_are_those_of_the_loss(projection):
         {},
         {"facing": True, "calibration": CALIBRATION},
         {"facing": True, "calibration": CALIBRATION, "up": UP},
-        {"sensor": "camera", "projection": PixelBins()},
+        {"sensor": "camera", "projection": PixelBins(), "calibration": CALIBRATION},
         {"projection": PolarBins(0.03, 0.04, flat=True), "calibration": CALIBRATION},
         {"extent_m": (20.0, 30.0)},
         {"extent_m": (0.5, 1.0)},

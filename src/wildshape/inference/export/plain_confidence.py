@@ -12,10 +12,12 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from wildshape.inference.confidence import DENSEST, OFF_AXIS, VIEW_PX
 from wildshape.inference.config import ReasonRule
 from wildshape.inference.export.plain_scores import PlainScores
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.confidence import COVERED_M, SMALLEST_M
+from wildshape.records import SensorKind
 
 _RULE = ReasonRule()
 
@@ -43,10 +45,13 @@ def confidence_plain(
     seen: Float[Tensor, "B 6"],
     settings: ModelSettings,
 ) -> Float[Tensor, "B"]:
-    """0 to 1, of scans in their sensor frames; 0 where `Completion.warning` would name the size."""
+    """0 to 1, of scans in their sensor frames; 0 where a warning would name size or axes."""
     low, high = settings.extent_m
     size = (scans.amax(1) - scans.amin(1)).norm(dim=-1)
     usual = (size >= _RULE.smallest * low) & (size <= _RULE.largest * high)
+    if settings.sensor == "camera":
+        middle = scans.mean(1)
+        usual = usual & (middle[:, 2] >= OFF_AXIS * middle.norm(dim=-1))
     return torch.where(usual, _foretold(scans, size, cost, seen, settings), 0.0)
 
 
@@ -57,13 +62,22 @@ def _foretold(
     calibration = settings.calibration
     if calibration is None:
         return 1.0 / (1.0 + (cost / settings.cost_m[1]).square())
-    number = torch.ones_like(scans[..., 0]).sum(-1)
+    number = _seen(scans, settings.sensor).clamp_max(DENSEST)
     distance = scans.mean(1).norm(dim=-1)
     own = torch.stack((number.log(), _log(distance), _log(size)), dim=-1)
     features = torch.cat((_log(cost)[:, None], seen[:, :5], own, seen[:, 5:]), dim=-1)
     foretold = calibration.bias + features @ features.new_tensor(calibration.weights)
     beyond = (foretold - math.log(calibration.within_m)) / calibration.sigma
     return 0.5 * (1.0 - torch.erf(beyond / math.sqrt(2)))
+
+
+def _seen(scans: Float[Tensor, "B N 3"], sensor_kind: SensorKind) -> Float[Tensor, "B"]:
+    """The number of points, or of the pixels that they fill."""
+    if sensor_kind == "lidar":
+        return torch.ones_like(scans[..., 0]).sum(-1)
+    at = (scans[..., :2] / scans[..., 2:].clamp_min(SMALLEST_M) * VIEW_PX).floor().double()
+    pixels = (at[..., 0] * 2.0**20 + at[..., 1]).sort(-1).values
+    return 1.0 + (pixels[:, 1:] != pixels[:, :-1]).float().sum(-1)
 
 
 def _of(values: Float[Tensor, "B H *rest"], chosen: Tensor) -> Tensor:
