@@ -109,8 +109,8 @@ Origin = Annotated[
         str_from_instance=lambda place: [",".join(f"{number:g}" for number in place)],
     ),
     arg(
-        help="the sensor's position in the files, of scans that were moved into a map; results are"
-        " in the sensor's frame"
+        help="the sensor's position in the files' frame and unit, of scans that were moved into a"
+        " map; results are in the sensor's frame"
     ),
 ]
 AT_ORIGIN: Place = (0.0, 0.0, 0.0)
@@ -121,7 +121,7 @@ Device = Annotated[
 ]
 Layout = Annotated[
     Literal["packed", "folders"],
-    arg(help="one packed store, or track folders with a file a scan"),
+    arg(help="one packed store, or track folders with a file per scan"),
 ]
 Boxes = Annotated[
     tuple[str, ...],
@@ -170,9 +170,9 @@ class FileOptions:
 class WorkOptions:
     """Who does the work."""
 
-    workers: Annotated[int | None, option(metavar="N", help="processes; by default one a core")] = (
-        None
-    )
+    workers: Annotated[
+        int | None, option(metavar="N", help="processes; by default one per core")
+    ] = None
     ray: Annotated[
         str | None,
         option(

@@ -3,7 +3,9 @@
 """Conversions: the same store whoever works on it, gone on with after a kill, filtered, refused."""
 
 import json
+import math
 import os
+import re
 import shutil
 import signal
 import sys
@@ -55,6 +57,20 @@ def test_every_option_belongs_to_a_source(tmp_path):
     known = {name for record in records if is_dataclass(record) for name in vars(record)}
     asked = {field.name for field in fields(Settings)} - {*_OURS, *_TRUTH, "keep_ground"}
     assert asked <= known
+
+
+@pytest.mark.parametrize(
+    "name", ["min_points", "largest_m", "margin", "ground", "gap", "views", "pixels", "edge"]
+)
+def test_help_states_the_defaults_of_the_readers(wildshape, tmp_path, name):
+    said = " ".join(wildshape("convert", "--help").out.replace("│", " ").split())
+    text = said.partition(f" --{name.replace('_', '-')} ")[2].partition(" --")[0]
+    sources = [open_source(source, tmp_path, {}) for source in SOURCES]
+    records = [r for source in sources for r in (source, *vars(source).values())]
+    own = [vars(record).get(name) for record in records if is_dataclass(record)]
+    numbers = {f"{value:g}" for value in own if value is not None and math.isfinite(value)}
+    assert numbers
+    assert numbers <= set(re.findall(r"\d+(?:\.\d+)?", text))
 
 
 def test_workers_and_order_do_not_show(wildshape, drives, tmp_path):

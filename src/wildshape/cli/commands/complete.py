@@ -68,19 +68,19 @@ class Settings:
     scans: Scans = DEFAULT_SCANS
     rays: Annotated[
         Path | None,
-        option(metavar="FILE", help="of one scan: rays of its frame that passed the object by"),
+        option(metavar="FILE", help="rays of one scan's frame that passed the object by (.npz)"),
     ] = None
     cloud_format: Annotated[Literal["ply", "pcd"], arg(help="of the shapes")] = "ply"
     mesh: Annotated[bool, arg(help="also write a closed mesh of each shape")] = False
     mesh_format: Annotated[Literal["ply", "obj", "glb"], arg(help="of the meshes")] = "ply"
     mesh_colours: Annotated[
         Literal["none", "confidence"],
-        arg(help="blue where the mesh was measured, orange where it was guessed"),
+        arg(help="confidence: blue where the mesh was measured, orange where it was guessed"),
     ] = "none"
     boxes: Boxes = ()
     calibration: Annotated[
         Path | None,
-        option(metavar="FILE", help="of KITTI (.txt) or Argoverse 2 (.feather), for these boxes"),
+        option(metavar="FILE", help="KITTI's (.txt) or Argoverse 2's (.feather), for --boxes"),
     ] = None
     format: Format = "auto"
     work: Work = DEFAULT_WORK

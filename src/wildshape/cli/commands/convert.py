@@ -58,16 +58,17 @@ class Settings:
     reader's own; those that a reader does not have are refused.
 
     Attributes:
-        every: take every k-th frame of an object.
-        min_points: a scan with fewer points on the object is left out.
+        every: take every N-th frame of an object.
+        min_points: a scan with fewer points on the object is left out; by default 100, of folders
+            and packed stores 16.
         min_mean_points: an object whose scans have fewer on average is left out.
         min_scans: an object with fewer scans is left out.
         range_m: least and largest distance of a scan from the sensor, metres.
-        largest_m: a scan with a longer diagonal is left out, metres; 21.1 of folders.
+        largest_m: a scan with a longer diagonal is left out, metres; by default 21.1 of folders.
         categories: the data set's own words: Car,Van.
         motion: objects that moved over the track, that stood, or any.
-        margin: labelled boxes are enlarged by this, metres.
-        ground: points lower than this above a box's floor are left out, metres.
+        margin: labelled boxes are enlarged by this, metres; by default 0.15.
+        ground: points lower than this above a box's floor are left out, metres; by default 0.2.
         keep_ground: leave them in, and those just under the floor.
         truth: accumulate each object's scans, by their true poses, into its shape.
         outliers: which rule removes stray points from that shape.
@@ -76,17 +77,18 @@ class Settings:
         ground_strip: height above the shape's lowest points that is left out, metres.
         unit: of the coordinates in the files (folder).
         origin: the sensor's position in the files, of scans that were moved into a map (folder).
-        split: of the data set (semantic-kitti, shapenet-views).
+        split: train, test or all (semantic-kitti), also val (shapenet-views); by default all.
         labels: folder of the labels (semantic-kitti).
-        gap: frames an object may be out of sight (semantic-kitti, rgbd).
+        gap: frames that an object may be out of sight and stay one track; by default 100 (rgbd),
+            any number (semantic-kitti).
         sweeps: the scans between the labelled ones, too (nuscenes).
-        lidar: up, down or both (argoverse2); a channel such as LIDAR_RIGHT (nuscenes).
-        views: of each object (shapenet-views).
-        pixels: edge of its images (shapenet-views).
+        lidar: up, down or both, the default (argoverse2); a channel such as LIDAR_RIGHT (nuscenes).
+        views: of each object, by default 5 (shapenet-views).
+        pixels: edge of its images, by default 128 (shapenet-views).
         max_depth: farther pixels are left out, metres (rgbd, bop).
-        edge: so many pixels at a mask's border are left out (rgbd, bop).
-        rays: keep the rays around each scan that did not hit its object, too (docs/formats.md); a
-            scan takes about six times the room.
+        edge: so many pixels at a mask's border are left out, by default 1 (rgbd, bop).
+        rays: also keep the rays around each scan that did not hit its object (docs/formats.md): up
+            to six times the space of the scans.
     """
 
     source: Name

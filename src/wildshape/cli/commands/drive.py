@@ -62,17 +62,17 @@ Sources = Annotated[
 class Settings:
     """Find every vehicle of a raw recording: its track, boxes and complete shape, without labels.
 
-    Writes DIR/boxes.csv (a line a vehicle and frame, in that frame's sensor frame), trajectory.txt
-    (T_world_sensor), tracks/ (input for every other command), objects/ and shapes/ (completed
-    shapes) and report.html (the drive over time, in 3D); of several drives each into a folder of
-    its name. Repeated, an interrupted run goes on where it stopped; a finished one gets the files
-    asked for that it lacks.
+    Writes DIR/boxes.csv (a line per vehicle and frame, in that frame's sensor frame),
+    trajectory.txt (T_world_sensor), tracks/ (input for every other command), objects/ and shapes/
+    (completed shapes) and report.html (the drive over time, in 3D); of several drives each into a
+    folder of its name. Repeat the command to continue a stopped run, or to add files to a finished
+    one.
     """
 
     source: Sources
     out: OutFolder
     topic: Annotated[
-        str | None, option(metavar="NAME", help="of point clouds, if a recording has several")
+        str | None, option(metavar="NAME", help="of the point clouds, if a recording has several")
     ] = None
     network: Network = DEFAULT_NETWORK
     work: Work = DEFAULT_WORK
@@ -81,7 +81,7 @@ class Settings:
         Path | None,
         option(
             metavar="FILE",
-            help="of KITTI (.txt) or Argoverse 2 (.feather), for these boxes and for detections",
+            help="KITTI's (.txt) or Argoverse 2's (.feather), for --boxes and --detections",
         ),
     ] = None
     mesh: Annotated[bool, arg(help="also write a closed mesh of each vehicle")] = False
@@ -93,20 +93,21 @@ class Settings:
         bool, arg(help="also write DIR/drive.rrd, to play in Rerun (extra `rerun`)")
     ] = False
     rays: Annotated[
-        bool, arg(help="keep the rays around each vehicle that did not hit it, too, in tracks/")
+        bool, arg(help="also keep, in tracks/, the rays around each vehicle that did not hit it")
     ] = False
     detections: Annotated[
         Path | None,
         option(
             metavar="FILE",
             help="boxes of your own detector in place of our clusters: labels of KITTI (a tracking"
-            " file, or a folder with a file a scan), results of nuScenes (in the sensor frame),"
-            " OpenPCDet or mmdetection3d as .json, or a boxes.csv; their tracks are kept",
+            " file, or a folder with a file per scan), results of nuScenes (in the sensor frame),"
+            " OpenPCDet or mmdetection3d as .json, or a boxes.csv; tracks are kept if every box"
+            " has one",
         ),
     ] = None
     min_score: Annotated[
         float | None,
-        option(metavar="S", help="of detections; boxes of a lower score are left out"),
+        option(metavar="S", help="detections of a lower score are left out"),
     ] = None
     adapt: Annotated[
         bool,
@@ -116,7 +117,7 @@ class Settings:
         ),
     ] = False
     adapt_steps: Annotated[
-        int | None, option(metavar="N", help="of that training; by default 300, minutes")
+        int | None, option(metavar="N", help="steps of that training, by default 300: minutes")
     ] = None
     no_report: Annotated[FlagCreatePairsOff[bool], arg(help="write no report.html")] = False
     overwrite: Overwrite = False

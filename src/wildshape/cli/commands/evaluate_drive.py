@@ -24,14 +24,14 @@ EXAMPLES = (
 Folder = Annotated[
     Path,
     Positional,
-    arg(metavar="DIR", help="a folder that `wildshape drive` wrote, or one of several such"),
+    arg(metavar="DIR", help="a folder that `wildshape drive` wrote, or a folder of several"),
 ]
 Labels = Annotated[
     Path,
     arg(
         metavar="L",
         help="a file of KITTI tracking's label_02, or a folder above it; of several drives, the"
-        " folder of what bears their names",
+        " folder of labels that have their names",
     ),
 ]
 
@@ -40,13 +40,13 @@ Labels = Annotated[
 class Settings:
     """Measure what was found in drives against KITTI tracking's labels or a simulated drive's.
 
-    Prints average precision, recall, HOTA, tracks a vehicle, errors of size and trajectory, beside
-    plain boxes around the same clusters. Several drives are measured as one.
+    Prints average precision, recall, HOTA, tracks per vehicle, errors of size and trajectory,
+    beside plain boxes around the same clusters. Several drives are measured as one.
 
     Attributes:
         out: write metrics.json, vehicles.json and table.md there.
-        points: a labelled vehicle with fewer points in a scan is not asked for.
-        range: farthest box, metres, where labels are a camera's.
+        points: a labelled vehicle with fewer points in a scan does not count.
+        range: farther boxes do not count, metres; not used with a simulated drive's labels.
     """
 
     folder: Folder

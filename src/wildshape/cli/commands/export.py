@@ -35,8 +35,8 @@ class Settings:
             help="checkpoint, folder of a run, or name of shipped weights; else the default ones",
         ),
     ] = None
-    out: Annotated[Path, arg(metavar="FILE", help="to write: .onnx or .pt2")] = Path("model.onnx")
-    scans: Annotated[int, arg(metavar="N", help="compared with torch")] = 24
+    out: Annotated[Path, arg(metavar="FILE", help="file, .onnx or .pt2")] = Path("model.onnx")
+    scans: Annotated[int, arg(metavar="N", help="scans, simulated, to compare on")] = 24
     overwrite: Overwrite = False
     json: AsJson = False
 

@@ -19,7 +19,7 @@ EXAMPLES = (
 Folder = Annotated[
     Path,
     Positional,
-    arg(metavar="DIR", help="the --out of drive, complete, register, train or an evaluation"),
+    arg(metavar="DIR", help="the --out of drive, complete, register, train or evaluate(-drive)"),
 ]
 OutFile = Annotated[
     Path | None, option(metavar="FILE", help="page to write; by default DIR/report.html")

@@ -41,22 +41,23 @@ class Settings:
 
     Attributes:
         tracks: how many objects.
-        scans: usable scans a track; by default 24 for a LiDAR, 5 for the depth camera; of a drive
-            all, by default 100.
+        scans: of a track, usable ones: by default 24 of a LiDAR, 5 of the depth camera; of a drive:
+            by default 100.
         seed: the same seed gives the same tracks.
-        sensor: what scans.
+        sensor: model of the LiDAR, or the depth camera.
         category: of our shapes, by default car; airplane and chair need the depth camera; of your
             own meshes: what their tracks are called.
         occlusion: probability that something stands in the way in a LiDAR track, by default 0.3.
-        ground: leave ground returns at the rim of the object in.
-        rays: keep the rays around each scan that did not hit the object, too (LiDAR).
+        ground: keep ground returns within 0.3 m of the object.
+        rays: also keep the rays around each scan that did not hit the object (LiDAR).
         varied: to train for real scans: more sizes and forms, sensors that differ, and scans cut
             off above the ground.
-        workers: processes; by default one a core.
+        workers: processes; by default one per core.
         drive: full scans of a street with traffic, their boxes and the sensor's way.
-        speed: of a drive, mean, metres a second; else drawn from 4 to 10; 0 stands still.
-        compensated: of a drive: the points of a scan as from one place, its middle.
-        point_times: of a drive: write PLY scans with the time of each point, too.
+        speed: of the vehicle in a drive, mean, metres per second; by default drawn from 4 to 10; 0
+            stands still.
+        compensated: of a drive: points as seen from the sensor's place at the middle of the scan.
+        point_times: of a drive: also write PLY scans with the time of each point.
     """
 
     out: Out

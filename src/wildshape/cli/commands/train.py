@@ -23,8 +23,8 @@ PRESETS = {
     "default": "a network as wide as the shipped one, 30,000 steps",
     "small": "fewer points, 12,000 steps: 20 minutes at best",
     "views": "depth views of objects of unit size, 8,000 steps",
-    "paper-lidar": "exactly the paper, LiDAR: 400,000 steps",
-    "paper-views": "exactly the paper, depth views: 300,000 steps",
+    "paper-lidar": "the paper's form, LiDAR: 400,000 steps",
+    "paper-views": "the paper's form, depth views: 300,000 steps",
     "tiny": "for tests: 500 steps, learns little",
     "dpc": "the paper's learned baseline; camera, rotation alone",
     "dpc-dagger": "that baseline with a translation, too",
@@ -61,7 +61,7 @@ class Settings:
         encoder: point network that reads a scan, at the preset's widths; by default PCN's.
         steps: gradient steps instead of the preset's; the schedule is stretched to them, all but
             the warm-up.
-        seed: of weights and batches.
+        seed: of the first weights and the batches.
         resume: go on with RUN; a finished one is left as it is.
         profile: write where a step's time goes to RUN/profile.txt; the weights are the same.
         start: fine-tune these weights, a checkpoint of the same preset or `shipped`.

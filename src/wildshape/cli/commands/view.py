@@ -46,11 +46,11 @@ Shown = Annotated[
 Inputs = Annotated[
     Path | None, option(metavar="INPUT", help="the scans, if they are no longer where they were")
 ]
-Port = Annotated[int, arg(metavar="N", help="taken, or the next free one; 0 takes any")]
+Port = Annotated[int, arg(metavar="N", help="port, or the next free one; 0: any free one")]
 AllowHost = Annotated[
     tuple[str, ...],
     listed("NAME,NAME"),
-    option(help="answer pages of these names, too: a tunnel's, each with :PORT or for any"),
+    option(help="also answer under these names, as a tunnel's; NAME:PORT: at one port alone"),
 ]
 
 
