@@ -343,10 +343,10 @@ def test_clusters_in_the_box_of_a_vehicle_are_its_own(tmp_path):
 
 def test_the_document_names_what_is_not_found():
     page = (Path(__file__).parents[2] / "docs/drive.md").read_text("utf-8")
-    (said,) = re.findall(r"Not found are .*?\. ", page)
+    (said,) = re.findall(r"Not found are:\n\n(?:- .*\n)+", page)
     rule = DriveConfig()
     sizes = rule.clusters.range_m, rule.vehicles.length_m[1], rule.vehicles.tall_m
     assert all(f" {size:.0f} m" in said for size in sizes), said
-    assert f"never with {rule.vehicles.fewest_points} points" in said
+    assert f"never seen with {rule.vehicles.fewest_points} points" in said
     assert rule.tracks.fewest_scans == 4
     assert "fewer than four scans" in said
