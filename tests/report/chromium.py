@@ -12,7 +12,7 @@ import shutil
 import signal
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -158,6 +158,7 @@ def browser(profile: Path) -> Iterator[Page]:
             (os.POSIX_SPAWN_DUP2, high[0], 3),
             (os.POSIX_SPAWN_DUP2, high[1], 4),
         ],
+        setpgroup=0,
     )
     for end in (for_child, from_child, *high):
         os.close(end)
@@ -166,8 +167,17 @@ def browser(profile: Path) -> Iterator[Page]:
     finally:
         os.kill(chromium, signal.SIGTERM)
         os.waitpid(chromium, 0)
+        _end_group(chromium)
         os.close(commands)
         os.close(answers)
+
+
+def _end_group(leader: int) -> None:
+    """Its helpers outlive it for a moment, and write into a profile that is being removed."""
+    with suppress(ProcessLookupError):
+        for _ in range(200):  # who is dead stays in the group until somebody waits for it
+            os.killpg(leader, signal.SIGKILL)
+            time.sleep(0.01)
 
 
 def colourful(picture: np.ndarray) -> int:

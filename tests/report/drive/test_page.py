@@ -155,4 +155,4 @@ def _check_on_a_phone(page: Page) -> None:
     spans = "[...document.querySelectorAll('#drive_labels span')]"
     for _ in range(30):  # they pass the edge as the view comes closer
         page.ask("document.querySelector('#drive_closer').click()")
-        assert page.ask(f"{spans}.every(s => {inside}(s.getBoundingClientRect()))")
+        page.wait(f"{spans}.every(s => {inside}(s.getBoundingClientRect()))")  # once it is drawn
