@@ -3,14 +3,12 @@
 """Conversions: the same store whoever works on it, gone on with after a kill, filtered, refused."""
 
 import json
-import math
 import os
-import re
 import shutil
 import signal
 import sys
 import time
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,9 +17,8 @@ from tests.datasets.street import street
 from tests.datasets.write_argoverse2 import write_log
 from tests.datasets.write_kitti_raw import in_velo, write_drive
 
-from wildshape.cli.commands.convert import _OURS, _TRUTH, Settings, _options
-from wildshape.datasets.sources import SOURCES, open_source
-from wildshape.datasets.tracks.source import Source
+from wildshape.cli.commands.convert import Settings, _options
+from wildshape.datasets.sources import open_source
 from wildshape.io.store.store import open_store
 from wildshape.io.tracks import read_track
 
@@ -44,33 +41,6 @@ def drives(tmp_path):
 def scan_file(drives, number, frame=0):
     drive = drives / "2011_09_26" / f"2011_09_26_drive_{number:04d}_sync"
     return drive / "velodyne_points" / "data" / f"{frame:010d}.bin"
-
-
-def test_every_source_can_be_opened(tmp_path):
-    for name in SOURCES:
-        assert isinstance(open_source(name, tmp_path, {}), Source)
-
-
-def test_every_option_belongs_to_a_source(tmp_path):
-    sources = [open_source(name, tmp_path, {}) for name in SOURCES]
-    records = [r for source in sources for r in (source, *vars(source).values())]
-    known = {name for record in records if is_dataclass(record) for name in vars(record)}
-    asked = {field.name for field in fields(Settings)} - {*_OURS, *_TRUTH, "keep_ground"}
-    assert asked <= known
-
-
-@pytest.mark.parametrize(
-    "name", ["min_points", "largest_m", "margin", "ground", "gap", "views", "pixels", "edge"]
-)
-def test_help_states_the_defaults_of_the_readers(wildshape, tmp_path, name):
-    said = " ".join(wildshape("convert", "--help").out.replace("│", " ").split())
-    text = said.partition(f" --{name.replace('_', '-')} ")[2].partition(" --")[0]
-    sources = [open_source(source, tmp_path, {}) for source in SOURCES]
-    records = [r for source in sources for r in (source, *vars(source).values())]
-    own = [vars(record).get(name) for record in records if is_dataclass(record)]
-    numbers = {f"{value:g}" for value in own if value is not None and math.isfinite(value)}
-    assert numbers
-    assert numbers <= set(re.findall(r"\d+(?:\.\d+)?", text))
 
 
 def test_workers_and_order_do_not_show(wildshape, drives, tmp_path):
