@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -99,6 +100,15 @@ def test_help_ends_with_examples_that_can_be_typed(wildshape, command):
         given = words[words.index(command) + 1 :]
         assert settings_of(command, *given) is not None
         assert all(word in help_text for word in given if word.startswith("--"))
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_titles_of_options_are_words_and_not_our_names_of_fields(wildshape, command):
+    lines = map(str.strip, wildshape(command, "--help").out.splitlines())
+    titles = {line for line in lines if re.fullmatch(r"[\w. ]*(arguments|options)", line)}
+    groups = {f"{kind} options" for kind in ("scan", "model", "file", "worker")}
+    assert titles - {"positional arguments"} <= {"options"} | groups
+    assert "options" in titles
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -183,10 +183,11 @@ class WorkOptions:
     ] = None
 
 
-Network = Annotated[NetworkOptions, OmitArgPrefixes]
-Work = Annotated[WorkOptions, OmitArgPrefixes]
+# Help lists each under a title of its name: `model options`.
+Network = Annotated[NetworkOptions, OmitArgPrefixes, arg(name="model", prefix_name=False)]
+Work = Annotated[WorkOptions, OmitArgPrefixes, arg(name="worker", prefix_name=False)]
 DEFAULT_WORK = WorkOptions()
-Files = Annotated[FileOptions, OmitArgPrefixes]
+Files = Annotated[FileOptions, OmitArgPrefixes, arg(name="file", prefix_name=False)]
 
 
 def check_mesh_format(kind: str, *, mesh: bool) -> None:
@@ -227,5 +228,5 @@ class ScanOptions:
         )
 
 
-Scans = Annotated[ScanOptions, OmitArgPrefixes]
+Scans = Annotated[ScanOptions, OmitArgPrefixes, arg(name="scan", prefix_name=False)]
 DEFAULT_SCANS = ScanOptions()
