@@ -28,6 +28,15 @@ def test_angles_are_good_to_a_tenth_of_a_degree():
     assert found.quantile(0.5) == pytest.approx(np.median(values), abs=0.1)
 
 
+def test_the_mean_of_azimuths_is_their_mean_direction():
+    behind = Tally(ANGLES, circular=True)
+    behind.add(np.asarray([179.0, -179.0, 178.0]))
+    assert behind.mean == pytest.approx(179.333, abs=1e-3)
+    around = Tally(ANGLES, circular=True)
+    around.add(np.arange(-180.0, 180.0, 45.0))
+    assert np.isnan(around.mean)
+
+
 def test_what_is_not_finite_is_passed_over():
     found = tally_of([np.nan, 1.0, np.inf])
     assert (found.count, found.most) == (1, 1.0)

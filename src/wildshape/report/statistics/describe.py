@@ -3,6 +3,7 @@
 """What an input holds, counted and drawn: a page, a picture, the numbers as JSON."""
 
 from dataclasses import asdict, dataclass, replace
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -100,7 +101,7 @@ def _quantity(quantity: Quantity) -> dict[str, Any]:
         "count": tally.count,
         "least": tally.least,
         "most": tally.most,
-        "mean": tally.mean,
+        "mean": tally.mean if isfinite(tally.mean) else None,
         **{name: tally.quantile(share) for name, share in _SHARES.items()},
         "histogram": {"edges": edges.tolist(), "shares": shares.tolist()},
     }

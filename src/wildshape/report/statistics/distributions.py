@@ -27,8 +27,8 @@ class RunningDistribution:
 
     def __init__(self) -> None:
         self.points, self.scans = Tally(LENGTHS), Tally(LENGTHS)
-        self.seen = (Tally(LENGTHS), Tally(ANGLES), Tally(ANGLES), Tally(ANGLES))
-        self.sensed = (Tally(LENGTHS), Tally(ANGLES), Tally(ANGLES))
+        self.seen = (Tally(LENGTHS), Tally(ANGLES, circular=True), Tally(ANGLES), Tally(ANGLES))
+        self.sensed = (Tally(LENGTHS), Tally(ANGLES, circular=True), Tally(ANGLES))
         self.extents = {
             kind: tuple(Tally(LENGTHS) for _ in range(3)) for kind in ("shape", "fused", "scan")
         }

@@ -7,6 +7,7 @@ from jaxtyping import Float, Num
 
 _PER_DECADE = 2400
 _FEWEST_BARS = 7
+_NO_DIRECTION = 1e-9  # mean of unit vectors that cancel but for rounding
 LENGTHS = np.logspace(-4, 9, 13 * _PER_DECADE + 1)
 """Bins for what is positive and spans decades: points, metres, scans; 0.1 % wide."""
 ANGLES = np.linspace(-180.0, 180.0, 7201)
@@ -23,15 +24,17 @@ class Tally:
         least: smallest of them; infinite while there is none.
         most: largest of them.
         whole: whether all of them are whole numbers.
+        circular: whether they are degrees of a full turn: -179 is next to 179.
     """
 
-    def __init__(self, edges: Float[np.ndarray, "b"]) -> None:
+    def __init__(self, edges: Float[np.ndarray, "b"], *, circular: bool = False) -> None:
         self.edges = edges
         self.counts = np.zeros(len(edges) - 1, np.int64)
         self.count = 0
         self.least, self.most = np.inf, -np.inf
         self.whole = True
-        self._sum = 0.0
+        self.circular = circular
+        self._sum = 0j
 
     def add(self, values: Num[np.ndarray, "n"]) -> None:
         """Count more numbers; those that are not finite are passed over."""
@@ -45,12 +48,17 @@ class Tally:
         self.least = min(self.least, float(values.min()))
         self.most = max(self.most, float(values.max()))
         self.whole = self.whole and bool((values == np.round(values)).all())
-        self._sum += float(values.sum())
+        summed = np.exp(1j * np.radians(values)) if self.circular else values
+        self._sum += complex(summed.sum())
 
     @property
     def mean(self) -> float:
-        """Exact; NaN of nothing."""
-        return self._sum / self.count if self.count else float("nan")
+        """Exact, of angles their mean direction; NaN of nothing, or where they have none."""
+        if not self.count or (self.circular and abs(self._sum) < _NO_DIRECTION * self.count):
+            return float("nan")
+        if self.circular:
+            return float(np.angle(self._sum, deg=True))
+        return self._sum.real / self.count
 
     def quantile(self, share: float) -> float:
         """The number that a share of all lies below, good to the width of a fine bin."""
