@@ -170,7 +170,7 @@ def _error(found: UprightBox, label: UprightBox) -> tuple[float, ...]:
 def shown(column: str, value: float) -> str:
     if "%" in column:
         return f"{value:.1f}"
-    return f"{value:.3f}" if "IoU" in column else f"{value:+.3f}"
+    return f"{value:.3f}" if "IoU" in column else f"{value:+z.3f}"
 
 
 if __name__ == "__main__":

@@ -148,6 +148,9 @@ def test_records_say_in_a_line_what_they_hold(done):
     found = Registration(done.pose, inlier_ratio=0.75, confidence=0.9, warning="too large.")
     said = {
         "Box(4.00 x 2.00 x 1.50 m, centre (0.00, 0.00, 0.00), yaw 0.0 degrees)": done.box,
+        "SE3(moves by (0.00, 1.00, 0.00) m, turns by 0.0 degrees)": SE3(
+            torch.eye(3), torch.tensor((-0.001, 1.0, -0.0))
+        ),
         f"Completion(40 points, confidence 0.90, {done.box!r})": done,
         "Track('a', 3 scans of 40 to 40 points, car, true shape)": track,
         "Track('b', 0 scans of 0 to 0 points, lidar)": Track("b", (), ()),

@@ -194,9 +194,9 @@ class Box:
 
     def __repr__(self) -> str:
         length, width, height = self.size
-        centre = ", ".join(f"{value:.2f}" for value in self.centre)
+        centre = ", ".join(f"{value:z.2f}" for value in self.centre)
         sides = f"{length:.2f} x {width:.2f} x {height:.2f} m"
-        return f"Box({sides}, centre ({centre}), yaw {math.degrees(self.yaw):.1f} degrees)"
+        return f"Box({sides}, centre ({centre}), yaw {math.degrees(self.yaw):z.1f} degrees)"
 
     @property
     def corners(self) -> Float[np.ndarray, "8 3"]:

@@ -51,6 +51,12 @@ def _precisions(scores: DriveScores) -> list[float | None]:
     return [one.average_precision for one in scores.rows[0].detections]
 
 
+def test_nothing_is_no_negative_bias() -> None:
+    slightly_short = CAR._replace(length=CAR.length - 0.001)
+    table = markdown(_evaluated([[slightly_short]], [[_label(CAR)]]), Counting())
+    assert "+0.00 +0.00 +0.00" in table
+
+
 def test_what_is_right_is_right_everywhere() -> None:
     scores = _evaluated([[CAR, FAR]] * 3, [[_label(CAR, 4), _label(FAR, 9)]] * 3)
     row = scores.rows[0]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from wildshape.report.statistics.drawing import number
 from wildshape.report.statistics.histogram import ANGLES, LENGTHS, Tally
 
 
@@ -62,6 +63,10 @@ def test_bars_hold_everything_and_whole_numbers_fairly(values, bins):
 def test_whole_numbers_fall_into_bars_of_equal_shares():
     _, heights = tally_of(np.repeat(np.arange(100, 180), 7)).bars(24)
     assert heights[:-1] == pytest.approx(heights[0])
+
+
+def test_nothing_is_no_negative_number():
+    assert [number(value) for value in (-0.0, -12.34)] == ["0", "-12.3"]
 
 
 def test_an_empty_tally_draws_as_nothing():

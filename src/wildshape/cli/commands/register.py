@@ -99,7 +99,7 @@ def _pair(settings: Settings, target: Path) -> None:
     rays = [one for track in (source, target_track) for one in track.rays or (None,)]
     found = predictor.register(source.scans[0], target_track.scans[0], source.sensor, rays=rays)
     matrix = found.T_target_source.matrix.tolist()
-    lines = [" ".join(f"{value:12.6f}" for value in row) for row in matrix]
+    lines = [" ".join(f"{value:z12.6f}" for value in row) for row in matrix]
     shares = f"inlier ratio {found.inlier_ratio:.3f}, confidence {found.confidence:.3f}"
     data = {
         "T_target_source": matrix,

@@ -99,7 +99,7 @@ def tracking_cells(figures: Mapping[str, Any]) -> list[str]:
         str(figures["identity_switches"]),
         _DASH if tracks is None else f"{tracks:.2f}",
         str(purity["impure_tracks"]),
-        _DASH if bias is None else " ".join(f"{side:+.2f}" for side in bias),
+        _DASH if bias is None else " ".join(f"{side:+z.2f}" for side in bias),
     ]
 
 

@@ -40,7 +40,7 @@ class SE3:
     def __repr__(self) -> str:
         if self.translation.ndim > 1:
             return f"SE3({' x '.join(map(str, self.translation.shape[:-1]))} transforms)"
-        moved = ", ".join(f"{value:.2f}" for value in self.translation.tolist())
+        moved = ", ".join(f"{value:z.2f}" for value in self.translation.tolist())
         return (
             f"SE3(moves by ({moved}) m, turns by {math.degrees(float(self.angle())):.1f} degrees)"
         )

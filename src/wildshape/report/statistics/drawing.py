@@ -25,7 +25,7 @@ def number(value: float) -> str:
         return "\N{EN DASH}"
     if abs(value) >= 100:
         return f"{value:,.0f}"
-    return f"{float(f'{value:.3g}'):g}"
+    return f"{float(f'{value:.3g}'):zg}"
 
 
 def literal(text: str) -> str:
