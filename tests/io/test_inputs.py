@@ -13,10 +13,11 @@ from tests.refusal import refused
 
 from wildshape.errors import BadInputError
 from wildshape.io.inputs import open_tracks
+from wildshape.io.rays import write_rays
 from wildshape.io.scans.points import Coordinates, read_points
 from wildshape.io.scans.writers import write_ply
 from wildshape.io.tracks import NoUsableScanError, write_track
-from wildshape.records import Track
+from wildshape.records import SightLines, Track
 
 
 @pytest.fixture
@@ -133,6 +134,24 @@ def test_a_scan_in_two_formats_is_told(dataset: Path) -> None:
     assert len(next(iter(source)).scans) == len(list(scans.iterdir()))
     (told,) = source.doubts
     assert told.startswith(f"a: {first.name} and {first.stem}.xyz are taken for two scans;")
+
+
+def test_each_kind_of_odd_names_is_told_with_its_own_tracks(
+    tmp_path: Path, cloud: np.ndarray
+) -> None:
+    rays = SightLines(np.eye(3, dtype=np.float32), np.full(3, np.inf, np.float32))
+    for track, names in {"a": ("10", "9"), "b": ("1", "2"), "c": ("1", "2")}.items():
+        for name in names:
+            write_ply(tmp_path / track / "scans" / f"{name}.ply", cloud)
+        (tmp_path / track / "rays").mkdir()
+        write_rays(tmp_path / track / "rays" / "other.npz", rays)
+    source = open_tracks(tmp_path)
+    assert len(list(source)) == 3
+    order, unused = source.doubts
+    assert order.startswith("a: 10.ply is sorted before 9.ply")
+    assert "likewise" not in order
+    assert unused.startswith("a: rays/other.npz and all others there are not used")
+    assert unused.endswith("(2 more tracks likewise)")
 
 
 def test_names_that_do_not_count_are_not_doubted(tmp_path: Path, cloud: np.ndarray) -> None:

@@ -84,7 +84,7 @@ class TrackSource:
         self._read = read
         self._skipped: dict[str, tuple[tuple[str, str], ...]] = {}  # by track
         self._dropped: dict[str, int] = {}
-        self._odd: dict[str, str] = {}
+        self._odd: dict[str, dict[str, str]] = {}  # by kind and track
         self._kinds: set[SensorKind] = set()
 
     @property
@@ -109,15 +109,15 @@ class TrackSource:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """A sentence each on points that were not finite, and on names of scans that are odd."""
+        """A sentence each on points that were not finite, and on names that are odd, by kind."""
         told = []
         if self._dropped:
             points = counted(sum(self._dropped.values()), "point")
             scans = counted(len(self._dropped), "scan")
             told.append(f"dropped {points} with NaN or infinity in {scans}")
-        if self._odd:
-            name, odd = next(iter(self._odd.items()))
-            more = len(self._odd) - 1
+        for tracks in self._odd.values():
+            name, odd = next(iter(tracks.items()))
+            more = len(tracks) - 1
             others = f" ({counted(more, 'more track')} likewise)" if more else ""
             told.append(f"{name}: {odd}{others}")
         return tuple(told)
@@ -150,8 +150,8 @@ class TrackSource:
         self._skipped[name] = found.skipped
         self._kinds.add(found.track.sensor.kind)
         self._dropped |= {f"{name}/{scan}": count for scan, count in found.dropped_nonfinite}
-        if found.doubt:
-            self._odd[name] = found.doubt
+        for kind, odd in found.doubts.items():
+            self._odd.setdefault(kind, {})[name] = odd
         return found.track
 
     def __iter__(self) -> Iterator[Track]:

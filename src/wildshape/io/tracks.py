@@ -5,7 +5,7 @@
 import shutil
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, get_args
@@ -47,13 +47,13 @@ class TrackFile:
         track: the usable scans, with their truth if there is any.
         skipped: file name and reason of each scan that could not be used.
         dropped_nonfinite: file name and number of the points that were NaN or infinite.
-        doubt: what is odd about the names of scans or rays, or nothing.
+        doubts: what is odd about the names of scans and rays, a sentence by kind.
     """
 
     track: Track
     skipped: Skipped = ()
     dropped_nonfinite: tuple[tuple[str, int], ...] = ()
-    doubt: str = ""
+    doubts: dict[str, str] = field(default_factory=dict)
 
 
 class NoUsableScanError(BadInputError):
@@ -105,8 +105,8 @@ def read_track_file(
         label_size_m=info["label_size_m"],
         shape_kind=info["shape_kind"],
     )
-    doubt = _doubt_of(files) or _doubt_of_rays(folder / "rays", files)
-    return TrackFile(track, skipped, dropped, doubt)
+    doubts = _doubts_of(files) | _doubts_of_rays(folder / "rays", files)
+    return TrackFile(track, skipped, dropped, doubts)
 
 
 def track_of_files(
@@ -119,30 +119,32 @@ def track_of_files(
     """
     kept, skipped, dropped = _read_scans(files, files[0].parent, coordinates)
     track = Track(name, tuple(kept.values()), _stems(list(kept)))
-    return TrackFile(track, skipped, dropped, _doubt_of(files))
+    return TrackFile(track, skipped, dropped, _doubts_of(files))
 
 
-def _doubt_of(files: list[Path]) -> str:
+def _doubts_of(files: list[Path]) -> dict[str, str]:
+    doubts = {}
     row = out_of_order([file.stem for file in files])
     if row is not None:
-        return (
+        doubts["order"] = (
             f"{files[row].name} is sorted before {files[row + 1].name}, for names are sorted as"
             " text; if they count time, write their numbers with leading zeros"
         )
-    for one, other in pairwise(files):
-        if one.stem == other.stem:
-            return (
-                f"{one.name} and {other.name} are taken for two scans; if they are one in two"
-                " formats, remove one"
-            )
-    return ""
+    twice = next(((one, other) for one, other in pairwise(files) if one.stem == other.stem), None)
+    if twice:
+        doubts["formats"] = (
+            f"{twice[0].name} and {twice[1].name} are taken for two scans; if they are one in two"
+            " formats, remove one"
+        )
+    return doubts
 
 
-def _doubt_of_rays(folder: Path, files: list[Path]) -> str:
+def _doubts_of_rays(folder: Path, files: list[Path]) -> dict[str, str]:
     rays = {path.stem for path in folder.glob("*.npz")}
     if not rays or rays & {name for file in files for name in (file.stem, file.name)}:
-        return ""
-    return f"rays/{min(rays)}.npz and all others there are not used; name them as the scans"
+        return {}
+    told = f"rays/{min(rays)}.npz and all others there are not used; name them as the scans"
+    return {"rays": told}
 
 
 def folder_name(folder: Path) -> str:
