@@ -51,6 +51,7 @@ def test_a_long_drive_is_drawn_within_its_limits(found):
 def test_each_vehicle_s_scans_are_fused_where_it_is_completed(found):
     report = report_from_drive(found.out)
     assert [shown.name for shown in report.objects] == list(CARS)
+    assert all(report.index[0].columns)
     assert [row[1] for row in report.index[0].rows] == ["standing", "moving"]
     assert [row[2:6] for row in report.index[0].rows] == [("0.90", "0.97", "0.94", "0.99")] * 2
     assert "That of what is seen driving is raised" in report.index[0].caption

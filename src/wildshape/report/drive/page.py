@@ -37,7 +37,7 @@ _ADAPTED = (
 )
 _COLUMNS = (
     "vehicle",
-    "",
+    "motion",
     "confidence",
     *PROBABILITIES.values(),
     "length, m",
@@ -169,7 +169,7 @@ def _object(found: FinishedDrive, one: FoundVehicle) -> ReportObject:
             ("box", f"{size} m"),
             ("confidence", f"{one.confidence:.2f}"),
             *_chances(found, one).items(),
-            ("", "moving" if one.moving else "standing"),
+            ("motion", "moving" if one.moving else "standing"),
             ("frames", f"{one.frames[0]} to {one.frames[-1]}"),
         ),
         paper=False,

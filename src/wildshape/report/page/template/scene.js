@@ -182,7 +182,7 @@
     const away = place && Math.hypot(...minus(place.slice(0, 3), here(now)));
     const list = [["size", one.size.map((v) => v.toFixed(2)).join(" × ") + " m"], ["confidence", one.confidence.toFixed(2)],
       ...Object.entries(one.chances).map(([label, chance]) => [label, chance.toFixed(2)]),
-      ["", one.moving ? "moving" : "standing"], ...(place ? [["distance", away.toFixed(1) + " m"], ["points in scan", one.points[now].toLocaleString("en")]] : [["", "not in this frame"]]),
+      ["motion", one.moving ? "moving" : "standing"], ...(place ? [["distance", away.toFixed(1) + " m"], ["points in scan", one.points[now].toLocaleString("en")]] : [["", "not in this frame"]]),
       ...(one.moving && place ? [["speed", one.speeds[now].toFixed(1) + " m/s"]] : [])];
     const table = document.createElement("dl");
     for (const [label, value] of list) table.append(make("dt", label), make("dd", value));
