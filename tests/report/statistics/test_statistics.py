@@ -99,6 +99,7 @@ def test_a_cameras_axes_are_turned_to_forward_left_up(tmp_path):
     found, by = described(packed(tmp_path / "store", [Track("t", (ahead,), ("0",), sensor=camera)]))
     assert by["azimuth"].tally.mean == pytest.approx(-5.7, abs=0.5)  # to the right
     assert by["elevation"].tally.mean == pytest.approx(-11.2, abs=0.5)  # and below
+    assert "upright in its sensor's frame" in by["length"].basis  # cameras may be tilted
     assert found.sensors == {"camera, 128 x 128 px, f 240": 1}
 
 

@@ -98,7 +98,7 @@ def _forward_left_up(
 
 
 def _extent_of_scans(track: Track) -> Float[np.ndarray, "3"]:
-    """Length, width, height of the upright box around the scan that shows most, metres."""
+    """Length, width, height of the box, upright for the sensor, around the longest scan, metres."""
     boxes = [_upright_size(scan, track.sensor.kind) for scan in track.scans if len(scan)]
     return max(boxes, key=lambda size: float(size[0]))
 

@@ -238,7 +238,7 @@ def _part(measured: int, of: int, what: str) -> str:
 _EXTENT_BASIS = {
     "shape": "truth shapes",
     "fused": "scans joined by truth",
-    "scan": "the upright box of each track's longest scan",
+    "scan": "the box of each track's longest scan, upright in its sensor's frame",
 }
 
 
