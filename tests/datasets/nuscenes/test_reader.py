@@ -30,6 +30,7 @@ from wildshape.datasets.nuscenes import table_index as nuscenes_index
 from wildshape.datasets.nuscenes.reader import NuScenes
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.datasets.tracks.source import all_tracks
+from wildshape.drives.recordings.nuscenes import open_scene
 from wildshape.errors import BadInputError
 
 CAR = Thing("car", velocity=(5.0, 3.0, 0.1), yaw_rate=0.3)
@@ -303,6 +304,29 @@ def test_relatives_are_read_as_nuscenes_is(written, cache, tmp_path, kind, sweep
         assert len(track.scans) == len(same[name].scans)
         for scan, other in zip(track.scans, same[name].scans):
             np.testing.assert_array_equal(scan, other)
+
+
+def test_t4_says_how_many_numbers_a_point_has(written, cache, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    root = write_relative(tmp_path / "t4", "t4", (SECOND, FIRST))
+    for file in root.glob("data/*/*.bin"):
+        rows = np.fromfile(file, "<f4").reshape(-1, 5)
+        np.column_stack((rows, rows[:, 3:])).tofile(file)
+    (root / "info.json").write_text('{"num_pts_feats": 7, "sources": []}')
+    table = root / "annotation" / "sample_data.json"
+    rows = [row | {"info_filename": "info.json"} for row in json.loads(table.read_text())]
+    table.write_text(json.dumps(rows))
+    source = NuScenes(root, cache=tmp_path)
+    found, same = tracks(source), tracks(NuScenes(written, cache=cache))
+    assert set(found) == set(same)
+    for name, track in found.items():
+        for scan, other in zip(track.scans, same[name].scans, strict=True):
+            np.testing.assert_array_equal(scan, other)
+    drive = open_scene(root / "scene-0061")
+    assert len(drive.read(0).points) > 500
+    (root / "info.json").write_text('{"num_pts_feats": "many"}')
+    with pytest.raises(BadInputError, match=r"info\.json: num_pts_feats is many, expected 4 to 64"):
+        tracks(source)
 
 
 def test_the_lidar_can_be_named(own, tmp_path):

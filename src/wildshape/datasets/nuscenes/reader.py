@@ -26,6 +26,7 @@ from wildshape.datasets.tracks.labelled_boxes import (
 from wildshape.datasets.tracks.parts import found_in, named
 from wildshape.datasets.tracks.selection import Selection, measured
 from wildshape.errors import BadInputError
+from wildshape.io.guard import read_json
 from wildshape.io.scans.arrays import read_rows
 from wildshape.io.scans.points import read_points
 from wildshape.records import Points, Sensor, Track
@@ -37,6 +38,8 @@ VEHICLES += ("other_vehicle", "emergency_vehicle")  # Lyft's
 _LAYOUT = f"<root>/v1.0-trainval/scene.json, ... and <root>/samples/{CHANNELS[0]}/*.pcd.bin"
 _TABLES = ("v1.*", "data", "train_data", "annotation")  # nuScenes, TruckScenes, Lyft, T4
 _TOKEN_LETTERS = 12
+_COLUMNS = ("x", "y", "z", "intensity", "ring")
+_FEWEST, _MOST = 4, 64  # numbers of a point
 
 
 @dataclass
@@ -103,7 +106,7 @@ class NuScenes:
                 for token, box in scene.boxes_at(frame).items()
                 if token in wanted
             ]
-            read = partial(read_sweep, file_of(tables, frame))
+            read = partial(read_sweep, file_of(tables, frame), info_of(tables, frame))
             crop_objects(objects, frame.name, read, self.crop, gathering)
         yield from gathering.finished()
 
@@ -164,11 +167,22 @@ def find_tables(root: Path) -> Path:
     return found[0]
 
 
-def read_sweep(path: Path) -> Points:
+def info_of(tables: Path, frame: Frame) -> Path | None:
+    """The file that says how many numbers a point of a frame has, if there is one."""
+    path = tables.parent / frame.info
+    return path if path.is_file() else None
+
+
+def read_sweep(path: Path, info: Path | None = None) -> Points:
     """One whole sweep `(n, 3)`, metres, in the frame of LIDAR_TOP.
 
+    Args:
+        path: of the file.
+        info: see `info_of`.
+
     Raises:
-        BadInputError: the file is missing or no sequence of x y z intensity ring in float32.
+        BadInputError: the file is missing or no sequence of x y z intensity ring in float32, or
+            of as many numbers as `info` says.
     """
     if not path.is_file():
         raise BadInputError(
@@ -178,8 +192,18 @@ def read_sweep(path: Path) -> Points:
     if path.suffix == ".pcd":  # TruckScenes
         points = read_points(path)
         return points[measured(points)]
-    points = read_rows(path, "x y z intensity ring")
+    points = read_rows(path, _columns(info) if info else " ".join(_COLUMNS))
     return np.ascontiguousarray(points[measured(points)])
+
+
+def _columns(info: Path) -> str:
+    count = read_json(info, "a scan's JSON object", dict).get("num_pts_feats", len(_COLUMNS))
+    if not isinstance(count, int) or not _FEWEST <= count <= _MOST:
+        raise BadInputError(
+            f"{info}: num_pts_feats is {str(count)[:40]}, expected {_FEWEST} to {_MOST}: how many"
+            " float32 a point has in the scan's file."
+        )
+    return " ".join([*_COLUMNS, *["more"] * count][:count])
 
 
 def _is_of(category: str, words: tuple[str, ...]) -> bool:

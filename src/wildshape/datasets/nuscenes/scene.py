@@ -27,6 +27,7 @@ class Frame:
         is_key: whether its boxes were labelled.
         microseconds: Unix time.
         T_global_sensor: one pose.
+        info: file that may say how many numbers a point has (T4), relative to the data root.
     """
 
     file: str
@@ -34,6 +35,7 @@ class Frame:
     is_key: bool
     microseconds: int
     T_global_sensor: SE3
+    info: str
 
     @property
     def name(self) -> str:
@@ -101,7 +103,7 @@ def read_scene(db: sqlite3.Connection, name: str, *, sweeps: bool) -> Scene:
 
 def _read_frames(db: sqlite3.Connection, scene: int, *, sweeps: bool) -> tuple[Frame, ...]:
     rows = db.execute(
-        "SELECT file, sample, is_key, timestamp, e.x, e.y, e.z, e.qw, e.qx, e.qy, e.qz,"
+        "SELECT file, info, sample, is_key, timestamp, e.x, e.y, e.z, e.qw, e.qx, e.qy, e.qz,"
         " c.x, c.y, c.z, c.qw, c.qx, c.qy, c.qz FROM frame"
         " JOIN ego e ON e.id = ego JOIN calibration c ON c.id = calibration"
         " WHERE scene = ? AND is_key >= ? ORDER BY timestamp",
@@ -109,12 +111,12 @@ def _read_frames(db: sqlite3.Connection, scene: int, *, sweeps: bool) -> tuple[F
     ).fetchall()
     if not rows:
         return ()
-    T_global_ego = _poses([row[4:11] for row in rows])
+    T_global_ego = _poses([row[5:12] for row in rows])
     _check_level(T_global_ego, "ego_pose.json")
-    T_global_sensor = T_global_ego @ _poses([row[11:] for row in rows])
+    T_global_sensor = T_global_ego @ _poses([row[12:] for row in rows])
     return tuple(
-        Frame(file, sample, bool(is_key), time, T_global_sensor[i])
-        for i, (file, sample, is_key, time, *_) in enumerate(rows)
+        Frame(file, sample, bool(is_key), time, T_global_sensor[i], info or "")
+        for i, (file, info, sample, is_key, time, *_) in enumerate(rows)
     )
 
 

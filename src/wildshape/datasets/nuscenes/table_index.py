@@ -31,9 +31,11 @@ TABLES = (
     "ego_pose",
     "sample_annotation",
 )
-_VERSION = 2
+_VERSION = 3
 _LATEST, _FARTHEST = 1 << 62, 1e8
 _PATIENCE_S = 7200.0
+_FILES = ("filename", "info_filename")
+_UNSAID = {"info_filename": None}  # T4's alone
 _POSE = "x REAL, y REAL, z REAL, qw REAL, qx REAL, qy REAL, qz REAL"
 _SCHEMA = (
     "CREATE TABLE scene (id INTEGER PRIMARY KEY, name TEXT)",
@@ -41,7 +43,7 @@ _SCHEMA = (
     f"CREATE TABLE calibration (id INTEGER PRIMARY KEY, {_POSE})",
     f"CREATE TABLE ego (id INTEGER PRIMARY KEY, {_POSE})",
     "CREATE TABLE frame (scene INTEGER, sample INTEGER, calibration INTEGER, ego INTEGER,"
-    " is_key INTEGER, timestamp INTEGER, file TEXT)",
+    " is_key INTEGER, timestamp INTEGER, file TEXT, info TEXT)",
     "CREATE TABLE box (scene INTEGER, sample INTEGER, instance INTEGER, width REAL, length REAL,"
     f" height REAL, {_POSE})",
 )
@@ -199,13 +201,13 @@ def _add_frames(
 ) -> _Ids:
     egos: _Ids = {}
     wanted = ("sample_token", "calibrated_sensor_token", "ego_pose_token")
-    kept = ("is_key_frame", "timestamp", "filename")
+    kept = ("is_key_frame", "timestamp", *_FILES)
     for sample, calibration, ego, *rest in _rows(tables, "sample_data", *wanted, *kept):
         if calibration not in calibrations:
             continue
         place = _known(samples, sample, tables, "sample_data", "sample")
         row = (*place, calibrations[calibration], egos.setdefault(ego, len(egos)), *rest)
-        db.execute("INSERT INTO frame VALUES (?,?,?,?,?,?,?)", row)
+        db.execute("INSERT INTO frame VALUES (?,?,?,?,?,?,?,?)", row)
     return egos
 
 
@@ -236,7 +238,7 @@ def _rows(tables: Path, name: str, *keys: str) -> Iterator[tuple[Any, ...]]:
     values = itemgetter(*keys)
     for row in json_rows(path):
         try:
-            found = values(row)
+            found = values(_UNSAID | row)
         except KeyError as error:
             raise SharedInputError(
                 f"{path}: a row has no {error}; unpack nuScenes' metadata archive again."
@@ -258,11 +260,13 @@ def _fits(key: str, value: object) -> bool:
         return isinstance(value, bool | int) and value in (0, 1)
     if key == "timestamp":
         return isinstance(value, int | float) and 0 <= value < _LATEST
+    if key == "info_filename" and value in (None, ""):
+        return True
     if not isinstance(value, str) or not value.isprintable():
         return False
     parts = value.split("/")
     longest = max(len(part.encode()) for part in parts)
-    return key != "filename" or (".." not in parts and parts[0] != "" and longest < 256)
+    return key not in _FILES or (".." not in parts and parts[0] != "" and longest < 256)
 
 
 def _known(ids: dict[str, Any], token: str, tables: Path, table: str, other: str) -> Any:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from wildshape.datasets.nuscenes.json_rows import json_rows
-from wildshape.datasets.nuscenes.reader import file_of, find_tables, read_sweep
+from wildshape.datasets.nuscenes.reader import file_of, find_tables, info_of, read_sweep
 from wildshape.datasets.nuscenes.scene import read_scene
 from wildshape.datasets.nuscenes.table_index import cache_folder, index_of, lidar_of
 from wildshape.drives.source import Drive
@@ -21,13 +21,14 @@ class _Sweeps:
     """Reads a frame's sweep; TruckScenes' points have times."""
 
     files: tuple[Path, ...]
+    infos: tuple[Path | None, ...]
     times: tuple[float, ...]
 
     def __call__(self, frame: int) -> Turn:
         file = self.files[frame]
         if file.suffix == ".pcd":
             return read_turn(file, self.times[frame])
-        return Turn(read_sweep(file))
+        return Turn(read_sweep(file, self.infos[frame]))
 
 
 def find_scenes(root: Path) -> list[Path]:
@@ -60,11 +61,12 @@ def open_scene(path: Path) -> Drive:
     there = [(frame, file) for frame, file in there if file.is_file()]
     if not there:
         raise BadInputError(f"{path}: none of its {channel} files is here; unpack their blobs.")
+    infos = tuple(info_of(tables, frame) for frame, _ in there)
     times = tuple(frame.microseconds / 1e6 for frame, _ in there)
     return Drive.of(
         name=path.name,
         scan_names=[frame.name for frame, _ in there],
-        read=_Sweeps(tuple(file for _, file in there), times),
+        read=_Sweeps(tuple(file for _, file in there), infos, times),
         times=times,
         T_world_sensor=stack([frame.T_global_sensor for frame, _ in there]),
         files=[file for _, file in there],
