@@ -221,6 +221,7 @@ class DrivePage:
 
     def _show_closely(self, number: int) -> None:
         """All of the vehicle's shape, and what its completed scans measured, at its place."""
+        self.found.check_current()
         one = self.found.vehicles[number]
         if self.frame not in one.frames:
             self.time.value = one.fullest
