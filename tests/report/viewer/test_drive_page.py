@@ -105,3 +105,12 @@ def test_a_folder_that_was_written_anew_is_not_mixed_with_what_is_shown(tmp_path
         page.picker.value = "<7>"
         assert "written anew" in page.text.content
         assert page.extra == []
+
+
+def test_a_scan_that_can_no_longer_be_read_is_said_on_the_page(tmp_path):
+    found = finished_drive(tmp_path)
+    with serving_drive(found) as page:
+        assert "cannot be read" not in page.text.content
+        shutil.rmtree(found.source)
+        page.time.value = 4
+        assert "cannot be read" in page.text.content

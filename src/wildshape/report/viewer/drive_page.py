@@ -277,6 +277,8 @@ class DrivePage:
         yield "vehicles", f"{len(self.boxes.get(frame, {}))} here, {len(self.names)} in all"
         if self.drive is None:
             yield "scans", "cannot be read"
+        elif found.scanned[frame] and not len(self.scan.points):
+            yield "scan", "cannot be read now"
         if number is None:
             yield "shape", "click a vehicle"
             return
