@@ -94,3 +94,23 @@ def test_a_vehicle_that_is_gone_is_said_on_the_page(tmp_path):
         assert "no such file" in page.text.content
         page.picker.value = NOTHING
         assert "click a vehicle" in page.text.content
+
+
+def test_a_folder_that_was_written_anew_is_not_mixed_with_what_is_shown(tmp_path):
+    found = finished_drive(tmp_path)
+    with serving_drive(found) as page:
+        said = json.loads((found.out / "wildshape.json").read_text())
+        said["result"]["seconds"]["completion"] = 3.5
+        (found.out / "wildshape.json").write_text(json.dumps(said))
+        page.picker.value = "<7>"
+        assert "written anew" in page.text.content
+        assert page.extra == []
+
+
+def test_a_scan_that_can_no_longer_be_read_is_said_on_the_page(tmp_path):
+    found = finished_drive(tmp_path)
+    with serving_drive(found) as page:
+        assert "cannot be read" not in page.text.content
+        shutil.rmtree(found.source)
+        page.time.value = 4
+        assert "cannot be read" in page.text.content

@@ -151,6 +151,15 @@ class FinishedDrive:
             )
         return drive.moved_by(self.T_level_sensor)
 
+    def check_current(self) -> None:
+        """Refuse a folder that holds another drive by now: a vehicle of this name is another one.
+
+        Raises:
+            BadInputError: it was written anew, or has gone.
+        """
+        if _read_record(self.out / MARKER) != self.record:
+            raise BadInputError(f"{self.out}: was written anew since; start the viewer again.")
+
     def shape(self, vehicle: FoundVehicle) -> Points:
         """`(n, 3)` complete shape, metres, in its box's frame: x forward, origin in the middle.
 

@@ -221,6 +221,7 @@ class DrivePage:
 
     def _show_closely(self, number: int) -> None:
         """All of the vehicle's shape, and what its completed scans measured, at its place."""
+        self.found.check_current()
         one = self.found.vehicles[number]
         if self.frame not in one.frames:
             self.time.value = one.fullest
@@ -276,6 +277,8 @@ class DrivePage:
         yield "vehicles", f"{len(self.boxes.get(frame, {}))} here, {len(self.names)} in all"
         if self.drive is None:
             yield "scans", "cannot be read"
+        elif found.scanned[frame] and not len(self.scan.points):
+            yield "scan", "cannot be read now"
         if number is None:
             yield "shape", "click a vehicle"
             return
