@@ -21,7 +21,8 @@ from PIL import Image
 from wildshape.cli.main import in_a_sentence
 from wildshape.errors import BadInputError
 from wildshape.io.boxes.detections import pose_of
-from wildshape.report.results import OBJECTS, box_of, find, read_object
+from wildshape.io.guard import read_json
+from wildshape.report.results import OBJECTS, box_of, find
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.shapes.solid import Solid
 
@@ -61,7 +62,7 @@ def main(settings: Settings) -> None:
 
 def panel(folder: Path, width: int) -> np.ndarray:
     """The middle scan's mesh in its box's frame, from behind and the left."""
-    entries = read_object(folder / OBJECTS)["scans"]
+    entries = read_json(folder / OBJECTS, "what complete writes")["scans"]
     entry = entries[len(entries) // 2]
     box = box_of(entry)
     assert box is not None
