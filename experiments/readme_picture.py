@@ -23,7 +23,7 @@ class Settings:
     """Draw simulated cars that no training has seen.
 
     Attributes:
-        out: .webp, .gif or .png.
+        out: .webp or .png.
         model: checkpoint; by default the shipped weights.
         seed: of the cars.
     """
