@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """How fast a sequence of SemanticKITTI becomes tracks, on one core, and in how much memory.
 
-python benchmarks/bench_convert.py [--frames N] [--small] [--sequence DIR --labels FOLDER]
+python benchmarks/bench_convert.py [--frames N] [--small]
 
-Replays the scans of a sequence (or made-up ones of the same size) as a long one: every 50 frames
-the cars get new numbers. Memory must not grow with --frames.
+Replays made-up scans of a real one's size as a long sequence: every 50 frames the cars get new
+numbers. Memory must not grow with --frames.
 """
 
 import tempfile
@@ -40,7 +40,7 @@ def made_up(folder: Path, frames: int = 6) -> Path:
     return folder
 
 
-def replay(source: Path, labels: str, folder: Path, frames: int) -> None:
+def replay(source: Path, folder: Path, frames: int) -> None:
     """Write a long sequence: links to the scans, labels with numbers that move on."""
     scans = sorted((source / "velodyne").glob("*.bin"))
     poses = (source / "poses.txt").read_text().splitlines()
@@ -51,7 +51,7 @@ def replay(source: Path, labels: str, folder: Path, frames: int) -> None:
     for i in range(frames):
         scan = scans[i % len(scans)]
         (folder / "velodyne" / f"{i:06d}.bin").symlink_to(scan.resolve())
-        found = np.fromfile(source / labels / f"{scan.stem}.label", "<u4")
+        found = np.fromfile(source / "labels" / f"{scan.stem}.label", "<u4")
         block = np.uint32(600 * (i // _BLOCK % 100) << 16)
         np.where(found >> 16 > 0, found + block, found).tofile(folder / "labels" / f"{i:06d}.label")
 
@@ -60,14 +60,11 @@ def main() -> None:
     parser = options(__doc__)
     parser.set_defaults(threads=1)
     parser.add_argument("--frames", type=int, help="300; small: 100")
-    parser.add_argument("--sequence", type=Path)
-    parser.add_argument("--labels", default="labels")
     arguments = begin(parser)
     frames = arguments.frames or (6 if arguments.smoke else 100 if arguments.small else 300)
     print(header("bench_convert"))
     with tempfile.TemporaryDirectory() as scratch:
-        source = arguments.sequence or made_up(Path(scratch) / "made_up")
-        replay(source, arguments.labels, Path(scratch) / "00", frames)
+        replay(made_up(Path(scratch) / "made_up"), Path(scratch) / "00", frames)
         began, tracks, scans = time.perf_counter(), 0, 0
         for track in SemanticKitti(Path(scratch) / "00").tracks_of("00"):
             tracks, scans = tracks + 1, scans + len(track.scans)

@@ -34,14 +34,12 @@ STEPS, ROTATION_BAR_DEG, CD_BAR_M, MINUTES_BAR = 3600, 3.0, 0.15, 10.0
 def main() -> None:
     parser = options(__doc__)
     parser.set_defaults(threads=1)
-    parser.add_argument("--steps", type=int, help=f"{STEPS}: 10 minutes of one core")
-    parser.add_argument("--seed", type=int, default=0, help="of the cars and of training")
     arguments = begin(parser)
     print(header("bench_overfit.py"))
-    steps = arguments.steps or (4 if arguments.smoke else 400 if arguments.small else STEPS)
+    steps = 4 if arguments.smoke else 400 if arguments.small else STEPS
     judge_speed(wanted=steps >= STEPS)
     scans, seeds = (3, 1) if arguments.smoke else (None, 3)
-    tracks = list(simulate_tracks(SimulationConfig(tracks=8, scans=scans), seed=arguments.seed))
+    tracks = list(simulate_tracks(SimulationConfig(tracks=8, scans=scans), seed=0))
     base = default()
     recipe = replace(base, optim=replace(base.optim, steps=steps), validate_every=steps)
     with TemporaryDirectory() as name:
@@ -50,7 +48,7 @@ def main() -> None:
             for track in tracks:
                 store.add(track)
         began = time.process_time()
-        model = fit(setup(recipe, open_store(folder / "cars"), folder / "run", seed=arguments.seed))
+        model = fit(setup(recipe, open_store(folder / "cars"), folder / "run"))
         minutes = (time.process_time() - began) / 60
         methods = {"wildshape, overfit": Learned(load(model))}
         results = [protocol.run(methods, tracks, rotate="yaw", seed=s) for s in range(seeds)]

@@ -96,16 +96,8 @@ def pauses(tab: Any, scans: int) -> list[float]:
     return np.diff(tab.ask("window.seen")[1:]).tolist()
 
 
-def save(path: Path, picture: np.ndarray) -> None:
-    from PIL import Image
-
-    Image.fromarray(picture).save(path)
-
-
 def main() -> None:
-    parser = options(__doc__)
-    parser.add_argument("--picture", type=Path, help="where to save what is seen, a PNG")
-    arguments = begin(parser)
+    arguments = begin(options(__doc__))
     print(header("bench_view.py"))
     tools = runpy.run_path(str(BROWSER))
     if tools["CHROMIUM"] is None:
@@ -116,8 +108,6 @@ def main() -> None:
         folder = completed_track(Path(name), count)
         served, drawn, viewer = first_picture(tab, folder)
         found = pauses(tab, count // 4 if arguments.small else count)
-        if arguments.picture:
-            save(arguments.picture, tab.shot())
         viewer.terminate()
         viewer.wait()
     start = {"page served": [1e3 * served], "first picture": [1e3 * drawn]}

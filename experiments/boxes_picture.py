@@ -22,6 +22,7 @@ from wildshape.inference.boxes import carried
 from wildshape.inference.predictor import load
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
+_CAR, _SHOWN = 78, 5  # a seed that no training has seen, and which scan is drawn
 _TRUTH, _ONE, _TRACK, _SCAN = "#009e73", "#d55e00", "#0072b2", "#8a8f98"
 
 
@@ -31,20 +32,16 @@ class Settings:
 
     Attributes:
         out: .webp or .png.
-        seed: of the car.
-        scan: number of the scan that is shown.
     """
 
     out: Annotated[Path, tyro.conf.Positional]
-    seed: int = 78
-    scan: int = 5
 
 
 def main(settings: Settings) -> None:
-    (track,) = simulate_tracks(SimulationConfig(tracks=1, scans=12), seed=settings.seed)
+    (track,) = simulate_tracks(SimulationConfig(tracks=1, scans=12), seed=_CAR)
     if track.shape is None or track.T_sensor_object is None:
         raise SystemExit("a simulated track has its truth")
-    model, i = load(), settings.scan
+    model, i = load(), _SHOWN
     pose, truth = track.T_sensor_object[i], true_box(track.shape, body=True)
     one = model.complete(track.scans[i], track.sensor)
     whole = model.complete_track(track.scans, track.sensor)[i]

@@ -15,46 +15,33 @@ import tyro
 import wildshape
 from wildshape.cli.main import in_a_sentence
 from wildshape.drives.recordings.recording_kinds import open_drive
-from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle, read_finished
+from wildshape.drives.writing.finished import read_finished
 from wildshape.report.drive.picture import write_drive_picture
 from wildshape.simulate.street.drive_folder import write_drive
 from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
 
+_SCANS, _STREET, _SHOWN = 100, 3, 4  # of a seed that no training has seen; vehicles drawn below
+
 
 @dataclass(frozen=True)
 class Settings:
-    """Draw a drive that no training has seen.
+    """Draw a drive.
 
     Attributes:
         out: .webp or .png.
-        scans: of the drive, ten a second.
-        seed: of the street.
-        shown: vehicles drawn below.
     """
 
     out: Annotated[Path, tyro.conf.Positional]
-    scans: int = 100
-    seed: int = 3
-    shown: int = 4
 
 
 def main(settings: Settings) -> None:
     with tempfile.TemporaryDirectory() as folder:
         street, out = Path(folder) / "street", Path(folder) / "found"
-        write_drive(WholeDrive(StreetConfig(scans=settings.scans), settings.seed), street)
+        write_drive(WholeDrive(StreetConfig(scans=_SCANS), _STREET), street)
         wildshape.drive(street / "velodyne" / "0000", out)
-        draw(settings, out)
-
-
-def draw(settings: Settings, out: Path) -> None:
-    found = read_finished(out)
-    shown = nearest(found)[: settings.shown]
-    write_drive_picture(found, open_drive(found.source), settings.out, shown)
-
-
-def nearest(found: FinishedDrive) -> list[FoundVehicle]:
-    """Those that came nearest first."""
-    return sorted(found.vehicles, key=lambda one: one.nearest_m)
+        found = read_finished(out)
+        nearest = sorted(found.vehicles, key=lambda one: one.nearest_m)[:_SHOWN]
+        write_drive_picture(found, open_drive(found.source), settings.out, nearest)
 
 
 if __name__ == "__main__":

@@ -21,10 +21,12 @@ from PIL import Image
 from wildshape.cli.main import in_a_sentence
 from wildshape.errors import BadInputError
 from wildshape.io.boxes.detections import pose_of
-from wildshape.report.results import OBJECTS, box_of, find, read_object
+from wildshape.io.guard import read_json
+from wildshape.report.results import OBJECTS, box_of, find
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.shapes.solid import Solid
 
+_WIDTH_PX, _COLUMNS = 200, 5  # of a panel, and panels in a line
 _COLOUR, _SHOWN, _AZIMUTH_DEG, _ELEVATION_DEG = (110, 150, 190), 10, 145.0, 22.0
 
 
@@ -35,14 +37,10 @@ class Settings:
     Attributes:
         out: .webp or .png.
         rows: folders with outputs of `complete --mesh`, of the same tracks each.
-        width: of a panel, pixels.
-        columns: panels in a line.
     """
 
     out: Annotated[Path, tyro.conf.Positional]
     rows: Annotated[tuple[Path, ...], tyro.conf.Positional]
-    width: int = 200
-    columns: int = 5
 
 
 def main(settings: Settings) -> None:
@@ -52,16 +50,16 @@ def main(settings: Settings) -> None:
         raise BadInputError("the folders hold no objects.json, or not the same tracks.")
     shown = min(_SHOWN, len(found[0]))
     chosen = np.linspace(0, len(found[0]) - 1, shown).round().astype(int)
-    columns = [np.concatenate([panel(row[i], settings.width) for row in found]) for i in chosen]
-    columns += [np.full_like(columns[0], 255)] * (-shown % settings.columns)  # the last line's end
-    lines = [columns[i : i + settings.columns] for i in range(0, len(columns), settings.columns)]
+    columns = [np.concatenate([panel(row[i], _WIDTH_PX) for row in found]) for i in chosen]
+    columns += [np.full_like(columns[0], 255)] * (-shown % _COLUMNS)  # the last line's end
+    lines = [columns[i : i + _COLUMNS] for i in range(0, len(columns), _COLUMNS)]
     picture = np.concatenate([np.concatenate(line, axis=1) for line in lines])
     Image.fromarray(picture).save(settings.out, quality=85)
 
 
 def panel(folder: Path, width: int) -> np.ndarray:
     """The middle scan's mesh in its box's frame, from behind and the left."""
-    entries = read_object(folder / OBJECTS)["scans"]
+    entries = read_json(folder / OBJECTS, "what complete writes")["scans"]
     entry = entries[len(entries) // 2]
     box = box_of(entry)
     assert box is not None

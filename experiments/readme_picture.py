@@ -23,20 +23,16 @@ class Settings:
     """Draw simulated cars that no training has seen.
 
     Attributes:
-        out: .webp, .gif or .png.
-        model: checkpoint; by default the shipped weights.
-        seed: of the cars.
+        out: .webp or .png.
     """
 
     out: Annotated[Path, tyro.conf.Positional]
-    model: Path | None = None
-    seed: int = 77
 
 
 def main(settings: Settings) -> None:
-    model = load(settings.model)
+    model = load()
     objects = []
-    for track in simulate_tracks(SimulationConfig(tracks=3), seed=settings.seed):
+    for track in simulate_tracks(SimulationConfig(tracks=3), seed=77):
         done = model.complete(track.scans[track.middle], track.sensor)
         T_middle_scan = model.register_track(track.scans, track.sensor)
         objects.append(

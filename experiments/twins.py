@@ -38,7 +38,7 @@ from wildshape.simulate.truth import visible_surface
 
 _CUT_M, _VAN_M = 0.2, 2.0
 _NOISE_M, _LOST, _GLASS, _THROUGH = 0.02, 0.05, 0.1, 0.6
-_NEIGHBOURS, _NEAR_M = 10, 0.35
+_NEIGHBOURS, _NEAR_M, _DRAWN = 10, 0.35, 3
 Maker = Callable[[int, Track], Solid]
 
 
@@ -50,21 +50,17 @@ class Settings:
         data: labelled tracks of an HDL-64E.
         out: picture to write.
         cad: folder of CAD meshes, for twins of their test split.
-        model: checkpoint, or the name of shipped weights.
-        car: number of the one that is drawn.
     """
 
     data: tyro.conf.Positional[Path]
     out: Path
     cad: Path | None = None
-    model: str = "default"
-    car: int = 3
 
 
 def main(settings: Settings) -> None:
     """Print a row for the real scans and each kind of twin."""
     torch.set_num_threads(1)
-    model = wildshape.load(settings.model)
+    model = wildshape.load()
     source = open_tracks(settings.data)
     real = [track for track in map(source.__getitem__, range(len(source))) if track.label_size_m]
     sets = {"real": real}
@@ -79,7 +75,7 @@ def main(settings: Settings) -> None:
         off = np.mean([errors(_boxes(model, track), track) for track in tracks], axis=0)
         cells = (f"{points:.0f}", f"{thick:.2f}", f"{near:.0f}", f"{deep:.0f}")
         print(f"| {name} | " + " | ".join((*cells, *map(shown, COLUMNS, off))) + " |", flush=True)
-    _draw(settings.out, {n: tracks[settings.car] for n, tracks in sets.items()}, model)
+    _draw(settings.out, {n: tracks[_DRAWN] for n, tracks in sets.items()}, model)
 
 
 def _makers(cad: Path | None) -> dict[str, Maker]:

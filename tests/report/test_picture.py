@@ -29,10 +29,9 @@ def test_columns_are_in_the_order_of_the_work(tmp_path: Path) -> None:
     assert ((left[..., 2] - left[..., 0]) > 60).sum() == 0
 
 
-@pytest.mark.parametrize("suffix", [".gif", ".webp"])
-def test_animation_turns(tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_animation_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(picture, "_FRAMES", 3)
-    path = tmp_path / f"picture{suffix}"
+    path = tmp_path / "picture.webp"
     picture.write_picture(_objects()[:1], path)
     with Image.open(path) as image:
         assert getattr(image, "n_frames", 1) == 3
@@ -42,7 +41,7 @@ def test_animation_turns(tmp_path: Path, suffix: str, monkeypatch: pytest.Monkey
     assert (np.abs(second - first).max(-1) > 60).mean() > 0.01
 
 
-@pytest.mark.parametrize(("objects", "name"), [([], "a.png"), (_objects(), "a.bmp")])
+@pytest.mark.parametrize(("objects", "name"), [([], "a.png"), (_objects(), "a.gif")])
 def test_refused(tmp_path: Path, objects: list[ReportObject], name: str) -> None:
     with pytest.raises(BadInputError, match=name):
         picture.write_picture(objects, tmp_path / name)

@@ -42,11 +42,10 @@ def _kitti(
     method: str,
     shape: tuple[float, float | None, float | None],
     pose: tuple[float, float, float],
-    std: dict[str, float] | None = None,
 ) -> PaperRow:
     """SemanticKITTI has no boxes to mirror at: its truth is partial alone (supplement)."""
     cd, precision, coverage = shape
-    return PaperRow(KITTI, method, None, None, None, *pose, std or {}, cd, precision, coverage)
+    return PaperRow(KITTI, method, None, None, None, *pose, {}, cd, precision, coverage)
 
 
 LIDAR_ROWS = (
@@ -109,26 +108,6 @@ VIEW_COUNT_ROWS = (
     PaperRow(VEHICLE, "paper, 4 views", 0.261, rot_median_deg=4.208, trans_median_m=0.160),
     PaperRow(VEHICLE, "paper, 8 views", 0.242, rot_median_deg=3.995, trans_median_m=0.142),
 )
-
-
-def _spread(
-    cd: float, acc30: float, rotation: float, translation: float, cd_name: str = "cd"
-) -> dict[str, float]:
-    names = (cd_name, "acc30", "rot_median_deg", "trans_median_m")
-    return dict(zip(names, (cd, acc30, rotation, translation), strict=True))
-
-
-# The deviation of CD on SemanticKITTI is printed as 0.09; its neighbours suggest 0.009.
-SEED_ROWS = (
-    PaperRow(
-        VEHICLE, "paper, mean of 5 seeds", 0.26, None, None, 0.7654, 4.21, 0.16,
-        _spread(0.009, 0.1920, 1.72, 0.032),
-    ),
-    _kitti(
-        "paper, mean of 5 seeds", (0.20, None, None), (0.6062, 11.54, 0.21),
-        _spread(0.09, 0.1917, 6.26, 0.032, cd_name="cd_partial"),
-    ),
-)  # fmt: skip
 
 VIEW_SEED_ROWS = (
     PaperRow(PLANE, "paper, 3 seeds", 1.95, acc30=0.9087, std={"cd": 0.03, "acc30": 0.0340}),

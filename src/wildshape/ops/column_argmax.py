@@ -7,7 +7,7 @@ from jaxtyping import Float, Float32, Int64
 from torch import Tensor
 
 from wildshape.errors import BadInputError
-from wildshape.ops.library import check_memory, library
+from wildshape.ops.library import WIDEST, check_memory, library
 
 
 def column_argmax(values: Float[Tensor, "n c"]) -> Int64[Tensor, "c"]:
@@ -29,19 +29,14 @@ def column_argmax_torch(values: Float[Tensor, "n c"]) -> Int64[Tensor, "c"]:
     return (len(values) - first).long()
 
 
-WIDEST = -1
-
-
 def column_argmax_native(values: Float32[Tensor, "n c"], level: int = WIDEST) -> Int64[Tensor, "c"]:
     """One pass over the values; `level` 0 is the portable form.
 
     Raises:
         BadInputError: not a matrix of float32 with a row.
-        RuntimeError: the library is not built.
     """
     loaded = library()
-    if loaded is None:
-        raise RuntimeError("the native library is not built; use the torch backend.")
+    assert loaded is not None  # whoever calls has asked
     check_memory("column_argmax", values, torch.float32)
     if values.ndim != 2 or not 0 < len(values) < 2**31:
         raise BadInputError(f"column_argmax: expected (n, c) with n >= 1, found {values.shape}.")

@@ -13,6 +13,7 @@ import torch
 from wildshape.errors import BadInputError, lacks_memory
 
 _ABI = 2
+WIDEST = -1  # the `level` of a kernel: the widest instructions that this processor has
 _PATH = Path(__file__).parent / "native" / "libwildshape_ops.so"
 
 _P, _I64, _INT = ctypes.c_void_p, ctypes.c_int64, ctypes.c_int

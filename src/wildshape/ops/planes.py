@@ -19,12 +19,10 @@ def planes_native(
         around: places in the cloud of the k points of each neighbourhood.
 
     Raises:
-        RuntimeError: the library is not built.
         IndexError: neighbourhoods of no points, or with places outside of the cloud.
     """
     kernel = added_kernel("planes")
-    if kernel is None:
-        raise RuntimeError("the native library is not built; use the torch backend.")
+    assert kernel is not None  # whoever calls has asked
     (clouds, count, size), most = around.shape, points.shape[1]
     if not size:
         raise IndexError("a neighbourhood has no points.")

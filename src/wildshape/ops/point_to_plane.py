@@ -65,14 +65,9 @@ def point_to_plane_native(
     width: float,
     holding: float,
 ) -> Equations:
-    """By `native/point_to_plane.c`, in double precision; no gradient.
-
-    Raises:
-        RuntimeError: the library is not built.
-    """
+    """By `native/point_to_plane.c`, in double precision; no gradient."""
     kernel = added_kernel("point_to_plane")
-    if kernel is None:
-        raise RuntimeError("the native library is not built; use the torch backend.")
+    assert kernel is not None  # whoever calls has asked
     check_places(counterpart, len(onto))
     scans, count, _ = points.shape
     given = [part.detach().contiguous() for part in (points, centre.double(), onto, normals)]

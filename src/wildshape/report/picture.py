@@ -34,14 +34,14 @@ def write_picture(objects: Sequence[ReportObject], path: Path) -> None:
 
     Args:
         objects: the rows; columns that no object has are left out.
-        path: `.png` stands still; `.gif` and `.webp` turn once around.
+        path: `.png` stands still; `.webp` turns once around.
 
     Raises:
         BadInputError: nothing to draw, or another suffix.
     """
     path = Path(path)
-    if path.suffix not in (".png", ".gif", ".webp"):
-        raise BadInputError(f"{path} is no picture we write: give it the suffix .png, .gif, .webp.")
+    if path.suffix not in (".png", ".webp"):
+        raise BadInputError(f"{path} is no picture we write: give it the suffix .png or .webp.")
     labels = _labels(objects)
     if not labels:
         raise BadInputError(f"{path} would be empty: no object has a cloud to draw.")
@@ -50,7 +50,7 @@ def write_picture(objects: Sequence[ReportObject], path: Path) -> None:
             figure, _ = _rows(objects, labels)
             figure.savefig(file, format="png", dpi=2 * _DPI, facecolor=_CARD)
         else:
-            _animate(objects, labels, file, path.suffix)
+            _animate(objects, labels, file)
 
 
 def still(scene: Scene) -> bytes:
@@ -95,10 +95,8 @@ def _rows(objects: Sequence[ReportObject], labels: list[str]) -> tuple[Any, list
     return figure, panels
 
 
-def _animate(
-    objects: Sequence[ReportObject], labels: list[str], file: IO[bytes], suffix: str
-) -> None:
-    """One turn; few colours without dithering keep a GIF small."""
+def _animate(objects: Sequence[ReportObject], labels: list[str], file: IO[bytes]) -> None:
+    """One turn."""
     from PIL import Image
 
     figure, panels = _rows(objects, labels)
@@ -108,19 +106,16 @@ def _animate(
         for axes, azimuth in panels:
             axes.view_init(elev=_ELEVATION, azim=azimuth + 360.0 * frame / _FRAMES)
         figure.canvas.draw()
-        image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
-        if suffix == ".gif":
-            image = image.quantize(64, dither=Image.Dither.NONE)
-        frames.append(image)
-    how: dict[str, Any] = {"quality": 60, "method": 4} if suffix == ".webp" else {}
+        frames.append(Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3]))
     frames[0].save(
         file,
-        format=suffix[1:].upper(),
+        format="WEBP",
         save_all=True,
         append_images=frames[1:],
         duration=1000 // _PER_SECOND,
         loop=0,
-        **how,
+        quality=60,
+        method=4,
     )
 
 

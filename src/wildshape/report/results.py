@@ -11,7 +11,7 @@ from typing import Any
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.guard import reading
+from wildshape.io.guard import read_json, reading
 from wildshape.io.inputs import TrackSource, open_tracks
 from wildshape.io.poses import read_poses
 from wildshape.io.scans.points import METRES, SENSOR_METRES, Coordinates, read_points
@@ -19,6 +19,7 @@ from wildshape.io.scans.writers import CLOUD_FORMATS
 from wildshape.records import Box, Points, Track
 
 MARKER, OBJECTS, METRICS, SCORES = "wildshape.json", "objects.json", "metrics.json", "scores.json"
+_SAID = "what complete or register writes"
 PROBABILITIES = {"p_pose": "heading right", "p_box": "box right", "p_kind": "kind right"}
 MEANING = (
     "The chances that the heading is within 10° of the truth, that the box shares 0.7 of the joint "
@@ -123,32 +124,14 @@ def find(folder: Path, name: str) -> list[Path]:
     return sorted(found)
 
 
-def read_object(path: Path) -> dict[str, Any]:
-    """A JSON object.
-
-    Raises:
-        BadInputError: the file holds something else.
-    """
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        data = error
-    if isinstance(data, dict):
-        return data
-    raise BadInputError(
-        f"{path}: expected a JSON object, found {str(data)[:80]!r}; write it again with the "
-        "command that made it."
-    )
-
-
 def read_result(folder: Path, inputs: Inputs | None = None) -> TrackResult:
     """A track's result, with its scans where they can be read; without `inputs` none are.
 
     Raises:
         BadInputError: objects.json is damaged.
     """
-    with reading(folder / OBJECTS, "what complete or register writes"):
-        record = read_object(folder / OBJECTS)
+    with reading(folder / OBJECTS, _SAID):
+        record = read_json(folder / OBJECTS, _SAID, dict)
         track = None if inputs is None else inputs.track(folder, record)
         found = TrackResult(folder, record, track)
         for scan in found.scans:
@@ -164,8 +147,8 @@ def chances_in(folder: Path) -> dict[str, float]:
     Raises:
         BadInputError: objects.json is damaged.
     """
-    with reading(folder / OBJECTS, "what complete or register writes"):
-        return chances_of(read_object(folder / OBJECTS).get("scans") or ())
+    with reading(folder / OBJECTS, _SAID):
+        return chances_of(read_json(folder / OBJECTS, _SAID, dict).get("scans") or ())
 
 
 def chances_of_scores(scores: Path, method: str) -> dict[str, dict[str, float]]:
@@ -239,4 +222,5 @@ def coordinates_of(settings: dict[str, Any]) -> Coordinates:
 
 
 def _settings(marker: Path) -> dict[str, Any]:
-    return read_object(marker).get("settings") or {} if marker.exists() else {}
+    said = "what a command says of itself"
+    return read_json(marker, said, dict).get("settings") or {} if marker.exists() else {}

@@ -60,7 +60,8 @@ def test_what_evaluate_did_not_write_is_refused(refused, store, tmp_path, said):
 
 def test_without_viser_the_extra_is_named(refused, completed, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
-    assert "wildshape[view]" in refused("view", completed)
+    said = refused("view", completed)
+    assert "viser, which is not installed: pip install 'wildshape[view]'" in said
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")

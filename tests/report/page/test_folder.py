@@ -203,7 +203,8 @@ def test_metrics_and_log_become_table_and_curves(tmp_path: Path) -> None:
         "provenance": {"commit": "abc"},
     }
     (tmp_path / "evaluation").mkdir()
-    (tmp_path / "evaluation" / "metrics.json").write_text(json.dumps(metrics), encoding="utf-8")
+    marked = "utf-8-sig"  # the byte order mark of a Windows editor
+    (tmp_path / "evaluation" / "metrics.json").write_text(json.dumps(metrics), encoding=marked)
     lines = [
         {"step": i, "loss": 1 / i, "observation": 0.1, "branch_shares": [0.5, 0.5]} for i in (1, 2)
     ]

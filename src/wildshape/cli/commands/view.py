@@ -153,15 +153,15 @@ def _scans(settings: Settings, path: Path) -> "Source":
 def _evaluated(settings: Settings) -> "Source":
     """The data of an evaluation, the worst object first, completed once more."""
     from wildshape.baselines.compare import OURS
-    from wildshape.io.guard import reading
+    from wildshape.io.guard import read_json, reading
     from wildshape.io.inputs import open_tracks
     from wildshape.io.scans.points import SENSOR_METRES
     from wildshape.records import as_text
-    from wildshape.report.results import METRICS, SCORES, coordinates_of, read_object
+    from wildshape.report.results import METRICS, SCORES, coordinates_of
     from wildshape.report.viewer.live_completion import from_model
     from wildshape.report.viewer.sources import worst_first
 
-    said = read_object(settings.input / METRICS)
+    said = read_json(settings.input / METRICS, "what evaluate writes", dict)
     with reading(settings.input / METRICS, "what evaluate writes"):
         asked = (said.get("provenance") or {}).get("settings") or {}
         data = settings.inputs or (Path(asked["data"]) if asked.get("data") else None)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from copy import copy
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 from uuid import uuid4
 
 from wildshape.datasets.tracks.source import Source
@@ -18,10 +18,10 @@ from wildshape.errors import BadInputError, SharedInputError
 from wildshape.io.atomic import write_json
 from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.io.tracks import write_track
+from wildshape.io.write_tracks import Layout
 from wildshape.records import Track
 
 STORE, TRACKS = "store", "tracks"
-Layout = Literal["packed", "folders"]
 _RESULT = "part.json"
 DAMAGED = "part: damaged, left out whole"
 _POSES_CURE = "check unit, frame and direction of its poses, and the scale of its scans"

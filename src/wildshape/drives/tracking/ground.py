@@ -16,10 +16,14 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from wildshape.drives.config import GroundConfig
-from wildshape.errors import MissingExtraError
+from wildshape.errors import load_library
 from wildshape.geometry.sampling import ordered_bits, value_of_bits
 from wildshape.records import Points
 
+_INSTALL = (
+    "pip install pypatchworkpp (it has wheels for Linux on x86-64, macOS on arm64 and Windows;"
+    " elsewhere it is built by a C++ compiler)"
+)
 _STDOUT = 1
 
 
@@ -58,14 +62,7 @@ def height_above_ground(
 def _ground_rows(
     points: Points, sensor_height_m: float, config: GroundConfig
 ) -> Int[np.ndarray, "g"]:
-    try:
-        import pypatchworkpp
-    except ImportError as error:
-        raise MissingExtraError(
-            "the ground is found by Patchwork++, which is not installed: pip install pypatchworkpp"
-            " (it has wheels for Linux on x86-64, macOS on arm64 and Windows; elsewhere it is built"
-            " by a C++ compiler)."
-        ) from error
+    pypatchworkpp = load_library("pypatchworkpp", "the ground is found by Patchwork++", _INSTALL)
     parameters = pypatchworkpp.Parameters()
     parameters.verbose = False
     parameters.enable_RNR = False  # wants intensities

@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Float
 
 from wildshape.drives.config import TrajectoryConfig
-from wildshape.errors import MissingExtraError
+from wildshape.errors import load_library
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import Twist
 from wildshape.ops.nearest import nearest
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from kiss_icp.kiss_icp import KissICP
 
 FEWEST_POINTS = 100  # of a scan that is followed
+_INSTALL = "pip install kiss-icp, or give a poses.txt beside the scans"
 _STEPS_M = (2.0, 4.0, 6.0, 8.0)  # from 2 m off a scan finds its place
 _STEPS_DEG = range(0, 360, 45)  # of the sensor's x
 
@@ -104,14 +105,10 @@ def _registered(kiss: "KissICP", scan: Points) -> Float[np.ndarray, "n 3"]:
 
 
 def _kiss_icp(config: TrajectoryConfig) -> "KissICP":
-    try:
-        from kiss_icp.config import load_config
-        from kiss_icp.kiss_icp import KissICP
-    except ImportError as error:
-        raise MissingExtraError(
-            "the sensor's way is found by KISS-ICP, which is not installed: pip install kiss-icp,"
-            " or give a poses.txt beside the scans."
-        ) from error
+    load_library("kiss_icp.kiss_icp", "the sensor's way is found by KISS-ICP", _INSTALL)
+    from kiss_icp.config import load_config
+    from kiss_icp.kiss_icp import KissICP
+
     settings = load_config(None)
     settings.registration.max_num_threads = 1  # the same scans give the same way to the last bit
     settings.data.deskew = False  # done before, as for all other stages

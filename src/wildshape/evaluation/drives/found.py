@@ -82,10 +82,6 @@ def read_found(path: Path, scans: int) -> FoundDrive:
     Raises:
         BadInputError: boxes are missing or damaged, or are of another number of scans.
     """
-    if not (path / BOXES).is_file():
-        raise BadInputError(
-            f"{path}: no {BOXES} in it; give a folder that `wildshape drive` wrote."
-        )
     frames: dict[int, list[Found]] = defaultdict(list)
     seen: set[tuple[int, str]] = set()
     for row in read_box_table(path / BOXES):

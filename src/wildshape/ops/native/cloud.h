@@ -23,6 +23,14 @@ typedef struct {
 
 static inline int64_t in_blocks(int64_t n) { return (n + BLOCK - 1) / BLOCK; }
 
+/* How many of at most `most` points cloud `b` has; all where there are no sizes. */
+static inline int64_t size_of(const int64_t *sizes, int64_t b, int64_t most)
+{
+    if (!sizes || sizes[b] > most)
+        return most;
+    return sizes[b] < 0 ? 0 : sizes[b];
+}
+
 /* Room for `most` points in one allocation, which begins at axes[0]; NULL there if there is none. */
 static inline void cloud_allocate(cloud *made, int64_t most)
 {

@@ -112,4 +112,18 @@ __attribute__((target("avx2"))) static inline float eight_highest(__m256 v)
 #define BITS(mask) (unsigned)(mask)
 #include KERNEL
 #include "forget.h"
+
+#define OF_LEVEL(name, n) ((n) == 2 ? avx512_##name : (n) == 1 ? avx2_##name : portable_##name)
+#else
+#define OF_LEVEL(name, n) portable_##name
 #endif
+
+/* The widest level of this processor: 0 portable, 1 AVX2 + FMA, 2 AVX-512. */
+int wildshape_level(void);
+
+/* A level that this processor has; -1 asks for the widest. */
+static inline int known_level(int level)
+{
+    const int widest = wildshape_level();
+    return level < 0 || level > widest ? widest : level;
+}

@@ -20,33 +20,17 @@
 /* ---- dispatch ---- */
 
 typedef void (*search_tile)(const cloud *, int64_t, const cloud *, float *, float *, int64_t *);
-enum { PORTABLE = 0, AVX2 = 1, AVX512 = 2 };
 
-/* The widest instruction set of this processor: 0 portable, 1 AVX2 + FMA, 2 AVX-512. */
 int wildshape_level(void)
 {
 #if defined(__x86_64__) || defined(_M_X64)
     __builtin_cpu_init();
     if (__builtin_cpu_supports("avx512f"))
-        return AVX512;
+        return 2;
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
-        return AVX2;
+        return 1;
 #endif
-    return PORTABLE;
-}
-
-static search_tile choose(int level)
-{
-    int widest = wildshape_level();
-    if (level < 0 || level > widest)
-        level = widest;
-#if defined(__x86_64__) || defined(_M_X64)
-    if (level == AVX512)
-        return avx512_search;
-    if (level == AVX2)
-        return avx2_search;
-#endif
-    return portable_search;
+    return 0;
 }
 
 /* ---- work sharing ---- */
@@ -67,13 +51,6 @@ typedef struct {
     int failed;
     int64_t counter;
 } search_job;
-
-static int64_t size_of(const side *points, int64_t b)
-{
-    if (!points->sizes || points->sizes[b] > points->most)
-        return points->most;
-    return points->sizes[b] < 0 ? 0 : points->sizes[b];
-}
 
 static void blank(const side *from, int64_t b, int64_t start, float squared)
 {
@@ -108,7 +85,8 @@ static void search_all(search_job *job, cloud held[2], float *bound)
         int64_t b = task / job->parts;
         for (int s = 0; s < 2 && b != at; s++) {
             const side *from = &job->sides[s];
-            cloud_fill(&held[s], from->points + b * from->stride, size_of(from, b));
+            const int64_t size = size_of(from->sizes, b, from->most);
+            cloud_fill(&held[s], from->points + b * from->stride, size);
         }
         at = b;
         for (int s = 0; s < 2; s++)
@@ -146,7 +124,7 @@ int wildshape_nearest(const float *a, int64_t a_stride, const int64_t *a_sizes, 
         .sides = {{a, a_stride, a_sizes, n, a_squared, a_index},
                   {b, b_stride, b_sizes, m, b_squared, b_index}},
         .clouds = clouds,
-        .search = choose(level),
+        .search = OF_LEVEL(search, known_level(level)),
     };
     if (clouds == 0)
         return 0;

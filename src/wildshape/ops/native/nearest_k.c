@@ -89,21 +89,6 @@ static inline void insert_key(uint64_t *keys, int k, uint64_t key)
 
 typedef void (*search_tile)(const cloud *, int64_t, const cloud *, const k_search *, float *,
                             uint64_t *);
-int wildshape_level(void);
-
-static search_tile choose(int level)
-{
-    const int widest = wildshape_level();
-    if (level < 0 || level > widest)
-        level = widest;
-#if defined(__x86_64__) || defined(_M_X64)
-    if (level == 2)
-        return avx512_search_k;
-    if (level == 1)
-        return avx2_search_k;
-#endif
-    return portable_search_k;
-}
 
 typedef struct {
     const float *points;
@@ -120,13 +105,6 @@ typedef struct {
     int failed;
     int64_t counter;
 } k_job;
-
-static int64_t size_of(const side *of, int64_t b)
-{
-    if (!of->sizes || of->sizes[b] > of->most)
-        return of->most;
-    return of->sizes[b] < 0 ? 0 : of->sizes[b];
-}
 
 static void write_found(const k_job *job, int64_t query, const uint64_t *keys)
 {
@@ -169,8 +147,10 @@ static void search_all(k_job *job, cloud held[2], float *bound, uint64_t *keys)
     const side *sides[2] = {&job->query, &job->target};
     for (int64_t task, at = -1; (task = next_task(&job->counter)) < job->clouds * job->parts;) {
         const int64_t b = task / job->parts;
-        for (int s = 0; s < 2 && b != at; s++)
-            cloud_fill(&held[s], sides[s]->points + 3 * b * sides[s]->most, size_of(sides[s], b));
+        for (int s = 0; s < 2 && b != at; s++) {
+            const int64_t most = sides[s]->most;
+            cloud_fill(&held[s], sides[s]->points + 3 * b * most, size_of(sides[s]->sizes, b, most));
+        }
         at = b;
         search_part(job, b, task % job->parts, &held[0], &held[1], bound, keys);
     }
@@ -214,7 +194,7 @@ int wildshape_nearest_k(const float *query, const int64_t *query_sizes, const in
         .most = most < FLT_MAX ? most : FLT_MAX,
         .squared = squared,
         .index = index,
-        .search = choose(level),
+        .search = OF_LEVEL(search_k, known_level(level)),
     };
     if (clouds == 0 || n == 0 || k == 0)
         return 0;

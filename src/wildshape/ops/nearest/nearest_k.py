@@ -9,12 +9,11 @@ from jaxtyping import Float, Int, Int64
 from torch import Tensor
 
 from wildshape.errors import BadInputError
-from wildshape.ops.library import added_kernel, check_memory
+from wildshape.ops.library import WIDEST, added_kernel, check_memory
 from wildshape.ops.nearest.neighbours import Neighbourhoods, as_int64, beyond_sizes, check_clouds
 from wildshape.ops.threads import exact_threads
 
 _CHUNK_ELEMENTS = 1 << 22
-_WIDEST = -1
 
 
 def nearest_k_native(
@@ -25,7 +24,7 @@ def nearest_k_native(
     target_sizes: Int[Tensor, "B"] | None = None,
     groups: tuple[Int64[Tensor, "B N"], Int64[Tensor, "B M"]] | None = None,
     most: float = math.inf,
-    level: int = _WIDEST,
+    level: int = WIDEST,
 ) -> Neighbourhoods:
     """Blocks of targets out of reach are left out; `level` as in `nearest_native`.
 
@@ -36,8 +35,7 @@ def nearest_k_native(
     check_memory("nearest_k", query, torch.float32)
     check_memory("nearest_k", target, torch.float32)
     kernel = added_kernel("nearest_k")
-    if kernel is None:
-        raise RuntimeError("the native library is not built; use another backend.")
+    assert kernel is not None  # whoever calls has asked
     shape = (*query.shape[:2], k)
     squared = torch.empty(shape, dtype=torch.float32, device="cpu")
     found = Neighbourhoods(squared, torch.empty_like(squared, dtype=torch.int64))

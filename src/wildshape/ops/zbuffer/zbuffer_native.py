@@ -17,12 +17,10 @@ def visible_native(
     """One pass over the points; the cost does not depend on `n_bins`.
 
     Raises:
-        RuntimeError: the library is not built.
         MemoryError: no room for the table of bins.
     """
     loaded = library()
-    if loaded is None:
-        raise RuntimeError("the native library is not built; use the torch backend.")
+    assert loaded is not None  # whoever calls has asked
     check_bins(bins, depth)
     check_memory("visible", bins, torch.int64)
     check_memory("visible", depth, torch.float32)

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.registration import to_middle
-from wildshape.io.guard import reading
+from wildshape.io.guard import read_json, reading
 from wildshape.records import Track, as_text
 from wildshape.report.content import Cloud, Curve, Figure, Report, ReportObject, Table, track_object
 from wildshape.report.page.curves import training_curves
@@ -46,7 +46,6 @@ from wildshape.report.results import (
     box_of,
     doubt_of,
     find,
-    read_object,
     read_result,
 )
 
@@ -126,7 +125,8 @@ def _evaluations(folder: Path) -> list[Evaluation]:
         path: as_text(str(at) if at.parts else folder.resolve().name) for path, at in places.items()
     }
     several = len(paths) > 1
-    return [Evaluation(p, read_object(p), f"{names[p]}: " if several else "") for p in paths]
+    found = [(p, read_json(p, "what evaluate writes", dict)) for p in paths]
+    return [Evaluation(p, said, f"{names[p]}: " if several else "") for p, said in found]
 
 
 def _judged(folder: Path, where: Inputs) -> Judged:
@@ -158,7 +158,8 @@ def _of_run(path: Path, record: dict[str, Any]) -> str:
 
 def _records(folder: Path, evaluations: list[Evaluation]) -> list[tuple[Path, dict[str, Any]]]:
     """What each command's output says of itself."""
-    markers = [(path, read_object(path)) for path in find(folder, MARKER)]
+    said = "what a command says of itself"
+    markers = [(path, read_json(path, said, dict)) for path in find(folder, MARKER)]
     return markers + [(one.path, one.metrics) for one in evaluations]
 
 

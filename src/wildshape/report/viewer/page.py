@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager, contextmanager
 from html import escape
 from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
 
-from wildshape.errors import BadInputError, MissingExtraError
+from wildshape.errors import BadInputError, MissingExtraError, load_library
 from wildshape.io.progress import counted
 from wildshape.report.viewer.allowed_hosts import answering_only, checked_hosts, prove
 from wildshape.report.viewer.details import details
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from viser import ViserServer
 
 HOST = "127.0.0.1"
+_INSTALL = "pip install 'wildshape[view]' (`wildshape report` draws results without it)"
 _LAST_PORT = 65535
 _PLAY_SECONDS, _SPEAK_SECONDS, _STOP_SECONDS, _LOOK_SECONDS = 0.12, 0.5, 5.0, 0.05
 _PATIENCE_S, _DRAWN_S = 10.0, 1.0  # for a browser to open the page, and to draw it
@@ -246,13 +247,7 @@ def run_until_interrupted(page: Shown) -> None:
 
 
 def _server(port: int, allowed: Sequence[str]) -> "ViserServer":
-    try:
-        import viser
-    except ImportError as error:
-        raise MissingExtraError(
-            "the viewer needs viser: pip install 'wildshape[view]' (`wildshape report` draws"
-            " results without it)."
-        ) from error
+    viser = load_library("viser", "the viewer needs viser", _INSTALL)
     with _quiet(), answering_only(allowed):
         server = viser.ViserServer(host=HOST, port=port, verbose=False)
     try:
