@@ -15,7 +15,7 @@ from tests.datasets import write_kitti_tracking as tracking
 from tests.datasets.street import street
 from tests.fuzz.scans import track
 from tests.fuzz.target import Arrays, Target, numbers_of
-from tests.io.store.stores import reseal
+from tests.io.older_store import reseal
 
 from wildshape.datasets.tracks.whole_tracks import Packed
 from wildshape.evaluation.drives.found import drives_of, read_found

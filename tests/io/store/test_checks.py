@@ -3,16 +3,18 @@
 """A store of which any bit is another is refused, or read as it was written."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from safetensors.numpy import load_file, save_file
-from tests.io.store.stores import content, reseal, with_gaps
-from tests.refusal import refused
+from tests.io.older_store import make_older, reseal
+from tests.io.store.stores import assert_holds, content, make_parts, with_gaps
 
 from wildshape.errors import BadInputError
 from wildshape.io.store import checks as store_checks
+from wildshape.io.store.join import join_stores
 from wildshape.io.store.layout import INDEX_JSON, INDEX_TENSORS
 from wildshape.io.store.store import StoreWriter, open_store
 from wildshape.records import Track
@@ -20,12 +22,14 @@ from wildshape.records import Track
 FLIPS = 100
 
 
-@pytest.fixture
-def path(track: Track, tmp_path: Path) -> Path:
+@pytest.fixture(params=["new", "older"])
+def path(request, track: Track, tmp_path: Path) -> Path:
     path = tmp_path / "store"
     with StoreWriter(path, {"command": "a test", "parts": [{"n": 1.5}]}, shard_bytes=1500) as made:
         for name in "abc":
             made.add(with_gaps(track, name))
+    if request.param == "older":
+        make_older(path)
     return path
 
 
@@ -47,7 +51,8 @@ def test_every_flipped_bit_is_seen_where_it_is_read(path: Path) -> None:
                 store = open_store(path)
                 same = list(content(store)) == whole
             except BadInputError as error:
-                assert str(file) in str(error), (file.name, place)  # noqa: PT017
+                older = "checksum" not in json.loads(good) if file.name == INDEX_JSON else False
+                assert str(path if older else file) in str(error), (file.name, place)  # noqa: PT017
                 assert "\n" not in str(error)  # noqa: PT017
             else:
                 assert same, (file.name, place)
@@ -73,17 +78,18 @@ def test_a_flipped_point_is_named_and_the_rest_can_be_read(track: Track, tmp_pat
 
 def test_a_cloud_is_compared_once(path: Path, monkeypatch) -> None:
     counted = []
-    monkeypatch.setattr(
-        "wildshape.io.store.store.cloud_crc",
-        lambda points: counted.append(1) or store_checks.cloud_crc(points),
-    )
+    for check in (store_checks.cloud_crc, store_checks.is_finite):
+        monkeypatch.setattr(
+            f"wildshape.io.store.store.{check.__name__}",
+            lambda points, check=check: counted.append(1) or check(points),
+        )
     store = open_store(path)
     for _ in range(3):
         assert len(list(content(store))) == 1 + 3 * 3 + sum(len(t.scans) for t in store)
     assert len(counted) == store.scan_count + sum(t.shape is not None for t in store)
 
 
-def test_an_index_is_compared_once_a_process(path: Path, monkeypatch) -> None:
+def test_files_of_older_stores_are_compared_once_a_process(path: Path, monkeypatch) -> None:
     compared = []
     real = store_checks.complaint
     monkeypatch.setattr(store_checks, "complaint", lambda *a: compared.append(a[0]) or real(*a))
@@ -91,7 +97,9 @@ def test_an_index_is_compared_once_a_process(path: Path, monkeypatch) -> None:
     store_checks._known_complaint.cache_clear()
     for _ in range(3):
         assert len(list(content(open_store(path)))) > 3
-    assert len(compared) == 1
+    shards = len(list(path.glob("points-*")))
+    older = "scan_crcs" not in load_file(path / INDEX_TENSORS)
+    assert len(compared) == (1 + shards if older else 1)
 
 
 def test_a_changed_file_is_compared_again(path: Path) -> None:
@@ -119,6 +127,18 @@ def test_points_that_are_no_numbers_are_not_written(track, tmp_path) -> None:
     assert open_store(tmp_path / "store").scan_points(0)[0, 0] == np.float32(1e30)
 
 
+def test_points_that_are_no_numbers_are_refused_where_there_are_no_crcs(track, tmp_path) -> None:
+    with StoreWriter(tmp_path / "store", {}) as writer:
+        writer.add(track)
+    (shard,) = (tmp_path / "store").glob("points-*")
+    data = bytearray(shard.read_bytes())
+    data[256:260] = np.float32(np.nan).tobytes()
+    shard.write_bytes(data)
+    make_older(tmp_path / "store")
+    with pytest.raises(BadInputError, match="the points of scan 0"):
+        open_store(tmp_path / "store").track(0)
+
+
 CRAFTED = {
     "track_starts": [0, 99, 2, 7],
     "scan_sizes": [-1] * 7,
@@ -139,9 +159,9 @@ def test_an_index_made_to_mislead_is_refused_though_all_checksums_fit(path: Path
     index[name] = np.asarray(CRAFTED[name], index[name].dtype)
     save_file(index, path / INDEX_TENSORS)
     reseal(path)
-    with pytest.raises(BadInputError, match=r"index\.safetensors") as raised:
+    with pytest.raises(BadInputError, match=r"index\.safetensors") as refused:
         list(content(open_store(path)))
-    assert "\n" not in str(raised.value)
+    assert "\n" not in str(refused.value)
 
 
 def test_an_index_off_the_grid_of_its_numbers_is_read(path: Path) -> None:
@@ -156,13 +176,14 @@ def test_an_index_off_the_grid_of_its_numbers_is_read(path: Path) -> None:
     assert after == before
 
 
-def test_a_store_without_its_checksums_is_refused(path: Path) -> None:
-    index = load_file(path / INDEX_TENSORS)
-    del index["scan_crcs"], index["shape_crcs"]
-    save_file(index, path / INDEX_TENSORS)
-    reseal(path)
-    refused(open_store, path, match=r"index\.safetensors: lacks scan_crcs, shape_crcs; .* again")
-    said = json.loads((path / INDEX_JSON).read_text())
-    del said["checksum"]
-    (path / INDEX_JSON).write_text(json.dumps(said))
-    refused(open_store, path, match=r"index\.json: lacks checksum; .* again")
+def test_parts_of_an_older_version_join_into_a_store_with_checksums(track, tmp_path) -> None:
+    out = tmp_path / "store"
+    parts = make_parts(track, out)
+    make_older(parts[0])
+    join_stores(parts, out, {})
+    assert_holds(out, track, "abc")
+    assert {"scan_crcs", "shape_crcs"} <= load_file(out / INDEX_TENSORS).keys()
+    shutil.rmtree(out)
+    parts = make_parts(track, out)
+    join_stores(parts, out, {})
+    assert_holds(out, track, "abc")

@@ -3,7 +3,8 @@
 """What tells a damaged packed store from a whole one, checked where it is read.
 
 A cloud has a CRC of its own, compared when it is first read: reading a few scans of a large shard
-reads no more than these. The index is compared whole when it is opened.
+reads no more than these. The index is compared whole when it is opened, and so is each shard of a
+store that an older version wrote without CRCs.
 """
 
 import hashlib
@@ -21,6 +22,7 @@ from jaxtyping import Float32
 from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
 from wildshape.io.store.layout import (
+    CRCS,
     CURE,
     EXTRAS,
     INDEX,
@@ -29,6 +31,7 @@ from wildshape.io.store.layout import (
     SHAPE_KINDS,
     FileRecord,
 )
+from wildshape.io.store.manifest import is_sealed
 from wildshape.io.store.rays import rows_that_fit
 
 _OF_SCANS = ("scan_starts", "scan_sizes", "scan_names", "scan_crcs")
@@ -99,7 +102,8 @@ def check_index(index: dict[str, np.ndarray], manifest: dict[str, Any], path: Pa
     Raises:
         BadInputError: something does not fit.
     """
-    kinds = INDEX | {n: EXTRAS[n] for n in EXTRAS if n in index}
+    needed = INDEX.keys() if any(name in index for name in CRCS) else INDEX.keys() - set(CRCS)
+    kinds = {n: INDEX[n] for n in needed} | {n: EXTRAS[n] for n in EXTRAS if n in index}
     wrong = sorted(n for n in kinds if n not in index or index[n].dtype != kinds[n])
     if wrong:
         raise BadInputError(f"{path / INDEX_TENSORS}: lacks {', '.join(wrong)}; {CURE}.")
@@ -112,7 +116,8 @@ def check_index(index: dict[str, np.ndarray], manifest: dict[str, Any], path: Pa
         "scans": len(index["scan_sizes"]),
         "points": int(index["shard_starts"][-1]),
     }
-    if any(manifest[key] != count for key, count in found.items()):
+    unsealed = CRCS[0] in index and not is_sealed(manifest)
+    if unsealed or any(manifest[key] != count for key, count in found.items()):
         raise BadInputError(f"{path / INDEX_JSON}: damaged, it does not fit its index; {CURE}.")
 
 
@@ -121,8 +126,8 @@ def _fits(index: dict[str, np.ndarray], shards: int) -> Iterator[bool]:
     tracks, scans = len(index["track_names"]), len(index["scan_sizes"])
     texts, rows = len(index["text_starts"]) - 1, index["shard_starts"]
     points = int(rows[-1])
-    yield all(index[n].shape == (tracks,) for n in _OF_TRACKS)
-    yield all(index[n].shape == (scans,) for n in _OF_SCANS)
+    yield all(index[n].shape == (tracks,) for n in _OF_TRACKS if n in index)
+    yield all(index[n].shape == (scans,) for n in _OF_SCANS if n in index)
     yield index["poses"].shape[1:] == (3, 4) and rows.shape == (shards + 1,)
     yield _rises(index["track_starts"], tracks, scans)
     yield _rises(index["text_starts"], texts, len(index["text_bytes"]))

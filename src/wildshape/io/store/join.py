@@ -30,7 +30,7 @@ from wildshape.io.store.layout import (
     WRITING_JSON,
     FileRecord,
 )
-from wildshape.io.store.manifest import check_seal, manifest_of, read_manifest, sealed
+from wildshape.io.store.manifest import check_seal, is_sealed, manifest_of, read_manifest, sealed
 from wildshape.io.store.store import Store
 from wildshape.io.store.writer import remove_store
 
@@ -80,6 +80,8 @@ def finish_join(out: Path) -> dict[str, Any]:
     """
     with reading(out / JOINING_JSON, "the plan of a join"):
         plan = json.loads((out / JOINING_JSON).read_text("utf-8"))
+        if not is_sealed(plan):
+            raise ValueError("it has no checksum")
         check_seal(out / JOINING_JSON, plan)
         moves, manifest = _inside(plan["moves"]), plan["manifest"]
     # Each step can be repeated; what the parts say of themselves is in the plan.

@@ -75,6 +75,9 @@ EXTRAS: dict[str, str] = {
 SHAPE_KINDS: dict[ShapeKind, str] = {"partial": "partial_shapes", "mirrored": "mirrored_shapes"}
 """Which of these list the tracks of a kind of shape; those in none have whole shapes."""
 
+CRCS = ("scan_crcs", "shape_crcs")
+"""Tensors that stores of older versions lack."""
+
 DTYPES = {"float32": "F32", "float64": "F64", "int64": "I64", "int32": "I32", "uint8": "U8"}
 """numpy's names of types -> those of safetensors."""
 

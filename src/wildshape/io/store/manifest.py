@@ -21,8 +21,8 @@ from wildshape.io.store.layout import (
     FileRecord,
 )
 
+_KEYS = {"fingerprint", "tracks", "scans", "points", "index", "shards", "provenance"}
 _CHECKSUM = "checksum"
-_KEYS = {"fingerprint", "tracks", "scans", "points", "index", "shards", "provenance", _CHECKSUM}
 
 
 def manifest_of(
@@ -97,13 +97,18 @@ def sealed(data: dict[str, Any]) -> dict[str, Any]:
     return {**data, _CHECKSUM: _digest(data)}
 
 
+def is_sealed(data: dict[str, Any]) -> bool:
+    """Whether JSON values have a checksum beside them; older versions wrote none."""
+    return _CHECKSUM in data
+
+
 def check_seal(path: Path, data: dict[str, Any]) -> None:
-    """Compare JSON values with their checksum.
+    """Compare JSON values with their checksum, if they have one.
 
     Raises:
         BadInputError: they are not what was written.
     """
-    if _digest(data) != data.get(_CHECKSUM):
+    if is_sealed(data) and _digest(data) != data[_CHECKSUM]:
         raise BadInputError(f"{path}: damaged, its checksum is wrong; {CURE}.")
 
 
