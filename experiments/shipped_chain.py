@@ -14,6 +14,7 @@ the weights of each finished round, `<round>.safetensors`: copied to another mac
 round and those before it are not trained again there.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -21,10 +22,14 @@ from shutil import copyfile
 from tempfile import TemporaryDirectory
 from typing import Literal
 
+import numpy as np
 import torch
 import tyro
 from experiments.mesh_credits import notice
 from experiments.meshes import road_vehicles
+from jaxtyping import Float32
+from torch import Tensor
+from torch.nn.functional import normalize
 
 from experiments import calibrate_confidence, confidence, views_weights
 from wildshape.cli.main import in_a_sentence
@@ -38,6 +43,7 @@ from wildshape.method.ray_encoder import RayConfig
 from wildshape.ops.device import choose_device
 from wildshape.ops.threads import exact_on
 from wildshape.parallel.team import Team, cores, team
+from wildshape.records import Track
 from wildshape.simulate.generate import SimulationConfig, simulated_by
 from wildshape.training.config import Recipe
 from wildshape.training.recipes import PRESETS
@@ -47,6 +53,7 @@ from wildshape.training.train import fit_with_progress
 _SENSORS = ("hdl64", "hdl64", "hdl32", "os1-128")
 _GROUND = 1  # of the sensors the one whose scans keep some ground
 _SCANS, _SHAPE_POINTS, _VALIDATE_EVERY = 16, 512, 10_000
+_GONE_M = 1.0  # from scan to scan by a vehicle that drives
 _COMMAND = "python -m experiments.shipped_chain --cad CAD --out RUN"
 VIEWS: tuple[Literal["airplane", "chair", "car"], ...] = ("airplane", "chair", "car")
 NAMES = ("default", *VIEWS)
@@ -66,6 +73,7 @@ class Round:
         teacher: round that poses and fuses its tracks; None: the paper's objective.
         start: round whose weights it goes on from; None: random ones.
         rays: the network sees those of the frames, too.
+        driving: the vehicles drive, and are taught to look where they do.
     """
 
     data: int
@@ -75,6 +83,7 @@ class Round:
     teacher: str | None = None
     start: str | None = None
     rays: bool = False
+    driving: bool = False
 
     def recipe(self, steps: int) -> Recipe:
         """What so many steps of it are."""
@@ -94,6 +103,9 @@ ROUNDS = {
     "second": Round(data=2, steps=12_000, teacher="taught", start="taught"),
     "main": Round(data=3, steps=30_000, teacher="second", start="second"),
     "last": Round(data=4, steps=100_000, lr=8e-4, teacher="main", start="main", rays=True),
+    "driven": Round(
+        data=5, steps=20_000, lr=4e-4, teacher="last", start="last", rays=True, driving=True
+    ),
 }
 """In their order; the last one is shipped."""
 
@@ -116,6 +128,7 @@ class Tracks:
 
 
 DATA = {1: Tracks(), 2: Tracks(), 3: Tracks(count=4800), 4: Tracks(occlusion=0.5, rays=512)}
+DATA[5] = DATA[4]
 """By their seeds. What is learned carries over to unseen objects the better the more there were."""
 
 
@@ -208,12 +221,33 @@ def trained(name: str, settings: Settings) -> None:
             resume=True,
             teacher=settings.checkpoint(of.teacher),
             start=settings.checkpoint(of.start),
+            fronts=driving(data) if of.driving else None,
             provenance=provenance(settings.command) | {"round": name},
             taught=lambda done, total: bar.at(done, total=total),
         )
     with exact_on(cores()):
         fit_with_progress(run, TERMINAL, stoppable, resume=settings.command)
     save_checkpoint(settings.finished(name), *load_checkpoint(folder / MODEL), half=True)
+
+
+def driving(tracks: Iterable[Track]) -> Float32[Tensor, "S 3"]:
+    """Which way vehicles drive, sensor frame of each scan: unit vectors.
+
+    Each is taken to drive straight ahead, and the sensor to have moved so that it saw what it did.
+    Of both the sensor's own motion alone is used, with the middles of the scans.
+    """
+    fronts = []
+    for track in tracks:
+        assert track.T_sensor_object is not None
+        T_world_sensor = track.T_sensor_object.inverse()
+        gone = torch.arange(len(track.scans)) * _GONE_M
+        T_world_sensor.translation[:, 0] += gone
+        middles = torch.from_numpy(
+            np.stack([scan.mean(0) for scan in track.scans]).astype(np.float64)
+        )
+        middles = T_world_sensor.apply(middles[:, None])[:, 0]
+        fronts.append((middles[-1] - middles[0]) @ T_world_sensor.rotation)
+    return normalize(torch.cat(fronts).float(), dim=-1)
 
 
 def _data(seed: int, settings: Settings) -> Store:
