@@ -53,7 +53,7 @@ from wildshape.training.train import fit_with_progress
 _SENSORS = ("hdl64", "hdl64", "hdl32", "os1-128")
 _GROUND = 1  # of the sensors the one whose scans keep some ground
 _SCANS, _SHAPE_POINTS, _VALIDATE_EVERY = 16, 512, 10_000
-_GONE_M = 1.0  # from scan to scan by a vehicle that drives
+_STEP_M = 1.0  # of a vehicle that drives, from scan to scan
 _COMMAND = "python -m experiments.shipped_chain --cad CAD --out RUN"
 VIEWS: tuple[Literal["airplane", "chair", "car"], ...] = ("airplane", "chair", "car")
 NAMES = ("default", *VIEWS)
@@ -73,7 +73,7 @@ class Round:
         teacher: round that poses and fuses its tracks; None: the paper's objective.
         start: round whose weights it goes on from; None: random ones.
         rays: the network sees those of the frames, too.
-        driving: the vehicles drive, and are taught to look where they do.
+        driving: its vehicles drive, and it is taught that they look where they go.
     """
 
     data: int
@@ -102,9 +102,9 @@ ROUNDS = {
     "taught": Round(data=1, steps=8_000, teacher="first"),
     "second": Round(data=2, steps=12_000, teacher="taught", start="taught"),
     "main": Round(data=3, steps=30_000, teacher="second", start="second"),
-    "last": Round(data=4, steps=100_000, lr=8e-4, teacher="main", start="main", rays=True),
+    "rays": Round(data=4, steps=100_000, lr=8e-4, teacher="main", start="main", rays=True),
     "driven": Round(
-        data=5, steps=20_000, lr=4e-4, teacher="last", start="last", rays=True, driving=True
+        data=5, steps=20_000, lr=4e-4, teacher="rays", start="rays", rays=True, driving=True
     ),
 }
 """In their order; the last one is shipped."""
@@ -127,8 +127,8 @@ class Tracks:
     varied: tuple[bool, ...] = (True, False, False, False)
 
 
-DATA = {1: Tracks(), 2: Tracks(), 3: Tracks(count=4800), 4: Tracks(occlusion=0.5, rays=512)}
-DATA[5] = DATA[4]
+_WITH_RAYS = Tracks(occlusion=0.5, rays=512)
+DATA = {1: Tracks(), 2: Tracks(), 3: Tracks(count=4800), 4: _WITH_RAYS, 5: _WITH_RAYS}
 """By their seeds. What is learned carries over to unseen objects the better the more there were."""
 
 
@@ -231,23 +231,20 @@ def trained(name: str, settings: Settings) -> None:
 
 
 def driving(tracks: Iterable[Track]) -> Float32[Tensor, "S 3"]:
-    """Which way vehicles drive, sensor frame of each scan: unit vectors.
+    """Where vehicles go, by the middles of their scans and the sensor's own motion: unit vectors.
 
-    Each is taken to drive straight ahead, and the sensor to have moved so that it saw what it did.
-    Of both the sensor's own motion alone is used, with the middles of the scans.
+    Each drives straight ahead, and the sensor so that it sees what it saw. Directions are in the
+    sensor frame of each scan, all tracks one after the other.
     """
-    fronts = []
+    ways = []
     for track in tracks:
-        assert track.T_sensor_object is not None
+        assert track.T_sensor_object is not None  # simulated
         T_world_sensor = track.T_sensor_object.inverse()
-        gone = torch.arange(len(track.scans)) * _GONE_M
-        T_world_sensor.translation[:, 0] += gone
-        middles = torch.from_numpy(
-            np.stack([scan.mean(0) for scan in track.scans]).astype(np.float64)
-        )
+        T_world_sensor.translation[:, 0] += _STEP_M * torch.arange(len(track.scans))
+        middles = torch.from_numpy(np.stack([scan.mean(0, np.float64) for scan in track.scans]))
         middles = T_world_sensor.apply(middles[:, None])[:, 0]
-        fronts.append((middles[-1] - middles[0]) @ T_world_sensor.rotation)
-    return normalize(torch.cat(fronts).float(), dim=-1)
+        ways.append((middles[-1] - middles[0]) @ T_world_sensor.rotation)
+    return normalize(torch.cat(ways).float(), dim=-1)
 
 
 def _data(seed: int, settings: Settings) -> Store:

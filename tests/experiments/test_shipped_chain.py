@@ -6,10 +6,11 @@ from dataclasses import replace
 from functools import partial
 
 import torch
-from experiments.shipped_chain import DATA, ROUNDS, Settings, trained
+from experiments.shipped_chain import DATA, ROUNDS, Settings, driving, trained
 
 from experiments import shipped_chain
 from wildshape.method.checkpoint import load_checkpoint
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.config import ValidationConfig
 from wildshape.training.recipes import PRESETS
 
@@ -47,6 +48,16 @@ def test_the_last_round_goes_on_from_weights_that_teach_it(
     assert of_other.provenance["command"].endswith(f"--share 0.0001 --start {taught.name}")
 
 
+def test_where_a_vehicle_goes_is_where_it_looks():
+    """As the sensor sees it, whichever side it passes on: by its own motion and the scans alone."""
+    tracks = list(simulate_tracks(SimulationConfig(tracks=8, scans=12), seed=77))
+    looks = torch.cat([track.T_sensor_object.rotation[:, :, 0] for track in tracks]).float()
+    ways = driving(tracks)
+    assert (looks[:, 0] < -0.5).any()  # oncoming
+    assert (looks[:, 0] > 0.5).any()
+    assert ((ways * looks).sum(-1) > 0.8).all()
+
+
 def test_a_trial_leaves_nothing_that_a_full_run_takes_for_its_own(cad, tmp_path, monkeypatch):
     kept = []
     monkeypatch.setattr(shipped_chain, "trained", lambda name, of: kept.append(of.finished(name)))
@@ -63,4 +74,4 @@ def test_a_finished_round_and_those_before_it_are_not_trained_again(cad, tmp_pat
     monkeypatch.setattr(shipped_chain, "trained", lambda name, of: asked.append(name))
     monkeypatch.setattr(shipped_chain, "_shipped", lambda *of: None)
     shipped_chain.main(settings)
-    assert asked == ["main", LAST]
+    assert asked == list(ROUNDS)[3:]
