@@ -12,13 +12,11 @@ class CompletionConfig:
     Attributes:
         looks: scans of a track that the network sees first, the fullest of equal parts of those to
             complete.
-        worst_cost_m: tracks whose best look costs more are no vehicles. Of twenty labelled
-            streets two vehicles are lost so; hedges of a real drive cost 0.20 to 0.28 m.
+        worst_cost_m: tracks whose best look costs more are no vehicles.
         hopeless_cost_m: nor are those whose fullest scan costs more.
         solid_scans: seen in so many scans with points as long, wide and high as a vehicle's, an
             object may cost more.
         solid_cost_m: but no more than this.
-        hopeless_nats: nor those whose fullest scan says less for a vehicle.
         least_nats: nor those whose looks say less on average, the fuller the heavier. No whole
             vehicle of three streets said less than -1.9, though fragments may; half of all else do.
         doubtful_nats: of those whose looks say less no other scans are completed. Of lorries from
@@ -34,11 +32,10 @@ class CompletionConfig:
     """
 
     looks: int = 3
-    worst_cost_m: float = 0.23
-    hopeless_cost_m: float = 0.25
+    worst_cost_m: float = 0.26
+    hopeless_cost_m: float = 0.4
     solid_scans: int = 15
     solid_cost_m: float = 0.35
-    hopeless_nats: float = -5.0
     least_nats: float = -4.0
     doubtful_nats: float = -3.0
     worst_nats: float = -6.0

@@ -7,6 +7,7 @@ what costs too much or has no size of a vehicle is left there, unless it drives.
 completed together.
 """
 
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -145,7 +146,7 @@ class Completer:
         began, of = time.perf_counter(), self.config.completion
         every = [self._candidate(seen) for seen in group]
         for count, cost_m, nats in (
-            (1, of.hopeless_cost_m, of.hopeless_nats),
+            (1, of.hopeless_cost_m, -math.inf),
             (of.looks, of.worst_cost_m, of.least_nats),
         ):
             self._look(every, count)
