@@ -21,7 +21,7 @@ def _with_ground(scan: np.ndarray, T_sensor_object, low: np.ndarray, high: np.nd
 
 def test_a_box_is_hardly_wider_with_ground_than_without():
     model = load()
-    track = drive_by(scans=5)
+    track = drive_by()
     low, high = shape_of(track).min(0), shape_of(track).max(0)
     wider = []
     for i, scan in enumerate(track.scans):

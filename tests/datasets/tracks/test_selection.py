@@ -29,7 +29,7 @@ def test_the_bound_is_that_of_the_shipped_weights():
     ("points", "said"),
     [
         (scene(30), "a full scan with points all around the sensor, no object: cut"),
-        (scene(30, sides=1.5), "over 21.1 m across, no single object: .* or raise --largest-m"),
+        (scene(30, sides=1.5), "over 20.1 m across, no single object: .* or raise --largest-m"),
     ],
 )
 def test_scans_of_scenes_are_left_out_and_named(tmp_path, points, said):

@@ -64,7 +64,7 @@ class Settings:
         min_mean_points: an object whose scans have fewer on average is left out.
         min_scans: an object with fewer scans is left out.
         range_m: least and largest distance of a scan from the sensor, metres.
-        largest_m: a scan with a longer diagonal is left out, metres; by default 21.1 of folders.
+        largest_m: a scan with a longer diagonal is left out, metres; by default 20.1 of folders.
         categories: the data set's own words: Car,Van.
         motion: objects that moved over the track, that stood, or any.
         margin: labelled boxes are enlarged by this, metres; by default 0.15.
