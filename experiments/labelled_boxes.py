@@ -7,12 +7,14 @@
     python -m experiments.labelled_boxes kitti procedural --model default RUN
 
 The label is the data set's box, or that of the true shape's body. Near is the end or side that
-faces the sensor. A mean is over objects of the means over their scans.
+faces the sensor. A mean is over objects of the means over their scans. Data converted with `--rays`
+have two rows a model more.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +31,7 @@ from wildshape.geometry.box import FittedBox
 from wildshape.inference.boxes import carried
 from wildshape.inference.predictor import Predictor
 from wildshape.io.inputs import open_tracks
-from wildshape.records import Box, Points, Track
+from wildshape.records import Box, Completion, Points, Track
 
 COLUMNS = (
     "length", "width", "roof", "floor", "near end", "far end", "near side", "far side",
@@ -65,7 +67,7 @@ def main(settings: Settings) -> None:
         scans = sum(len(track.scans) for track in tracks)
         print(f"\n{path.name}: {len(tracks)} objects, {scans} scans; metres\n")
         print("| boxes | " + " | ".join(COLUMNS) + " |\n| --- |" + " ---: |" * len(COLUMNS))
-        for name, boxes_of in _methods(models):
+        for name, boxes_of in _methods(models, rays=any(track.rays for track in tracks)):
             rows = [errors(boxes_of(track), track) for track in tracks]
             print(f"| {name} | " + " | ".join(map(shown, COLUMNS, np.mean(rows, axis=0))) + " |")
 
@@ -82,13 +84,22 @@ def _spread(track: Track, scans: int) -> Track:
     return track.part(np.linspace(0, last, most).round().astype(int).tolist())
 
 
-def _methods(models: dict[str, Predictor]) -> Iterator[tuple[str, Callable[[Track], list]]]:
+def _methods(
+    models: dict[str, Predictor], *, rays: bool
+) -> Iterator[tuple[str, Callable[[Track], list]]]:
     yield "smallest rectangle", lambda track: [smallest_rectangle(scan) for scan in track.scans]
     yield "L-shape", lambda track: [l_shape(scan) for scan in track.scans]
     yield "label put on the points", _labels_on_points
     for name, model in models.items():
         yield f"{name}, one scan", lambda track, m=model: _boxes(m.complete_many(track.scans))
         yield f"{name}, track", lambda track, m=model: _boxes(m.complete_track(track.scans))
+        if rays:
+            yield f"{name}, one scan and its rays", partial(_with_rays, model.complete_many)
+            yield f"{name}, track and its rays", partial(_with_rays, model.complete_track)
+
+
+def _with_rays(complete: Callable[..., Iterable[Completion]], track: Track) -> list[UprightBox]:
+    return _boxes(complete(track.scans, rays=track.rays))
 
 
 def _labels_on_points(track: Track) -> list[UprightBox]:
