@@ -134,6 +134,8 @@ def test_rays_may_be_handed_in_in_any_form_and_none_change_nothing(track: Track,
         assert same.cost == pytest.approx(alone.cost)
     together = model.complete_track(track.scans, rays=track.rays)
     assert len(together) == 2
+    (same,) = model.complete_many([scan], rays=None)
+    assert same.box == alone.box
     refused(model.complete_track, track.scans, rays=[rays], match="1 sets of rays for 2 scans")
     refused(as_rays, 3, match="expected directions")
     refused(as_rays, (np.eye(3), ["a"]), match="rays: ranges are no array of numbers")

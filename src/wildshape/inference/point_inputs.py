@@ -155,20 +155,20 @@ def check_sensor(sensor: object) -> None:
         raise BadInputError(f"sensor: expected a wildshape.Sensor, found {sensor!r}.")
 
 
-def rays_of_each(rays: Iterable[object], scans: Sequence[object]) -> list[SightLines | None]:
-    """`as_rays` of one set a scan, or of none at all.
+def rays_of_each(rays: object, scans: Sequence[object]) -> list[SightLines | None]:
+    """`as_rays` of one set a scan, or of none: None, or no set.
 
     Raises:
         BadInputError: another number of sets than of scans, or no rays.
     """
-    rays = each_of(rays, "sets of rays")
+    rays = () if rays is None else each_of(rays, "sets of rays")
     if len(rays) and len(rays) != len(scans):
         raise BadInputError(f"{len(rays)} sets of rays for {len(scans)} scans; give one a scan.")
     return [as_rays(one, f"rays {i}") for i, one in enumerate(rays)]
 
 
 def together(
-    scans: Iterable[object], rays: Iterable[object], sensor: object
+    scans: Iterable[object], rays: object, sensor: object
 ) -> tuple[list[Points], list[SightLines | None]]:
     """All scans of a track, and the rays beside each.
 

@@ -136,7 +136,7 @@ class Predictor:
         return next(self.complete_many([points], sensor, rays=[rays]))
 
     def complete_many(
-        self, scans: Each, sensor: Sensor | None = None, *, rays: Each = ()
+        self, scans: Each, sensor: Sensor | None = None, *, rays: object = None
     ) -> Iterator[Completion]:
         """`complete` for many scans, in batches; each is completed on its own."""
         point_inputs.check_sensor(sensor)
@@ -149,7 +149,7 @@ class Predictor:
             yield from self._each(clouds, sensor, known[part])
 
     def complete_track(
-        self, scans: Each, sensor: Sensor | None = None, *, rays: Each = ()
+        self, scans: Each, sensor: Sensor | None = None, *, rays: object = None
     ) -> list[Completion]:
         """One shape from all scans of a track, in time order, posed in each of them.
 
@@ -226,7 +226,7 @@ class Predictor:
         gathered.add(done, self._off_ground(scan, shape, done.pose))
 
     def register(
-        self, source: object, target: object, sensor: Sensor | None = None, *, rays: Each = ()
+        self, source: object, target: object, sensor: Sensor | None = None, *, rays: object = None
     ) -> Registration:
         """`T_target_source` of two scans `(n, 3)`, sensor frames, metres; `rays`: of both."""
         point_inputs.check_sensor(sensor)
@@ -237,7 +237,7 @@ class Predictor:
         return registered(*pair, done, self.config.inliers)
 
     def register_track(
-        self, scans: Each, sensor: Sensor | None = None, *, track: bool = False, rays: Each = ()
+        self, scans: Each, sensor: Sensor | None = None, *, track: bool = False, rays: object = None
     ) -> SE3:
         """`T_middle_scan`: every scan to the frame of the track's middle scan.
 
@@ -245,12 +245,12 @@ class Predictor:
             scans: of one object, in time order.
             sensor: how they were taken.
             track: pose the scans together (`complete_track`) and not each on its own.
-            rays: of each, as in `complete`.
+            rays: of each, as in `complete`; None: of none.
         """
         return to_middle(self.poses(scans, sensor, track=track, rays=rays))
 
     def poses(
-        self, scans: Each, sensor: Sensor | None = None, *, track: bool = False, rays: Each = ()
+        self, scans: Each, sensor: Sensor | None = None, *, track: bool = False, rays: object = None
     ) -> SE3:
         """`T_sensor_canonical` of each scan, as `register_track`."""
         clouds, known = point_inputs.together(scans, rays, sensor)
@@ -260,7 +260,7 @@ class Predictor:
         return stack([item.pose for item in done])
 
     def fuse(
-        self, scans: Each, sensor: Sensor | None = None, *, track: bool = False, rays: Each = ()
+        self, scans: Each, sensor: Sensor | None = None, *, track: bool = False, rays: object = None
     ) -> Points:
         """All points of a track in its middle scan's frame, metres, as `register_track`."""
         clouds = point_inputs.all_as_points(scans)
