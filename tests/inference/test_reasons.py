@@ -3,6 +3,8 @@
 """Each reason speaks above its threshold and not below, alone and on a track."""
 
 import dataclasses
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +18,8 @@ from wildshape.inference.confidence import (
     reasons_of_track,
     warning_of,
 )
+from wildshape.inference.config import ReasonRule
+from wildshape.method.checkpoint import SHIPPED, load_checkpoint
 from wildshape.records import Box, Completion, Sensor
 
 SETTINGS = dataclasses.replace(models.SETTINGS, cost_m=(0.1, 0.2))
@@ -121,3 +125,19 @@ def test_a_track_keeps_what_speaks_against_the_scan():
     for cost, expected in ((0.1, ("few_points",)), (0.4, ("few_points", "poor_fit"))):
         together = dataclasses.replace(alone, cost=cost, confidence=0.7)
         assert judged(together, None, None, SETTINGS).reasons == expected
+
+
+def test_the_document_names_the_bounds_of_the_shipped_weights():
+    settings, rule = load_checkpoint(SHIPPED)[1], ReasonRule()
+    (low, high), (_, p90) = settings.extent_m, settings.cost_m
+    text = (Path(__file__).parents[2] / "docs/formats.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(too_\w+|poor_fit)` .*: ([\d.]+) m", text, re.MULTILINE)
+    warned = re.search(r"above ([\d.]+) m or below ([\d.]+) m", text)
+    assert {name: float(bound) for name, bound in rows} == {
+        "too_large_for_model": round(high, 1),
+        "too_small_for_model": round(rule.smallest * low, 2),
+        "poor_fit": round(rule.poor_fit * p90, 2),
+    }
+    assert warned
+    assert float(warned[1]) == round(rule.largest * high, 1)
+    assert float(warned[2]) == round(rule.smallest * low, 2)
