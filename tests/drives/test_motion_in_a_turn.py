@@ -93,6 +93,21 @@ def test_the_way_is_as_true_where_the_first_scan_is_empty(simulated):
     assert off_behind < 2 * off
 
 
+@pytest.mark.parametrize("timed", [False, True])
+def test_the_way_is_as_true_where_most_scans_are_empty(timed):
+    """As if they were missing: the step over them was taken for that of one scan."""
+    street = WholeDrive(StreetConfig(scans=13, sensor="hdl32", speed=6.0), 3)
+    scans = [street.scan(frame) for frame in range(13)]
+    none = Turn(np.empty((0, 3), np.float32))
+    every = drive_of(scans, timed=timed)
+    drive = replace(every, read=lambda frame: none if frame % 3 else every.read(frame))
+    way = find_trajectory(drive, find_mounting(drive, CONFIG.mounting), CONFIG)
+    true = np.stack([scan.T_world_sensor for scan in scans])
+    off = way.T_world_sensor.matrix.numpy() - np.linalg.inv(true[0]) @ true
+    assert way.breaks.frames == ()
+    assert np.linalg.norm(off[3:, :3, 3], axis=1).max() < 0.3  # of the first step nothing is known
+
+
 @pytest.mark.parametrize(("stamped_s", "timed_s"), [(0.0999, 0.0), (0.0, 0.1)])
 def test_a_scan_that_is_late_does_not_make_the_sensor_race(simulated, stamped_s, timed_s):
     """By its stamp, or by the times of its points: the next one seems to come at once."""

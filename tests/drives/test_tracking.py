@@ -20,7 +20,7 @@ from wildshape.drives.config import (
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.clusters import extents, find_clusters
 from wildshape.drives.tracking.ground import height_above_ground
-from wildshape.drives.tracking.mounting import Mounting, ground_plane
+from wildshape.drives.tracking.mounting import Mounting, find_mounting, ground_plane
 from wildshape.drives.tracking.segmentation import Cutter
 from wildshape.drives.tracking.sightings import Sightings, merged
 from wildshape.drives.tracking.tracks import Seen, link
@@ -54,6 +54,17 @@ def test_height_and_tilt_of_a_sensor_come_from_the_ground():
         turn.rotation @ torch.from_numpy(found[:3]), torch.tensor([0.0, 0, 1]).double()
     )
     SE3.from_matrix(turn.matrix)  # a rotation
+
+
+@pytest.mark.parametrize("full", [(0, 4, 11), (5,)])
+def test_scans_without_points_say_nothing_of_the_ground(full):
+    """Most were empty, and ground was said to be missing; or all looked at, and it was refused."""
+    seen, none = Turn(road(np.random.default_rng(0))), Turn(np.empty((0, 3), np.float32))
+    names = [f"{frame:06d}" for frame in range(12)]
+    drive = Drive.of("street", names, lambda frame: seen if frame in full else none)
+    found = find_mounting(drive, MountingConfig())
+    assert found.height_m == pytest.approx(1.7, abs=0.02)
+    assert found.ground > 0.9
 
 
 def test_what_is_seen_of_a_cluster_is_the_middle_and_size_of_its_extent():

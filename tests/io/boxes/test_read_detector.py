@@ -154,6 +154,8 @@ def test_a_fingerprint_tells_names_and_contents(tmp_path):
         ("a.json", 7, "results of nuScenes"),
         ("a.json", nuscenes(size=[1, 2]), "results of nuScenes"),
         ("a.json", nuscenes(rotation=[math.nan, 0, 0, 0]), "not finite"),
+        ("a.txt", f"{LABEL.format(turn=0)} nan", "score is not finite"),
+        ("a.json", nuscenes(detection_score=math.nan), "score is not finite"),
         ("a.json", nuscenes(rotation=[0, 0, 0, 0]), "next to 0"),
         ("a.json", nuscenes(rotation=[0.05, 0, 0, 0.05]), "next to 0"),
         ("a.json", [{"boxes_lidar": [LEFT], "pred_labels": [1]}], "no 'name'"),

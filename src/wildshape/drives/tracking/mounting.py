@@ -8,11 +8,13 @@ slope.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from wildshape.drives.config import MountingConfig
 from wildshape.drives.source import Drive
@@ -139,8 +141,13 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
     Raises:
         BadInputError: no scan shows ground around the sensor, or it is above.
     """
-    chosen = np.unique(np.linspace(0, len(drive) - 1, config.scans).round().astype(int))
-    scans = [drive.scan(int(frame)) for frame in chosen]
+    chosen = np.unique(np.linspace(0, len(drive) - 1, config.scans).round().astype(int)).tolist()
+    scans = _with_points(drive, chosen, config) or _with_points(drive, range(len(drive)), config)
+    if not scans:
+        drive.read(0)  # says why if it cannot be read
+        raise BadInputError(
+            f"{drive.name}: its scans hold no points, or all of them are NaN; write them again."
+        )
     if all(_is_an_object(scan, config) for scan in scans):
         raise BadInputError(
             f"{drive.name}: its scans are of single objects, cut out; drive needs the whole scans."
@@ -159,11 +166,6 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
             )
     found = np.array([plane for plane in planes if plane is not None])
     if not len(found):
-        drive.read(int(chosen[0]))  # says why if it cannot be read
-        if not any(map(len, scans)):
-            raise BadInputError(
-                f"{drive.name}: its scans hold no points, or all of them are NaN; write them again."
-            )
         raise BadInputError(
             f"{drive.name}: no ground is seen below the sensor; the scans must be full ones in the"
             " sensor's frame, metres, z up."
@@ -185,6 +187,11 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
         _cut_off(scans, height, config),
         int(np.median([_gaps(scan) for scan in scans])),
     )
+
+
+def _with_points(drive: Drive, frames: Iterable[int], config: MountingConfig) -> list[Points]:
+    """The scans of some frames that hold points, so many at most."""
+    return list(islice(filter(len, map(drive.scan, frames)), config.scans))
 
 
 def _gaps(scan: Points) -> int:
@@ -213,10 +220,10 @@ def _near(points: Points, config: MountingConfig) -> Points:
     return points[(points[:, :2] ** 2).sum(1) < config.reach_m**2]
 
 
-def _in_common(drive: Drive, chosen: Int[np.ndarray, "k"], config: MountingConfig) -> bool:
+def _in_common(drive: Drive, chosen: list[int], config: MountingConfig) -> bool:
     """Whether ground is seen where the sensor's own vehicle is, but not from the first scan on."""
     soon = [frame for frame in _SOON if frame < len(drive)]
-    first, *later = sorted({*chosen.tolist(), *soon})
+    first, *later = sorted({*chosen, *soon})
     if not len(drive.scan(first)) or _seen_below(drive.scan(first), config):
         return False
     seen = [_seen_below(drive.scan(frame), config) for frame in later]
@@ -234,8 +241,6 @@ def _seen_below(scan: Points, config: MountingConfig) -> int:
 
 def _is_an_object(scan: Points, config: MountingConfig) -> bool:
     """Whether a scan is small and lies on one side of the sensor."""
-    if not len(scan):
-        return False
     middle, sides = scan.mean(0), np.ptp(scan, axis=0)
     around = (scan[:, :2] @ middle[:2] < 0).any()
     return bool(max(sides[:2]) < config.object_m and not around)

@@ -62,9 +62,6 @@ class Odometry:
     def follow(self, scan: Points, frame: int) -> None:
         """Go one scan on."""
         pose, step = self.kiss.last_pose, self.kiss.last_delta
-        if len(scan) < FEWEST_POINTS:
-            self.kiss.last_pose = pose @ step
-            return
         there = _registered(self.kiss, scan)
         fit = 1.0 if self._before is None else self._fit(there)
         if fit < self.config.good_fit and (found := self._from_afar(scan, pose)) is not None:

@@ -148,7 +148,7 @@ def _may_drive(drive: Drive, turns: list[Turn], config: DriveConfig) -> str:
         return ""
     ahead = torch.tensor((_TRIED_M, 0.0, 0.0), dtype=torch.float64)
     step = SE3(torch.eye(3, dtype=torch.float64), ahead)
-    driving = Twist.between(SE3.identity(), step, _seconds(drive, 1))
+    driving = Twist.between(SE3.identity(), step, _seconds(drive, 0, 1))
     poses, odometry = _follow(drive, turns, config, driving)
     if odometry.lost or _far(poses[-2:]) < _GOES_M:
         return ""
@@ -174,32 +174,39 @@ def _follow(
 
     A turn is followed at its own middle, wherever in it the scan's stamp lies. About its first
     point, an error of the speed would come back in the next step as large, and turned round. A
-    step takes half of what a turn lasts at least: stamps may be late.
+    step takes half of what a turn lasts at least: stamps may be late. A scan of hardly any points
+    is placed, and else left out as if it were missing.
     """
     odometry = Odometry(config.trajectory, motion)
-    poses, middle = [], 0.0
+    longest = _longest_guess(drive, config.trajectory)
+    poses, last, step, before = [], 0, 0, 0.0  # of the last scan followed; before: its middle
     for frame, turn in enumerate(turns):
-        before = middle
-        if len(turn.points) >= FEWEST_POINTS:
-            middle = _middle(turn)
-            odometry.count(turn, frame)
-        since = _seconds(drive, frame) + middle - before if frame else 0.0
+        few = len(turn.points) < FEWEST_POINTS
+        middle = 0.0 if few else _middle(turn)
+        since = _seconds(drive, last, frame) + middle - before
+        if few:
+            gone_on = odometry.motion.after(min(since, longest)).matrix.numpy()
+            poses.append(odometry.kiss.last_pose @ gone_on)
+            at(frame + 1)
+            continue
+        odometry.count(turn, frame)
         since = max(since, _lasts(turn) / 2)
-        if frame and _steps_differ(drive, frame):
-            odometry.expect(min(since, _longest_guess(drive, config.trajectory)))
+        if drive.ticks[frame] - drive.ticks[last] != step:  # KISS-ICP guesses the last step again
+            odometry.expect(min(since, longest))
         odometry.follow(_since(turn, middle).carried(odometry.motion), frame)
         if frame:
             odometry.learn(since)
         pose = odometry.kiss.last_pose.copy()
         poses.append(pose @ odometry.motion.after(-middle).matrix.numpy() if middle else pose)
+        last, step, before = frame, drive.ticks[frame] - drive.ticks[last], middle
         at(frame + 1)
     return poses, odometry
 
 
-def _seconds(drive: Drive, frame: int) -> float:
-    """Since the frame before; scans, where no times are known."""
+def _seconds(drive: Drive, start: int, end: int) -> float:
+    """Between two frames; scans, where no times are known."""
     at = drive.times or drive.ticks
-    return float(at[frame] - at[frame - 1])
+    return float(at[end] - at[start])
 
 
 def _middle(turn: Turn) -> float:
@@ -211,7 +218,7 @@ def _middle(turn: Turn) -> float:
 
 def _lasts(turn: Turn) -> float:
     """From the first point's time to the last one's; 0 where no times are known."""
-    return float(np.ptp(turn.seconds)) if turn.seconds is not None and len(turn.points) else 0.0
+    return 0.0 if turn.seconds is None else float(np.ptp(turn.seconds))
 
 
 def _since(turn: Turn, seconds: float) -> Turn:
@@ -221,15 +228,8 @@ def _since(turn: Turn, seconds: float) -> Turn:
 
 def _longest_guess(drive: Drive, config: TrajectoryConfig) -> float:
     """How long a motion is believed to go on: seconds, or scans where no times are known."""
-    return config.longest_guess * float(np.median(np.diff(drive.times or drive.ticks)))
-
-
-def _steps_differ(drive: Drive, frame: int) -> bool:
-    """Whether KISS-ICP's guess, the last step once more, does not hold: the first, or at gaps."""
-    if frame == 1:
-        return True
-    before, now = np.diff(drive.ticks[frame - 2 : frame + 1])
-    return bool(now != before)
+    steps = np.diff(drive.times or drive.ticks)
+    return config.longest_guess * float(np.median(steps)) if len(steps) else 0.0
 
 
 def landmarks(

@@ -32,7 +32,13 @@ class DetectorBox:
     score: float | None = None
 
     def __post_init__(self) -> None:
-        """JSON may hold halves of characters, which no file can (`as_text`)."""
+        """JSON may hold halves of characters, which no file can (`as_text`).
+
+        Raises:
+            ValueError: the score is not finite.
+        """
+        if self.score is not None and not math.isfinite(self.score):
+            raise ValueError(f"a box whose score is not finite: {self.score}")
         for name in ("scan", "category", "track"):
             if isinstance(given := getattr(self, name), str):
                 object.__setattr__(self, name, as_text(given))
