@@ -7,7 +7,7 @@ import shutil
 from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from wildshape.datasets.tracks.conversion import STORE, TRACKS, PartResult
 from wildshape.errors import BadInputError
@@ -34,36 +34,6 @@ _COMMAND = "convert"
 Done = list[tuple[Path, PartResult]]
 
 
-@runtime_checkable
-class Destination(Protocol):
-    """An output; parts that are finished wait for the others in its folder `PARTS`."""
-
-    @property
-    def replaces(self) -> bool:
-        """Whether an earlier output is set aside until this one is finished."""
-        ...
-
-    def begin(self) -> list[PartResult] | None:
-        """Start, or go on; returns the results if there is nothing left to convert.
-
-        Raises:
-            BadInputError: something else is there.
-        """
-        ...
-
-    def finish(self, done: Done) -> None:
-        """Put the parts together, in the order given.
-
-        Raises:
-            BadInputError: two tracks of one name.
-        """
-        ...
-
-    def abandon(self) -> None:
-        """Leave no trace, or what was set aside."""
-        ...
-
-
 def left_out(results: list[PartResult]) -> dict[str, int]:
     """How much was left out of all parts, by reason; what is most comes first."""
     total: Counter[str] = Counter()
@@ -80,7 +50,7 @@ def _told(results: list[PartResult]) -> dict[str, Any]:
 
 @dataclass
 class _Folder:
-    """What every destination is told.
+    """What every destination is told; finished parts wait for the others in its folder `PARTS`.
 
     Attributes:
         path: its folder.
@@ -101,7 +71,11 @@ class PackedStore(_Folder):
     replaces = False
 
     def begin(self) -> list[PartResult] | None:
-        """See `Destination`."""
+        """Start, or go on; returns the results if there is nothing left to convert.
+
+        Raises:
+            BadInputError: something else is there.
+        """
         self._made = {**provenance(command_line()), "made_by": _COMMAND, "settings": self.settings}
         if self.path.exists() and not self.path.is_dir():
             raise BadInputError(f"{self.path}: is a file; OUT names a folder to write.")
@@ -122,12 +96,16 @@ class PackedStore(_Folder):
         return None
 
     def finish(self, done: Done) -> None:
-        """See `Destination`."""
+        """Put the parts together, in the order given.
+
+        Raises:
+            BadInputError: two tracks of one name.
+        """
         stores = [place / STORE for place, result in done if result.tracks]
         join_stores(stores, self.path, self._made | _told([result for _, result in done]))
 
     def abandon(self) -> None:
-        """See `Destination`."""
+        """Leave no trace."""
         shutil.rmtree(self.path / PARTS, ignore_errors=True)
         (self.path / WRITING_JSON).unlink(missing_ok=True)
         if not any(self.path.iterdir()):
@@ -162,11 +140,11 @@ class TrackFolders(_Folder):
 
     @property
     def replaces(self) -> bool:
-        """See `Destination`."""
+        """Whether an earlier output is set aside until this one is finished."""
         return self._output.replaces
 
-    def begin(self) -> list[PartResult] | None:
-        """See `Destination`."""
+    def begin(self) -> None:
+        """Start, or go on; errors as of `PackedStore`."""
         if (self.path / MARKER).is_file() and not unfinished(self.path, _COMMAND):
             shutil.rmtree(self.path / PARTS, ignore_errors=True)  # of a run killed at its very end
         self._output: Output = begin(
@@ -180,10 +158,9 @@ class TrackFolders(_Folder):
         if not self._output.resumed:
             shutil.rmtree(self.path / PARTS, ignore_errors=True)
         _sweep(self.path / PARTS)
-        return None
 
     def finish(self, done: Done) -> None:
-        """See `Destination`."""
+        """Give the tracks their names, in the order given; errors as of `PackedStore`."""
         names = [file_name(name) for _, result in done for name in result.names]
         twice = [name for name, count in Counter(names).items() if count > 1]
         if twice:
@@ -198,7 +175,7 @@ class TrackFolders(_Folder):
         shutil.rmtree(self.path / PARTS, ignore_errors=True)
 
     def abandon(self) -> None:
-        """See `Destination`."""
+        """Leave no trace, or what was set aside."""
         shutil.rmtree(self.path / PARTS, ignore_errors=True)
         self._output.abandon()
 
