@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a conversion goes: a packed store or track folders, begun, gone on with and finished."""
 
-import json
 import shutil
 from collections import Counter
 from dataclasses import asdict, dataclass
@@ -26,6 +25,7 @@ from wildshape.io.output import (
 from wildshape.io.progress import SILENT, Progress
 from wildshape.io.store.join import finish_join, is_joining, join_stores
 from wildshape.io.store.layout import FORMAT, JOINING_JSON, PARTS, VERSION, WRITING_JSON
+from wildshape.io.store.origin import is_begun_by, unfinished_provenance
 from wildshape.io.store.writer import check_room
 from wildshape.io.tracks import place_track
 from wildshape.io.write_tracks import FILES
@@ -82,7 +82,7 @@ class PackedStore(_Folder):
         lock_folder(self.path)
         if not (self.path / WRITING_JSON).is_file():
             (self.path / JOINING_JSON).unlink(missing_ok=True)  # of a run killed at its very end
-        if self._is_ours():
+        if is_begun_by(self.path, self._made):
             self.progress.say(f"going on with the unfinished store in {self.path}")
             remove_leftovers(self.path)
         else:
@@ -111,23 +111,12 @@ class PackedStore(_Folder):
         if not any(self.path.iterdir()):
             self.path.rmdir()
 
-    def _is_ours(self) -> bool:
-        """Whether this very conversion was stopped here."""
-        found = self._writing()
-        return all(found.get(key) == self._made[key] for key in ("made_by", "settings"))
-
-    def _writing(self) -> dict[str, Any]:
-        try:
-            found = json.loads((self.path / WRITING_JSON).read_text("utf-8"))["provenance"]
-        except (OSError, ValueError, KeyError, TypeError):
-            return {}
-        return found if isinstance(found, dict) else {}
-
     def _make_room(self) -> None:
-        if not self.overwrite and self._writing().get("made_by") == _COMMAND:
+        found = unfinished_provenance(self.path)
+        if not self.overwrite and found.get("made_by") == _COMMAND:
             raise BadInputError(
                 f"{self.path}: holds an unfinished conversion with other settings or of other"
-                f" data{unlike(self._writing(), self.settings)}; repeat it as it was, pass"
+                f" data{unlike(found, self.settings)}; repeat it as it was, pass"
                 " --overwrite, or choose another OUT."
             )
         check_room(self.path, overwrite=self.overwrite)
