@@ -69,13 +69,6 @@ def convert(
 
     The output depends on the data set and the options alone, not on who worked on what when.
 
-    Args:
-        source: the data set.
-        out: where the tracks go.
-        options: how.
-        progress: is told what goes on.
-        name: of the data set, for people.
-
     Raises:
         BadInputError: the data set or the output cannot be used, or no track came.
         MissingExtraError: Ray is not installed.

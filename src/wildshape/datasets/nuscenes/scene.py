@@ -83,12 +83,7 @@ class Scene:
 
 
 def read_scene(db: sqlite3.Connection, name: str, *, sweeps: bool) -> Scene:
-    """A scene out of the index of its tables.
-
-    Args:
-        db: see `table_index.index_of`.
-        name: of the scene.
-        sweeps: also the frames between the key frames.
+    """A scene out of `table_index.index_of`; `sweeps`: the frames between the key frames, too.
 
     Raises:
         BadInputError: there is no such scene.

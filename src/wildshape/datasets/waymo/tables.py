@@ -141,10 +141,8 @@ def range_images(path: Path, component: str) -> Iterator[tuple[int, np.ndarray]]
 
     One image is held, however the file is cut into row groups.
 
-    Args:
-        path: of the table.
-        component: `LiDARComponent` (range, intensity, elongation, in a no-label zone) or
-            `LiDARPoseComponent` (roll, pitch, yaw, x, y, z).
+    `component`: `LiDARComponent` (range, intensity, elongation, in a no-label zone) or
+    `LiDARPoseComponent` (roll, pitch, yaw, x, y, z).
 
     Raises:
         BadInputError: the table is missing or damaged, or its frames are not in time order.

@@ -87,11 +87,7 @@ def check_suffix(path: Path) -> None:
 
 
 def write_cloud(path: Path, points: Float[np.ndarray, "n 3"]) -> None:
-    """Write points atomically.
-
-    Args:
-        path: .ply .pcd .npy .xyz .txt .las .laz
-        points: metres.
+    """Write points, metres, atomically, in the format of `CLOUD_SUFFIXES` that the name ends in.
 
     Raises:
         BadInputError: another suffix, one of a format of float32 for points that it would move by

@@ -42,12 +42,7 @@ _STEPS = 65534  # int16 from -32767 to 32767 across the scene
 
 
 def write_report(report: Report, path: Path) -> None:
-    """Write the page; the file appears under its name only when it is whole.
-
-    Args:
-        report: what to show; every part may be empty.
-        path: the `.html` file; an existing one is replaced.
-    """
+    """Write the page; its file appears, or is replaced, only when it is whole."""
     write_text(path, render(report))
 
 

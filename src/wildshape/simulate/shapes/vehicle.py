@@ -79,10 +79,7 @@ class _Body:
 def vehicle(kind: str, rng: np.random.Generator, roundest_m: float | None = None) -> Solid:
     """A random vehicle of a kind in `KINDS`; box middle above the origin, wheels on z = 0.
 
-    Args:
-        kind: of vehicle.
-        rng: the only source of chance.
-        roundest_m: how far its corners, seen from above, stand back at most; None: as usual.
+    `roundest_m`: how far its corners, seen from above, stand back at most; None: as usual.
     """
     body = _draw(kind, rng)
     if roundest_m is not None:
