@@ -53,7 +53,6 @@ class _Folder:
     """What every destination is told; finished parts wait for the others in its folder `PARTS`.
 
     Attributes:
-        path: its folder.
         settings: JSON values; all that decides the content.
         overwrite: replace what is there.
         progress: is told that an earlier run is gone on with.

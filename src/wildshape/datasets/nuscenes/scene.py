@@ -26,7 +26,6 @@ class Frame:
         sample: number of the key frame that it is, or that follows it.
         is_key: whether its boxes were labelled.
         microseconds: Unix time.
-        T_global_sensor: one pose.
         info: file that may say how many numbers a point has (T4), relative to the data root.
     """
 

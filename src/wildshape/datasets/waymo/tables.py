@@ -42,7 +42,6 @@ class Calibration:
     """Of the TOP LiDAR.
 
     Attributes:
-        T_vehicle_sensor: one pose.
         table: inclination of each beam, radians, lowest first; None if they are spread evenly.
         limits: least and largest inclination, radians, where there is no table.
         path: of the file that it was read from.

@@ -163,7 +163,6 @@ class MeshFiles:
     """How meshes are wanted.
 
     Attributes:
-        kind: of the files.
         coloured: by confidence (`geometry/meshing.py`).
     """
 
