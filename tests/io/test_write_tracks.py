@@ -6,7 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tests.refusal import refused
 
+from wildshape.io.store.store import open_store
 from wildshape.io.tracks import read_track
 from wildshape.io.write_tracks import write_tracks
 from wildshape.records import Track
@@ -69,3 +71,20 @@ def test_killed_between_two_of_its_files_it_is_gone_on_with(
         assert len([*theirs.parent.glob("scans/*")]) in (0, 3)
     _write(_other(track), tmp_path / "out")
     _assert_replaced(tmp_path / "out", track, theirs)
+
+
+@pytest.mark.parametrize("text", ["[]", '{"provenance": null}', '{"provenance": [1]}', "\xff", "{"])
+def test_a_damaged_half_written_store_is_refused_and_can_be_replaced(
+    track: Track, tmp_path: Path, text: str
+) -> None:
+    """What said who was writing it ended the command with an error of Python's."""
+    out = tmp_path / "store"
+    out.mkdir()
+    (out / "writing.json").write_bytes(text.encode("latin-1"))
+
+    def write(*, overwrite: bool) -> None:
+        write_tracks([track], out, "packed", command="simulate", settings={}, overwrite=overwrite)
+
+    refused(write, overwrite=False, match="a half-written packed store is there already")
+    write(overwrite=True)
+    assert open_store(out).names == (track.name,)

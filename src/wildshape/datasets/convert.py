@@ -9,12 +9,7 @@ from dataclasses import asdict, dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from wildshape.datasets.destinations import (
-    Destination,
-    PackedStore,
-    TrackFolders,
-    left_out,
-)
+from wildshape.datasets.destinations import PackedStore, TrackFolders, left_out
 from wildshape.datasets.tracks.conversion import Conversion, Part, PartResult
 from wildshape.datasets.tracks.source import Source
 from wildshape.datasets.tracks.truth import TruthBuilder
@@ -74,13 +69,6 @@ def convert(
 
     The output depends on the data set and the options alone, not on who worked on what when.
 
-    Args:
-        source: the data set.
-        out: where the tracks go.
-        options: how.
-        progress: is told what goes on.
-        name: of the data set, for people.
-
     Raises:
         BadInputError: the data set or the output cannot be used, or no track came.
         MissingExtraError: Ray is not installed.
@@ -90,7 +78,7 @@ def convert(
     identity = _identity(name, source, options, parts)
     settings = json.loads(json.dumps(identity, default=str), parse_constant=str)
     kind = PackedStore if options.layout == "packed" else TrackFolders
-    destination: Destination = kind(out, settings, options.overwrite, progress)
+    destination = kind(out, settings, options.overwrite, progress)
     earlier = destination.begin()
     if earlier is not None:
         return Converted(earlier)

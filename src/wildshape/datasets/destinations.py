@@ -2,12 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a conversion goes: a packed store or track folders, begun, gone on with and finished."""
 
-import json
 import shutil
 from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from wildshape.datasets.tracks.conversion import STORE, TRACKS, PartResult
 from wildshape.errors import BadInputError
@@ -26,42 +25,13 @@ from wildshape.io.output import (
 from wildshape.io.progress import SILENT, Progress
 from wildshape.io.store.join import finish_join, is_joining, join_stores
 from wildshape.io.store.layout import FORMAT, JOINING_JSON, PARTS, VERSION, WRITING_JSON
+from wildshape.io.store.origin import is_begun_by, unfinished_provenance
 from wildshape.io.store.writer import check_room
 from wildshape.io.tracks import place_track
 from wildshape.io.write_tracks import FILES
 
 _COMMAND = "convert"
 Done = list[tuple[Path, PartResult]]
-
-
-@runtime_checkable
-class Destination(Protocol):
-    """An output; parts that are finished wait for the others in its folder `PARTS`."""
-
-    @property
-    def replaces(self) -> bool:
-        """Whether an earlier output is set aside until this one is finished."""
-        ...
-
-    def begin(self) -> list[PartResult] | None:
-        """Start, or go on; returns the results if there is nothing left to convert.
-
-        Raises:
-            BadInputError: something else is there.
-        """
-        ...
-
-    def finish(self, done: Done) -> None:
-        """Put the parts together, in the order given.
-
-        Raises:
-            BadInputError: two tracks of one name.
-        """
-        ...
-
-    def abandon(self) -> None:
-        """Leave no trace, or what was set aside."""
-        ...
 
 
 def left_out(results: list[PartResult]) -> dict[str, int]:
@@ -80,10 +50,9 @@ def _told(results: list[PartResult]) -> dict[str, Any]:
 
 @dataclass
 class _Folder:
-    """What every destination is told.
+    """What every destination is told; finished parts wait for the others in its folder `PARTS`.
 
     Attributes:
-        path: its folder.
         settings: JSON values; all that decides the content.
         overwrite: replace what is there.
         progress: is told that an earlier run is gone on with.
@@ -101,14 +70,18 @@ class PackedStore(_Folder):
     replaces = False
 
     def begin(self) -> list[PartResult] | None:
-        """See `Destination`."""
+        """Start, or go on; returns the results if there is nothing left to convert.
+
+        Raises:
+            BadInputError: something else is there.
+        """
         self._made = {**provenance(command_line()), "made_by": _COMMAND, "settings": self.settings}
         if self.path.exists() and not self.path.is_dir():
             raise BadInputError(f"{self.path}: is a file; OUT names a folder to write.")
         lock_folder(self.path)
         if not (self.path / WRITING_JSON).is_file():
             (self.path / JOINING_JSON).unlink(missing_ok=True)  # of a run killed at its very end
-        if self._is_ours():
+        if is_begun_by(self.path, self._made):
             self.progress.say(f"going on with the unfinished store in {self.path}")
             remove_leftovers(self.path)
         else:
@@ -122,34 +95,27 @@ class PackedStore(_Folder):
         return None
 
     def finish(self, done: Done) -> None:
-        """See `Destination`."""
+        """Put the parts together, in the order given.
+
+        Raises:
+            BadInputError: two tracks of one name.
+        """
         stores = [place / STORE for place, result in done if result.tracks]
         join_stores(stores, self.path, self._made | _told([result for _, result in done]))
 
     def abandon(self) -> None:
-        """See `Destination`."""
+        """Leave no trace."""
         shutil.rmtree(self.path / PARTS, ignore_errors=True)
         (self.path / WRITING_JSON).unlink(missing_ok=True)
         if not any(self.path.iterdir()):
             self.path.rmdir()
 
-    def _is_ours(self) -> bool:
-        """Whether this very conversion was stopped here."""
-        found = self._writing()
-        return all(found.get(key) == self._made[key] for key in ("made_by", "settings"))
-
-    def _writing(self) -> dict[str, Any]:
-        try:
-            found = json.loads((self.path / WRITING_JSON).read_text("utf-8"))["provenance"]
-        except (OSError, ValueError, KeyError, TypeError):
-            return {}
-        return found if isinstance(found, dict) else {}
-
     def _make_room(self) -> None:
-        if not self.overwrite and self._writing().get("made_by") == _COMMAND:
+        found = unfinished_provenance(self.path)
+        if not self.overwrite and found.get("made_by") == _COMMAND:
             raise BadInputError(
                 f"{self.path}: holds an unfinished conversion with other settings or of other"
-                f" data{unlike(self._writing(), self.settings)}; repeat it as it was, pass"
+                f" data{unlike(found, self.settings)}; repeat it as it was, pass"
                 " --overwrite, or choose another OUT."
             )
         check_room(self.path, overwrite=self.overwrite)
@@ -162,11 +128,11 @@ class TrackFolders(_Folder):
 
     @property
     def replaces(self) -> bool:
-        """See `Destination`."""
+        """Whether an earlier output is set aside until this one is finished."""
         return self._output.replaces
 
-    def begin(self) -> list[PartResult] | None:
-        """See `Destination`."""
+    def begin(self) -> None:
+        """Start, or go on; errors as of `PackedStore`."""
         if (self.path / MARKER).is_file() and not unfinished(self.path, _COMMAND):
             shutil.rmtree(self.path / PARTS, ignore_errors=True)  # of a run killed at its very end
         self._output: Output = begin(
@@ -180,10 +146,9 @@ class TrackFolders(_Folder):
         if not self._output.resumed:
             shutil.rmtree(self.path / PARTS, ignore_errors=True)
         _sweep(self.path / PARTS)
-        return None
 
     def finish(self, done: Done) -> None:
-        """See `Destination`."""
+        """Give the tracks their names, in the order given; errors as of `PackedStore`."""
         names = [file_name(name) for _, result in done for name in result.names]
         twice = [name for name, count in Counter(names).items() if count > 1]
         if twice:
@@ -198,7 +163,7 @@ class TrackFolders(_Folder):
         shutil.rmtree(self.path / PARTS, ignore_errors=True)
 
     def abandon(self) -> None:
-        """See `Destination`."""
+        """Leave no trace, or what was set aside."""
         shutil.rmtree(self.path / PARTS, ignore_errors=True)
         self._output.abandon()
 

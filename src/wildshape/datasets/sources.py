@@ -36,13 +36,9 @@ SOURCES = {
 
 
 def open_source(name: str, root: Path, options: dict[str, Any]) -> "Source":
-    """The reader of a data set, with its own defaults where nothing else is wanted.
+    """The reader of a data set of `SOURCES`, with its own defaults where nothing else is wanted.
 
-    Args:
-        name: of `SOURCES`.
-        root: where the data set lies.
-        options: values for the fields of the reader or of its records (`Selection`, `Crop`), as
-            far as the user gave them.
+    `options`: values for the fields of the reader or of its records (`Selection`, `Crop`).
 
     Raises:
         BadInputError: no such source, or an option that it does not have.

@@ -39,10 +39,8 @@ def atomic_write(path: Path | str, *, flush: bool = False) -> Iterator[IO[bytes]
     It is written beside its final place and renamed; folders are made. After an error (Ctrl-C
     included) nothing is left and an older file under `path` is as it was.
 
-    Args:
-        path: the file.
-        flush: to the disk, which takes milliseconds: for what took long to make, and is to be whole
-            after a loss of power, too.
+    `flush`: to the disk, which takes milliseconds: for what took long to make, and is to be whole
+    after a loss of power, too.
 
     Raises:
         OSError: the disk is full, the folder cannot be written or the name is too long; it names

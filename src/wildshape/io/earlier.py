@@ -19,9 +19,7 @@ MARKERS = (MARKER, MOVED, f"{EARLIER}/{MARKER}")
 def set_aside(path: Path, patterns: Sequence[str]) -> None:
     """Clear a folder of an output: it is kept, unless it was itself to replace one that is kept.
 
-    Args:
-        path: the folder.
-        patterns: of the output's files; others stay, folders that are empty then do not.
+    `patterns`: of the output's files; others stay, folders that are empty then do not.
     """
     if (path / MARKER).is_file():
         (path / MARKER).replace(path / MOVED)

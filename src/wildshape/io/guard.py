@@ -95,12 +95,7 @@ def first_line(error: BaseException, limit: int = 160) -> str:
 
 
 def check_unpacked(path: Path, unpacked: int, packed: int) -> None:
-    """Refuse a compressed file that unpacks to far more than any scan does.
-
-    Args:
-        path: named in the error.
-        unpacked: bytes that it promises.
-        packed: bytes that it holds.
+    """Refuse a compressed file that unpacks to far more bytes than any scan does.
 
     Raises:
         BadInputError: over a hundred times as many, and over 32 MB.
@@ -115,12 +110,8 @@ def check_unpacked(path: Path, unpacked: int, packed: int) -> None:
 def check_promise(path: Path, what: str, promised: int, least: int, present: int) -> None:
     """Refuse a header that promises more than its file can hold, before anything is allocated.
 
-    Args:
-        path: named in the error.
-        what: the name of the counted things, for example `points`.
-        promised: how many of them the header promises.
-        least: bytes that the promise needs at least.
-        present: bytes that the file holds after its header.
+    `what` is counted, for example `points`: `promised` of them, which take at least `least` bytes,
+    where `present` follow the header.
 
     Raises:
         BadInputError: the promise is negative, absurd, or does not fit into the file.
@@ -141,12 +132,9 @@ def check_promise(path: Path, what: str, promised: int, least: int, present: int
 
 
 def read_json(path: Path, expected: str, kind: type = object) -> Any:
-    """What a JSON file holds.
+    """What a JSON file in UTF-8 holds; `kind`: `dict` or `list`, anything by default.
 
-    Args:
-        path: of the file, in UTF-8.
-        expected: what it should hold, for the error.
-        kind: `dict` or `list`; anything by default.
+    `expected`: what it should hold, for the error.
 
     Raises:
         BadInputError: missing, damaged, of another kind, or hardly anything but brackets, which

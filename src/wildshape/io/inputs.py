@@ -159,10 +159,7 @@ class TrackSource:
         return (track for _, track in self.tracks())
 
     def tracks(self, done: Callable[[str], bool] = lambda _: False) -> Iterator[tuple[int, Track]]:
-        """The usable tracks with their numbers, without those that are done already.
-
-        Args:
-            done: says so of a track's name.
+        """The usable tracks with their numbers, without those that are `done`, by their names.
 
         Raises:
             BadInputError: not a single track can be used.
@@ -184,11 +181,7 @@ class TrackSource:
             raise last
 
     def parts(self, most: int | None, done: Callable[[str], bool]) -> Iterator[Part]:
-        """The usable tracks in parts of at most so many scans.
-
-        Args:
-            most: scans of a part; None: all of a track.
-            done: see `tracks`.
+        """The usable tracks in parts of at most so many scans, None: whole; `done` as of `tracks`.
 
         Raises:
             BadInputError: not a single track can be used.
@@ -201,10 +194,7 @@ class TrackSource:
                 yield Part(index, replace(track.part(rows), shape=None), first, count)
 
     def single(self, why: str) -> Track:
-        """The only track.
-
-        Args:
-            why: what takes one track, for the error.
+        """The only track; `why` is what takes one, for the error.
 
         Raises:
             BadInputError: there are several, or it cannot be used.

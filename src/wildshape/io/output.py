@@ -150,11 +150,7 @@ def finished(
 
 
 def keep_apart(out: Path, *sources: Path | None) -> None:
-    """Refuse to read from what is written: `--overwrite` would remove the input.
-
-    Args:
-        out: folder that is written.
-        sources: data and weights that are read; None for those that are not.
+    """Refuse to read from what is written, which `--overwrite` removes; None is no source.
 
     Raises:
         BadInputError: an input is the output folder or lies in it.
@@ -270,10 +266,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def provenance(command: str) -> dict[str, Any]:
-    """JSON values that say how a result came about.
-
-    Args:
-        command: the command line, as a user would type it again.
+    """JSON values that say how the result of a command line came about.
 
     torch is asked only if it is imported already: reading a file must not cost seconds.
     """

@@ -25,10 +25,7 @@ _NEEDED, _OPTIONAL = ("directions", "ranges"), "origins"
 def read_rays(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> SightLines:
     """The rays in an `.npz` of `directions (m, 3)`, `ranges (m,)` and perhaps `origins (m, 3)`.
 
-    Args:
-        path: of the file.
-        coordinates: of ranges and origins on disk; what is returned is in metres and the sensor's
-            frame.
+    `coordinates`: of ranges and origins on disk; here they are in metres and the sensor's frame.
 
     Raises:
         BadInputError: an array is missing, shapes do not fit, or they are no rays.
@@ -54,10 +51,7 @@ def read_rays(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> Sig
 def check_unit(rays: SightLines | None, scan: Points, name: str) -> None:
     """Refuse rays that end in another order of magnitude than where their object lies.
 
-    Args:
-        rays: beside an object, metres.
-        scan: the object's own returns, the same frame.
-        name: for the error.
+    `scan`: the returns of the object; both in one frame, metres. `name` is for the error.
 
     Raises:
         BadInputError: nearly all end 60 times as far away, or most 30 times as near.

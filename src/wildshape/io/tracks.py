@@ -195,11 +195,6 @@ def rays_beside(
 ) -> SightLines | None:
     """The rays of a scan of a track folder, if it has any; they bear its name, or its file's.
 
-    Args:
-        path: of the scan.
-        scan: as it was read, metres.
-        coordinates: of the files.
-
     Raises:
         BadInputError: they are damaged, or of another unit.
     """

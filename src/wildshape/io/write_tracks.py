@@ -14,7 +14,8 @@ from wildshape.errors import BadInputError
 from wildshape.io.atomic import lock_folder
 from wildshape.io.output import begin, command_line, file_name, provenance
 from wildshape.io.progress import SILENT, Progress
-from wildshape.io.store.layout import INDEX_JSON, WRITING_JSON
+from wildshape.io.store.layout import INDEX_JSON
+from wildshape.io.store.origin import is_begun_by
 from wildshape.io.store.store import StoreWriter
 from wildshape.io.tracks import is_placed, place_track, write_track
 from wildshape.records import Track
@@ -93,17 +94,14 @@ class _Output(NamedTuple):
 def _packed(tracks: Iterable[Track], wanted: _Output) -> Iterator[Track]:
     """Into a packed store, which cannot be gone on with: a half-written one is begun again."""
     out = wanted.out
-    origin = {
-        **provenance(command_line()),
-        "made_by": wanted.command,
-        "settings": wanted.settings,
-    }
+    made = {"made_by": wanted.command, "settings": wanted.settings}
+    origin = provenance(command_line()) | made
     first, tracks = _first(tracks)
     if not first:
         return  # nothing half-written stays behind
     if not out.is_file():
         lock_folder(out)
-    again = _half_written(out, origin)
+    again = is_begun_by(out, origin) and not (out / INDEX_JSON).exists()
     if again:
         wanted.progress.say(f"beginning the half-written store {out} again")
     with StoreWriter(out, origin, overwrite=wanted.overwrite or again) as writer:
@@ -116,18 +114,6 @@ def _first(tracks: Iterable[Track]) -> tuple[list[Track], Iterator[Track]]:
     """The first track, if there is one, and an iterator over the others."""
     rest = iter(tracks)
     return list(islice(rest, 1)), rest
-
-
-def _half_written(out: Path, origin: dict[str, Any]) -> bool:
-    """Whether an interrupted run of the same command and settings left a store."""
-    path = out / WRITING_JSON
-    if not path.is_file() or (out / INDEX_JSON).exists():
-        return False
-    try:
-        found = json.loads(path.read_text("utf-8")).get("provenance", {})
-    except ValueError:
-        return False
-    return all(found.get(key) == origin[key] for key in ("made_by", "settings"))
 
 
 def _folders(tracks: Iterable[Track], wanted: _Output) -> Iterator[Track]:

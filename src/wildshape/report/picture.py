@@ -32,9 +32,7 @@ _COLUMNS = ("input scan", "completed", "fused by us", "truth")
 def write_picture(objects: Sequence[ReportObject], path: Path) -> None:
     """Draw objects as rows, input scan -> completed -> fused (-> truth) as columns.
 
-    Args:
-        objects: the rows; columns that no object has are left out.
-        path: `.png` stands still; `.webp` turns once around.
+    Columns that no object has are left out; `.png` stands still, `.webp` turns once around.
 
     Raises:
         BadInputError: nothing to draw, or another suffix.

@@ -80,7 +80,7 @@ class Job:
             returns = varied_returns(returns, rng)
         if isinstance(config.device, DepthCamera):
             return _camera_track(target, config, config.device, scans, returns, rng)
-        chance = np.random.default_rng([self.seed, index, 1]) if config.rays else None
+        chance = np.random.default_rng([self.seed, index, 1])
         return _lidar_track(target, config, config.device, scans, returns, rng, chance)
 
     def _target(self, index: int, rng: np.random.Generator) -> Solid:
@@ -100,7 +100,7 @@ def _lidar_track(
     scans: int,
     returns: Returns,
     rng: np.random.Generator,
-    of_rays: np.random.Generator | None,
+    of_rays: np.random.Generator,
 ) -> RawTrack:
     """Drive past an object, again if need be, until enough usable scans are together.
 
@@ -130,8 +130,11 @@ def _lidar_track(
                 usable.append((turn, T_object_sensor))
             if len(usable) == scans:
                 clouds, used = [turn.points for turn, _ in usable], np.stack([T for _, T in usable])
-                seen = _Seen(scene, target, lidar, returns, config)
-                passed = () if of_rays is None else seen.passing(usable, of_rays)
+                wall = _backdrop(of_rays) if config.varied else None
+                passed = tuple(
+                    passing_rays(scene, target, lidar, T, returns, turn, config.rays, of_rays, wall)
+                    for turn, T in (usable if config.rays else ())
+                )
                 return RawTrack(clouds, used, shape, target.kind, passed)
     raise BadInputError(
         f"the object {target.kind or 'given'} gives no {scans} scans of >= {config.min_points} "
@@ -140,29 +143,11 @@ def _lidar_track(
     )
 
 
-@dataclass(frozen=True)
-class _Seen:
-    """What a drive past an object saw."""
-
-    scene: Scene
-    target: Solid
-    lidar: SpinningLidar
-    returns: Returns
-    config: SimulationConfig
-
-    def passing(
-        self, turns: list[tuple[Turn, np.ndarray]], rng: np.random.Generator
-    ) -> tuple[SightLines | None, ...]:
-        """The rays of each turn that passed the object by."""
-        wall, most = self.backdrop(rng), self.config.rays
-        seen, returns = (self.scene, self.target, self.lidar), self.returns
-        return tuple(passing_rays(*seen, T, returns, turn, most, rng, wall) for turn, T in turns)
-
-    def backdrop(self, rng: np.random.Generator) -> Backdrop | None:
-        """For training a hedge or a house beyond the object, more often than not."""
-        if not self.config.varied or rng.random() >= _WALLED:
-            return None
-        return Backdrop(float(rng.uniform(*_WALL_OFFSET_M)), float(rng.uniform(*_WALL_HEIGHT_M)))
+def _backdrop(rng: np.random.Generator) -> Backdrop | None:
+    """For training a hedge or a house beyond the object, more often than not."""
+    if rng.random() >= _WALLED:
+        return None
+    return Backdrop(float(rng.uniform(*_WALL_OFFSET_M)), float(rng.uniform(*_WALL_HEIGHT_M)))
 
 
 def _stretch(

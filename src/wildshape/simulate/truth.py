@@ -20,14 +20,9 @@ def visible_surface(
     first hit from far away in at least one of some random directions. What is inside a closed
     body, or under a car, is therefore not in it.
 
-    Args:
-        solid: the object.
-        scene: of the object alone.
-        count: points returned.
-        lowest_deg: lowest elevation from which it is looked at: 0 for objects that stand on the
-            road (a LiDAR, higher than a car's floor, never looks up at it), -90 for objects seen
-            from everywhere.
-        rng: the only source of chance.
+    `lowest_deg`: lowest elevation from which it is looked at: 0 for objects that stand on the road
+    (a LiDAR, higher than a car's floor, never looks up at it), -90 for objects seen from
+    everywhere. `scene` is of the object alone.
 
     Raises:
         BadInputError: nearly nothing of the surface can be seen from outside.

@@ -98,6 +98,12 @@ def test_frames_without_a_scan_and_other_types_are_counted(training):
     assert (cyclist.name, cyclist.category) == ("0001_0012", "cyclist")
 
 
+def test_a_file_whose_name_is_no_number_is_no_scan(training):
+    """`²` is a digit to Python's isdigit, and none to int."""
+    (training / "velodyne" / "0001" / "².bin").touch()
+    assert set(tracks(training)) == set(NAMES.values())
+
+
 def test_an_object_unlabelled_for_a_while_stays_one(training):
     labels = training / "label_02" / "0001.txt"
     lines = labels.read_text().splitlines(keepends=True)

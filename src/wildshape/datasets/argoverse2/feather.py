@@ -26,10 +26,7 @@ _TEXTS = ("track_uuid", "category", "sensor_name")
 def read_feather(path: Path, names: tuple[str, ...], brings: str) -> Columns:
     """The named columns of a table, all `(n,)`; text comes as an array of objects.
 
-    Args:
-        path: of the file.
-        names: of the columns.
-        brings: what to get where the file is missing, in words.
+    `brings`: what to get where the file is missing, in words.
 
     Raises:
         BadInputError: the file is missing, damaged or lacks a column.

@@ -128,12 +128,7 @@ class CityPoses:
     ) -> Float[np.ndarray, "n 3"]:
         """Where the ray of each point began, in the egovehicle frame at the sweep's time, metres.
 
-        The LiDARs go on with the vehicle while they turn.
-
-        Args:
-            stamp: of the sweep.
-            sweep: its points.
-            T_ego_lidars: of up_lidar and of down_lidar.
+        The LiDARs, up_lidar and then down_lidar, go on with the vehicle while they turn.
         """
         T_stamp_city = self.at(stamp).inverse()
         steps = np.clip(np.rint(sweep.offsets_ns / _STEP_NS), -_MOST_STEPS, _MOST_STEPS)

@@ -16,9 +16,7 @@ _LARGEST = 1e9  # metres or pixels; squares of far larger numbers overflow
 def read_calibration(path: Path, cure: str) -> dict[str, np.ndarray]:
     """The numbers of each line by the line's name; a colon after the name is optional.
 
-    Args:
-        path: of the file.
-        cure: what brings a file that is missing, for the error.
+    `cure`: what brings a file that is missing, for the error.
 
     Raises:
         BadInputError: the file is missing or a line is not a name and numbers.

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from wildshape.datasets.tracks.parts import numbered
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 
@@ -36,15 +37,14 @@ def drive_poses(drive: Path) -> dict[int, SE3]:
     Raises:
         BadInputError: the GPS/IMU records or their calibration are missing or damaged.
     """
-    files = sorted(file for file in (drive / _OXTS).glob("*.txt") if file.stem.isdecimal())
-    if not files:
-        raise BadInputError(
-            f"{drive / _OXTS}: no records; whether an object moves needs the GPS/IMU data that"
-            " KITTI's 'synced+rectified' archive of the drive brings."
-        )
-    rows = [_record(file.read_text(errors="replace"), f"{file}") for file in files]
+    none = (
+        "no records; whether an object moves needs the GPS/IMU data that KITTI's 'synced+rectified'"
+        " archive of the drive brings"
+    )
+    files = numbered(drive / _OXTS, ".txt", none)
+    rows = [_record(file.read_text(errors="replace"), f"{file}") for file in files.values()]
     T_world_velo = poses_of(np.asarray(rows)) @ _T_velo_imu(drive.parent / _CALIBRATION).inverse()
-    return {int(file.stem): T_world_velo[i] for i, file in enumerate(files)}
+    return dict(zip(files, T_world_velo))
 
 
 def _record(text: str, where: str) -> list[float]:

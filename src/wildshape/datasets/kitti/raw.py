@@ -143,7 +143,7 @@ def scan_files(drive: Path) -> dict[int, Path]:
     files: dict[int, Path] = {}
     for folder in reversed(_SCAN_FOLDERS):
         found = (drive / folder).glob("*.bin")
-        files |= {int(path.stem): path for path in found if path.stem.isdigit()}
+        files |= {int(path.stem): path for path in found if path.stem.isdecimal()}
     if not files:
         raise BadInputError(
             f"{drive / _SCAN_FOLDERS[0]}: no .bin scans; KITTI's 'synced+rectified' archive of the "

@@ -21,7 +21,7 @@ from wildshape.datasets.tracks.labelled_boxes import (
     crop_objects,
     described,
 )
-from wildshape.datasets.tracks.parts import found_in
+from wildshape.datasets.tracks.parts import found_in, numbered
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError, SharedInputError
 from wildshape.geometry.transforms.se3 import SE3
@@ -159,16 +159,11 @@ def _open(training: Path, name: str) -> _Sequence:
     return _Sequence(
         name=name,
         labels=read_boxes(training / _LABELS / f"{name}.txt"),
-        scans=_scan_files(training / _SCANS / name),
+        scans=numbered(
+            training / _SCANS / name,
+            ".bin",
+            "no .bin scans; KITTI tracking's velodyne archive brings them",
+        ),
         T_velo_rect=(T_rect_camera @ T_camera_velo).inverse(),
         T_world_velo=T_world_velo,
     )
-
-
-def _scan_files(folder: Path) -> dict[int, Path]:
-    files = {int(path.stem): path for path in folder.glob("*.bin") if path.stem.isdigit()}
-    if not files:
-        raise BadInputError(
-            f"{folder}: no .bin scans; KITTI tracking's velodyne archive brings them."
-        )
-    return files

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """KITTI tracking's `label_02/SSSS.txt`: boxes in the rectified frame of camera 2's rig."""
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from wildshape.datasets.tracks.labelled_boxes import check_boxes
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detector import MOST_TURN
+from wildshape.io.boxes.detector_kitti import box_axes
 
 CATEGORIES = (
     "Car",
@@ -93,15 +93,7 @@ def _box(words: list[str], where: str) -> LabelledBox:
         raise BadInputError(
             f"{where}: frame {words[0]}, object {words[1]}, turn {turn} radians; {_CURE}."
         )
-    pose = _pose(x, y - height / 2, z, turn)
+    centre = torch.tensor((x, y - height / 2, z), dtype=torch.float64)
+    pose = SE3(box_axes(turn), centre)
     check_boxes(np.asarray([[length, width, height]]), pose, where, _CURE)
     return LabelledBox(frame, track, words[2], (length, width, height), pose)
-
-
-def _pose(x: float, y: float, z: float, turn: float) -> SE3:
-    """Forward is camera x turned by `turn` about camera y (down); up is camera -y."""
-    c, s = math.cos(turn), math.sin(turn)
-    axes = ((c, s, 0.0), (0.0, 0.0, -1.0), (-s, c, 0.0))
-    return SE3(
-        torch.tensor(axes, dtype=torch.float64), torch.tensor((x, y, z), dtype=torch.float64)
-    )

@@ -174,11 +174,7 @@ def info_of(tables: Path, frame: Frame) -> Path | None:
 
 
 def read_sweep(path: Path, info: Path | None = None) -> Points:
-    """One whole sweep `(n, 3)`, metres, in the frame of LIDAR_TOP.
-
-    Args:
-        path: of the file.
-        info: see `info_of`.
+    """One whole sweep `(n, 3)`, metres, in the frame of LIDAR_TOP; `info` as of `info_of`.
 
     Raises:
         BadInputError: the file is missing or no sequence of x y z intensity ring in float32, or

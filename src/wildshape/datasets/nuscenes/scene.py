@@ -26,7 +26,6 @@ class Frame:
         sample: number of the key frame that it is, or that follows it.
         is_key: whether its boxes were labelled.
         microseconds: Unix time.
-        T_global_sensor: one pose.
         info: file that may say how many numbers a point has (T4), relative to the data root.
     """
 
@@ -83,12 +82,7 @@ class Scene:
 
 
 def read_scene(db: sqlite3.Connection, name: str, *, sweeps: bool) -> Scene:
-    """A scene out of the index of its tables.
-
-    Args:
-        db: see `table_index.index_of`.
-        name: of the scene.
-        sweeps: also the frames between the key frames.
+    """A scene out of `table_index.index_of`; `sweeps`: the frames between the key frames, too.
 
     Raises:
         BadInputError: there is no such scene.

@@ -19,6 +19,7 @@ from jaxtyping import Float
 
 from wildshape.datasets.pandaset.pandas_pickle import read_pickled_table
 from wildshape.datasets.tracks.labelled_boxes import WORLD_M, check_boxes
+from wildshape.datasets.tracks.parts import numbered
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
 from wildshape.geometry.transforms.se3 import SE3, between
@@ -74,11 +75,7 @@ def frame_files(folder: Path) -> dict[int, Path]:
     Raises:
         BadInputError: there is none.
     """
-    stems = {file.name.removesuffix(FILE): file for file in folder.glob(f"*{FILE}")}
-    files = {int(stem): file for stem, file in stems.items() if stem.isdecimal()}
-    if not files:
-        raise BadInputError(f"{folder}: holds none of 00{FILE} to 79{FILE}; {_BRINGS}.")
-    return dict(sorted(files.items()))
+    return numbered(folder, FILE, f"holds none of 00{FILE} to 79{FILE}; {_BRINGS}")
 
 
 def read_cuboids(path: Path) -> Cuboids:

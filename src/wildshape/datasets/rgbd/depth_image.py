@@ -20,9 +20,7 @@ _LARGEST = 0xFFFF
 def read_png(path: Path, what: str) -> Shaped[np.ndarray, "h w"]:
     """The numbers in a PNG of one channel, 8 or 16 bits; of a palette its indices.
 
-    Args:
-        path: the file.
-        what: it should be, for the error: `a 16-bit depth PNG`.
+    `what` it should be, for the error: `a 16-bit depth PNG`.
 
     Raises:
         BadInputError: no such file, truncated, in colour, or far larger than its file.

@@ -78,19 +78,6 @@ def categories_of(categories: Iterable[str], motion: Motion) -> dict[int, Kind]:
     return kinds
 
 
-def label_files(folder: Path) -> dict[int, Path]:
-    """The label file of each frame that has one.
-
-    Raises:
-        BadInputError: there is none.
-    """
-    found = folder.glob("*.label")
-    files = {int(path.stem): path for path in sorted(found) if path.stem.isdigit()}
-    if not files:
-        raise BadInputError(f"{folder}: no .label files; {LABELS_CURE}.")
-    return files
-
-
 def read_labels(path: Path) -> Labels:
     """The labels of one scan's points.
 

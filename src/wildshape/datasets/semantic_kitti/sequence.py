@@ -14,11 +14,10 @@ from wildshape.datasets.semantic_kitti.labels import (
     Kind,
     Labels,
     Visit,
-    label_files,
     on_objects,
     read_labels,
 )
-from wildshape.datasets.tracks.parts import found_in
+from wildshape.datasets.tracks.parts import found_in, numbered
 from wildshape.datasets.tracks.selection import measured
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
@@ -117,7 +116,7 @@ def open_sequence(folder: Path, name: str, labels: str, kinds: dict[int, Kind]) 
     Raises:
         BadInputError: no labels, scans, calibration or poses, or fewer poses than frames.
     """
-    files = label_files(folder / labels)
+    files = numbered(folder / labels, ".label", f"no .label files; {LABELS_CURE}")
     if not (folder / _SCANS).is_dir():
         raise BadInputError(
             f"{folder / _SCANS}: no such folder; KITTI odometry's scans "

@@ -33,10 +33,7 @@ class Damage:
     def miss(self, what: str, error: BadInputError, count: int = 1) -> None:
         """Go on without a piece; the first of a part are named, the others are only counted.
 
-        Args:
-            what: a word for the piece: `scan`, `object`.
-            error: what is wrong with it.
-            count: how many pieces are lost by it.
+        `what` is a word for the piece (`scan`, `object`), `count` how many are lost by it.
         """
         self.note(error)
         named = error in self._errors
@@ -101,11 +98,7 @@ class Gathering:
     def wants(self, name: str, frame: int, *, category: str, source: str) -> bool:
         """Whether this frame of an object is to be cropped at all (`Selection.every`).
 
-        Args:
-            name: of the object and of its track, unique in the data set.
-            frame: number of the frame; frames never go back.
-            category: of the object.
-            source: where it comes from, in words.
+        `name`: of the object and of its track, unique in the data set; frames never go back.
         """
         seen = self._objects.setdefault(name, _Object(category, source))
         seen.offered += 1
@@ -115,9 +108,7 @@ class Gathering:
     def read(self, read: Callable[[], Scan | None], wanted: int) -> Scan | None:
         """What a frame's file holds; None, and counted why, where it is missing or damaged.
 
-        Args:
-            read: the file; None where there is none.
-            wanted: how many objects are to be cut out of it; for none it is not read.
+        `read` gives None where there is no file; for no object that is wanted it is not read.
         """
         if not wanted:
             return None

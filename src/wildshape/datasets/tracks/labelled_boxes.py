@@ -66,13 +66,8 @@ def crop_objects(
 ) -> None:
     """Cut the objects of a frame that are wanted out of its scan, which is read only for them.
 
-    Args:
-        objects: in the frame.
-        scan_name: of the frame.
-        read: the whole scan, sensor frame, metres, or its points `(s, 3)` alone; None where the
-            frame has no file.
-        crop: see there.
-        to: gathers the tracks; counts a scan that is missing or damaged.
+    `read` gives the whole scan, sensor frame, metres, or its points `(s, 3)` alone; None where the
+    frame has no file. A scan that is missing or damaged is counted.
     """
     wanted = [
         one
@@ -107,11 +102,8 @@ def rows_in_box(
 ) -> Int[np.ndarray, " n"]:
     """Which points of a whole scan belong to a box's object, as rows of it in rising order.
 
-    Args:
-        cloud: `(s, 3)` sensor frame, metres.
-        T_sensor_object: of the box; origin at its CENTRE, x forward, y left, z up.
-        size: full lengths along the box's own x, y, z, metres.
-        crop: see there.
+    Sensor frame, metres; the box's origin is its CENTRE, x forward, y left, z up, and its size is
+    full lengths along these.
     """
     half = np.asarray(size) / 2
     centre = T_sensor_object.translation.numpy()
@@ -129,11 +121,7 @@ def rows_in_box(
 def check_boxes(sizes: Float[np.ndarray, "b 3"], poses: SE3, where: str, cure: str) -> None:
     """Refuse boxes that no object can have.
 
-    Args:
-        sizes: full lengths, metres.
-        poses: one a box.
-        where: the file, for the error.
-        cure: what to do, for the error.
+    `sizes` are full lengths, metres; `where` and `cure` are for the error.
 
     Raises:
         BadInputError: a size that is not above 0 or over 1 km, a pose that is not finite.

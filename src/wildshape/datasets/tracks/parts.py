@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the parts of a data set are called: folders below its root, or groups of numbered tracks."""
+"""What the parts of a data set are called: folders below its root, groups of tracks, frames."""
 
 import re
 from pathlib import Path
@@ -26,6 +26,19 @@ def found_in(folder: Path) -> str:
         return "no such folder"
     names = sorted(path.name for path in folder.iterdir())
     return f"found {', '.join(names[:8]) or 'an empty folder'}"
+
+
+def numbered(folder: Path, suffix: str, none: str) -> dict[int, Path]:
+    """The files of a folder by the number that is their name, in order; others are passed over.
+
+    Raises:
+        BadInputError: there is none; `none` says so, and what to do.
+    """
+    stems = {file.name.removesuffix(suffix): file for file in sorted(folder.glob(f"*{suffix}"))}
+    files = {int(stem): file for stem, file in stems.items() if stem.isdecimal()}
+    if not files:
+        raise BadInputError(f"{folder}: {none}.")
+    return dict(sorted(files.items()))
 
 
 def groups(count: int) -> list[str]:

@@ -134,7 +134,6 @@ class TruthBuilder:
             reflection at the object's own x-z plane (y -> -y).
         outliers: which rule removes stray points; see `geometry.sampling`.
         radius: of the rule `radius`: a point needs `neighbours` others within this, metres.
-        neighbours: see `radius`.
         strip: height above the lowest points that is left out as ground, metres; for readers
             that have not already done so.
         lowest: share of the points that may lie under the ground from which `strip` counts: one

@@ -170,9 +170,7 @@ def _places(origins: Points) -> Points:
 def frames(tables: dict[str, Path], boxes: dict[int, list[Labelled]]) -> Iterator[Frame]:
     """The frames of a segment that have boxes, in time order, one held at a time.
 
-    Args:
-        tables: file of each component.
-        boxes: by time in microseconds.
+    `boxes`: by time in microseconds.
 
     Raises:
         BadInputError: a table is missing or corrupt, or they are not of one segment.

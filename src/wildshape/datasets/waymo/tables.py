@@ -42,7 +42,6 @@ class Calibration:
     """Of the TOP LiDAR.
 
     Attributes:
-        T_vehicle_sensor: one pose.
         table: inclination of each beam, radians, lowest first; None if they are spread evenly.
         limits: least and largest inclination, radians, where there is no table.
         path: of the file that it was read from.
@@ -141,10 +140,8 @@ def range_images(path: Path, component: str) -> Iterator[tuple[int, np.ndarray]]
 
     One image is held, however the file is cut into row groups.
 
-    Args:
-        path: of the table.
-        component: `LiDARComponent` (range, intensity, elongation, in a no-label zone) or
-            `LiDARPoseComponent` (roll, pitch, yaw, x, y, z).
+    `component`: `LiDARComponent` (range, intensity, elongation, in a no-label zone) or
+    `LiDARPoseComponent` (roll, pitch, yaw, x, y, z).
 
     Raises:
         BadInputError: the table is missing or damaged, or its frames are not in time order.

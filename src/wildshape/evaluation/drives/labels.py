@@ -19,6 +19,7 @@ from wildshape.datasets.kitti.oxts import read_oxts
 from wildshape.datasets.kitti.raw import read_velodyne
 from wildshape.datasets.kitti.tracking import VEHICLES
 from wildshape.datasets.kitti.tracking_labels import LabelledBox, read_boxes
+from wildshape.datasets.tracks.parts import numbered
 from wildshape.errors import BadInputError
 from wildshape.evaluation.drives.overlap import UprightBox
 from wildshape.geometry.box import SIGNS
@@ -193,14 +194,8 @@ def _place(path: Path) -> _Place:
 
 def _scans(place: _Place) -> tuple[Path, ...]:
     folder = place.root / "velodyne" / place.name
-    found = sorted(
-        (file for file in folder.glob("*.bin") if file.stem.isdigit()), key=lambda f: int(f.stem)
-    )
-    if not found:
-        raise BadInputError(
-            f"{folder}: no .bin scans; labels count by their points, keep the scans beside them."
-        )
-    return tuple(found)
+    none = "no .bin scans; labels count by their points, keep the scans beside them"
+    return tuple(numbered(folder, ".bin", none).values())
 
 
 def _projection(calibration: dict[str, np.ndarray], T_rect_velo: SE3, place: _Place) -> np.ndarray:

@@ -50,11 +50,7 @@ class Cloud(NamedTuple):
 
 
 def cloud_of(data: bytes, *, cdr: bool) -> Cloud:
-    """All points of a message.
-
-    Args:
-        data: serialized.
-        cdr: as ROS 2 does; otherwise as ROS 1 does.
+    """All points of a message, serialized as ROS 2 does (`cdr`) or as ROS 1 does.
 
     Raises:
         ValueError: no fields x, y and z, or fewer bytes than it promises.

@@ -19,11 +19,8 @@ def write_argoverse2_boxes(
 ) -> None:
     """Write a feather table with the columns of Argoverse 2's labels, and `score`.
 
-    Args:
-        path: of the file, `annotations.feather` by custom.
-        detections: a row each.
-        T_ego_sensor: the data set's boxes are in the egovehicle frame; None leaves them in the
-            sensor's.
+    The data set's boxes are in the egovehicle frame; without `T_ego_sensor` they stay in the
+    sensor's.
 
     Raises:
         MissingExtraError: pyarrow is not installed.

@@ -83,10 +83,7 @@ def check_radians(turn: float) -> float:
 def upright_box(centre: Sequence[float], size: Sequence[float], yaw: float) -> Box:
     """A box that does not lean.
 
-    Args:
-        centre: x, y, z of its middle, metres.
-        size: length, width, height, metres.
-        yaw: about z, counter-clockwise from x, radians.
+    Metres; `size` is length, width, height; `yaw` about z, counter-clockwise from x, radians.
 
     Raises:
         ValueError: not three numbers each, no box, or a turn in degrees.

@@ -12,6 +12,8 @@ from math import cos, sin
 from pathlib import Path
 
 import torch
+from jaxtyping import Float
+from torch import Tensor
 
 from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.geometry.transforms.se3 import SE3
@@ -55,14 +57,13 @@ def _boxes(lines: list[str], stem: str, T_sensor_rect: SE3) -> Iterator[Detector
 
 def _given(words: list[str], scan: str, track: str | None, T_sensor_rect: SE3) -> DetectorBox:
     height, width, length, x, y, z, turn = map(float, words[8:15])
-    upright = Box((x, y - height / 2, z), (length, width, height), _quaternion(check_radians(turn)))
+    qw, qx, qy, qz = quaternion_from_rotation(box_axes(check_radians(turn))).tolist()
+    upright = Box((x, y - height / 2, z), (length, width, height), (qw, qx, qy, qz))
     score = float(words[_SCORE]) if len(words) > _SCORE else None
     return DetectorBox(scan, words[0], track, moved(checked(upright), T_sensor_rect), score)
 
 
-def _quaternion(turn: float) -> tuple[float, float, float, float]:
+def box_axes(turn: float) -> Float[Tensor, "3 3"]:
     """Forward is camera x turned by `turn` about camera y (down); up is camera -y."""
     c, s = cos(turn), sin(turn)
-    axes = torch.tensor(((c, s, 0.0), (0.0, 0.0, -1.0), (-s, c, 0.0)), dtype=torch.float64)
-    qw, qx, qy, qz = quaternion_from_rotation(axes).tolist()
-    return qw, qx, qy, qz
+    return torch.tensor(((c, s, 0.0), (0.0, 0.0, -1.0), (-s, c, 0.0)), dtype=torch.float64)

@@ -22,9 +22,7 @@ def read_results(path: Path, scans: int) -> list[DetectorBox]:
     frame, as `write_nuscenes_boxes` writes them. A list is of OpenPCDet or mmdetection3d, an object
     a scan; an object with `bboxes_3d` is one scan of mmdetection3d, named as the file.
 
-    Args:
-        path: of the file.
-        scans: of the drive; a list that does not name its own has as many.
+    `scans`: of the drive; a list that does not name its own has as many.
 
     Raises:
         BadInputError: it cannot be read, holds something else, or a list of other scans.

@@ -83,12 +83,8 @@ def label_line(
 ) -> str:
     """A line of label_02, without a score.
 
-    Args:
-        frame: number of the scan.
-        track: number of the object.
-        kind: as KITTI names it, for example `Car`.
-        box: in the rectified camera frame; one that leans is stood upright about its centre.
-        projection: see `KittiCamera`.
+    `kind`: as KITTI names it, for example `Car`. The box is in the rectified camera frame; one that
+    leans is stood upright about its centre. `projection`: see `KittiCamera`.
     """
     (x, y, z), (length, width, height) = box.centre, box.size
     forward = pose_of(box).rotation[:, 0]

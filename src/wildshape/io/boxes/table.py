@@ -24,9 +24,7 @@ class BoxRow:
         frame: counted from 0.
         time: seconds, if known.
         track: name of the vehicle.
-        x: of the box's centre, the frame's sensor frame, metres.
-        y: see x.
-        z: see x.
+        x: of the box's centre, the frame's sensor frame, metres, like y and z.
         length: metres, along the heading.
         width: metres.
         height: metres.

@@ -24,7 +24,6 @@ class OusterTurns:
     """The turns of a recording, in time order.
 
     Attributes:
-        path: of the packets.
         described: what the sensor says of itself, JSON.
         times: of each turn's first column, on the sensor's clock, seconds.
         warnings: what is odd about it, a sentence each.

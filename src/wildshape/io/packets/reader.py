@@ -18,13 +18,8 @@ SUFFIXES = (".pcap", ".pcapng")
 
 @dataclass(frozen=True)
 class PacketFile:
-    """A recording of packets.
+    """A recording of packets, its turns read one by one."""
 
-    Attributes:
-        turns: in it.
-    """
-
-    path: Path
     turns: VelodyneTurns | OusterTurns
 
     def __call__(self, number: int) -> Turn:
@@ -33,7 +28,7 @@ class PacketFile:
         Raises:
             BadInputError: damaged.
         """
-        with reading(self.path, f"packets of turn {number}"):
+        with reading(self.turns.path, f"packets of turn {number}"):
             turn = self.turns(number)
             kept = np.isfinite(turn.points).all(1)
             seconds = None if turn.seconds is None else turn.seconds[kept]
@@ -63,4 +58,4 @@ def open_packets(path: Path) -> PacketFile:
             f"{path}: {odd}no whole turn of a Velodyne; an Ouster's needs the sensor's own"
             f" description, {described.name}, beside it."
         )
-    return PacketFile(path, turns)
+    return PacketFile(turns)

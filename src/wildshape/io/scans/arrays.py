@@ -38,9 +38,7 @@ def read_kitti_bin(path: Path) -> Float32[np.ndarray, "n 3"]:
 def read_rows(path: Path, columns: str) -> Float32[np.ndarray, "n 3"]:
     """The x y z of a file of bare float32 rows, little endian.
 
-    Args:
-        path: of the file.
-        columns: names of all, x y z intensity first.
+    `columns`: names of all, x y z intensity first.
 
     Raises:
         BadInputError: missing, or its size is no multiple of a row's, or 0, or the rows have

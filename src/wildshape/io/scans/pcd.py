@@ -55,16 +55,7 @@ def read_pcd(path: Path) -> Float[np.ndarray, "n 3"]:
     """
     with path.open("rb") as file:
         header = _read_header(file, path)
-        present = path.stat().st_size - file.tell()
-        if header.encoding == "ascii":
-            points = _read_ascii(file, header, present, path, _AXES)
-        elif header.encoding == "binary":
-            check_promise(path, "points", header.points, header.points * header.row_bytes, present)
-            points = _read_rows(file, header)
-        else:
-            places = [header.fields.index(axis) for axis in _AXES]
-            columns = _columns(_unpacked(file, header, present, path), header, places)
-            points = np.stack(columns, -1).astype(np.float64)
+        points = _read(file, header, path, _AXES).astype(np.float64, copy=False)
     if len(points) != header.points:
         raise BadInputError(
             f"{path}: the header promises {header.points} points, the file holds {len(points)}: "
@@ -82,16 +73,24 @@ def read_pcd_field(path: Path, names: tuple[str, ...]) -> Num[np.ndarray, "n"] |
     with reading(path, "a PCD file"), path.open("rb") as file:
         header = _read_header(file, path)
         found = [name for name in names if name in header.fields]
-        if not found:
-            return None
-        place = header.fields.index(found[0])
-        present = path.stat().st_size - file.tell()
-        if header.encoding == "ascii":
-            return _read_ascii(file, header, present, path, found[:1])[:, 0]
-        if header.encoding == "binary_compressed":
-            return _columns(_unpacked(file, header, present, path), header, [place])[0]
-        check_promise(path, "points", header.points, header.points * header.row_bytes, present)
-        return _rows(file, header)[f"{place}"][:, 0]
+        return _read(file, header, path, found[:1])[:, 0] if found else None
+
+
+def _read(
+    file: IO[bytes], header: _Header, path: Path, names: Sequence[str]
+) -> Num[np.ndarray, "n k"]:
+    """The first number of some fields, of each point, in the narrowest type that holds them all."""
+    present = path.stat().st_size - file.tell()
+    if header.encoding == "ascii":
+        return _read_ascii(file, header, present, path, names)
+    places = [header.fields.index(name) for name in names]
+    if header.encoding == "binary_compressed":
+        return np.stack(_columns(_unpacked(file, header, present, path), header, places), -1)
+    check_promise(path, "points", header.points, header.points * header.row_bytes, present)
+    # The fields of a row are named by their place.
+    fields = [(f"{i}", kind, (n,)) for i, (kind, n) in enumerate(zip(header.kinds, header.counts))]
+    rows = np.frombuffer(file.read(header.points * header.row_bytes), np.dtype(fields))
+    return np.stack([rows[f"{place}"][:, 0] for place in places], -1)
 
 
 def _read_header(file: IO[bytes], path: Path) -> _Header:
@@ -144,7 +143,6 @@ def _point_count(found: dict[str, list[str]]) -> int:
 def _read_ascii(
     file: IO[bytes], header: _Header, present: int, path: Path, names: Sequence[str]
 ) -> Float[np.ndarray, "n k"]:
-    """The first number of some fields, of each point."""
     check_promise(
         path, "points", header.points, header.points * 2 * sum(header.counts) - 1, present
     )
@@ -154,20 +152,6 @@ def _read_ascii(
         return np.empty((0, len(names)))
     columns = [sum(header.counts[: header.fields.index(name)]) for name in names]
     return np.loadtxt(chain([first], lines), usecols=columns, ndmin=2, comments=None)
-
-
-def _read_rows(file: IO[bytes], header: _Header) -> Float[np.ndarray, "n 3"]:
-    rows = _rows(file, header)
-    return np.stack([rows[f"{header.fields.index(axis)}"][:, 0] for axis in _AXES], -1).astype(
-        np.float64
-    )
-
-
-def _rows(file: IO[bytes], header: _Header) -> np.ndarray:
-    """The points of a binary file; its fields are named by their place."""
-    kinds = header.kinds
-    fields = [(f"{i}", kind, (n,)) for i, (kind, n) in enumerate(zip(kinds, header.counts))]
-    return np.frombuffer(file.read(header.points * header.row_bytes), np.dtype(fields))
 
 
 def _unpacked(file: IO[bytes], header: _Header, present: int, path: Path) -> bytes:

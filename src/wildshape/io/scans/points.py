@@ -210,9 +210,7 @@ def without_repeats(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "k 3"
 def check_scan(points: Float[np.ndarray, "n 3"], name: str) -> None:
     """Refuse what cannot be a scan of one object in metres, taken by a sensor at the origin.
 
-    Args:
-        points: `(n, 3)`, metres, in the precision of the file.
-        name: the file, for the error.
+    Points are in metres, in the precision of the file; `name` is for the error.
 
     Raises:
         BadInputError: fewer than 16 finite, different points, all points equal, an extent (the
@@ -255,11 +253,7 @@ def check_repeats(points: Float[np.ndarray, "n 3"], name: str) -> Float[np.ndarr
 
 
 def check_one_object(points: Float[np.ndarray, "n 3"], name: str) -> None:
-    """Refuse a scene, and units that are no metres.
-
-    Args:
-        points: `(n, 3)`, finite, metres.
-        name: the file, for the error.
+    """Refuse a scene, and units that are no metres; `name` is for the error.
 
     Raises:
         BadInputError: they are over 100 m or under 1 cm across.
@@ -289,10 +283,6 @@ def _extent(points: Float[np.ndarray, "n 3"]) -> float:
 
 def check_near(points: Float[np.ndarray, "n 3"], name: str) -> None:
     """Refuse what no sensor at the origin saw, and what float32 could not hold to a millimetre.
-
-    Args:
-        points: `(n, 3)`, metres, in the precision of the file.
-        name: the file, for the error.
 
     Raises:
         BadInputError: the points lie farther than 1 km from the origin.

@@ -33,9 +33,7 @@ FIELDS = {
 def read_turn(path: Path, scan_time: float | None) -> Turn:
     """A whole scan, and when its points were taken, if a PLY, PCD, LAS, LAZ or .npy says so.
 
-    Args:
-        path: as of `read_points`.
-        scan_time: of the scan, seconds, if known.
+    `scan_time`: of the scan, seconds, if known.
 
     Raises:
         BadInputError: as `read_points`.

@@ -51,40 +51,19 @@ def cloud_bytes(points: Float[np.ndarray, "n 3"], kind: CloudFormat) -> bytes:
 
 
 def write_ply(path: Path | str, points: Float[np.ndarray, "n 3"]) -> None:
-    """Write points as binary little-endian PLY, float32 x y z, atomically.
-
-    Args:
-        path: the file; its folder is made if needed.
-        points: `(n, 3)`, metres.
-    """
+    """Write points, metres, as binary little-endian PLY, float32 x y z, atomically."""
     with atomic_write(path) as file:
         file.write(ply_bytes(points))
 
 
-def _ply(file: BinaryIO, points: Float[np.ndarray, "n 3"]) -> None:
-    file.write(ply_bytes(points))
-
-
-def _pcd(file: BinaryIO, points: Float[np.ndarray, "n 3"]) -> None:
-    file.write(_pcd_bytes(points))
-
-
-def _text(file: BinaryIO, points: Float[np.ndarray, "n 3"]) -> None:
-    np.savetxt(file, points, fmt="%.6f")
-
-
-def _las(file: BinaryIO, points: Float[np.ndarray, "n 3"], *, packed: bool) -> None:
-    las_cloud(points).write(file, do_compress=packed)
-
-
-_WRITERS: dict[str, Callable[[BinaryIO, Float[np.ndarray, "n 3"]], None]] = {
-    ".ply": _ply,
-    ".pcd": _pcd,
+_WRITERS: dict[str, Callable[[BinaryIO, Float[np.ndarray, "n 3"]], object]] = {
+    ".ply": lambda file, points: file.write(ply_bytes(points)),
+    ".pcd": lambda file, points: file.write(_pcd_bytes(points)),
     ".npy": np.save,
-    ".xyz": _text,
-    ".txt": _text,
-    ".las": partial(_las, packed=False),
-    ".laz": partial(_las, packed=True),
+    ".xyz": partial(np.savetxt, fmt="%.6f"),
+    ".txt": partial(np.savetxt, fmt="%.6f"),
+    ".las": lambda file, points: las_cloud(points).write(file, do_compress=False),
+    ".laz": lambda file, points: las_cloud(points).write(file, do_compress=True),
 }
 CLOUD_SUFFIXES = tuple(_WRITERS)
 """The suffixes of files that points are written to, in lower case."""
@@ -108,11 +87,7 @@ def check_suffix(path: Path) -> None:
 
 
 def write_cloud(path: Path, points: Float[np.ndarray, "n 3"]) -> None:
-    """Write points atomically.
-
-    Args:
-        path: .ply .pcd .npy .xyz .txt .las .laz
-        points: metres.
+    """Write points, metres, atomically, in the format of `CLOUD_SUFFIXES` that the name ends in.
 
     Raises:
         BadInputError: another suffix, one of a format of float32 for points that it would move by
@@ -188,7 +163,6 @@ class MeshFiles:
     """How meshes are wanted.
 
     Attributes:
-        kind: of the files.
         coloured: by confidence (`geometry/meshing.py`).
     """
 

@@ -46,10 +46,7 @@ def is_joining(out: Path) -> bool:
 def join_stores(parts: Sequence[Path], out: Path, provenance: dict[str, Any]) -> None:
     """Make one store of several, in their order; they are used up.
 
-    Args:
-        parts: finished stores, below `out` in `.parts`, which is removed.
-        out: the folder of the new store; an older store there is replaced.
-        provenance: JSON values kept with the store.
+    They lie below `out` in `.parts`, which is removed; an older store at `out` is replaced.
 
     Raises:
         BadInputError: two tracks have one name, or a part is damaged.

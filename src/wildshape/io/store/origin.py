@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from wildshape.io.store.layout import INDEX_JSON
+from wildshape.io.store.layout import INDEX_JSON, WRITING_JSON
 
 _RECORDS = (INDEX_JSON, "wildshape.json")
 
@@ -34,9 +34,24 @@ def origin_of(path: Path) -> StoreOrigin:
     return StoreOrigin()
 
 
+def unfinished_provenance(path: Path) -> dict[str, Any]:
+    """That of a packed store which is being written; a damaged record counts as none."""
+    return _provenance(_read(path / WRITING_JSON))
+
+
+def is_begun_by(path: Path, made: dict[str, Any]) -> bool:
+    """Whether a run of the command and settings in a provenance was stopped while writing there."""
+    found = unfinished_provenance(path)
+    return all(found.get(key) == made[key] for key in ("made_by", "settings"))
+
+
+def _provenance(record: dict[str, Any]) -> dict[str, Any]:
+    found = record.get("provenance")
+    return found if isinstance(found, dict) else {}
+
+
 def _parse(record: dict[str, Any]) -> StoreOrigin:
-    provenance = record.get("provenance")
-    provenance = dict(provenance) if isinstance(provenance, dict) else {}
+    provenance = dict(_provenance(record))
     provenance.pop("parts", None)  # of a large data set there are thousands
     raw = provenance.pop("left_out", None) or record.get("left_out")
     left_out = raw if isinstance(raw, dict) else {}

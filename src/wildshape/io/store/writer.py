@@ -307,9 +307,7 @@ def check_room(path: Path, *, overwrite: bool) -> None:
 def remove_store(path: Path, *, parts: bool = True) -> None:
     """Remove a store, finished or half-written: its own files, no others.
 
-    Args:
-        path: its folder.
-        parts: remove the finished parts of a conversion as well.
+    `parts`: the finished parts of a conversion, too.
     """
     # The store ends to exist with its manifest, which therefore goes first.
     own = (INDEX_JSON, JOINING_JSON, INDEX_TENSORS, "points-*.safetensors*", ".*.part")

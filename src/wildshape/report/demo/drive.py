@@ -32,11 +32,7 @@ class DemoDrive:
 def find_vehicles(out: Path, scans: int, predictor: Predictor, progress: Progress) -> DemoDrive:
     """Simulate a drive below `out`, find its vehicles, and draw them.
 
-    Args:
-        out: the demo's folder.
-        scans: ten a second; 0 leaves the drive out.
-        predictor: completes them.
-        progress: is told what goes on.
+    `scans`: ten a second; 0 leaves the drive out.
     """
     if scans == 0:
         return DemoDrive("")

@@ -130,9 +130,10 @@ def _registration(name: str, ours: Mapping[str, Any], identity: Mapping[str, Any
 def _completion(name: str, ours: Mapping[str, Any], one_scan: Mapping[str, Any]) -> str:
     if ours["cd"] is None or one_scan["cd"] is None:
         return f"{name}: no true shape, so completion could not be measured"
+    better = ours["cd"] < one_scan["cd"]
     return (
-        f"{name}: completion of one scan {'beats' if ours['cd'] < one_scan['cd'] else 'does NOT'}"
-        f"{'' if ours['cd'] < one_scan['cd'] else ' beat'} what ICP has of one scan"
+        f"{name}: completion of one scan {'beats' if better else 'does NOT beat'} what ICP has of"
+        " one scan"
         f" (CD {ours['cd']:.3f} m against {one_scan['cd']:.3f} m)"
     )
 

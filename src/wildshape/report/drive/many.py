@@ -105,12 +105,8 @@ def drive_many(
 ) -> DrivesResult:
     """Each drive by one worker; a drive whose worker is killed goes on with another.
 
-    Args:
-        task: what is done with each.
-        folders: the output of each source.
-        workers: processes in all; None: one a core.
-        ray: address of a Ray cluster in place of this machine; all paths are the same there.
-        progress: is told how many are done.
+    `folders`: the output of each source; `workers`: in all, None: one a core; `ray`: address of a
+    cluster in place of this machine, where all paths are the same.
 
     Raises:
         BadInputError: no cluster there, or a drive killed every worker.

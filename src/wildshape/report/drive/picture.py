@@ -48,11 +48,7 @@ def write_drive_picture(
 ) -> None:
     """What lies near the sensor's way, and below some vehicles: a scan and the completed shape.
 
-    Args:
-        found: the drive.
-        drive: its scans.
-        path: `.png` or `.webp`.
-        shown: at most five vehicles.
+    `path`: `.png` or `.webp`; `shown`: at most five vehicles.
     """
     low, high = _bounds(found, _NEAR_M)
     ratio = (high[1] - low[1]) / (high[0] - low[0])

@@ -58,7 +58,6 @@ class Evaluation(NamedTuple):
 
     Attributes:
         path: of its metrics.json.
-        metrics: the content.
         which: its place in the folder, to begin titles with; empty where it is the only one.
     """
 

@@ -42,12 +42,7 @@ _STEPS = 65534  # int16 from -32767 to 32767 across the scene
 
 
 def write_report(report: Report, path: Path) -> None:
-    """Write the page; the file appears under its name only when it is whole.
-
-    Args:
-        report: what to show; every part may be empty.
-        path: the `.html` file; an existing one is replaced.
-    """
+    """Write the page; its file appears, or is replaced, only when it is whole."""
     write_text(path, render(report))
 
 
@@ -65,12 +60,12 @@ def render(report: Report) -> str:
         stills=_stills(report, scenes),
         objects_hidden="" if report.objects else "hidden",
         cost=_section("Cost", _tiles(report.cost)),
-        findings=_findings(report.findings),
+        findings=_items(report.findings, " class=findings"),
         index="".join(_section(t.title, _html_table(t)) for t in report.index),
         tables="".join(_section(t.title, _html_table(t)) for t in report.tables),
         curves=_curves(report.curves),
         figures=_figures(report),
-        notes=_notes(report.notes),
+        notes=_section("Notes", _items(report.notes)),
         provenance=_provenance(report.provenance),
         data=_json(_data(report, scenes)),
         plotly=get_plotlyjs(),
@@ -213,9 +208,9 @@ def _picture(figure: Figure) -> str:
     return f"<figure{wide}><figcaption>{escape(figure.title)}</figcaption>{image}</figure>"
 
 
-def _findings(findings: tuple[str, ...]) -> str:
-    items = "".join(f"<li>{_prose(finding)}</li>" for finding in findings)
-    return f"<ul class=findings>{items}</ul>" if items else ""
+def _items(texts: tuple[str, ...], kind: str = "") -> str:
+    items = "".join(f"<li>{_prose(text)}</li>" for text in texts)
+    return f"<ul{kind}>{items}</ul>" if items else ""
 
 
 def _stills(report: Report, scenes: list[Scene]) -> str:
@@ -243,11 +238,6 @@ def _still(shown: ReportObject, scene: Scene) -> str:
 
 def _embedded(image: bytes, kind: str) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(image).decode('ascii')}"
-
-
-def _notes(notes: tuple[str, ...]) -> str:
-    items = "".join(f"<li>{_prose(note)}</li>" for note in notes)
-    return _section("Notes", f"<ul>{items}</ul>" if items else "")
 
 
 def _provenance(provenance: dict) -> str:

@@ -32,12 +32,7 @@ _SHARES = {"q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95}
 
 @dataclass(frozen=True)
 class Description:
-    """What an input holds.
-
-    Attributes:
-        title: its name.
-        written: the files.
-    """
+    """What an input holds, its name, and the files that were written."""
 
     title: str
     statistics: Statistics

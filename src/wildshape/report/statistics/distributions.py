@@ -41,10 +41,7 @@ class RunningDistribution:
     ) -> None:
         """Count posed scans: how far the object is, and from where, in ITS frame, it is seen.
 
-        Args:
-            R_sensor_object: rotations, the scans of a track next to each other.
-            t_sensor_object: translations, metres.
-            sizes: scans of each track.
+        The scans of a track are next to each other, as many as `sizes` says; metres.
         """
         distance = np.linalg.norm(t_sensor_object, axis=1)
         towards = -np.einsum("sij,si->sj", R_sensor_object, t_sensor_object)

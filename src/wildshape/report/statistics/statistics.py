@@ -245,10 +245,7 @@ _EXTENT_BASIS = {
 def _quantities(distribution: RunningDistribution, read: str, indexed: str) -> tuple[Quantity, ...]:
     """The distributions there are.
 
-    Args:
-        distribution: filled.
-        read: which tracks' points were read, in words.
-        indexed: which tracks the rest comes from, in words.
+    `read` and `indexed`: which tracks' points were read, and which the rest is from, in words.
     """
     by_truth = distribution.seen[0].count > 0
     where = "object's frame, by truth" if by_truth else "sensor's frame, middle of each scan"

@@ -28,14 +28,10 @@ _LONGEST = 12  # letters of a scan's name
 
 
 def draw_track(row: Sequence["Axes"], track: Track) -> None:
-    """Draw a few scans of a track from first to last, then all of them together.
+    """Draw a few scans of a track from first to last, then all of them together, on `PANELS` axes.
 
     With truth all panels are in the object's frame, from one viewpoint, what other scans see in
     grey. Without it each scan is drawn as its sensor sees it, from a little higher up.
-
-    Args:
-        row: `PANELS` axes.
-        track: to be drawn.
     """
     clouds = _scans(track)
     whole = _whole(track)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the panel says of the scan shown: sizes, confidence, and errors where truth is known."""
 
+from collections.abc import Sequence
 from html import escape
 
 import numpy as np
@@ -28,8 +29,14 @@ def details(stage: Stage, wish: Wish, status: str = "") -> str:
         _small(done.warning, "color:#d55e00"),
         _small(status),
     ]
-    inside = "".join(part for part in parts if part)
-    return f"<div style='font-size:.85em;line-height:1.5;padding:0 .8em .5em'>{inside}</div>"
+    return framed(parts)
+
+
+def framed(parts: Sequence[str]) -> str:
+    """Pieces of HTML, as the panel shows them."""
+    return (
+        f"<div style='font-size:.85em;line-height:1.5;padding:0 .8em .5em'>{''.join(parts)}</div>"
+    )
 
 
 def _rows(stage: Stage, wish: Wish) -> list[tuple[str, str]]:

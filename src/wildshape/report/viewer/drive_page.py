@@ -21,9 +21,9 @@ from wildshape.records import Box, Points
 from wildshape.report.drive.scene import NOBODY, SceneConfig, boxes_by_frame, thinned
 from wildshape.report.results import box_of, chances_in, read_result
 from wildshape.report.scene import box_segments
-from wildshape.report.viewer.details import row
+from wildshape.report.viewer.details import framed, row
 from wildshape.report.viewer.drawing_frame import as_node
-from wildshape.report.viewer.page import HOST, hosting
+from wildshape.report.viewer.page import HOST, aim, hosting
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -134,7 +134,7 @@ class DrivePage:
         way = self.found.T_level_sensor.translation.numpy()
         middle = way.mean(0)
         size = max(40.0, float(np.ptp(way, axis=0).max()))
-        self._aim(middle, middle + np.array((-0.8, -0.25, 0.75)) * size)
+        aim(self.server, middle, middle + np.array((-0.8, -0.25, 0.75)) * size)
 
     def _controls(self) -> None:
         gui, last = self.server.gui, len(self.found) - 1
@@ -235,13 +235,8 @@ class DrivePage:
         middle, size = T.translation.numpy(), max(one.size)
         towards = self.found.T_level_sensor[self.frame].translation.numpy() - middle
         towards[2] = 0.6 * np.linalg.norm(towards)
-        self._aim(middle, middle + 1.9 * size * towards / max(np.linalg.norm(towards), 1e-6))
-
-    def _aim(self, target: np.ndarray, place: np.ndarray) -> None:
-        """The camera of new pages and those open."""
-        clients = [client.camera for client in self.server.get_clients().values()]
-        for camera in (self.server.initial_camera, *clients):
-            camera.position, camera.look_at = tuple(place.tolist()), tuple(target.tolist())
+        place = middle + 1.9 * size * towards / max(np.linalg.norm(towards), 1e-6)
+        aim(self.server, middle, place)
 
     def _dots(self, name: str, points: Points, colours: Any, size: float) -> Any:
         cloud = np.ascontiguousarray(points, np.float32)
@@ -266,9 +261,7 @@ class DrivePage:
 
     def _details(self) -> str:
         """A piece of HTML; every name is escaped."""
-        parts = list(self._rows())
-        inside = "".join(row(label, escape(value)) for label, value in parts)
-        return f"<div style='font-size:.85em;line-height:1.5;padding:0 .8em .5em'>{inside}</div>"
+        return framed([row(label, escape(value)) for label, value in self._rows()])
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         found, frame, number = self.found, self.frame, self.chosen

@@ -31,12 +31,7 @@ def from_model(
 ) -> Source:
     """Scans, and a model that completes them when they are shown.
 
-    Args:
-        title: where the scans come from.
-        labels: names of the tracks.
-        track: reads one.
-        model: gives the model; called once, when the first scan is to be completed.
-        note: a sentence to show beside them.
+    `model` is called once, when the first scan is to be completed.
     """
     loaded: list[Completes] = []
 

@@ -12,6 +12,8 @@ from contextlib import AbstractContextManager, contextmanager
 from html import escape
 from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
 
+import numpy as np
+
 from wildshape.errors import BadInputError, MissingExtraError, load_library
 from wildshape.io.progress import counted
 from wildshape.report.viewer.allowed_hosts import answering_only, checked_hosts, prove
@@ -130,19 +132,9 @@ class Page:
         self.stage = stage
         self.status = "completing ..."
         self.panel.fit(stage.track)
-        self._aim_camera()
+        size = stage.extent()
+        aim(self.server, np.zeros(3), size * np.array((0.75, -0.95, 0.65)))
         self.refresh()
-
-    def _aim_camera(self) -> None:
-        """The camera at a distance that fits the object, for new pages and those open."""
-        if self.stage is None:
-            return
-        size = self.stage.extent()
-        place = (0.75 * size, -0.95 * size, 0.65 * size)
-        self.server.initial_camera.position = place
-        self.server.initial_camera.look_at = (0.0, 0.0, 0.0)
-        for client in self.server.get_clients().values():
-            client.camera.position, client.camera.look_at = place, (0.0, 0.0, 0.0)
 
     def _make(self, number: int, turn: int) -> None:
         """Whatever is made of the scans goes to the scene as it comes, the one shown first."""
@@ -183,6 +175,13 @@ class Page:
             self.refresh()
             if self.stage is None:
                 self.panel.text.content = f"<div style='padding:.8em'>{escape(text)}</div>"
+
+
+def aim(server: "ViserServer", target: np.ndarray, place: np.ndarray) -> None:
+    """The camera of new pages and those open."""
+    clients = [client.camera for client in server.get_clients().values()]
+    for camera in (server.initial_camera, *clients):
+        camera.position, camera.look_at = tuple(place.tolist()), tuple(target.tolist())
 
 
 def serving(

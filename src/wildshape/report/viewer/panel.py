@@ -39,11 +39,7 @@ class Panel:
     ) -> None:
         """Lay the controls out.
 
-        Args:
-            server: whose page they stand on.
-            labels: of the tracks.
-            wished: called whenever something else is to be shown of the track.
-            chosen: called with a track's number.
+        `wished` is called whenever something else is to be shown, `chosen` with a track's number.
         """
         self.gui, self.labels, self.wished = server.gui, labels, wished
         self.picker = self._picker()

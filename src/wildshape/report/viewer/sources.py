@@ -76,9 +76,7 @@ def true_shape(track: Track) -> Points | None:
 def from_results(folder: Path, inputs: Path | None = None) -> Source:
     """What `complete` or `register` left in a folder, or in one track's folder.
 
-    Args:
-        folder: with objects.json in it or one or two levels below.
-        inputs: where the scans are now, if they have moved.
+    `inputs`: where the scans are now, if they have moved.
 
     Raises:
         BadInputError: nothing of the kind is there, or no scans at `inputs`.

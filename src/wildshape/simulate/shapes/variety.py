@@ -50,13 +50,7 @@ def varied(solid: Solid, rng: np.random.Generator) -> Solid:
 
 
 def _rounded(at: np.ndarray, half_m: float, rng: np.random.Generator) -> np.ndarray:
-    """Vertices `(v, 3)` in a box from -1 to 1, drawn in at its ends, its roof and its corners.
-
-    Args:
-        at: vertices.
-        half_m: half of the vehicle's length, metres.
-        rng: the only source of chance.
-    """
+    """Vertices `(v, 3)` in a box from -1 to 1, drawn in at its ends, its roof and its corners."""
     x, y, z = at.T
     taper, belly, cabin = rng.uniform(0, (_USUAL.taper, _USUAL.belly, _USUAL.cabin))
     begins, widest = rng.uniform((0.3, -0.4), (0.7, 0.1))

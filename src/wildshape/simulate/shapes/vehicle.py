@@ -79,10 +79,7 @@ class _Body:
 def vehicle(kind: str, rng: np.random.Generator, roundest_m: float | None = None) -> Solid:
     """A random vehicle of a kind in `KINDS`; box middle above the origin, wheels on z = 0.
 
-    Args:
-        kind: of vehicle.
-        rng: the only source of chance.
-        roundest_m: how far its corners, seen from above, stand back at most; None: as usual.
+    `roundest_m`: how far its corners, seen from above, stand back at most; None: as usual.
     """
     body = _draw(kind, rng)
     if roundest_m is not None:
@@ -165,10 +162,10 @@ def _half_width(body: _Body, x: np.ndarray) -> np.ndarray:
 def _well(body: _Body, x: np.ndarray) -> np.ndarray:
     """Height of the body's lower edge: the floor, raised over the wheels."""
     reach = body.wheel_radius + 0.05
-    arch = [np.sqrt(np.maximum(reach**2 - (x - w) ** 2, 0)) for w in body.wheel_x]
-    return np.maximum(body.floor, body.wheel_radius + np.max(arch, axis=0) - 1e-3) * (
-        np.max(arch, axis=0) > 0
-    ) + body.floor * (np.max(arch, axis=0) <= 0)
+    arches = [np.sqrt(np.maximum(reach**2 - (x - w) ** 2, 0)) for w in body.wheel_x]
+    arch = np.max(arches, axis=0)
+    raised = np.maximum(body.floor, body.wheel_radius + arch - 1e-3)
+    return np.where(arch > 0, raised, body.floor)
 
 
 def _shell(body: _Body) -> Solid:
@@ -230,8 +227,9 @@ def _wheels(body: _Body) -> list[Solid]:
     r, wide = body.wheel_radius, 0.2 if body.kind != "truck" else 0.3
     wheels = []
     for x in body.wheel_x:
-        outer = float(_half_width(body, np.array((x,)))[0]) if x < body.top[-1, 0] else None
-        y = (outer if outer is not None else body.width / 2) - 0.015
+        under_body = x < body.top[-1, 0]
+        outer = float(_half_width(body, np.array((x,)))[0]) if under_body else body.width / 2
+        y = outer - 0.015
         for side in (-1, 1):
             start = np.array((-x, side * (y - wide), r))
             tip = np.array((-x, side * y, r))

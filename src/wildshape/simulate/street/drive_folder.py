@@ -67,11 +67,8 @@ def write_drive(
 ) -> Written:
     """Write all scans and then their truth; scans that are there already are not made again.
 
-    Args:
-        drive: what is simulated.
-        out: the folder; what an interrupted run of the same drive left in it is gone on with.
-        at: called with the number of scans that are there.
-        point_times: write `scans`, too.
+    What an interrupted run of the same drive left is gone on with. `at` is told how many scans are
+    there; `point_times`: write `scans`, too.
     """
     scans, rows = out / "velodyne" / SEQUENCE, out / _ROWS
     for number in range(drive.config.scans):

@@ -18,11 +18,8 @@ def roadside(
 ) -> Iterator[tuple[float, Solid]]:
     """Things beside a street, each with its place along it, in the world frame.
 
-    Args:
-        street: with its path and ground.
-        end: where the last plot ends, metres along the street.
-        kept_free: `(n, 3)` circles x, y, radius, metres, that nothing behind the pavement enters.
-        rng: the only source of chance.
+    Nothing behind the pavement enters a circle of `kept_free`, `(n, 3)` x, y, radius, metres;
+    `end`: of the last plot, metres along the street.
     """
     for side in (-1.0, 1.0):
         s = -LEAD_M

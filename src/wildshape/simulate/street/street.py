@@ -244,11 +244,7 @@ def _pedestrian(rng: np.random.Generator) -> Solid:
 def random_street(seed: int, seconds: float, speed: float | None, vehicles: Vehicles) -> Street:
     """A street that is long enough for a drive.
 
-    Args:
-        seed: of all chance.
-        seconds: how long the drive takes.
-        speed: of the sensor's vehicle, metres a second; None: drawn from 4 to 10; 0: it stands.
-        vehicles: draws the shape of one.
+    `speed`: of the sensor's vehicle, metres a second; None: drawn from 4 to 10; 0: it stands.
     """
     rng = np.random.default_rng([seed, 0])
     drawn = float(rng.uniform(4.0, 10.0))

@@ -111,11 +111,7 @@ def cast_turn(
 ) -> Echoes:
     """The nearest surface of each pulse.
 
-    Args:
-        still: what does not move, in the world frame.
-        movers: what moves.
-        turn: the pulses.
-        T_world_sensor: `(c, 4, 4)` at each column's time.
+    `still` is in the world frame; `T_world_sensor`: `(c, 4, 4)` at each column's time.
     """
     echoes = _cast(still, turn.directions, T_world_sensor)
     for mover in movers:
@@ -175,12 +171,7 @@ def returned(
 ) -> np.ndarray:
     """`(r, c)` bool: pulses that come back strong enough to be told.
 
-    Args:
-        echoes: what the pulses met.
-        sensor: its range.
-        dropout: share of pulses lost at random.
-        glass: share of pulses on glass that do come back.
-        rng: the only source of chance.
+    `dropout`: share of pulses lost at random; `glass`: of those on glass that do come back.
     """
     grazing = np.where(echoes.ground, _GRAZING_GROUND, _GRAZING)
     chance = (1.0 - dropout) * np.minimum(echoes.cosine / grazing, 1.0)

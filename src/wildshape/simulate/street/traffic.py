@@ -31,12 +31,6 @@ def traffic(street: Street, end: float, seconds: float, seed: int) -> tuple[Acto
     """All actors of a street, numbered; no two vehicles meet on it, none comes near the sensor's.
 
     Those that have driven past its end all stand there, one in another, far from the sensor.
-
-    Args:
-        street: its path, its lanes and how the sensor's vehicle moves.
-        end: of the street, metres.
-        seconds: of the drive.
-        seed: of all chance.
     """
     rng = np.random.default_rng([seed, 1])
     stretch = _Stretch(street, -LEAD_M, end, seconds)
