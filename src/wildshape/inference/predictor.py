@@ -33,6 +33,7 @@ from wildshape.inference.refine import Refined, refine, with_its_scan
 from wildshape.inference.registration import fuse_scans, registered, to_middle
 from wildshape.inference.tracks.complete_track import Gathered, complete_together
 from wildshape.inference.tracks.joint_icp import key_scans
+from wildshape.inference.tracks.pose_outliers import SensorMotion
 from wildshape.io.scans.points import LEAST_POINTS
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint, weights_file
 from wildshape.method.network import ShapePoseNet
@@ -211,7 +212,11 @@ class Predictor:
         return gathered
 
     def put_together(
-        self, alone: Iterable[Completion], scans: Sequence[Points], rays: Rays = ()
+        self,
+        alone: Iterable[Completion],
+        scans: Sequence[Points],
+        rays: Rays = (),
+        motion: SensorMotion | None = None,
     ) -> Iterator[Completion]:
         """One shape of a track's scans that were completed each on its own."""
         if len(scans) < 2:
@@ -219,7 +224,7 @@ class Predictor:
         gathered = Gathered(self.settings)
         for cloud, done in zip(scans, alone):
             self._add(gathered, cloud, done)
-        return complete_together(gathered, self.config, rays)
+        return complete_together(gathered, self.config, rays, motion)
 
     def _add(self, gathered: Gathered, scan: Points, done: Completion) -> None:
         shape = done.pose.inverse().apply_numpy(done.points)

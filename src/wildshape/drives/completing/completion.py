@@ -36,6 +36,7 @@ from wildshape.inference.folders.complete_folder import (
     objects_of,
 )
 from wildshape.inference.predictor import Predictor
+from wildshape.inference.tracks.pose_outliers import SensorMotion
 from wildshape.io.atomic import write_json
 from wildshape.io.boxes.detections import moved
 from wildshape.io.output import file_name, remove_leftovers
@@ -176,7 +177,10 @@ class Completer:
         done = list(islice(alone, len(one.looks)))
         scans = [look.scans[0] for look in one.in_time]
         rays = [one.rays.get(i) for i in one.places] if self.config.completion.rays else ()
-        return list(self.predictor.put_together(done, scans, rays))
+        frames = list(one.looked_at.frames)
+        ticks = torch.tensor([self.drive.ticks[frame] for frame in frames])
+        motion = SensorMotion(self.T_world_level.rotation[frames].double(), ticks)
+        return list(self.predictor.put_together(done, scans, rays, motion))
 
     def _look(self, every: list[_Candidate], count: int | None) -> None:
         """Look at the first so many scans of each."""

@@ -42,7 +42,11 @@ from wildshape.inference.tracks.heading_vote import (
     voted_signs,
 )
 from wildshape.inference.tracks.joint_icp import fused, refine_checked, sampled
-from wildshape.inference.tracks.pose_outliers import without_outliers
+from wildshape.inference.tracks.pose_outliers import (
+    SensorMotion,
+    without_leaps,
+    without_outliers,
+)
 from wildshape.inference.tracks.track_cost import network_inputs, track_cost
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.trust import TrackFeatures
@@ -129,7 +133,10 @@ class Gathered:
 
 @plain_torch()
 def complete_together(
-    gathered: Gathered, config: InferenceConfig = _DEFAULT, rays: Rays = ()
+    gathered: Gathered,
+    config: InferenceConfig = _DEFAULT,
+    rays: Rays = (),
+    motion: SensorMotion | None = None,
 ) -> Iterator[Completion]:
     """Completions of a track's single scans made those of one object.
 
@@ -137,6 +144,7 @@ def complete_together(
         gathered: of two scans or more.
         config: how they are made so.
         rays: that passed the object by, one set a scan, if any are known.
+        motion: of the sensor, if known.
 
     Returns:
         One a scan; each has its points when it is taken.
@@ -145,7 +153,7 @@ def complete_together(
     shape = gathered.shape
     poses = stack([item.pose for item in gathered.said])
     inputs = network_inputs(scans, settings)
-    voted = _voted(poses, shape, gathered, inputs, config.track)
+    voted = _voted(poses, shape, gathered, inputs, config.track, motion)
     mirror, unit = settings.network.mirror, settings.unit
     clouds, start = _in_units(scans, voted, unit)
     fit = refine_checked(clouds, start, gathered.weights, mirror=mirror, config=config.track)
@@ -256,16 +264,22 @@ def _voted(
     gathered: Gathered,
     inputs: list[NetworkInput],
     config: TrackConfig,
+    motion: SensorMotion | None,
 ) -> SE3:
     """The same poses, all looking one way and no outlier among them."""
     middle = float(shape[:, 0].amin() + shape[:, 0].amax()) / 2
-    if slow(T_sensor_can.rotation, config.vote):
-        signs = followed_signs(T_sensor_can.rotation, gathered.sure, config.vote)
+    rotation = T_sensor_can.rotation if motion is None else motion.rotation @ T_sensor_can.rotation
+    if slow(rotation, config.vote):
+        signs = followed_signs(rotation, gathered.sure, config.vote)
     else:
         gain, links = _votes(T_sensor_can, shape, middle, gathered, inputs, config)
         leaps = gathered.settings.sensor == "lidar" and len(gain) < FEWEST
         signs = voted_signs(gain, links, gathered.sure, config.vote, leaps=leaps)
     turned = turned_where(T_sensor_can, signs, middle)
+    if motion is not None:
+        turned = without_leaps(
+            turned, gathered.scans, shape, gathered.sure, motion, config.outliers
+        )
     between = without_outliers(turned, gathered.scans, shape, gathered.sure, config)
     if between is turned:
         return turned

@@ -7,13 +7,18 @@ often as not. Votes on half turns do not see that, and fitting scans onto each o
 by a quarter. But an object does not turn by one from scan to scan. Where most neighbours are posed
 alike, one that is not is an outlier, and so is a run of scans that is less sure than the others.
 Turned back, it stands where what was seen of it begins.
+
+Where the sensor's own motion is known, what an object turns is told apart from what the sensor
+does. No vehicle turns by a quarter within a second: of two runs of scans that say so the surer one,
+all its scans together, is right.
 """
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from wildshape.geometry.transforms.rotation import rotation_angle, rotation_z
@@ -25,6 +30,18 @@ from wildshape.records import Points
 _DEFAULT = TrackConfig()
 _REACH = 3  # scans apart of two neighbours that are compared
 _STRAYS = 0.02
+
+
+class SensorMotion(NamedTuple):
+    """How the sensor turned along a track.
+
+    Attributes:
+        rotation: `R_world_sensor` of each scan.
+        ticks: when each was taken, counted in scans.
+    """
+
+    rotation: Float[Tensor, "V 3 3"]
+    ticks: Int[Tensor, "V"]
 
 
 def without_outliers(
@@ -46,21 +63,53 @@ def without_outliers(
     """
     rotation = T_sensor_object.rotation
     alone = outliers(rotation, config.outliers)
-    off = alone | _unsure_runs(rotation, alone, sure, config.outliers)
+    less = config.outliers.less_sure
+    off = alone | _runs_against(rotation, alone, sure, less, config.outliers)
     off &= sure <= sure[~off].mean()
     if not bool(off.any()):
         return T_sensor_object
     unsure = bool((sure[off] < config.outliers.less_sure * sure[~off].mean()).all())
     if not slow(rotation[~off], config.vote, fewest=2 if unsure else FEWEST):
         return T_sensor_object
-    found = SE3(rotation.clone(), T_sensor_object.translation.clone())
+    return _put_back(off, T_sensor_object, rotation, scans, shape, config.outliers)
+
+
+def without_leaps(
+    T_sensor_object: SE3,
+    scans: Sequence[Points],
+    shape: Float[Tensor, "P 3"],
+    sure: Float[Tensor, "V"],
+    motion: SensorMotion,
+    config: PoseOutlierConfig = _DEFAULT.outliers,
+) -> SE3:
+    """The same of a sensor whose motion is known: no object turns faster than vehicles do."""
+    rotation = motion.rotation @ T_sensor_object.rotation
+    none = torch.zeros(len(rotation), dtype=torch.bool)
+    soon = motion.ticks, config.leap_ticks
+    off = _runs_against(rotation, none, sure, math.inf, config, soon)
+    return _put_back(off, T_sensor_object, rotation, scans, shape, config)
+
+
+def _put_back(
+    off: Bool[Tensor, "V"],
+    T_sensor_object: SE3,
+    rotation: Float[Tensor, "V 3 3"],
+    scans: Sequence[Points],
+    shape: Float[Tensor, "P 3"],
+    config: PoseOutlierConfig,
+) -> SE3:
+    """The poses, those that are off turned as the scans beside them are; `rotation`: compared."""
+    R_world_sensor = rotation @ T_sensor_object.rotation.mT
+    rotation = rotation.clone()
+    found = SE3(T_sensor_object.rotation.clone(), T_sensor_object.translation.clone())
     ends = _ends(shape)
     rows, right = torch.nonzero(off)[:, 0], torch.nonzero(~off)[:, 0]
     known = set(right.tolist())
     away = (rows[:, None] - right).abs().amin(1)
     for i in rows[away.argsort(stable=True)].tolist():
         near = i - 1 if i - 1 in known else i + 1
-        turned = _turned_back(rotation[i], found.rotation[near], config.outliers)
+        rotation[i] = _turned_back(rotation[i], rotation[near], config)
+        turned = R_world_sensor[i].mT @ rotation[i]
         found.translation[i] = _placed(scans[i], turned, ends, found.translation[near])
         found.rotation[i] = turned
         known.add(i)
@@ -106,13 +155,18 @@ def _turned_back(
     return best if _degrees(best, near) < config.apart_deg else near
 
 
-def _unsure_runs(
+def _runs_against(
     rotation: Float[Tensor, "V 3 3"],
     off: Bool[Tensor, "V"],
     sure: Float[Tensor, "V"],
+    less_sure: float,
     config: PoseOutlierConfig,
+    soon: tuple[Int[Tensor, "V"], float] | None = None,
 ) -> Bool[Tensor, "V"]:
-    """Of runs of scans, each posed like the next, those against a much surer one."""
+    """Of runs of scans, each posed like the next, those against one so much surer.
+
+    `soon`: ticks of the scans, and how many of these between two scans say that one is wrong.
+    """
     runs: list[list[int]] = []
     for i in torch.nonzero(~off)[:, 0].tolist():
         if runs and _degrees(rotation[runs[-1][-1]], rotation[i]) < config.apart_deg:
@@ -121,12 +175,14 @@ def _unsure_runs(
             runs.append([i])
     found = torch.zeros_like(off)
     best = max(runs, key=lambda run: float(sure[run].sum()))
-    enough = config.less_sure * float(sure[best].mean())
+    enough = less_sure * float(sure[best].mean())
     for way in (1, -1):
         last = best[-1] if way > 0 else best[0]
         for run in runs[runs.index(best) :: way][1:]:
             first, end = (run[0], run[-1])[::way]
             against = _degrees(rotation[last], rotation[first]) >= config.apart_deg
+            if soon:
+                against &= abs(int(soon[0][last] - soon[0][first])) <= soon[1]
             if against and float(sure[run].mean()) < enough:
                 found[run] = True
             else:
