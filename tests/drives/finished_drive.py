@@ -3,6 +3,7 @@
 """The folder of a finished drive as `wildshape drive` leaves it, made without finding anything."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -25,19 +26,21 @@ CARS = {
 }
 
 
-def finished_drive(folder: Path) -> FinishedDrive:
+def finished_drive(
+    folder: Path, cars: Mapping[str, list[tuple[float, float, float]]] = CARS
+) -> FinishedDrive:
     """The sensor drives 1 m a frame along x, past two cars on a plane."""
     rng = np.random.default_rng(0)
     out, recording = folder / "found", folder / "street"
     times = [0.1 * frame for frame in range(FRAMES)]
     names = [f"{frame:06d}" for frame in range(FRAMES)]
     shape = _shell(rng, 800)
-    rows, seen = [], {name: [] for name in CARS}
+    rows, seen = [], {name: [] for name in cars}
     recording.mkdir(parents=True)
     for frame in range(FRAMES):
         ground = np.column_stack((rng.uniform(-40, 40, (3000, 2)), np.full(3000, -HEIGHT)))
         parts = [ground]
-        for name, places in CARS.items():
+        for name, places in cars.items():
             x, y, yaw = places[frame]
             T_sensor_box = _pose(x - frame, y, SIZE[2] / 2 - HEIGHT, yaw)
             points = T_sensor_box.apply_numpy(_shell(rng, 200))

@@ -201,7 +201,8 @@ def track_object(
         clouds.append(Cloud(label, fuse_scans(track.scans, T_middle_scan)))
     if completed is not None:
         clouds.append(Cloud("completed", completed))
-    number = f"scan {track.scan_names[middle]} of {len(track.scans)}"
+    others = len(track.scans) > 1
+    number = f"scan {track.scan_names[middle]} of {len(track.scans)}" if others else ""
     about = (track.category, number, counted(len(scan), "point"), track.source)
     return ReportObject(
         name=track.name,

@@ -19,10 +19,6 @@ from wildshape.report.content import Cloud, ReportObject
 MAX_POINTS = 4096
 _MARGIN = 0.06
 _GAP, _ARROW = 0.06, 0.2  # of the object's extent: before the arrow, and its length
-AXES = {
-    "lidar": ("x, m", "y, m", "z, m"),
-    "camera": ("x right, m", "z forward, m", "\N{MINUS SIGN}y up, m"),
-}
 
 Segments = Float[np.ndarray, "e 2 3"]
 

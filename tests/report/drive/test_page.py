@@ -140,12 +140,16 @@ def test_the_scene_plays_and_a_click_on_a_vehicle_opens_it(found, tmp_path):
         assert [url for url in page.loads() if not url.startswith(("file:", "data:"))] == []
 
 
-def _check_on_a_phone(page: Page) -> None:
-    """Scale and legend have their own places; names are whole, however near the edge."""
+def _resize(page: Page, width: int) -> None:
     page.call(
         "Emulation.setDeviceMetricsOverride",
-        width=390, height=800, deviceScaleFactor=1, mobile=False,
+        width=width, height=800, deviceScaleFactor=1, mobile=False,
     )  # fmt: skip
+
+
+def _check_on_a_phone(page: Page) -> None:
+    """Scale and legend have their own places; names are whole, however near the edge."""
+    _resize(page, 390)
     page.wait("innerWidth == 390")
     place = "document.querySelector('#drive_{}').getBoundingClientRect()"
     low, top = place.format("scale"), place.format("legend")
@@ -157,3 +161,18 @@ def _check_on_a_phone(page: Page) -> None:
     for _ in range(30):  # they pass the edge as the view comes closer
         page.ask("document.querySelector('#drive_closer').click()")
         page.wait(f"{spans}.every(s => {inside}(s.getBoundingClientRect()))")  # once it is drawn
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="did not run: no chromium on PATH")
+def test_the_first_view_shows_every_vehicle(tmp_path):
+    far = {"a": (-30.0, 14.0, 0.2), "b": (30.0, -14.0, 0.1), "c": (0.0, -18.0, 0.1)}
+    found = finished_drive(tmp_path, {name: [place] * FRAMES for name, place in far.items()})
+    write_drive_report(found.out)
+    with browser(tmp_path / "profile") as page:
+        page.open("about:blank")
+        for width in (1280, 390):
+            _resize(page, width)
+            page.call("Page.navigate", url=(found.out / "report.html").as_uri())
+            spans = "[...document.querySelectorAll('#drive_labels span')]"
+            page.wait(f"innerWidth == {width} && {spans}.length")
+            assert set(page.ask(f"{spans}.map(e => e.textContent)")) == {*far, "sensor"}

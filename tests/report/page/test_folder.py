@@ -253,7 +253,7 @@ def test_an_evaluation_of_drives_has_the_figures_of_its_table(tmp_path: Path) ->
     assert list(table.columns) == [*lines[0], *lines[5][1:]]
     assert list(table.rows[0]) == [*lines[2], *lines[7][1:]]
     assert "66.7" in table.rows[0]
-    assert "3 labels of 1 vehicles" in table.caption
+    assert "3 labels of 1 vehicle with 100 points or more; 1 of them found." in table.caption
 
 
 def test_scans_that_are_named_must_be_there(tmp_path: Path) -> None:

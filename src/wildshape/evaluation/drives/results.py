@@ -13,6 +13,7 @@ from wildshape.evaluation.drives.labels import Counting
 from wildshape.evaluation.drives.protocol import DriveScores
 from wildshape.evaluation.tables import pipe_table
 from wildshape.io.atomic import write_json, write_text
+from wildshape.io.progress import counted
 
 FORMAT = 1
 FILES = ("metrics.json", "vehicles.json", "table.md")
@@ -111,9 +112,10 @@ def notes(found: Mapping[str, Any]) -> list[str]:
     """What the figures of `metrics.json` are of, a sentence or two each."""
     ours = next(iter(found["methods"].values()))
     lines = [
-        f"Counted: {ours['labels']} labels of {ours['purity']['vehicles']} vehicles with"
+        f"Counted: {counted(ours['labels'], 'label')} of"
+        f" {counted(ours['purity']['vehicles'], 'vehicle')} with"
         f" {found['counting']['points']} points or more;"
-        f" {ours['purity']['vehicles_found']} vehicles found.",
+        f" {ours['purity']['vehicles_found']} of them found.",
         "AP in percent; recall in percent at IoU 0.5 in bird's eye view (BEV), as HOTA's overlap.",
         "Length, width, height: mean of found minus labelled.",
     ]

@@ -32,7 +32,7 @@ from wildshape.report.content import (
     Table,
 )
 from wildshape.report.picture import still
-from wildshape.report.scene import AXES, Scene, scene_of
+from wildshape.report.scene import Scene, scene_of
 
 _MAX_CURVE_POINTS = 2000
 _DASH, _SPREAD = "\N{EN DASH}", " ± "
@@ -106,7 +106,6 @@ def _data(report: Report, scenes: list[Scene]) -> dict:
             "name": shown.name,
             "subtitle": shown.subtitle,
             "details": shown.details,
-            "axes": AXES[shown.sensor],
             **_scene(scene),
         }
         for shown, scene in zip(report.objects, scenes, strict=True)

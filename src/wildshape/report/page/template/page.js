@@ -88,8 +88,8 @@
     const span = object.high.map((v, i) => v - object.low[i]);
     const unit = object.extent; // plotly's unit of length: one object
     const step = gridStep(object);
-    const axis = (i) => ({ range: [object.low[i], object.high[i]], dtick: step, color: ink("--soft"),
-      title: { text: object.axes[i], font: { size: 11 } }, tickfont: { size: 9 }, gridcolor: ink("--grid"),
+    const axis = (i) => ({ range: [object.low[i], object.high[i]], dtick: step, title: { text: "" },
+      showticklabels: false, gridcolor: ink("--grid"),
       showbackground: false, zeroline: false, showspikes: false, showline: false, ticks: "" });
     return { margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)", showlegend: false,
       font: { color: ink("--ink") }, scene: { xaxis: axis(0), yaxis: axis(1), zaxis: axis(2),

@@ -291,16 +291,22 @@
     redraw();
   }
   const middle = () => { // of the way and the vehicles
-    const all = [...data.way, ...vehicles.flatMap((one) => one.places.filter(Boolean).slice(0, 1))];
+    const all = [...data.way, ...vehicles.flatMap((one) => [one.places.find(Boolean), one.places.findLast(Boolean)]).filter(Boolean)];
     const ends = [0, 1].map((i) => { const v = all.map((p) => p[i]); return [Math.min(...v), Math.max(...v)]; });
     const wide = canvas.clientWidth / canvas.clientHeight;
     const along = Math.atan2(...minus(data.way.at(-1), data.way[0]).slice(0, 2).reverse());
-    return { target: [...ends.map(([a, b]) => (a + b) / 2), low[0][2]], along: Math.hypot(...minus(data.way.at(-1), data.way[0])) > 5 ? along : 0,
+    return { all, target: [...ends.map(([a, b]) => (a + b) / 2), low[0][2]], along: Math.hypot(...minus(data.way.at(-1), data.way[0])) > 5 ? along : 0,
       span: Math.max((ends[0][1] - ends[0][0]) / wide, ends[1][1] - ends[1][0]) + 16 };
+  };
+  const nearest = (places) => { // that shows all of them, with 3 m around; of a long drive what is about its middle
+    const { right, up, back } = axes(), wide = canvas.clientWidth / canvas.clientHeight;
+    const needed = ([x, y]) => { const p = minus([x, y, view.target[2]], view.target);
+      return dot(back, p) + Math.max((Math.abs(dot(right, p)) + 3) / wide, Math.abs(dot(up, p)) + 3) / half; };
+    return Math.min(90 / Math.min(1, wide), Math.max(...places.map(needed)));
   };
   const presets = {
     "above": () => { const { target, span } = middle(); view.target = target; $("follow").checked = false; look(Math.PI / 2, -Math.PI / 2, span / (2 * half)); },
-    "3/4": () => { const { target, along, span } = middle(); view.target = target; $("follow").checked = false; look(0.55, along + Math.PI + 0.35, Math.min(90, 0.75 * span / (2 * half))); },
+    "3/4": () => { const { all, target, along } = middle(); $("follow").checked = false; Object.assign(view, { target, elevation: 0.55, azimuth: along + Math.PI + 0.35 }); look(view.elevation, view.azimuth, nearest(all)); },
     "behind the sensor": () => { const m = frames[now].pose; $("follow").checked = true; look(0.3, Math.atan2(m[1][0], m[0][0]) + Math.PI, 24); },
   };
 
