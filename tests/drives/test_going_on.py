@@ -175,9 +175,10 @@ def test_what_is_missing_of_a_group_is_completed_as_it_was(found, recording, tmp
     assert completer.missing(objects)[0] == group
     predictor, asked = completer.predictor, []
 
-    def together(alone, scans, rays):
+    def together(alone, scans, rays, motion):
         asked.append((scans, rays))
-        return Predictor.put_together(predictor, alone, scans, rays)
+        assert len(motion.rotation) == len(motion.ticks) == len(scans)
+        return Predictor.put_together(predictor, alone, scans, rays, motion)
 
     monkeypatch.setattr(predictor, "put_together", together)
     completer(group)

@@ -15,7 +15,12 @@ from wildshape.geometry.transforms.rotation import (
     rotation_z,
 )
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.tracks.pose_outliers import outliers, without_outliers
+from wildshape.inference.tracks.pose_outliers import (
+    SensorMotion,
+    outliers,
+    without_leaps,
+    without_outliers,
+)
 
 HALF = torch.tensor((2.0, 0.9, 0.7), dtype=torch.float64)
 SHAPE = torch.cartesian_prod(*(torch.linspace(-1, 1, 9, dtype=torch.float64) for _ in range(3)))
@@ -115,6 +120,36 @@ def test_a_run_as_sure_as_the_others_stays():
     true = following()
     turned = gone_astray(true, [5, 6, 7])
     assert put_back(turned, true, torch.full((8,), 0.9, dtype=torch.float64)) is turned
+
+
+def swerving(true: SE3) -> tuple[SE3, Tensor]:
+    """The same poses seen by a sensor that turns about itself, and its `R_world_sensor`."""
+    turn = rotation_z(torch.arange(len(true), dtype=torch.float64) * math.radians(50))
+    R_sensor_world = SE3(turn.mT, torch.zeros(len(true), 3, dtype=torch.float64))
+    return R_sensor_world @ true, turn
+
+
+@pytest.mark.parametrize(("rows", "turns"), [([5, 6, 7], 1), ([0, 3], 1), ([2, 6, 7], 2)])
+def test_no_vehicle_turns_by_a_quarter_within_a_second(rows, turns):
+    """Scans as sure as the others are put back, however the sensor itself turns meanwhile."""
+    true, R_world_sensor = swerving(following())
+    given = true
+    for _ in range(turns):
+        given = gone_astray(given, rows)
+    motion = SensorMotion(R_world_sensor, 4 * torch.arange(8))
+    found = without_leaps(given, seen_in(true), SHAPE, SURE[:8], motion)
+    degrees, metres = off_by(found, true)
+    assert degrees < 1e-4
+    assert metres < 0.1
+
+
+def test_a_vehicle_may_turn_a_corner_where_nobody_sees_it():
+    turned = gone_astray(following(), [5, 6, 7])
+    ticks = torch.tensor([0, 4, 8, 12, 16, 36, 40, 44])
+    motion = SensorMotion(torch.eye(3, dtype=torch.float64).expand(8, 3, 3), ticks)
+    found = without_leaps(turned, seen_in(turned), SHAPE, SURE[:8], motion)
+    assert torch.equal(found.rotation, turned.rotation)
+    assert torch.equal(found.translation, turned.translation)
 
 
 def test_a_steady_track_stays_as_it_is():

@@ -161,7 +161,7 @@ def _runs_against(
     sure: Float[Tensor, "V"],
     less_sure: float,
     config: PoseOutlierConfig,
-    soon: tuple[Int[Tensor, "V"], float] | None = None,
+    soon: tuple[Int[Tensor, "V"], int] | None = None,
 ) -> Bool[Tensor, "V"]:
     """Of runs of scans, each posed like the next, those against one so much surer.
 
