@@ -156,7 +156,7 @@ class PoseOutlierConfig:
             a sensor that passes close by sees an object turn fast.
         misfit: nor is it one if the shape costs no more than so many times what it usually does.
         less_sure: a run of scans against a surer one is wrong if it is less sure than this share.
-        leap_ticks: within so many scans' time no vehicle turns by `apart_deg`: a second.
+        leap_ticks: no vehicle turns by `apart_deg` within so many scans' time, two seconds.
     """
 
     alike_deg: float = 25.0
@@ -164,7 +164,7 @@ class PoseOutlierConfig:
     worse_m: float = 0.5
     misfit: float = 1.5
     less_sure: float = 0.75
-    leap_ticks: int = 10
+    leap_ticks: int = 20
 
 
 @dataclass(frozen=True)

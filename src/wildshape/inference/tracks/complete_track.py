@@ -154,6 +154,8 @@ def complete_together(
     poses = stack([item.pose for item in gathered.said])
     inputs = network_inputs(scans, settings)
     voted = _voted(poses, shape, gathered, inputs, config.track, motion)
+    if motion is not None:
+        voted = without_leaps(voted, scans, shape, gathered.sure, motion, config.track.outliers)
     mirror, unit = settings.network.mirror, settings.unit
     clouds, start = _in_units(scans, voted, unit)
     fit = refine_checked(clouds, start, gathered.weights, mirror=mirror, config=config.track)
@@ -276,10 +278,6 @@ def _voted(
         leaps = gathered.settings.sensor == "lidar" and len(gain) < FEWEST
         signs = voted_signs(gain, links, gathered.sure, config.vote, leaps=leaps)
     turned = turned_where(T_sensor_can, signs, middle)
-    if motion is not None:
-        turned = without_leaps(
-            turned, gathered.scans, shape, gathered.sure, motion, config.outliers
-        )
     between = without_outliers(turned, gathered.scans, shape, gathered.sure, config)
     if between is turned:
         return turned

@@ -9,8 +9,7 @@ alike, one that is not is an outlier, and so is a run of scans that is less sure
 Turned back, it stands where what was seen of it begins.
 
 Where the sensor's own motion is known, what an object turns is told apart from what the sensor
-does. No vehicle turns by a quarter within a second: of two runs of scans that say so the surer one,
-all its scans together, is right.
+does, and no vehicle turns by a quarter within two seconds.
 """
 
 import math
@@ -63,8 +62,7 @@ def without_outliers(
     """
     rotation = T_sensor_object.rotation
     alone = outliers(rotation, config.outliers)
-    less = config.outliers.less_sure
-    off = alone | _runs_against(rotation, alone, sure, less, config.outliers)
+    off = alone | _unsure_runs(rotation, alone, sure, config.outliers)
     off &= sure <= sure[~off].mean()
     if not bool(off.any()):
         return T_sensor_object
@@ -82,12 +80,30 @@ def without_leaps(
     motion: SensorMotion,
     config: PoseOutlierConfig = _DEFAULT.outliers,
 ) -> SE3:
-    """The same of a sensor whose motion is known: no object turns faster than vehicles do."""
+    """The same of a sensor whose motion is known: no object turns faster than vehicles do.
+
+    Of all scans those are right that together are surest and do not contradict each other so.
+    """
     rotation = motion.rotation @ T_sensor_object.rotation
-    none = torch.zeros(len(rotation), dtype=torch.bool)
-    soon = motion.ticks, config.leap_ticks
-    off = _runs_against(rotation, none, sure, math.inf, config, soon)
-    return _put_back(off, T_sensor_object, rotation, scans, shape, config)
+    turn = torch.rad2deg(rotation_angle(rotation[:, None].mT @ rotation))
+    since = (motion.ticks[:, None] - motion.ticks).abs() / config.leap_ticks
+    right = _surest_chain(turn < config.apart_deg * since.clamp_min(1.0), sure)
+    return _put_back(~right, T_sensor_object, rotation, scans, shape, config)
+
+
+def _surest_chain(follows: Bool[Tensor, "V V"], sure: Float[Tensor, "V"]) -> Bool[Tensor, "V"]:
+    """The scans that together are surest, each of which may follow the one before it."""
+    total, before = sure.clone(), [-1] * len(sure)
+    for i in range(1, len(sure)):
+        reached = torch.where(follows[:i, i], total[:i], 0.0)
+        if bool(reached.any()):
+            before[i] = int(reached.argmax())
+            total[i] += reached[before[i]]
+    chain, i = torch.zeros_like(follows[0]), int(total.argmax())
+    while i >= 0:
+        chain[i] = True
+        i = before[i]
+    return chain
 
 
 def _put_back(
@@ -155,18 +171,13 @@ def _turned_back(
     return best if _degrees(best, near) < config.apart_deg else near
 
 
-def _runs_against(
+def _unsure_runs(
     rotation: Float[Tensor, "V 3 3"],
     off: Bool[Tensor, "V"],
     sure: Float[Tensor, "V"],
-    less_sure: float,
     config: PoseOutlierConfig,
-    soon: tuple[Int[Tensor, "V"], int] | None = None,
 ) -> Bool[Tensor, "V"]:
-    """Of runs of scans, each posed like the next, those against one so much surer.
-
-    `soon`: ticks of the scans, and how many of these between two scans say that one is wrong.
-    """
+    """Of runs of scans, each posed like the next, those against a much surer one."""
     runs: list[list[int]] = []
     for i in torch.nonzero(~off)[:, 0].tolist():
         if runs and _degrees(rotation[runs[-1][-1]], rotation[i]) < config.apart_deg:
@@ -175,14 +186,12 @@ def _runs_against(
             runs.append([i])
     found = torch.zeros_like(off)
     best = max(runs, key=lambda run: float(sure[run].sum()))
-    enough = less_sure * float(sure[best].mean())
+    enough = config.less_sure * float(sure[best].mean())
     for way in (1, -1):
         last = best[-1] if way > 0 else best[0]
         for run in runs[runs.index(best) :: way][1:]:
             first, end = (run[0], run[-1])[::way]
             against = _degrees(rotation[last], rotation[first]) >= config.apart_deg
-            if soon:
-                against &= abs(int(soon[0][last] - soon[0][first])) <= soon[1]
             if against and float(sure[run].mean()) < enough:
                 found[run] = True
             else:
