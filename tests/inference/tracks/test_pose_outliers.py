@@ -144,7 +144,7 @@ def test_no_vehicle_turns_by_a_quarter_within_two_seconds(rows, turns):
 
 
 def test_one_scan_gone_astray_leads_no_others_with_it():
-    """After a gap the vehicle might have turned that far; the scans after it say that it did not."""
+    """After the gap it might have turned so far; the scans that follow say that it did not."""
     true = following()
     given = gone_astray(true, [4])
     ticks = torch.tensor([0, 4, 8, 12, 60, 64, 68, 72])
