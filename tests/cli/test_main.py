@@ -218,6 +218,21 @@ def test_unknown_commands_and_options_are_refused_in_a_sentence(refused):
     assert "'abc'; see wildshape" in refused("simulate", "x", "--tracks", "abc")
 
 
+def test_a_locale_that_lacks_the_letters_of_a_name_is_said(tmp_path):
+    scan = Path(__file__).parents[2] / "examples/scan.npy"
+    (tmp_path / "größe.npy").write_bytes(scan.read_bytes())
+    done = subprocess.run(
+        [sys.executable, "-m", "wildshape", "complete", "größe.npy", "--out", "out"],
+        capture_output=True,
+        cwd=tmp_path,
+        env={**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith(b"wildshape: ")
+    assert done.stderr.endswith(b"cannot be written in ascii; set PYTHONUTF8=1.\n")
+    assert done.stderr.count(b"\n") == 1
+
+
 def test_version(wildshape):
     assert wildshape("--version").out.strip().count(".") == 2
 

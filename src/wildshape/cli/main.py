@@ -124,7 +124,7 @@ def in_a_sentence() -> Iterator[None]:
     reserved: list[bytearray] = []
     try:
         reserved.append(bytearray(_RESERVED_BYTES))
-        with terminable():
+        with terminable(), _letters_checked():
             yield
     except (BadInputError, MissingExtraError) as error:
         _leave(str(error), _BAD_INPUT)
@@ -145,6 +145,19 @@ def in_a_sentence() -> Iterator[None]:
             raise
         _drop_output()
         _leave(_system_sentence(error), _FAILED if error.errno in _NO_ROOM else _BAD_INPUT)
+
+
+@contextmanager
+def _letters_checked() -> Iterator[None]:
+    """A name that this locale has no letters for is bad input."""
+    try:
+        yield
+    except UnicodeEncodeError as error:
+        if error.encoding == "utf-8":
+            raise
+        raise BadInputError(
+            f"{error.object}: cannot be written in {error.encoding}; set PYTHONUTF8=1."
+        ) from error
 
 
 def _drop_output() -> None:
