@@ -177,7 +177,7 @@ def test_what_is_missing_of_a_group_is_completed_as_it_was(found, recording, tmp
 
     def together(alone, scans, rays, motion):
         asked.append((scans, rays))
-        assert len(motion.rotation) == len(motion.ticks) == len(scans)
+        assert len(motion.rotation) == len(motion.seconds) == len(scans)
         return Predictor.put_together(predictor, alone, scans, rays, motion)
 
     monkeypatch.setattr(predictor, "put_together", together)

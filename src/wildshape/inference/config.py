@@ -156,7 +156,8 @@ class PoseOutlierConfig:
             a sensor that passes close by sees an object turn fast.
         misfit: nor is it one if the shape costs no more than so many times what it usually does.
         less_sure: a run of scans against a surer one is wrong if it is less sure than this share.
-        leap_ticks: no vehicle turns by `apart_deg` within so many scans' time, two seconds.
+        leap_s: within so many seconds no vehicle turns by `apart_deg`.
+        unseen_s: scans in a row that are farther apart tell nothing of it.
     """
 
     alike_deg: float = 25.0
@@ -164,7 +165,8 @@ class PoseOutlierConfig:
     worse_m: float = 0.5
     misfit: float = 1.5
     less_sure: float = 0.75
-    leap_ticks: int = 20
+    leap_s: float = 2.0
+    unseen_s: float = 1.0
 
 
 @dataclass(frozen=True)

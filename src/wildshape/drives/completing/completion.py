@@ -46,6 +46,7 @@ from wildshape.records import Completion, Points
 
 RULED_OUT, CATEGORY = "ruled_out.json", "car"
 _GROUP = 5  # objects that are worked on together
+_USUAL_S = 0.1  # between scans, where no times are known
 
 
 @dataclass
@@ -178,8 +179,9 @@ class Completer:
         scans = [look.scans[0] for look in one.in_time]
         rays = [one.rays.get(i) for i in one.places] if self.config.completion.rays else ()
         frames = list(one.looked_at.frames)
-        ticks = torch.tensor([self.drive.ticks[frame] for frame in frames])
-        motion = SensorMotion(self.T_world_level.rotation[frames].double(), ticks)
+        at = self.drive.times or _USUAL_S * np.array(self.drive.ticks)
+        seconds = torch.tensor([at[frame] - at[frames[0]] for frame in frames])
+        motion = SensorMotion(self.T_world_level.rotation[frames].double(), seconds)
         return list(self.predictor.put_together(done, scans, rays, motion))
 
     def _look(self, every: list[_Candidate], count: int | None) -> None:

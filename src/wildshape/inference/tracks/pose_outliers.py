@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from wildshape.geometry.transforms.rotation import rotation_angle, rotation_z
@@ -36,11 +36,11 @@ class SensorMotion(NamedTuple):
 
     Attributes:
         rotation: `R_world_sensor` of each scan.
-        ticks: when each was taken, counted in scans.
+        seconds: when each was taken.
     """
 
     rotation: Float[Tensor, "V 3 3"]
-    ticks: Int[Tensor, "V"]
+    seconds: Float[Tensor, "V"]
 
 
 def without_outliers(
@@ -86,8 +86,10 @@ def without_leaps(
     """
     rotation = motion.rotation @ T_sensor_object.rotation
     turn = torch.rad2deg(rotation_angle(rotation[:, None].mT @ rotation))
-    since = (motion.ticks[:, None] - motion.ticks).abs() / config.leap_ticks
-    right = _surest_chain(turn < config.apart_deg * since.clamp_min(1.0), sure)
+    since = (motion.seconds[:, None] - motion.seconds).abs()
+    follows = turn < config.apart_deg * (since / config.leap_s).clamp_min(1.0)
+    follows |= (since > config.unseen_s) & torch.ones_like(follows).tril(1).triu(1)
+    right = _surest_chain(follows, sure)
     return _put_back(~right, T_sensor_object, rotation, scans, shape, config)
 
 
