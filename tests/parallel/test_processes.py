@@ -189,13 +189,21 @@ def test_short_work_is_done_here(two, monkeypatch):
 def test_helpers_told_of_long_work_help_at_once(tmp_path, monkeypatch):
     """They have begun before it does, and short work, too, is worth it then."""
     monkeypatch.setattr(processes, "_WORTH_S", 60.0)
-    with team(2, soon=Who) as both:
+    with team(2, soon=Who.__module__) as both:
         assert len(set(both.as_done(Who(tmp_path), range(20)))) == 2
+
+
+def test_a_block_within_leaves_the_helpers_to_the_one_around(two, tmp_path):
+    with team(two) as same:
+        assert len(set(same.as_done(Who(tmp_path), range(20)))) == 2
+    with team(two) as again:
+        assert again is two
+        assert len(set(again.as_done(Who(tmp_path), range(20)))) == 2
 
 
 def test_what_cannot_be_told_to_helpers_beforehand_is_done_here(monkeypatch):
     monkeypatch.setattr(processes, "_WORTH_S", 60.0)
-    with team(2, soon=lambda: None) as both:
+    with team(2, soon="no.such.module") as both:
         assert list(both.in_order(str, range(3))) == ["0", "1", "2"]
 
 

@@ -19,7 +19,7 @@ from wildshape.drives.writing.folder import BOXES, FRAMES
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.output import begin, finished, keep_apart, remove_leftovers
 from wildshape.method.checkpoint import weights_file
-from wildshape.parallel.team import ALONE, team
+from wildshape.parallel.team import ALONE, Team, team
 
 if TYPE_CHECKING:
     from wildshape.drives.adapting.adapt import Adaptation
@@ -35,7 +35,7 @@ def drive(
     *,
     topic: str | None = None,
     predictor: Predictor | None = None,
-    workers: int | None = None,
+    workers: int | Team | None = None,
     files: DriveFiles = _NO_FILES,
     detections: DetectionFile | None = None,
     adapt: "AdaptConfig | Adaptation | None" = None,
@@ -53,7 +53,8 @@ def drive(
         config: the numbers of every stage.
         topic: of point clouds, for a recording of ROS that holds several.
         predictor: by default the shipped weights.
-        workers: processes that cut scans and complete objects; None: one a core.
+        workers: processes that cut scans and complete objects; None: one a core; or those of a
+            `parallel.team.team` that are there already.
         files: what else to write into the folder.
         detections: what somebody else's detector found, in place of the clusters.
         adapt: train the model on what was found, and complete the drive again if it is better; or
@@ -82,7 +83,7 @@ def drive(
     done = None if overwrite else finished(out, "drive", settings, parts=(BOXES, FRAMES))
     if done is None:
         output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
-        soon = Pipeline if len(recording) >= _LONG else None
+        soon = Pipeline.__module__ if len(recording) >= _LONG else None
         with output.abandoned_if_refused(), team(workers, soon=soon) as helpers:
             clock = run.clock.going_on(run.stages / SECONDS)
             found = replace(run, helpers=helpers, clock=clock).perform()

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, suppress
+from importlib import import_module
 from queue import SimpleQueue
 from threading import Thread
 from typing import Any, TypeVar
@@ -39,10 +40,13 @@ class Processes:
         """How many processes have done some of the work until now."""
         return 1 + sum(one.helped for one in self._assistants)
 
-    def begin(self, task: Callable[[Any], Any]) -> None:
-        """Start the helpers, for work known to be long: they import what such a task needs."""
-        for one in self._assistants:
-            one.assist(task, None)
+    def begin(self, module: str) -> None:
+        """Start the first helper for work that may be long: it imports the module of its tasks.
+
+        The others follow once it is seen to be long.
+        """
+        for one in self._assistants[:1]:
+            one.assist(_Importing(module), None)
 
     def in_order(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
         """`task(item)` of all items, in order; few results are kept in memory.
@@ -81,6 +85,19 @@ class Processes:
         finally:
             handout.end()
             threads.restore()
+
+
+class _Importing:
+    """In place of a task: a helper that takes it has imported a module."""
+
+    def __init__(self, module: str) -> None:
+        self._module = module
+
+    def __reduce__(self) -> tuple[Callable[[str], Any], tuple[str]]:
+        return import_module, (self._module,)
+
+    def __call__(self, item: Any) -> None:
+        """Nothing: there are no items."""
 
 
 _Job = tuple[Callable[[Any], Any], Handout[Any, Any] | None]

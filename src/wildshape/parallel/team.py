@@ -5,7 +5,7 @@
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Protocol, TypeVar, runtime_checkable
 
 from wildshape.errors import BadInputError
 from wildshape.parallel.processes import Processes
@@ -44,19 +44,24 @@ ALONE: Team = Processes(1)
 
 @contextmanager
 def team(
-    workers: int | None = None, ray: str | None = None, soon: Callable[..., Any] | None = None
+    workers: int | Team | None = None, ray: str | None = None, soon: str | None = None
 ) -> Iterator[Team]:
     """The processes of this machine, or a cluster's; the end of the block ends them.
 
     Args:
-        workers: how many; None: one a core.
+        workers: how many; None: one a core; or those of a block around this one, which ends them.
         ray: address of a Ray cluster in place of this machine (`on_ray`).
-        soon: what long work will need; this machine's helpers import it at once.
+        soon: a module that long work will need; a helper of this machine imports it at once.
 
     Raises:
         BadInputError: fewer than one worker; no cluster answers there.
         MissingExtraError: Ray is not installed.
     """
+    if workers is not None and not isinstance(workers, int):
+        if soon is not None and isinstance(workers, Processes):
+            workers.begin(soon)
+        yield workers
+        return
     if workers is not None and workers < 1:
         raise BadInputError(f"--workers {workers}: expected 1 or more.")
     if ray is not None:

@@ -12,6 +12,8 @@ from tests.drives.finished_drive import CARS, FRAMES, HEIGHT, finished_drive
 from tests.refusal import refused
 from tests.report.chromium import CHROMIUM, Page, browser, colourful, eventually, moved
 
+from wildshape.parallel import processes
+from wildshape.parallel.team import team
 from wildshape.report.drive.page import report_from_drive, write_drive_report
 from wildshape.report.drive.scene import NOBODY, SceneConfig, drawn_scans, scene_data
 
@@ -65,6 +67,20 @@ def test_each_vehicle_s_scans_are_fused_where_it_is_completed(found):
         for cloud in shown.clouds:
             reach = np.abs(cloud.points - np.asarray(shown.box.centre)).max(0)
             assert (reach < (2.6, 1.5, 0.8)).all(), cloud.label
+
+
+def test_helpers_draw_the_same_page(found, monkeypatch):
+    monkeypatch.setattr(processes, "_WORTH_S", 0.0)
+    with team(2, soon="wildshape.report.drive.page") as helpers:
+        together = report_from_drive(found.out, helpers=helpers)
+        while helpers.worked == 1:
+            together = report_from_drive(found.out, helpers=helpers)
+    alone = report_from_drive(found.out)
+    assert alone.scene is not None
+    assert together.scene is not None
+    assert together.scene.picture == alone.scene.picture
+    assert together.scene.data == alone.scene.data
+    assert [shown.details for shown in together.objects] == [s.details for s in alone.objects]
 
 
 def test_without_the_recording_the_vehicles_are_drawn_alone(found, tmp_path):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import FlagCreatePairsOff, Positional, arg
 
+from wildshape.cli.commands import uncollected
 from wildshape.cli.options import (
     DEFAULT_NETWORK,
     DEFAULT_WORK,
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from wildshape.drives.tracking.detections import DetectionFile
     from wildshape.drives.writing.files import DriveFiles
     from wildshape.inference.folders.box_files import BoxFiles
+    from wildshape.parallel.team import Team
     from wildshape.report.drive.many import DriveAndPage, DrivesResult
 
 EXAMPLES = (
@@ -131,12 +133,25 @@ def run(settings: Settings) -> None:
         BadInputError: a source, the model or the output cannot be used.
         MissingExtraError: a library is not installed.
     """
-    from wildshape.cli.terminal import say
-    from wildshape.drives.adapting.adapt import adapt_to
-    from wildshape.drives.config import INFERENCE, DriveConfig
-    from wildshape.drives.writing.files import DriveFiles
-    from wildshape.inference.predictor import load
-    from wildshape.report.drive.many import DriveAndPage
+    from wildshape.parallel.team import team
+
+    work = settings.work
+    if work.ray is not None:
+        _run(settings, work.workers)
+        return
+    # A helper imports what it needs while this process does.
+    with team(work.workers, soon="wildshape.drives.pipeline") as helpers:
+        _run(settings, helpers)
+
+
+def _run(settings: Settings, workers: "int | Team | None") -> None:
+    with uncollected():
+        from wildshape.cli.terminal import say
+        from wildshape.drives.adapting.adapt import adapt_to
+        from wildshape.drives.config import INFERENCE, DriveConfig
+        from wildshape.drives.writing.files import DriveFiles
+        from wildshape.inference.predictor import load
+        from wildshape.report.drive.many import DriveAndPage
 
     adapt, files = _adapt(settings), _files(settings)
     drives = _drives(settings)
@@ -150,7 +165,7 @@ def run(settings: Settings) -> None:
         files=files,
         detections=detections,
         report=not settings.no_report,
-        workers=settings.work.workers,
+        workers=workers,
         overwrite=settings.overwrite,
     )
     several = len(folders) > 1 or settings.work.ray is not None

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from wildshape.baselines.named import NAMES
+from wildshape.cli.commands import uncollected
 from wildshape.cli.options import (
     DEFAULT_FILES,
     DEFAULT_WORK,
@@ -82,9 +83,10 @@ def run(settings: Settings) -> None:
     """
     import json
 
-    from wildshape.baselines.compare import ComparisonOptions, compare
-    from wildshape.cli.terminal import TERMINAL, answer, say, say_skipped
-    from wildshape.io.progress import counted, duration
+    with uncollected():
+        from wildshape.baselines.compare import ComparisonOptions, compare
+        from wildshape.cli.terminal import TERMINAL, answer, say, say_skipped
+        from wildshape.io.progress import counted, duration
 
     options = ComparisonOptions(
         models=settings.model,

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
+from wildshape.cli.commands import uncollected
 from wildshape.cli.options import DEFAULT_SCANS, Scans
 from wildshape.errors import BadInputError
 
@@ -37,15 +38,16 @@ def run(settings: Settings) -> None:
     Raises:
         BadInputError: input, model or output cannot be used.
     """
-    from wildshape.cli.terminal import answer, say, say_skipped
-    from wildshape.geometry.transforms.se3 import stack
-    from wildshape.inference.confidence import ReasonCounts
-    from wildshape.inference.predictor import load
-    from wildshape.inference.registration import fuse_scans, to_middle
-    from wildshape.io.inputs import open_tracks
-    from wildshape.io.output import refuse_file
-    from wildshape.io.progress import counted
-    from wildshape.io.scans.writers import check_suffix, write_cloud
+    with uncollected():
+        from wildshape.cli.terminal import answer, say, say_skipped
+        from wildshape.geometry.transforms.se3 import stack
+        from wildshape.inference.confidence import ReasonCounts
+        from wildshape.inference.predictor import load
+        from wildshape.inference.registration import fuse_scans, to_middle
+        from wildshape.io.inputs import open_tracks
+        from wildshape.io.output import refuse_file
+        from wildshape.io.progress import counted
+        from wildshape.io.scans.writers import check_suffix, write_cloud
 
     asked = settings.scans
     check_suffix(settings.out)

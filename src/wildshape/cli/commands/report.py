@@ -8,6 +8,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
+from wildshape.cli.commands import uncollected
 from wildshape.cli.options import AsJson, Overwrite, option
 
 EXAMPLES = (
@@ -49,12 +50,13 @@ def run(settings: Settings) -> None:
     Raises:
         BadInputError: nothing there to report, or the page exists.
     """
-    from wildshape.cli.terminal import answer
-    from wildshape.drives.writing.folder import is_drive
-    from wildshape.io.output import refuse_file
-    from wildshape.report.drive.page import report_from_drive
-    from wildshape.report.page.folder import report_from_folder
-    from wildshape.report.page.html import write_report
+    with uncollected():
+        from wildshape.cli.terminal import answer
+        from wildshape.drives.writing.folder import is_drive
+        from wildshape.io.output import refuse_file
+        from wildshape.report.drive.page import report_from_drive
+        from wildshape.report.page.folder import report_from_folder
+        from wildshape.report.page.html import write_report
 
     out = settings.out or settings.folder / "report.html"
     refuse_file(out, overwrite=settings.overwrite)

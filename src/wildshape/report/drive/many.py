@@ -16,7 +16,7 @@ from wildshape.drives.writing.files import DriveFiles
 from wildshape.errors import BadInputError
 from wildshape.inference.predictor import Predictor
 from wildshape.io.progress import SILENT, Progress
-from wildshape.parallel.team import cores, team
+from wildshape.parallel.team import Team, cores, team
 from wildshape.report.drive.page import write_drive_report
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class DriveAndPage:
     detections: DetectionFile | None = None
     adapt: "Adaptation | None" = None
     report: bool = True
-    workers: int | None = None
+    workers: int | Team | None = None
     overwrite: bool = False
 
     def find(self, source: Path, out: Path, watch: Watch = silent) -> DriveResult:
@@ -52,23 +52,24 @@ class DriveAndPage:
             BadInputError: source, detections or output cannot be used.
             MissingExtraError: a library is not installed.
         """
-        found = drive(
-            source,
-            out,
-            self.config,
-            topic=self.topic,
-            predictor=self.predictor,
-            workers=self.workers,
-            files=self.files,
-            detections=self.detections,
-            adapt=self.adapt,
-            overwrite=self.overwrite,
-            watch=watch,
-        )
-        if self.report and not (out / REPORT).is_file():
-            watch("report", 0, 1)
-            write_drive_report(out)
-            watch("report", 1, 1)
+        with team(self.workers) as helpers:
+            found = drive(
+                source,
+                out,
+                self.config,
+                topic=self.topic,
+                predictor=self.predictor,
+                workers=helpers,
+                files=self.files,
+                detections=self.detections,
+                adapt=self.adapt,
+                overwrite=self.overwrite,
+                watch=watch,
+            )
+            if self.report and not (out / REPORT).is_file():
+                watch("report", 0, 1)
+                write_drive_report(out, helpers)
+                watch("report", 1, 1)
         return found
 
     def __call__(self, place: tuple[Path, Path]) -> tuple[Path, DriveResult | BadInputError]:

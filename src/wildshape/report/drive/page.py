@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """`report.html` of a drive: the scene played over time, and each vehicle with its shape."""
 
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from wildshape.drives.result import REPORT
 from wildshape.drives.source import Drive
@@ -11,10 +14,11 @@ from wildshape.drives.writing.playback.moments import readable_source
 from wildshape.geometry.sampling import thin
 from wildshape.inference.registration import fuse_scans, to_middle
 from wildshape.io.progress import counted, duration
+from wildshape.parallel.team import ALONE, Team
 from wildshape.records import Points, as_text
 from wildshape.report.content import Cell, Cloud, Report, ReportObject, SceneView, Table
-from wildshape.report.drive.picture import picture_from_above
-from wildshape.report.drive.scene import drawn_scans, scene_data
+from wildshape.report.drive.picture import for_picture, picture_from_above
+from wildshape.report.drive.scene import DrawnScan, drawn_scans, scene_data
 from wildshape.report.page.html import write_report
 from wildshape.report.results import (
     MEANING,
@@ -50,47 +54,64 @@ _COLUMNS = (
 )
 
 
-def report_from_drive(out: Path, moved: Path | None = None) -> Report:
+def report_from_drive(out: Path, moved: Path | None = None, helpers: Team = ALONE) -> Report:
     """The page of a finished drive.
 
     Args:
         out: the drive's folder.
         moved: where the recording is now, if it is no longer where it was. Where it cannot be read
             the scene shows no scans.
+        helpers: who reads and draws.
 
     Raises:
         BadInputError: no finished drive, or a damaged one; `moved` is another recording.
     """
     found = read_finished(out)
-    return drive_report(found, found.open_source(moved) if moved else readable_source(found))
+    source = found.open_source(moved) if moved else readable_source(found)
+    return drive_report(found, source, helpers)
 
 
-def write_drive_report(out: Path) -> None:
-    """Write `report.html` into a finished drive's folder.
+def write_drive_report(out: Path, helpers: Team = ALONE) -> None:
+    """Write `report.html` into a finished drive's folder; `helpers`: who reads and draws.
 
     Raises:
         BadInputError: no finished drive, or a damaged one.
     """
-    write_report(report_from_drive(out), out / REPORT)
+    write_report(report_from_drive(out, helpers=helpers), out / REPORT)
 
 
-def drive_report(found: FinishedDrive, drive: Drive | None) -> Report:
+def drive_report(found: FinishedDrive, drive: Drive | None, helpers: Team = ALONE) -> Report:
     """The page's content; without the recording the scene shows no scans."""
     said = found.record.get("result") or {}
     gone = () if drive is not None else (f"{found.source} cannot be read: no scans are drawn.",)
     adapted = _ADAPTED if "adapted" in found.record else ()
     shown = found.vehicles[:MOST_OBJECTS]
-    scans = drawn_scans(found, drive)
+    scans = drawn_scans(found, drive, helpers=helpers)
+    parts: tuple[Callable[[], Any], ...] = (
+        partial(_scene_and_objects, found, scans, shown),
+        partial(picture_from_above, found, for_picture(scans)),
+    )
+    (scene, objects), picture = helpers.in_order(_done, parts)
     return Report(
         title=f"Wildshape drive: {as_text(found.name)}",
         facts=tuple(_facts(found)),
-        scene=SceneView(scene_data(found, scans), picture_from_above(found, scans)),
+        scene=SceneView(scene, picture),
         index=(_index(found),) if found.vehicles else (),
-        objects=tuple(_object(found, one) for one in shown),
+        objects=objects,
         cost=tuple(_cost(said.get("seconds") or {})),
         notes=(*gone, *adapted, *map(str, said.get("warnings") or ()), *_NOTES),
         provenance=found.record.get("provenance") or {},
     )
+
+
+def _done(part: Callable[[], Any]) -> Any:
+    return part()
+
+
+def _scene_and_objects(
+    found: FinishedDrive, scans: list[DrawnScan], shown: Sequence[FoundVehicle]
+) -> tuple[dict[str, Any], tuple[ReportObject, ...]]:
+    return scene_data(found, scans), tuple(_object(found, one) for one in shown)
 
 
 def _facts(found: FinishedDrive) -> list[tuple[str, str]]:

@@ -35,6 +35,11 @@ _SCANS, _SHAPE_POINTS = 12, 2500
 _NEAR_M, _ROW = 25.0, 0.15  # of the README's picture: a row of vehicles, of the width
 
 
+def for_picture(scans: Sequence[DrawnScan]) -> Sequence[DrawnScan]:
+    """Those of all scans whose points are drawn."""
+    return scans[:: -(-len(scans) // _SCANS) or 1]
+
+
 def picture_from_above(found: FinishedDrive, scans: Sequence[DrawnScan]) -> bytes:
     """A WebP of the whole drive: what stands, every vehicle where it was best seen, the ways."""
     low, high = _bounds(found)
@@ -129,7 +134,7 @@ def _above(
 
 def _standing(axes: Any, found: FinishedDrive, scans: Sequence[DrawnScan]) -> None:
     """Points on no vehicle of some scans, brighter the higher."""
-    for scan in scans[:: -(-len(scans) // _SCANS) or 1]:
+    for scan in for_picture(scans):
         T = found.T_level_sensor[scan.frame]
         points = T.apply_numpy(scan.points[scan.owners == NOBODY])
         height = points[:, 2] - float(T.translation[2]) + found.ground_m

@@ -19,12 +19,14 @@ from wildshape.geometry.box import box_axes
 from wildshape.geometry.footprint import upright_places
 from wildshape.geometry.sampling import thin
 from wildshape.ops.connected import first_of_cells
+from wildshape.parallel.team import ALONE, Team
 from wildshape.records import Box, Points
 from wildshape.report.page.html import quantise
 from wildshape.report.results import chances_in
 
 _AROUND_M, _FOOT_M = 0.15, 0.15  # a box that is a little small; the ground under it
 NOBODY = -1
+_NO_POINTS = np.empty((0, 3), np.float32)
 
 
 @dataclass(frozen=True)
@@ -70,16 +72,32 @@ _DEFAULT = SceneConfig()
 
 
 def drawn_scans(
-    found: FinishedDrive, drive: Drive | None, config: SceneConfig = _DEFAULT
+    found: FinishedDrive,
+    drive: Drive | None,
+    config: SceneConfig = _DEFAULT,
+    helpers: Team = ALONE,
 ) -> list[DrawnScan]:
     """The scans that are drawn, read one by one; without the recording they have no points."""
     step = -(-len(found) // config.frames) or 1
     frames = range(0, len(found), step)
     most = min(config.points_a_scan, config.points // max(1, len(frames)))
-    boxes = boxes_by_frame(found)
-    none = np.empty((0, 3), np.float32)
-    scans = ((frame, none if drive is None else drive.scan(frame)) for frame in frames)
-    return [thinned(frame, scan, boxes.get(frame, {}), most, config) for frame, scan in scans]
+    if drive is None:
+        return [thinned(frame, _NO_POINTS, {}, most, config) for frame in frames]
+    return list(helpers.in_order(_Drawing(drive, boxes_by_frame(found), most, config), frames))
+
+
+@dataclass(frozen=True)
+class _Drawing:
+    """Reads a scan and makes it ready; fields as `thinned` takes them, of all frames."""
+
+    drive: Drive
+    boxes: dict[int, dict[int, Box]]
+    most: int
+    config: SceneConfig
+
+    def __call__(self, frame: int) -> DrawnScan:
+        boxes = self.boxes.get(frame, {})
+        return thinned(frame, self.drive.scan(frame), boxes, self.most, self.config)
 
 
 def boxes_by_frame(found: FinishedDrive) -> dict[int, dict[int, Box]]:
