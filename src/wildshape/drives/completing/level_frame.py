@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
-from wildshape.drives.completing.rolling_shutter import Turns
+from wildshape.drives.completing.rolling_shutter import HALF_TICK, Turns
 from wildshape.drives.object_config import BoxConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.mounting import Mounting
@@ -144,7 +144,8 @@ def on_ground_of_each(
         turns: of the drive's sensor.
         config: see there.
     """
-    ticks, ground = np.take(turns.ticks, frames), _ground(one.seen, frames, cuts, turns)
+    ticks = np.take(turns.ticks, frames).astype(np.float64)
+    ground = _ground(one.seen, frames, cuts, turns)
     gaps = shown[:, 2] - one.size[2] / 2 - ground
     is_ground = _usual(ticks, ground, config) | _usual(ticks, -gaps, config)
     gaps = np.where(is_ground, gaps, np.nan)
@@ -175,7 +176,7 @@ def _ground(
 
 
 def _usual(
-    ticks: Int[np.ndarray, "f"], heights: Float[np.ndarray, "f"], config: BoxConfig
+    ticks: Float[np.ndarray, "f"], heights: Float[np.ndarray, "f"], config: BoxConfig
 ) -> Bool[np.ndarray, "f"]:
     """Which heights of the ground are as those around them."""
     usual = _around(ticks, heights, config.ground_stray_ticks, _LOWER)
@@ -183,12 +184,12 @@ def _usual(
 
 
 def _around(
-    ticks: Int[np.ndarray, "f"], values: Float[np.ndarray, "f"], reach: int, quantile: float
+    ticks: Float[np.ndarray, "f"], values: Float[np.ndarray, "f"], reach: int, quantile: float
 ) -> Float[np.ndarray, "f"]:
     """A quantile of the values up to so many ticks before and after each; NaN are left out."""
     known = np.flatnonzero(~np.isnan(values))
-    first = np.searchsorted(ticks[known], ticks - reach, "left")
-    last = np.searchsorted(ticks[known], ticks + reach, "right")
+    first = np.searchsorted(ticks[known], ticks - reach - HALF_TICK)
+    last = np.searchsorted(ticks[known], ticks + reach + HALF_TICK)
     around = (np.sort(values[known[a:b]]) for a, b in zip(first, last))
     return np.array([_quantile(some, quantile) if len(some) else np.nan for some in around])
 
