@@ -129,7 +129,7 @@ def test_rays_of_another_unit_than_the_scans_are_refused(
 def test_rays_of_another_scan_or_frame_are_refused(track: Track, tmp_path: Path) -> None:
     """Nothing noticed; no ray said anything of the object."""
     scan = track.scans[0] + np.array((10, 2, 0), np.float32)
-    beside = SightLines.of_returns(scan * np.float32((1.5, 1.6, 1.5)))
+    beside = SightLines.of_returns(scan * np.array((1.5, 1.6, 1.5), np.float32))
     write_track(tmp_path / "t", replace(track.part([0]), scans=(scan,), rays=(beside,)))
     assert len(read_track(tmp_path / "t").rays) == 1
     (file,) = (tmp_path / "t" / "rays").iterdir()
