@@ -24,7 +24,7 @@ from wildshape.geometry.transforms.rotation import quaternion_from_rotation, rot
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import OBJECTS
 from wildshape.io.boxes.detections import detections_of, poses_of
-from wildshape.io.guard import read_json
+from wildshape.io.guard import read_json, reading
 from wildshape.records import Box, Points
 
 _LOWER = 0.25  # what is wrongly taken for ground lies too high: it is of a lorry
@@ -83,11 +83,14 @@ def read_completed(seen: Sightings, folder: Path, drive: Drive, turns: Turns) ->
     Raises:
         BadInputError: the files are damaged.
     """
-    said = read_json(folder / OBJECTS, "what complete writes")
-    found = list(detections_of(said, 0))
-    place = {name: frame for frame, name in enumerate(drive.scan_names)}
-    frames = tuple(place[one.scan] for one in found)
-    costs = np.array([float(scan["cost_m"]) for scan in said["scans"]])
+    with reading(folder / OBJECTS, "what complete writes"):
+        said = read_json(folder / OBJECTS, "what complete writes")
+        found = list(detections_of(said, 0))
+        place = {name: frame for frame, name in enumerate(drive.scan_names)}
+        frames = tuple(place[one.scan] for one in found)
+        costs = np.array([float(scan["cost_m"]) for scan in said["scans"]])
+        p_kind = _mean([scan.get("p_kind") for scan in said["scans"]])
+        size = found[0].box.size
     points = dict(zip(seen.frames, seen.points))
     weights = np.array([points[frame] for frame in frames], float)
     T_level_box = turns.T_level_sensor[torch.tensor(frames)] @ poses_of([one.box for one in found])
@@ -96,10 +99,10 @@ def read_completed(seen: Sightings, folder: Path, drive: Drive, turns: Turns) ->
         seen=seen,
         frames=frames,
         boxes=boxes,
-        size=found[0].box.size,
+        size=size,
         cost_m=weighted_median(costs, weights),
         confidence=float(np.mean([one.score for one in found])),
-        p_kind=_mean([scan.get("p_kind") for scan in said["scans"]]),
+        p_kind=p_kind,
         phases=phases,
     )
 
