@@ -83,3 +83,21 @@ def test_what_is_replaced_is_kept_until_the_new_is_finished(tmp_path: Path) -> N
     output.finish()
     assert not (out / EARLIER).exists()
     assert {path.read_text() for path in out.rglob("*.ply")} == {"3"}
+
+
+@pytest.mark.parametrize(
+    "files", [None, -1, "*.ply", [None], ["**x"], ["/*"], ["../*"], ["*/../../*"]]
+)
+def test_nothing_is_removed_by_patterns_that_are_none_or_lead_out(
+    tmp_path: Path, files: object
+) -> None:
+    """`../*` moved the files beside the folder into it, and the last of them were lost."""
+    out = tmp_path / "out"
+    _written(out, 1).finish()
+    (tmp_path / "mine.txt").write_text("mine")
+    marker = out / MARKER
+    marker.write_text(json.dumps({**json.loads(marker.read_text()), "files": files}))
+    before = _content(tmp_path)
+    settings = "complete", {"a": 2}, ["*.ply"]
+    refused(begin, out, *settings, overwrite=True, match=f"{MARKER}: expected which files are")
+    assert _content(tmp_path) == before

@@ -126,6 +126,18 @@ def test_rays_of_another_unit_than_the_scans_are_refused(
     refused(with_rays, source, tmp_path / "r.npz", SENSOR_METRES, match=f"r.npz: .*{match}")
 
 
+def test_rays_of_another_scan_or_frame_are_refused(track: Track, tmp_path: Path) -> None:
+    """Nothing noticed; no ray said anything of the object."""
+    scan = track.scans[0] + np.array((10, 2, 0), np.float32)
+    beside = SightLines.of_returns(scan * np.array((1.5, 1.6, 1.5), np.float32))
+    write_track(tmp_path / "t", replace(track.part([0]), scans=(scan,), rays=(beside,)))
+    assert len(read_track(tmp_path / "t").rays) == 1
+    (file,) = (tmp_path / "t" / "rays").iterdir()
+    elsewhere, match = beside.directions[:, [1, 0, 2]], "no ray comes nearer than 7.* the same scan"
+    write_rays(file, SightLines(elsewhere, beside.ranges))
+    refused(read_track, tmp_path / "t", match=f"{file.name}: {match}")
+
+
 def test_units_and_refusals_name_the_file(tmp_path: Path) -> None:
     path = tmp_path / "r.npz"
     write_rays(path, rays_of(4, merged=True))

@@ -258,7 +258,7 @@ class Pipeline:
 
     def turns(self, objects: list[Sightings], T_level_sensor: SE3) -> Turns:
         """The sensor's turns, in their sense where points have no times."""
-        found = Turns(self.drive.ticks, T_level_sensor, breaks=self.breaks.frames)
+        found = Turns(self.drive.moments, T_level_sensor, breaks=self.breaks.frames)
         first = range(min(FIRST_SCANS, len(self.drive)))  # one alone may be empty
         if all(self.drive.turn(frame).seconds is None for frame in first):
             shown = ((one.frames, one.boxes) for one in self.completed(objects, found))

@@ -25,7 +25,7 @@ from wildshape.drives.writing.folder import (
 )
 from wildshape.inference.folders.box_files import BOX_FILES
 from wildshape.inference.predictor import Predictor
-from wildshape.io.guard import reading
+from wildshape.io.guard import reading, record_of
 from wildshape.io.output import MARKER
 from wildshape.io.scans.writers import MESH_FORMATS
 
@@ -152,6 +152,4 @@ def line_of(
 def earlier_result(out: Path, record: dict[str, Any]) -> DriveResult:
     """What an earlier run found, by its record."""
     with reading(out / MARKER, "what `wildshape drive` says of itself"):
-        said = record["result"]
-        lists = {name: tuple(said[name]) for name in ("vehicles", "warnings")}
-        return DriveResult(**{**said, **lists, "out": out})
+        return record_of(DriveResult, {**record["result"], "out": out}, {})

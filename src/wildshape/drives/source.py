@@ -12,7 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Num
 
 from wildshape.drives.frame_cache import FrameCache
 from wildshape.errors import BadInputError
@@ -41,6 +41,7 @@ class Drive:
         name: of the recording.
         scan_names: one a frame; frames are counted from 0.
         ticks: when each was taken, counted in scans: a missing scan leaves its number out.
+        moments: the same in parts of scans, where stamps are known: steps may be uneven.
         read: gives a frame's finite points, sensor frame, metres, and when each was taken, if
             that is known; they are not to be changed. `BadInputError` if it cannot.
         times: when each scan was taken, seconds, if known.
@@ -54,6 +55,7 @@ class Drive:
     name: str
     scan_names: tuple[str, ...]
     ticks: tuple[int, ...]
+    moments: tuple[float, ...]
     read: Callable[[int], Turn]
     times: tuple[float, ...] | None = None
     T_world_sensor: SE3 | None = None
@@ -90,11 +92,12 @@ class Drive:
                     " they were taken"
                 )
                 raise BadInputError(f"{name}: time {row} ({after:.10g}) {wrong}.")
-        ticks, missing = _ticks(names, times)
+        ticks, moments, missing = _ticks(names, times)
         return cls(
             name=name,
             scan_names=names,
             ticks=ticks,
+            moments=moments,
             read=FrameCache(read),
             times=None if times is None else tuple(times),
             T_world_sensor=T_world_sensor,
@@ -231,17 +234,22 @@ def _beside(frame: int, times: Sequence[float], last: int) -> tuple[int, int]:
 
 def _ticks(
     names: tuple[str, ...], times: Sequence[float] | None
-) -> tuple[tuple[int, ...], tuple[str, ...]]:
-    """When each scan was taken, in scans since the first, and a sentence if some are missing."""
+) -> tuple[tuple[int, ...], tuple[float, ...], tuple[str, ...]]:
+    """When each scan was taken, in scans since the first, and a sentence if some are missing.
+
+    Counted whole, then in thousandths: those are all whole where steps are even.
+    """
     if times is not None:
-        ticks = _counted(np.diff(times))
+        steps = _in_scans(np.diff(times))
     elif numbers := _numbers(names):
-        ticks = _numbered(names, numbers)
+        steps = _numbered(names, numbers)
     else:
-        ticks = np.arange(len(names))
+        steps = np.ones(len(names) - 1)
+    ticks = _since_first(np.clip(np.rint(steps), 1, _LONGEST_PAUSE).astype(int))
+    moments = _since_first(np.clip(np.round(steps, 3), 0.001, _LONGEST_PAUSE))
     missing = int(ticks[-1]) + 1 - len(names)
     told = (f"{counted(missing, 'scan')} missing between the others",) if missing else ()
-    return tuple(ticks.tolist()), told
+    return tuple(ticks.tolist()), tuple(moments.tolist()), told
 
 
 def _numbers(names: tuple[str, ...]) -> Sequence[int | float]:
@@ -251,8 +259,8 @@ def _numbers(names: tuple[str, ...]) -> Sequence[int | float]:
     return [] if any(_DATED.match(name) for name in names) else numbers_of(names)
 
 
-def _numbered(names: tuple[str, ...], numbers: Sequence[int | float]) -> Int[np.ndarray, "n"]:
-    """Names that count scans one by one, or by tens, or are stamps of a clock.
+def _numbered(names: tuple[str, ...], numbers: Sequence[int | float]) -> Float[np.ndarray, "m"]:
+    """Steps of names that count scans one by one, or by tens, or are stamps of a clock.
 
     Raises:
         BadInputError: they do not rise.
@@ -261,11 +269,13 @@ def _numbered(names: tuple[str, ...], numbers: Sequence[int | float]) -> Int[np.
     if (steps <= 0).any():
         raise BadInputError(f"{names[0]} to {names[-1]}: scans share a number; rename them.")
     one_by_one = (steps == 1).any() and all(float(number).is_integer() for number in numbers)
-    return _counted(steps, 1.0 if one_by_one else None)
+    return steps if one_by_one else _in_scans(steps)
 
 
-def _counted(steps: Float[np.ndarray, "m"], one: float | None = None) -> Int[np.ndarray, "n"]:
-    """Scans since the first; `one`: the step from a scan to the next, by default the middle one."""
-    one = one or float(np.median(steps)) if len(steps) else 1.0
-    whole = np.clip(np.rint(steps / one), 1, _LONGEST_PAUSE).astype(int)
-    return np.concatenate(([0], np.cumsum(whole)))
+def _in_scans(steps: Float[np.ndarray, "m"]) -> Float[np.ndarray, "m"]:
+    """Steps in units of the middle one."""
+    return steps / np.median(steps) if len(steps) else steps
+
+
+def _since_first(steps: Num[np.ndarray, "m"]) -> Num[np.ndarray, "n"]:
+    return np.concatenate(([0], np.cumsum(steps)))

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.box import spans
-from wildshape.io.rays import check_unit, read_rays
+from wildshape.io.rays import check_rays, read_rays
 from wildshape.io.scans.points import (
     LEAST_POINTS,
     check_near,
@@ -178,15 +178,17 @@ def together(
     check_sensor(sensor)
     clouds = all_as_points(scans)
     known = rays_of_each(rays, clouds)
-    check_units(known, clouds)
+    check_all_rays(known, clouds)
     return clouds, known
 
 
-def check_units(rays: Sequence[SightLines | None], scans: Sequence[Points], first: int = 0) -> None:
-    """Refuse rays of another unit than their scans; errors count them from `first`.
+def check_all_rays(
+    rays: Sequence[SightLines | None], scans: Sequence[Points], first: int = 0
+) -> None:
+    """Refuse rays of another unit or scan; errors count them from `first`.
 
     Raises:
-        BadInputError: see `check_unit`.
+        BadInputError: see `check_rays`.
     """
     for i, (one, scan) in enumerate(zip(rays, scans), first):
-        check_unit(one, scan, f"rays {i}")
+        check_rays(one, scan, f"rays {i}")

@@ -146,7 +146,7 @@ class Predictor:
         for start in range(0, len(scans), BATCH):
             part = slice(start, start + BATCH)
             clouds = point_inputs.all_as_points(scans[part], start)
-            point_inputs.check_units(known[part], clouds, start)
+            point_inputs.check_all_rays(known[part], clouds, start)
             yield from self._each(clouds, sensor, known[part])
 
     def complete_track(
@@ -237,7 +237,7 @@ class Predictor:
         point_inputs.check_sensor(sensor)
         pair = point_inputs.as_points(source, "source"), point_inputs.as_points(target, "target")
         known = point_inputs.rays_of_each(rays, pair)
-        point_inputs.check_units(known, pair)
+        point_inputs.check_all_rays(known, pair)
         done = self._each(pair, sensor, known)
         return registered(*pair, done, self.config.inliers)
 

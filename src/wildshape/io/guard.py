@@ -227,11 +227,11 @@ def _value(hint: Any, value: Any, bounds: Bounds, at: str) -> Any:
         return _one_of(choices, value, bounds, at)
     if isinstance(hint, type) and is_dataclass(hint):
         return record_of(hint, value, bounds, at)
-    if origin is tuple:
-        return _tuple(choices, value, bounds, at)
+    if origin in (tuple, dict):
+        return (_tuple if origin is tuple else _dict)(choices, value, bounds, at)
     if hint in (int, float):
         return _number(hint, value, bounds.get(at, _ANY_NUMBER), at)
-    allowed = value in choices if origin is Literal else type(value) is (origin or hint)
+    allowed = value in choices if origin is Literal else isinstance(value, origin or hint)
     if not allowed:
         expected = (
             " or ".join(map(str, choices)) if origin is Literal else (origin or hint).__name__
@@ -265,6 +265,12 @@ def _tuple(hints: tuple[Any, ...], value: Any, bounds: Bounds, at: str) -> tuple
     if len(value) != len(hints):
         raise _wrong(at, value, f"{len(hints)} values")
     return tuple(_value(h, v, bounds, at) for h, v in zip(hints, value))
+
+
+def _dict(hints: tuple[Any, ...], value: Any, bounds: Bounds, at: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise _wrong(at, value, "an object")
+    return {n: _value(hints[1], v, bounds, f"{at}.{n}") for n, v in value.items()}
 
 
 def _number(hint: type, value: Any, between: tuple[float, float], at: str) -> Any:

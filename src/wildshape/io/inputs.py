@@ -9,7 +9,7 @@ from pathlib import Path
 
 from wildshape.errors import BadInputError
 from wildshape.io.progress import counted
-from wildshape.io.rays import check_unit, read_rays
+from wildshape.io.rays import check_rays, read_rays
 from wildshape.io.scans.points import (
     SENSOR_METRES,
     SUFFIXES,
@@ -262,7 +262,7 @@ def with_rays(source: TrackSource, path: Path, coordinates: Coordinates) -> Trac
             f"{path}: rays of one scan, but {source.path} holds {len(track.scans)}; keep those of a"
             " track in its folder rays/, named as the scans."
         )
-    check_unit(rays, track.scans[0], str(path))
+    check_rays(rays, track.scans[0], str(path))
     dropped = tuple(
         (name.removeprefix(f"{track.name}/"), count) for name, count in source.dropped_nonfinite
     )

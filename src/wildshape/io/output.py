@@ -24,6 +24,7 @@ from typing import Any
 from wildshape.errors import BadInputError, LostWorkersError, MissingExtraError
 from wildshape.io.atomic import lock_folder, write_json
 from wildshape.io.earlier import EARLIER, MARKER, MARKERS, MOVED, forget, put_back, set_aside
+from wildshape.io.guard import reading
 from wildshape.io.progress import SILENT, Progress
 
 _LONGEST_BYTES, _SHOWN = 251, 60  # of a name before `.ply`; file systems end at 255
@@ -229,7 +230,7 @@ def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: 
     """Whether the output there is to be gone on with; with `overwrite` it is set aside."""
     record = _read(path)
     if overwrite:
-        set_aside(path, record.get("files", []))
+        set_aside(path, _own_files(path, record))
         return False
     if not (path / MARKER).is_file():
         raise BadInputError(
@@ -250,6 +251,20 @@ def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: 
             " or choose another --out."
         )
     return True
+
+
+def _own_files(path: Path, record: dict[str, Any]) -> list[str]:
+    """Patterns of the files that an output says it wrote; none leads out of its folder.
+
+    Raises:
+        BadInputError: it does not say.
+    """
+    with reading(path / MARKER, "which files are an output's"):
+        patterns = record.get("files", [])
+        found = [file.relative_to(path).parts for one in patterns for file in path.glob(one)]
+        if not isinstance(patterns, list) or any(".." in parts for parts in found):
+            raise ValueError(f"files {patterns}")
+        return patterns
 
 
 def _read(path: Path) -> dict[str, Any]:

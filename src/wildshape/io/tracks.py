@@ -20,7 +20,7 @@ from wildshape.io.atomic import write_json
 from wildshape.io.guard import read_json
 from wildshape.io.order import out_of_order
 from wildshape.io.poses import read_poses, write_poses
-from wildshape.io.rays import check_unit, read_rays, write_rays
+from wildshape.io.rays import check_rays, read_rays, write_rays
 from wildshape.io.scans.points import (
     METRES,
     SENSOR_METRES,
@@ -196,7 +196,7 @@ def rays_beside(
     """The rays of a scan of a track folder, if it has any; they bear its name, or its file's.
 
     Raises:
-        BadInputError: they are damaged, or of another unit.
+        BadInputError: they are damaged, of another unit or of another scan.
     """
     folder = path.parent.parent / "rays"
     names = (f"{path.stem}.npz", f"{path.name}.npz")
@@ -204,7 +204,7 @@ def rays_beside(
     if file is None:
         return None
     rays = read_rays(file, coordinates)
-    check_unit(rays, scan, str(file))
+    check_rays(rays, scan, str(file))
     return rays
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.boxes.detections import read_box
 from wildshape.io.guard import read_json, reading
 from wildshape.io.inputs import TrackSource, open_tracks
 from wildshape.io.poses import read_poses
@@ -208,10 +209,7 @@ def box_of(entry: dict[str, Any]) -> Box | None:
     """The box of an entry of objects.json, in the scan's sensor frame."""
     if not entry.get("box"):
         return None
-    x, y, z = (float(v) for v in entry["box"]["centre"])
-    length, width, height = (float(v) for v in entry["box"]["size"])
-    qw, qx, qy, qz = (float(v) for v in entry["box"]["quaternion_wxyz"])
-    return Box((x, y, z), (length, width, height), (qw, qx, qy, qz))
+    return read_box(entry["box"])
 
 
 def coordinates_of(settings: dict[str, Any]) -> Coordinates:

@@ -190,3 +190,15 @@ def test_control_characters_of_a_file_do_not_reach_the_terminal(refused, trained
     path.write_bytes(b"\x1b[2J\x07 VERSION")
     said = refused("complete", path, "--out", tmp_path / "c", "--model", trained)
     assert "\x1b" not in said
+
+
+def test_what_an_earlier_run_left_out_is_no_text(wildshape, hidden, trained, tmp_path):
+    """A traceback in a run that was gone on with."""
+    line = "complete", hidden, "--out", tmp_path / "c", "--model", trained
+    assert wildshape(*line).code == 0
+    (objects,), marker = (tmp_path / "c").glob("*/objects.json"), tmp_path / "c" / "wildshape.json"
+    for path, changed in ((marker, {"status": "running"}), (objects, {"skipped": "x"})):
+        path.write_text(json.dumps(json.loads(path.read_text()) | changed))
+    found = wildshape(*line)
+    assert found.code == 2
+    assert f"{objects}: expected what an earlier run wrote" in found.err

@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
 import json
+import math
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -130,8 +131,10 @@ def test_probabilities_of_the_least_sure_scan_are_shown(tmp_path: Path) -> None:
         ("heading right", "0.40"),
         ("box right", "0.95"),
     )
-    (tmp_path / "car" / "objects.json").write_text(json.dumps({"scans": [{"p_pose": "high"}]}))
-    refused(report_from_folder, tmp_path, match=r"objects\.json")
+    nowhere = {"centre": [0, math.nan, 0], "size": [4, 2, 1], "quaternion_wxyz": [1, 0, 0, 0]}
+    for wrong in ({"p_pose": "high"}, {"scan": NAMES[0], "box": nowhere}):
+        (tmp_path / "car" / "objects.json").write_text(json.dumps({"scans": [wrong]}))
+        refused(report_from_folder, tmp_path, match=r"objects\.json")
 
 
 def test_an_evaluation_s_objects_by_our_error(tmp_path: Path) -> None:

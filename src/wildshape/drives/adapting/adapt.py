@@ -205,7 +205,7 @@ class _Adapting:
             at = partial(self.told, "headings", len(examples))
             kept = clear_headed(self.predictor, examples, self.config, at)
             write_json(path, [one.name for one in kept])
-        names = set(read_json(path, "names of tracks", list))
+        names = set(map(str, read_json(path, "names of tracks", list)))
         return [one for one in examples if one.name in names]
 
     def measured(self, when: str, predictor: Predictor, held: list[Example]) -> Measures:

@@ -8,7 +8,7 @@ it, the nearer the heavier (local regression, Cleveland 1979), for vehicles brak
 Before and after them it goes straight on.
 """
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,10 +17,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from wildshape.drives.completing.level_frame import Completed
-from wildshape.drives.completing.rolling_shutter import Turns
+from wildshape.drives.completing.rolling_shutter import HALF_TICK, Turns
 from wildshape.drives.object_config import BoxConfig
 
-_LEAST_APART = 0.5  # ticks
 _ROUNDS = 10
 _ENOUGH = 4  # moments for a parabola: through three one goes whatever they are
 _BEFORE = 3  # completed scans that the next one has to agree with
@@ -52,7 +51,7 @@ def smooth(one: Completed, turns: Turns, config: BoxConfig) -> Way:
     seen = one.seen.frames
     frames = [seen[0]]
     for frame in seen[1:]:
-        if turns.ticks[frame] - turns.ticks[frames[-1]] <= config.longest_gap:
+        if turns.ticks[frame] - turns.ticks[frames[-1]] < config.longest_gap + HALF_TICK:
             frames.extend(range(frames[-1] + 1, frame))
         frames.append(frame)
     return way_over(one, tuple(frames), turns, config)
@@ -137,8 +136,8 @@ def expected(one: Completed, turns: Turns, beyond_ticks: int, config: BoxConfig)
     if not way.moving:
         boxes = np.broadcast_to(way.boxes, (len(frames), 4))  # held once
         return Way(frames, boxes, moving=False)
-    start = bisect_left(ticks, ticks[first] - beyond_ticks)
-    stop = bisect_right(ticks, ticks[last] + beyond_ticks)
+    start = bisect_left(ticks, ticks[first] - beyond_ticks - HALF_TICK)
+    stop = bisect_left(ticks, ticks[last] + beyond_ticks + HALF_TICK)
     frames = range(max(start, frames.start), min(stop, frames.stop))
     return way_over(one, frames, turns, config)
 
@@ -172,7 +171,7 @@ def velocity_of(
 
 def _apart(ticks: Float[np.ndarray, "s"]) -> Float[np.ndarray, "s 1"]:
     """Ticks between scans: a beam may end a turn and begin the next one on the same vehicle."""
-    return np.maximum(ticks, _LEAST_APART)[:, None]
+    return np.maximum(ticks, HALF_TICK)[:, None]
 
 
 def _gets_far(
@@ -201,7 +200,7 @@ def _middle(boxes: Float[np.ndarray, "k 4"]) -> Float[np.ndarray, "4"]:
 
 def _moments(at: Float[np.ndarray, "k"]) -> Float[np.ndarray, "m"]:
     """Ticks of the completed scans; two that lie no half tick apart are one moment."""
-    return at[np.diff(at, prepend=-np.inf) >= _LEAST_APART]
+    return at[np.diff(at, prepend=-np.inf) >= HALF_TICK]
 
 
 def _weights(

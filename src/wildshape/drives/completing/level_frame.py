@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
-from wildshape.drives.completing.rolling_shutter import Turns
+from wildshape.drives.completing.rolling_shutter import HALF_TICK, Turns
 from wildshape.drives.object_config import BoxConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.mounting import Mounting
@@ -24,7 +24,7 @@ from wildshape.geometry.transforms.rotation import quaternion_from_rotation, rot
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import OBJECTS
 from wildshape.io.boxes.detections import detections_of, poses_of
-from wildshape.io.guard import read_json
+from wildshape.io.guard import read_json, reading
 from wildshape.records import Box, Points
 
 _LOWER = 0.25  # what is wrongly taken for ground lies too high: it is of a lorry
@@ -83,11 +83,14 @@ def read_completed(seen: Sightings, folder: Path, drive: Drive, turns: Turns) ->
     Raises:
         BadInputError: the files are damaged.
     """
-    said = read_json(folder / OBJECTS, "what complete writes")
-    found = list(detections_of(said, 0))
-    place = {name: frame for frame, name in enumerate(drive.scan_names)}
-    frames = tuple(place[one.scan] for one in found)
-    costs = np.array([float(scan["cost_m"]) for scan in said["scans"]])
+    with reading(folder / OBJECTS, "what complete writes"):
+        said = read_json(folder / OBJECTS, "what complete writes")
+        found = list(detections_of(said, 0))
+        place = {name: frame for frame, name in enumerate(drive.scan_names)}
+        frames = tuple(place[one.scan] for one in found)
+        costs = np.array([float(scan["cost_m"]) for scan in said["scans"]])
+        p_kind = _mean([scan.get("p_kind") for scan in said["scans"]])
+        size = found[0].box.size
     points = dict(zip(seen.frames, seen.points))
     weights = np.array([points[frame] for frame in frames], float)
     T_level_box = turns.T_level_sensor[torch.tensor(frames)] @ poses_of([one.box for one in found])
@@ -96,10 +99,10 @@ def read_completed(seen: Sightings, folder: Path, drive: Drive, turns: Turns) ->
         seen=seen,
         frames=frames,
         boxes=boxes,
-        size=found[0].box.size,
+        size=size,
         cost_m=weighted_median(costs, weights),
         confidence=float(np.mean([one.score for one in found])),
-        p_kind=_mean([scan.get("p_kind") for scan in said["scans"]]),
+        p_kind=p_kind,
         phases=phases,
     )
 
@@ -144,7 +147,8 @@ def on_ground_of_each(
         turns: of the drive's sensor.
         config: see there.
     """
-    ticks, ground = np.take(turns.ticks, frames), _ground(one.seen, frames, cuts, turns)
+    ticks = np.take(turns.ticks, frames).astype(np.float64)
+    ground = _ground(one.seen, frames, cuts, turns)
     gaps = shown[:, 2] - one.size[2] / 2 - ground
     is_ground = _usual(ticks, ground, config) | _usual(ticks, -gaps, config)
     gaps = np.where(is_ground, gaps, np.nan)
@@ -175,7 +179,7 @@ def _ground(
 
 
 def _usual(
-    ticks: Int[np.ndarray, "f"], heights: Float[np.ndarray, "f"], config: BoxConfig
+    ticks: Float[np.ndarray, "f"], heights: Float[np.ndarray, "f"], config: BoxConfig
 ) -> Bool[np.ndarray, "f"]:
     """Which heights of the ground are as those around them."""
     usual = _around(ticks, heights, config.ground_stray_ticks, _LOWER)
@@ -183,12 +187,12 @@ def _usual(
 
 
 def _around(
-    ticks: Int[np.ndarray, "f"], values: Float[np.ndarray, "f"], reach: int, quantile: float
+    ticks: Float[np.ndarray, "f"], values: Float[np.ndarray, "f"], reach: int, quantile: float
 ) -> Float[np.ndarray, "f"]:
     """A quantile of the values up to so many ticks before and after each; NaN are left out."""
     known = np.flatnonzero(~np.isnan(values))
-    first = np.searchsorted(ticks[known], ticks - reach, "left")
-    last = np.searchsorted(ticks[known], ticks + reach, "right")
+    first = np.searchsorted(ticks[known], ticks - reach - HALF_TICK)
+    last = np.searchsorted(ticks[known], ticks + reach + HALF_TICK)
     around = (np.sort(values[known[a:b]]) for a, b in zip(first, last))
     return np.array([_quantile(some, quantile) if len(some) else np.nan for some in around])
 

@@ -23,6 +23,7 @@ from wildshape.io.guard import read_json, reading
 TURNS = "turns.json"
 """File of a drive's stages: what is known of its turns."""
 _LATEST = 2**53  # scans
+HALF_TICK = 0.5  # scans less apart are of one moment; a reach of whole ticks ends half a tick on
 _STEPS = 3  # where a box is shown depends on when it is met, and the reverse
 _WHOLE, _HALF = (0, 1, -1), (0, 0.5, -0.5)
 _SENSES = _WHOLE + _HALF
@@ -36,7 +37,7 @@ class Turns:
     """The turns of a sensor, one a frame.
 
     Attributes:
-        ticks: of their middles.
+        ticks: of their middles, in parts of scans where steps are uneven.
         T_level_sensor: at their middles.
         sense: 1: the beam comes from behind over the right side and the front, counterclockwise
             from above; -1: over the left side; 0: points are as seen at the turn's middle. 0.5 and
@@ -44,7 +45,7 @@ class Turns:
         breaks: frames whose place is guessed from the frame before.
     """
 
-    ticks: tuple[int, ...]
+    ticks: tuple[int | float, ...]
     T_level_sensor: SE3
     sense: int | float = 0
     breaks: tuple[int, ...] = ()
@@ -60,7 +61,7 @@ class Turns:
             return cls(tuple(range(len(T_level_sensor))), T_level_sensor)
         with reading(path, "the turns of a sensor"):
             said = read_json(path, "the turns of a sensor")
-            ticks = tuple(map(int, said["ticks"]))
+            ticks = tuple(map(float, said["ticks"]))
             rising = all(before < after <= _LATEST for before, after in pairwise((-1, *ticks)))
             if said["sense"] not in _SENSES or len(ticks) != len(T_level_sensor) or not rising:
                 raise ValueError(f"sense {said['sense']!r}, {len(ticks)} scans")
@@ -114,7 +115,8 @@ class Turns:
     ) -> tuple[Float[np.ndarray, "k 3"], Float[np.ndarray, "k 3"]]:
         """Velocity and turn of the sensor a tick, level world, from the frames around each."""
         before, after = np.maximum(rows - 1, 0), np.minimum(rows + 1, len(self.ticks) - 1)
-        since = np.maximum(np.take(self.ticks, after) - np.take(self.ticks, before), 1)[:, None]
+        since = np.take(self.ticks, after) - np.take(self.ticks, before)
+        since = np.maximum(since, HALF_TICK)[:, None]
         R = self.T_level_sensor.rotation.numpy()
         turn = R[after] @ np.swapaxes(R[before], 1, 2)
         twice = turn - np.swapaxes(turn, 1, 2)

@@ -25,7 +25,7 @@ from wildshape.drives.tracking.mounting import Mounting
 from wildshape.drives.tracking.odometry import FEWEST_POINTS, Odometry
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import STANDING, Twist
-from wildshape.io.guard import read_json, record_of
+from wildshape.io.guard import read_record
 from wildshape.io.progress import counted
 from wildshape.ops.connected import first_of_cells
 from wildshape.records import Turn
@@ -54,7 +54,7 @@ class Breaks:
         """Of a file; none where there is no file."""
         if not path.is_file():
             return cls()
-        return record_of(cls, read_json(path, "the breaks of a way"), {})
+        return read_record(path, "the breaks of a way", cls)
 
     def ticks(self, ticks: Sequence[int], config: LinkConfig) -> list[int]:
         """Ticks with so long a pause at each break that nothing is linked across."""

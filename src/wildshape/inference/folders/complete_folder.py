@@ -198,7 +198,7 @@ def write_results(
         before = _written_before(output.path / file_name(name) / OBJECTS)
         if before is None:
             return False
-        earlier.extend((f"{name}/{scan['scan']}", scan["reason"]) for scan in before)
+        earlier.extend((f"{name}/{scan}", reason) for scan, reason in before)
         summary.finished_before += 1
         return True
 
@@ -287,12 +287,13 @@ def _whole_tracks(
         names, found = [], []
 
 
-def _written_before(path: Path) -> list[dict[str, str]] | None:
+def _written_before(path: Path) -> list[tuple[str, str]] | None:
     """What an earlier run skipped of a track that it finished; None if it did not."""
     if not path.is_file():
         return None
     with reading(path, "what an earlier run wrote"):
-        return json.loads(path.read_text("utf-8"))["skipped"]
+        skipped = json.loads(path.read_text("utf-8"))["skipped"]
+        return [(str(scan["scan"]), str(scan["reason"])) for scan in skipped]
 
 
 def _write_poses(

@@ -139,7 +139,7 @@ def detections_of(said: dict[str, Any], number: int) -> Iterator[Detection]:
             category=_text(said.get("category") or ""),
             sensor=kind,
             score=_finite([scan["confidence"]])[0],
-            box=_box(scan["box"]),
+            box=read_box(scan["box"]),
         )
 
 
@@ -150,7 +150,12 @@ def _text(raw: object) -> str:
     return text
 
 
-def _box(raw: dict[str, Any]) -> Box:
+def read_box(raw: dict[str, Any]) -> Box:
+    """The box of an entry of objects.json.
+
+    Raises:
+        ValueError: a number makes no sense (KeyError, TypeError: is missing, is none).
+    """
     x, y, z = _finite(raw["centre"])
     length, width, height = _finite(raw["size"])
     qw, qx, qy, qz = _finite(raw["quaternion_wxyz"])
