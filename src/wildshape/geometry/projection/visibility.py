@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Bins of the sensor's own image in which the nearest point hides the rest (METHOD 5, paper 4.3).
+"""Bins of the sensor's own image in which the nearest point hides the rest (METHOD 5, paper 4.4).
 
 Three ways to bin. Each gives `(bin, depth, count)`; `wildshape.ops.zbuffer.visible` does the rest.
 """
