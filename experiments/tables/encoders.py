@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Any point network can be the encoder (paper, section 4.1): PCN's, PointNet++ and DGCNN."""
+"""Any point network can be the encoder (paper, section 4.2): PCN's, PointNet++ and DGCNN."""
 
 from experiments.tables.rows import default_form
 from experiments.tables.sources import Sources

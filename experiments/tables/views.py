@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Depth views of airplanes, cars and chairs (paper, tables 1 and 4; supplement, table 3)."""
+"""Depth views of airplanes, cars and chairs (paper, tables 1 and 4; supplement, 7 and 8)."""
 
 from dataclasses import replace
 

@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables for people, and the rows that the paper prints."""
 
+import re
 from dataclasses import replace
 
 import pytest
 from tests.evaluation.scores import completion, scores
 
-from wildshape.evaluation.paper import ABLATION_ROWS, KITTI, LIDAR_ROWS, VIEW_ROWS
+from wildshape.evaluation.paper import ABLATION_ROWS, KITTI, LIDAR_ROWS, VIEW_ROWS, VIEW_SEED_ROWS
 from wildshape.evaluation.results import MethodScores, Results
 from wildshape.evaluation.tables import markdown, paper_markdown, write_table
 
@@ -22,7 +23,7 @@ def test_table_shows_every_row_what_was_left_out_and_the_paper_apart(tmp_path):
     text = write_table(tmp_path, runs).read_text()
     assert "SemanticKITTI" not in table
     assert "other data" in text
-    assert "| 3D vehicle | paper, mean of 5 seeds | 0.260 |" in text
+    assert "| 3D vehicle | paper, mean of 5 seeds | 0.260 ± 0.009 |" in text
     lines = [line for line in table.splitlines() if line.startswith("|")]
     assert len({line.count("|") for line in lines}) == 1
 
@@ -58,6 +59,20 @@ def test_paper_rows_add_up():
     for cd, precision, coverage in whole:
         assert cd == pytest.approx(precision + coverage, abs=0.011)
     assert "97.7" in paper_markdown()
+
+
+def test_the_papers_means_over_seeds_have_its_deviations():
+    """Its tables of sensitivity (supplement) print one beside each mean."""
+    rows = [
+        row for row in (*LIDAR_ROWS, *VIEW_SEED_ROWS) if re.search("mean of 5|3 seeds", row.method)
+    ]
+    assert len(rows) == 11
+    for row in rows:
+        figures = [name for name, mean in vars(row).items() if isinstance(mean, float)]
+        assert sorted(row.std) == sorted(figures), row
+    said = paper_markdown()
+    for cell in ("76.5 ± 19.2", "4.21 ± 1.72", "0.200 ± 0.090", "60.6 ± 19.2", "11.54 ± 6.26"):
+        assert f"| {cell} |" in said
 
 
 def test_paper_shapes_of_semantickitti_stand_under_partial_truth():

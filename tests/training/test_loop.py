@@ -101,6 +101,18 @@ def test_killed_before_the_first_checkpoint_starts_anew(car_store, undisturbed, 
     assert_same_run(tmp_path, undisturbed)
 
 
+def test_the_optimiser_is_adam_as_it_comes_and_without_a_mean_the_last_weights_are_kept(
+    car_store, tmp_path
+):
+    plain = replace(SMALLEST, optim=replace(SMALLEST.optim, steps=3, average=0.0))
+    state = trained(car_store, tmp_path, recipe=plain).state
+    usual = torch.optim.Adam([torch.zeros(1)]).defaults
+    for name in ("betas", "eps", "weight_decay", "amsgrad"):
+        assert state.optimiser.defaults[name] == usual[name]
+    kept, last = load_file(tmp_path / MODEL), state.network.state_dict()
+    assert all(torch.equal(kept[name], weights) for name, weights in last.items())
+
+
 def test_resuming_a_finished_run_changes_nothing(car_store, undisturbed, tmp_path):
     trained(car_store, tmp_path)
     told = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}

@@ -28,7 +28,15 @@ def test_what_both_paper_presets_share(recipe):
     assert recipe.network.encoder == (128, 256, 512, 1024)
     assert recipe.network.decoder == (1024, 1024)
     assert (recipe.network.points, recipe.network.branches) == (2048, 4)
-    assert (recipe.network.mirror, recipe.network.scale) == (False, 1.0)
+    assert (recipe.network.pose, recipe.network.start) == ((512, 128), (0.5, 0.5, 0.5))
+    assert (recipe.network.mirror, recipe.network.selector) == (False, False)
+    assert (recipe.network.scale, recipe.network.backbone, recipe.network.rays) == (
+        1.0,
+        "pcn",
+        None,
+    )
+    assert (recipe.loss.hindsight, recipe.loss.belief) == ("scan", 0)
+    assert (recipe.loss.time_ordered, recipe.loss.agree_at) == (False, ())
     assert (recipe.views.tracks, recipe.views.views, recipe.views.window) == (8, 4, 20)
     assert (recipe.views.turn, recipe.views.min_points) == ("none", 100)
     assert (recipe.optim.lr, recipe.optim.decay_every) == (1e-4, 100_000)
@@ -38,14 +46,16 @@ def test_what_both_paper_presets_share(recipe):
 def test_lidar():
     recipe = paper_lidar()
     assert (recipe.loss.beta, recipe.views.points, recipe.views.sensor) == (0.05, 1024, "lidar")
-    assert isinstance(recipe.loss.projection, PolarBins)
+    assert recipe.loss.projection == PolarBins(0.02, 0.02)
+    assert recipe.network.spread == "yaw"
     assert (recipe.optim.steps, recipe.optim.decay) == (400_000, 0.7)
 
 
 def test_views():
     recipe = paper_views()
     assert (recipe.loss.beta, recipe.views.points, recipe.views.sensor) == (0.25, 3096, "camera")
-    assert isinstance(recipe.loss.projection, PixelBins)
+    assert recipe.loss.projection == PixelBins(1 / 30)
+    assert recipe.network.spread == "sphere"
     assert (recipe.optim.steps, recipe.optim.decay) == (300_000, 0.5)
 
 

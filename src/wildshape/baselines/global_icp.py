@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Global-ICP of the paper's section 4: features find a start, ICP does the rest (METHOD 9)."""
+"""Global-ICP of the paper's section 5.3: features find a start, ICP does the rest (METHOD 9)."""
 
 from dataclasses import dataclass
 

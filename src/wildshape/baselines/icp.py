@@ -64,7 +64,7 @@ def point_to_point(
 
 @dataclass(frozen=True)
 class LocalIcp:
-    """Local-ICP of the paper's section 4: point-to-point ICP between consecutive scans (METHOD 9).
+    """Local-ICP (paper 5.3, METHOD 9): point-to-point ICP between consecutive scans.
 
     Each pair starts from aligned centroids. The paper does not say where it starts; it uses Open3D,
     whose default is no motion at all. A scan here lies in its own sensor frame, where a parked car

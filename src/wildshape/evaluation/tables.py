@@ -40,7 +40,11 @@ def paper_markdown(rows: Sequence[PaperRow] = LIDAR_ROWS) -> str:
     columns = [headed(figure) for figure in FIGURES if figure.name in known]
     heading = ["data", "method", *(column.heading for column in columns)]
     cells = [
-        [row.data, row.method, *(cell(getattr(row, f.name), None, f) for f in columns)]
+        [
+            row.data,
+            row.method,
+            *(cell(getattr(row, f.name), row.std.get(f.name), f) for f in columns),
+        ]
         for row in rows
     ]
     title = "### The paper's printed figures: other data, so no common benchmark"

@@ -34,7 +34,7 @@ class LossConfig:
         agree_at: shares of the run at which all tracks agree on which way is front; from then on
             a branch more than 90 degrees from its scan's agreed pose cannot win.
         hindsight: for what one branch wins: each `scan`, the views of a `track`, or a `batch`. The
-            paper says "for each batch" (section 4.1), DPC's hindsight is each scan's.
+            paper says "for each batch" (section 4.2), DPC's hindsight is each scan's.
     """
 
     beta: float = 0.05

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The network of the paper (section 4.1, METHOD 3): scan to canonical shape and pose hypotheses."""
+"""The network of the paper (section 4.2, METHOD 3): scan to canonical shape and pose hypotheses."""
 
 from dataclasses import dataclass
 from typing import Literal, NamedTuple

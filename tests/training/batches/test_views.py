@@ -81,6 +81,13 @@ def test_points_are_the_scan_itself_about_its_own_centre(tmp_path):
     torch.testing.assert_close(camera.draw(0).centres[0], box_centre(scan))
 
 
+def test_points_are_drawn_with_replacement(tmp_path):
+    """METHOD 2: of as many draws as points a share of 1 - 1/e is distinct, 95 of 150."""
+    sampler = sampler_of(tmp_path / "a", [[150]], views=1, window=1, tracks=1, points=150)
+    distinct = [len(sampler.draw(step).scans[0].unique(dim=0)) for step in range(50)]
+    assert np.mean(distinct) == pytest.approx(150 * (1 - (149 / 150) ** 150), abs=3)
+
+
 def test_views_are_distinct_and_lie_within_the_window(tmp_path):
     sampler = sampler_of(tmp_path / "a", [[200] * 30] * 2)
     spans, seen = set(), set()

@@ -40,7 +40,7 @@ SPLITS: dict[Split, tuple[str, ...]] = {
     "all": (),
 }
 PAPER = Selection(motion="parked", min_mean_points=512)
-"""The selection of Gu et al., section 4."""
+"""The selection of Gu et al., section 5.1."""
 
 LONGEST_M = {"car": 8.0, "bicycle": 4.0, "motorcycle": 4.0, "on-rails": 60.0}
 """How long an object of a category can be: no two of its scans have their middles further apart."""

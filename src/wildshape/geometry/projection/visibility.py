@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Bins of the sensor's own image in which the nearest point hides the rest (METHOD 5, paper 4.3).
+"""Bins of the sensor's own image in which the nearest point hides the rest (METHOD 5, paper 4.4).
 
 Three ways to bin. Each gives `(bin, depth, count)`; `wildshape.ops.zbuffer.visible` does the rest.
 """
@@ -70,7 +70,7 @@ Projection = PolarBins | FacingBins | PixelBins
 def polar_bins(points: Float[Tensor, "B N 3"], bins: PolarBins) -> Bins:
     """Bins over the whole sphere, in the sensor's own axes (paper eq. 4)."""
     polar = to_spherical(points)
-    columns = round(2 * torch.pi / bins.d_azimuth)
+    columns = math.ceil(2 * torch.pi / bins.d_azimuth)  # fewer would join bins that do not touch
     rows = 2 * math.ceil(torch.pi / 2 / bins.d_pitch) + 1  # so that no two heights share a row
     u = torch.floor(polar.azimuth / bins.d_azimuth).long() % columns
     v = torch.floor(polar.pitch / bins.d_pitch).long() % rows

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The encoders by name: any point network can be the encoder (paper, section 4.1).
+"""The encoders by name: any point network can be the encoder (paper, section 4.2).
 
 Imports no torch, so that the command line can offer the names.
 """
