@@ -28,13 +28,13 @@ from wildshape.drives.tracking.rays import RayCutter
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.transforms.se3 import SE3, stack
-from wildshape.inference.choose_hypothesis import Looked
 from wildshape.inference.folders.complete_folder import (
     COMPLETED,
     OBJECTS,
     POSES,
     objects_of,
 )
+from wildshape.inference.looks import Looked
 from wildshape.inference.predictor import Predictor
 from wildshape.inference.tracks.pose_outliers import SensorMotion
 from wildshape.io.atomic import write_json

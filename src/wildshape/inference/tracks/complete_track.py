@@ -20,7 +20,7 @@ from wildshape.geometry.sampling import sorted_points, voxel_thin
 from wildshape.geometry.surface import mirrored
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_for
-from wildshape.inference.choose_hypothesis import Looked, NetworkInput
+from wildshape.inference.choose_hypothesis import NetworkInput
 from wildshape.inference.confidence import (
     Glance,
     glance_of,
@@ -30,6 +30,7 @@ from wildshape.inference.confidence import (
 )
 from wildshape.inference.config import BoxConfig, InferenceConfig, ReasonRule, TrackConfig
 from wildshape.inference.free_space import Rays, Sights, without_free_space
+from wildshape.inference.looks import Looked, off_ground
 from wildshape.inference.refine import drawn_to, padded, shown
 from wildshape.inference.tracks.heading_vote import (
     FEWEST,
@@ -83,7 +84,10 @@ class Gathered:
         self._bottoms = torch.zeros(3, dtype=torch.float64)
 
     def add(self, done: Completion, scan: Points) -> None:
-        """The next scan, completed."""
+        """The next scan, completed; its ground goes, unless the network completes that, too."""
+        if done.refined and self.settings.sensor == "lidar":
+            shape = done.pose.inverse().apply_numpy(done.points)
+            scan = off_ground(scan, shape, done.pose)
         own = torch.from_numpy(done.points[: len(self._sum)]).double()
         self._odds.append(odds_of(done))
         T_canonical_sensor = done.pose.inverse()
