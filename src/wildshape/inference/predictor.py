@@ -14,11 +14,10 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference import point_inputs
 from wildshape.inference.compiled import compiled
-from wildshape.inference.complete_scan import Posed, completed, refined
 from wildshape.inference.config import InferenceConfig
 from wildshape.inference.free_space import Rays
-from wildshape.inference.looks import Looked, looked_at
 from wildshape.inference.registration import fuse_scans, registered, to_middle
+from wildshape.inference.single_scans import Looked, Posed, completed, looked_at, refined
 from wildshape.inference.tracks.complete_track import Gathered, complete_together
 from wildshape.inference.tracks.joint_icp import key_scans
 from wildshape.inference.tracks.pose_outliers import SensorMotion

@@ -34,8 +34,8 @@ from wildshape.inference.folders.complete_folder import (
     POSES,
     objects_of,
 )
-from wildshape.inference.looks import Looked
 from wildshape.inference.predictor import Predictor
+from wildshape.inference.single_scans import Looked
 from wildshape.inference.tracks.pose_outliers import SensorMotion
 from wildshape.io.atomic import write_json
 from wildshape.io.boxes.detections import moved

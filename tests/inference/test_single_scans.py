@@ -8,10 +8,10 @@ from tests.turned import SCAN, turned_scans
 
 from wildshape.geometry.transforms.rotation import random_rotation
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference import looks as module
-from wildshape.inference.choose_hypothesis import network_input
-from wildshape.inference.looks import look, look_twice
+from wildshape.inference import single_scans as module
 from wildshape.inference.predictor import load
+from wildshape.inference.single_scans import look, look_twice
+from wildshape.method.choose_hypothesis import network_input
 
 
 @torch.no_grad()

@@ -16,7 +16,6 @@ from wildshape.geometry.projection.ray_points import KINDS
 from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.projection.visibility import Projection
 from wildshape.geometry.sampling import drawn, sorted_points
-from wildshape.inference.free_space import Sights
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.network import Poses, ShapePoseNet
 from wildshape.method.ray_encoder import RayConfig
@@ -55,13 +54,15 @@ class NetworkInput(NamedTuple):
         rays = torch.cat((self.rays[..., :3] @ by.mT, self.rays[..., 3:]), dim=-1)
         return NetworkInput(self.scans @ by.mT, self.centres, by @ self.turn, self.sizes, rays)
 
-    def beside(self, sights: Sights | None, config: RayConfig | None) -> "NetworkInput":
+    def beside(
+        self, rays: Sequence[SightLines | None] | None, config: RayConfig | None
+    ) -> "NetworkInput":
         """The same with the rays of the scans' frames, if there are any and a network sees them."""
-        if sights is None or config is None:
+        if rays is None or config is None:
             return self
         seen = [
             _rays_seen(one, turn, centre, config)
-            for one, turn, centre in zip(sights.rays, self.turn, self.centres, strict=True)
+            for one, turn, centre in zip(rays, self.turn, self.centres, strict=True)
         ]
         return self._replace(rays=torch.stack(seen))
 

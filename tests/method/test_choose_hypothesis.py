@@ -11,10 +11,8 @@ from wildshape.geometry.centring import box_centre, frustum_centre
 from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.sampling import drawn, sorted_points
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.choose_hypothesis import choose_hypothesis, network_input
-from wildshape.inference.config import FreeSpaceConfig
-from wildshape.inference.free_space import Sights
 from wildshape.inference.predictor import load
+from wildshape.method.choose_hypothesis import choose_hypothesis, network_input
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.multiview import LossConfig
 from wildshape.method.ray_encoder import RayConfig
@@ -30,8 +28,7 @@ def test_a_network_sees_no_rays_from_another_side():
     given = network_input([scan], 64, "lidar", facing=True)
 
     def seen(*parts):
-        sights = Sights([scan], [SightLines.joined(parts)], FreeSpaceConfig())
-        return given.beside(sights, RayConfig()).rays
+        return given.beside([SightLines.joined(parts)], RayConfig()).rays
 
     assert torch.equal(seen(own, facing), seen(own))
     assert not torch.equal(seen(own, beside), seen(own))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Looks at scans: what a network says of each before it is completed.
+"""Single scans: what a network says of them, and how each is completed on its own (METHOD 7).
 
 Two things go beyond the paper. Turned towards its object (`line_of_sight.py`), nothing of a scan's
 rotation is unknown but the roll about the line of sight, and upright is what a network knows best:
@@ -16,25 +16,30 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from wildshape.geometry.densify import denser, partners
 from wildshape.geometry.ground import without_skirt
 from wildshape.geometry.projection.line_of_sight import roll_angle
-from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.choose_hypothesis import (
+from wildshape.geometry.sampling import sorted_points
+from wildshape.geometry.transforms.se3 import SE3, stack
+from wildshape.inference.boxes import box_seen
+from wildshape.inference.confidence import glance_of, judged, look_features
+from wildshape.inference.config import HypothesisRule, InferenceConfig, RefineConfig
+from wildshape.inference.free_space import Rays, SeenScores, Sights, without_free_space
+from wildshape.inference.refine import Refined, refine, with_its_scan
+from wildshape.io.scans.points import LEAST_POINTS
+from wildshape.method.checkpoint import ModelSettings
+from wildshape.method.choose_hypothesis import (
     Chosen,
     NetworkInput,
     ScoresT,
     choose_hypothesis,
     network_input,
 )
-from wildshape.inference.confidence import look_features
-from wildshape.inference.config import HypothesisRule, InferenceConfig
-from wildshape.inference.free_space import Rays, SeenScores, Sights
-from wildshape.io.scans.points import LEAST_POINTS
-from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.network import ShapePoseNet
-from wildshape.method.trust_features import rival_margin
-from wildshape.records import Points
+from wildshape.method.trust import Surface
+from wildshape.method.trust_features import rival_margin, scan_features, surfaces
+from wildshape.records import Completion, Points, Sensor
 
 _RULE = HypothesisRule()
 
@@ -192,7 +197,9 @@ def _found(
 ) -> Found:
     """What a network says of scans, on the host."""
     inputs = network_input(scans, settings.input_points, settings.sensor, settings.facing)
-    inputs = inputs.beside(sights, settings.network.rays).to(next(network.parameters()).device)
+    inputs = inputs.beside(sights and sights.rays, settings.network.rays).to(
+        next(network.parameters()).device
+    )
     if settings.facing:
         found = look_twice(network, settings, inputs, rule, sights)
     else:
@@ -211,3 +218,87 @@ def _each_off_ground(scans: Sequence[Points], found: Found) -> list[Points]:
 def off_ground(scan: Points, shape: Points, T_sensor_canonical: SE3) -> Points:
     """The scan without the ground beside its object."""
     return without_skirt(scan, shape, T_sensor_canonical, LEAST_POINTS)
+
+
+class Posed(NamedTuple):
+    """What is made of a batch of scans.
+
+    Attributes:
+        shapes: the network's points, canonical frame.
+        T_sensor_canonical: their poses.
+        points: of the complete shapes, sensor frames, those of `shapes` first.
+        refined: whether they were fitted to the scans.
+        surfaces: of a LiDAR's scans, where refined; what is trusted is told by them.
+    """
+
+    shapes: Float[Tensor, "B P 3"]
+    T_sensor_canonical: SE3
+    points: Float[Tensor, "B Q 3"]
+    refined: bool = False
+    surfaces: Sequence[Surface] = ()
+
+    @classmethod
+    def of(cls, found: Found) -> "Posed":
+        """As the network says."""
+        T_sensor_canonical = SE3(found.rotation, found.translation)
+        return cls(found.shapes, T_sensor_canonical, T_sensor_canonical.apply(found.shapes))
+
+
+def refined(
+    looked: Looked,
+    up: Float[Tensor, "3"] | None,
+    settings: ModelSettings,
+    config: RefineConfig,
+    device: torch.device,
+    *,
+    dense: bool,
+) -> Posed:
+    """Shapes and poses fitted to the scans on a device (`refine.py`); `up` as there."""
+    seen, found = [sorted_points(one) for one in looked.seen], looked.found
+    on_device = (part.to(device) for part in found[:3])
+    up = None if up is None else up.to(device)
+    done = refine(seen, *on_device, mirror=settings.network.mirror, up=up, config=config)
+    done = Refined(*(part.cpu() for part in done))
+    T_sensor_canonical = SE3(done.rotation, done.translation)
+    posed = T_sensor_canonical.to(torch.float32).apply(done.shapes)
+    shown = surfaces(seen, done.rotation) if settings.sensor == "lidar" else ()
+    points = denser(posed, partners(found.shapes, config.partner)) if dense else posed
+    return Posed(done.shapes, T_sensor_canonical, points, True, shown)
+
+
+def completed(
+    looked: Looked,
+    i: int,
+    posed: Posed,
+    sensor: Sensor | None,
+    settings: ModelSettings,
+    config: InferenceConfig,
+) -> Completion:
+    """Scan `i` of those looked at."""
+    scan, seen, found, sights = looked.scans[i], looked.seen[i], looked.found, looked.sights
+    said = glance_of(scan, sensor, *found.said(i), settings, config.reasons)
+    shape, T_sensor_can, points = posed.shapes[i], posed.T_sensor_canonical[i], posed.points[i]
+    whole, solid, standing = points.numpy(), shape, None
+    shows = with_its_scan(whole, shape, seen, T_sensor_can, settings, config.refine)
+    if sights is not None:
+        alone = sights.part([i])
+        solid = without_free_space(shape, stack([T_sensor_can]), alone)
+        standing = alone.of(whole, 0)
+    done = Completion(
+        points=shows,
+        pose=T_sensor_can.to(torch.float64).owned(),
+        box=box_seen(solid, T_sensor_can, seen, settings, config.box),
+        confidence=said.confidence,
+        branch=said.branch,
+        cost=said.cost,
+        refined=posed.refined,
+        warning=said.warning,
+        reasons=said.reasons,
+        features=said.features,
+    )
+    if not posed.surfaces:
+        return judged(done, None, None, settings, config.reasons)
+    rival = float(found.features[i, -1])
+    evidence = scan_features(done, seen, posed.surfaces[i], rival, standing)
+    trust = settings.trust
+    return judged(done, trust and trust.scan, evidence, settings, config.reasons)
