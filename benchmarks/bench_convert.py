@@ -18,15 +18,15 @@ from turns import begin, options
 
 from wildshape.datasets.semantic_kitti.reader import SemanticKitti
 
-_POINTS, _CARS, _ON_CAR, _BLOCK = 124_000, 8, 1000, 50
+_POINTS, _CARS, _ON_CAR, _BLOCK, _FRAMES = 124_000, 8, 1000, 50, 6
 
 
-def made_up(folder: Path, frames: int = 6) -> Path:
+def made_up(folder: Path) -> Path:
     """Cars of random points in a cloud of random points: nobody looks at shapes here."""
     rng = np.random.default_rng(0)
     for name in ("velodyne", "labels"):
         (folder / name).mkdir(parents=True)
-    for i in range(frames):
+    for i in range(_FRAMES):
         points = rng.uniform((-40, -40, -40, 0), (40, 40, 40, 1), (_POINTS, 4)).astype("<f4")
         labels = np.full(_POINTS, 40, "<u4")
         for car in range(_CARS):
@@ -36,7 +36,7 @@ def made_up(folder: Path, frames: int = 6) -> Path:
         points.tofile(folder / "velodyne" / f"{i:06d}.bin")
         labels.tofile(folder / "labels" / f"{i:06d}.label")
     (folder / "calib.txt").write_text("Tr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n")
-    (folder / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * frames)
+    (folder / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * _FRAMES)
     return folder
 
 

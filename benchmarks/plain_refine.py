@@ -13,7 +13,6 @@ from wildshape.inference.config import RefineConfig
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
-_SMALLEST_M = 1e-6
 _DEFAULT = RefineConfig()
 
 Cloud = Float[np.ndarray, "_ 3"]

@@ -27,6 +27,7 @@ import torch
 import tyro
 from experiments.mesh_credits import notice
 from experiments.meshes import road_vehicles
+from experiments.shipped_rounds import DATA, ROUNDS
 from jaxtyping import Float32
 from torch import Tensor
 from torch.nn.functional import normalize
@@ -39,97 +40,23 @@ from wildshape.io.output import provenance
 from wildshape.io.store.store import Store, is_finished_store, open_store
 from wildshape.io.store.writer import StoreWriter
 from wildshape.method.checkpoint import MODEL, load_checkpoint, save_checkpoint, weights_file
-from wildshape.method.ray_encoder import RayConfig
 from wildshape.ops.device import choose_device
 from wildshape.ops.threads import exact_on
 from wildshape.parallel.team import Team, cores, team
 from wildshape.records import Track
 from wildshape.simulate.generate import SimulationConfig, simulated_by
-from wildshape.training.config import Recipe
-from wildshape.training.recipes import PRESETS
 from wildshape.training.setup import setup
 from wildshape.training.train import fit_with_progress
 
 _SENSORS = ("hdl64", "hdl64", "hdl32", "os1-128")
 _GROUND = 1  # of the sensors the one whose scans keep some ground
-_SCANS, _SHAPE_POINTS, _VALIDATE_EVERY = 16, 512, 10_000
+_SCANS, _SHAPE_POINTS = 16, 512
 _STEP_M = 1.0  # of a vehicle that drives, from scan to scan
 _COMMAND = "python -m experiments.shipped_chain --cad CAD --out RUN"
 VIEWS: tuple[Literal["airplane", "chair", "car"], ...] = ("airplane", "chair", "car")
 NAMES = ("default", *VIEWS)
 _VIEW_STEPS = 5000  # of each of the two stages
 _CALIBRATION_TRACKS = 60
-
-
-@dataclass(frozen=True)
-class Round:
-    """One training of the vehicles' weights.
-
-    Attributes:
-        data: seed of its tracks.
-        steps: gradient steps.
-        preset: whose recipe it is; `small` has a quarter of the shape's points and teaches as well.
-        lr: learning rate that it falls from; None: the preset's.
-        teacher: round that poses and fuses its tracks; None: the paper's objective.
-        start: round whose weights it goes on from; None: random ones.
-        rays: the network sees those of the frames, too.
-        driving: its vehicles drive, and it is taught that they look where they go.
-    """
-
-    data: int
-    steps: int
-    preset: Literal["small", "default"] = "default"
-    lr: float | None = None
-    teacher: str | None = None
-    start: str | None = None
-    rays: bool = False
-    driving: bool = False
-
-    def recipe(self, steps: int) -> Recipe:
-        """What so many steps of it are."""
-        base = PRESETS[self.preset]()
-        rate = base.optim.lr if self.lr is None else self.lr
-        return replace(
-            base,
-            network=replace(base.network, rays=RayConfig() if self.rays else None),
-            optim=replace(base.optim, steps=steps, lr=rate, precision="fp32"),
-            validate_every=_VALIDATE_EVERY,
-        )
-
-
-ROUNDS = {
-    "first": Round(data=1, steps=6_000, preset="small"),
-    "taught": Round(data=1, steps=8_000, teacher="first"),
-    "second": Round(data=2, steps=12_000, teacher="taught", start="taught"),
-    "main": Round(data=3, steps=30_000, teacher="second", start="second"),
-    "rays": Round(data=4, steps=100_000, lr=8e-4, teacher="main", start="main", rays=True),
-    "driven": Round(
-        data=5, steps=20_000, lr=4e-4, teacher="rays", start="rays", rays=True, driving=True
-    ),
-}
-"""In their order; the last one is shipped."""
-
-
-@dataclass(frozen=True)
-class Tracks:
-    """The simulated drives of a data set.
-
-    Attributes:
-        count: of all sensors and sources; as many of each.
-        occlusion: share of them past something that stands in the way.
-        rays: kept with a scan.
-        varied: forms and sensors varied, or as they are, as many tracks of each.
-    """
-
-    count: int = 2400
-    occlusion: float = 0.3
-    rays: int = 0
-    varied: tuple[bool, ...] = (True, False, False, False)
-
-
-_WITH_RAYS = Tracks(occlusion=0.5, rays=512)
-DATA = {1: Tracks(), 2: Tracks(), 3: Tracks(count=4800), 4: _WITH_RAYS, 5: _WITH_RAYS}
-"""By their seeds. What is learned carries over to unseen objects the better the more there were."""
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,10 @@ from experiments.tables.train import Workshop, model_of
 from experiments.tables.tsne import tsne
 
 from wildshape.evaluation.pictures import project
-from wildshape.inference.choose_hypothesis import network_input
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import atomic_write
 from wildshape.io.store.store import open_store
+from wildshape.method.choose_hypothesis import network_input
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -18,6 +18,7 @@ from jaxtyping import Float
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.box import SIGNS, box_axes
+from wildshape.geometry.projection.pinhole import Intrinsics
 from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import Twist
@@ -45,18 +46,6 @@ def as_text(name: str) -> str:
         return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
     except UnicodeEncodeError:
         return name.encode("utf-8", "backslashreplace").decode()
-
-
-@dataclass(frozen=True)
-class Intrinsics:
-    """Pinhole camera, pixels: `u = fx x / z + cx`, `v = fy y / z + cy`."""
-
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    width: int
-    height: int
 
 
 @dataclass(frozen=True)

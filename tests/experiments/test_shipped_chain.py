@@ -6,9 +6,10 @@ from dataclasses import replace
 from functools import partial
 
 import torch
-from experiments.shipped_chain import DATA, ROUNDS, Settings, driving, trained
+from experiments.shipped_chain import Settings, driving, trained
+from experiments.shipped_rounds import DATA, ROUNDS
 
-from experiments import shipped_chain
+from experiments import shipped_chain, shipped_rounds
 from wildshape.method.checkpoint import load_checkpoint
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.config import ValidationConfig
@@ -30,7 +31,8 @@ def test_the_last_round_goes_on_from_weights_that_teach_it(
     monkeypatch.setattr(shipped_chain, "_SCANS", 5)
     drives = {seed: replace(tracks, varied=(True,)) for seed, tracks in DATA.items()}
     monkeypatch.setattr(shipped_chain, "DATA", drives)
-    monkeypatch.setattr(shipped_chain, "PRESETS", {name: partial(quick, name) for name in PRESETS})
+    presets = {name: partial(quick, name) for name in PRESETS}
+    monkeypatch.setattr(shipped_rounds, "PRESETS", presets)
     few = Settings(tmp_path, cad, share=1e-4)
     half_written(tmp_path / "tracks1")
     for name in ("first", "taught"):

@@ -14,10 +14,10 @@ import wildshape
 from wildshape.geometry.projection.visibility import PolarBins
 from wildshape.geometry.transforms.rotation import rotation_from_vector
 from wildshape.geometry.transforms.se3 import SE3, stack
-from wildshape.inference.choose_hypothesis import Looked
 from wildshape.inference.config import FreeSpaceConfig
 from wildshape.inference.free_space import SeenScores, Sights, without_free_space
 from wildshape.inference.point_inputs import as_rays
+from wildshape.inference.single_scans import Looked
 from wildshape.io.rays import write_rays
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.records import SightLines, Track

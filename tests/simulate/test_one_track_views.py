@@ -5,7 +5,8 @@
 import numpy as np
 import pytest
 
-from wildshape.simulate.one_track import back_project, depth_image, random_pose, view
+from wildshape.geometry.projection.pinhole import back_project
+from wildshape.simulate.one_track import depth_image, random_pose, view
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.sensor import DEPTH_CAMERA
 from wildshape.simulate.shapes.solid import box
@@ -16,7 +17,7 @@ def test_back_projection_is_exact_on_a_plane() -> None:
     plane = box((-5.0, -5.0, 2.0), (5.0, 5.0, 3.0))
     depth = depth_image(Scene([plane]), DEPTH_CAMERA, np.eye(4))
     np.testing.assert_allclose(depth, 2.0, atol=1e-5)
-    points = back_project(depth, DEPTH_CAMERA).astype(np.float64)
+    points = back_project(depth, DEPTH_CAMERA.intrinsics).astype(np.float64)
     assert len(points) == 128 * 128
     u = 240.0 * points[:, 0] / points[:, 2] + 64.0
     v = 240.0 * points[:, 1] / points[:, 2] + 64.0

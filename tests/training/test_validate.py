@@ -12,8 +12,8 @@ from tests.packed import packed
 
 from wildshape.geometry.transforms.rotation import random_rotation, rotation_angle
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.choose_hypothesis import choose_hypothesis
 from wildshape.inference.predictor import load
+from wildshape.method.choose_hypothesis import choose_hypothesis
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.multiview import LossConfig
 from wildshape.method.network import Poses

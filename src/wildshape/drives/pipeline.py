@@ -13,7 +13,6 @@ from typing import Any
 from wildshape.drives.adapting import second_pass
 from wildshape.drives.clock import Clock
 from wildshape.drives.completing.boxes import faced, smooth
-from wildshape.drives.completing.cluster_association import associate
 from wildshape.drives.completing.completion import Completer
 from wildshape.drives.completing.level_frame import (
     Completed,
@@ -22,14 +21,10 @@ from wildshape.drives.completing.level_frame import (
     read_completed,
 )
 from wildshape.drives.completing.merging import Places
-from wildshape.drives.completing.own_vehicle import carries_sensor
 from wildshape.drives.completing.rolling_shutter import TURNS, Turns, with_sense
-from wildshape.drives.completing.surroundings import crowded
+from wildshape.drives.completing.selection import Selector
 from wildshape.drives.completing.vehicles import (
-    Judged,
-    judge,
     likely,
-    refused,
     stated,
     surer_if_driving,
     write_judged,
@@ -289,41 +284,21 @@ class Pipeline:
         self, objects: list[Sightings], completed: list[Completed], places: Places
     ) -> list[Vehicle]:
         """Which of the objects are vehicles, and where they are; `completed`: not ruled out."""
-        turns = places.turns
+        turns, boxes = places.turns, self.config.boxes
+        known = self.drive, self.cuts, self.config, self.tracked, self.helpers.in_order
         with self.clock.stage("vehicles", 1) as at:
-            completed = [
-                surer_if_driving(one, turns, self.config.boxes, self.config.vehicles)
-                for one in completed
+            judged = [
+                surer_if_driving(one, turns, boxes, self.config.vehicles) for one in completed
             ]
-            own = {one.seen.name for one in completed if self.is_own(one, turns)}
-            others = [one for one in completed if one.seen.name not in own]
-            said = judge(others, places, self.config.vehicles)
-            kept = {one.name: one.confidence for one in said if not one.reasons}
-            found = [one for one in completed if one.seen.name in kept]
-            parts, crowd = dict[str, str](), set[str]()
-            if not self.tracked:
-                found.sort(key=lambda one: -kept[one.seen.name])
-                associated = associate(found, self.cuts, turns, self.config)
-                found, parts = associated.vehicles, associated.parts
-                around = self.config.surroundings
-                doubtful = [one for one in found if stated(one, kept) < around.sure]
-                crowd = crowded(self.drive.scan, doubtful, turns, around, self.helpers.in_order)
-                found = [one for one in found if one.seen.name not in crowd]
-            said = refused(said, parts | dict.fromkeys(crowd, "crowded"))
-            said += [Judged(name, 0.0, ("own_vehicle",)) for name in sorted(own)]
+            found, said = Selector(*known)(judged, places)
             write_judged(self.completing / "vehicles.json", objects, said)
-            found = [on_ground(one, self.cuts, turns, self.config.boxes) for one in found]
+            found = [on_ground(one, self.cuts, turns, boxes) for one in found]
             at(1)
+            sure = {one.name: one.confidence for one in said}
             return [
-                Vehicle(one, smooth(one, turns, self.config.boxes), stated(one, kept))
+                Vehicle(one, smooth(one, turns, boxes), stated(one, sure))
                 for one in sorted(found, key=lambda one: one.seen.name)
             ]
-
-    def is_own(self, one: Completed, turns: Turns) -> bool:
-        """Whether it is of the vehicle that carries the sensor."""
-        nearest_m = self.config.ground.nearest_m
-        known = self.cuts, turns.T_level_sensor, nearest_m, self.config.own_vehicle
-        return carries_sensor(one.seen, *known)
 
     def write(self, vehicles: list[Vehicle], turns: Turns) -> int:
         """The user's files; how many boxes they hold."""

@@ -69,12 +69,13 @@ def look_features(
     spread = (shape - posed[rows, second]).norm(dim=-1).mean(-1)
     found = scans.gather(1, scores.to_scan[rows, first][..., None].expand(-1, -1, 3))
     covered = ((shape - found).norm(dim=-1) < COVERED_M).float().mean(-1)
-    terms = [_log(part[rows, first]) for part in (scores.observation, scores.projection)]
+    terms = [log_of(part[rows, first]) for part in (scores.observation, scores.projection)]
     margin = believed[rows, second] - believed[rows, first]
     return torch.stack((*terms, entropy, margin, spread, covered), dim=-1)
 
 
-def _log(values: Float[Tensor, "B"]) -> Float[Tensor, "B"]:
+def log_of(values: Float[Tensor, "B"]) -> Float[Tensor, "B"]:
+    """Logarithm of lengths, metres; of none as of the smallest."""
     return values.clamp_min(SMALLEST_M).log()
 
 

@@ -11,33 +11,18 @@ from pathlib import Path
 import torch
 
 from wildshape.errors import BadInputError
-from wildshape.geometry.densify import denser, partners
-from wildshape.geometry.ground import without_skirt
-from wildshape.geometry.sampling import sorted_points
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference import point_inputs
-from wildshape.inference.boxes import box_seen
-from wildshape.inference.choose_hypothesis import (
-    Found,
-    Looked,
-    Posed,
-    look,
-    look_twice,
-    network_input,
-)
 from wildshape.inference.compiled import compiled
-from wildshape.inference.confidence import glance_of, judged
 from wildshape.inference.config import InferenceConfig
-from wildshape.inference.free_space import Rays, Sights, without_free_space
-from wildshape.inference.refine import Refined, refine, with_its_scan
+from wildshape.inference.free_space import Rays
 from wildshape.inference.registration import fuse_scans, registered, to_middle
+from wildshape.inference.single_scans import Looked, Posed, completed, looked_at, refined
 from wildshape.inference.tracks.complete_track import Gathered, complete_together
 from wildshape.inference.tracks.joint_icp import key_scans
 from wildshape.inference.tracks.pose_outliers import SensorMotion
-from wildshape.io.scans.points import LEAST_POINTS
 from wildshape.method.checkpoint import ModelSettings, load_checkpoint, weights_file
 from wildshape.method.network import ShapePoseNet
-from wildshape.method.trust_features import scan_features, surfaces
 from wildshape.ops.device import choose_device, plain_torch
 from wildshape.records import Completion, Points, Registration, Sensor
 
@@ -205,8 +190,8 @@ class Predictor:
             part = slice(start, start + BATCH)
             for i, looked in enumerate(self.look(list(scans[part]), rays[part]).each(), start):
                 if i in keys:
-                    done = self.complete_looked(looked, sensor, dense=False)
-                    self._add(gathered, scans[i], *done)
+                    (done,) = self.complete_looked(looked, sensor, dense=False)
+                    gathered.add(done, scans[i])
                 else:
                     gathered.pass_by(looked, sensor, self.config.reasons)
         return gathered
@@ -218,17 +203,20 @@ class Predictor:
         rays: Rays = (),
         motion: SensorMotion | None = None,
     ) -> Iterator[Completion]:
-        """One shape of a track's scans that were completed each on its own."""
+        """One shape of a track's scans that were completed each on its own.
+
+        Args:
+            alone: a completion of each scan, in time order.
+            scans: sensor frames, metres.
+            rays: that passed the object by, one set a scan, if any are known.
+            motion: how the sensor turned, if known: headings are then followed in the world.
+        """
         if len(scans) < 2:
             return iter(list(alone))
         gathered = Gathered(self.settings)
         for cloud, done in zip(scans, alone):
-            self._add(gathered, cloud, done)
+            gathered.add(done, cloud)
         return complete_together(gathered, self.config, rays, motion)
-
-    def _add(self, gathered: Gathered, scan: Points, done: Completion) -> None:
-        shape = done.pose.inverse().apply_numpy(done.points)
-        gathered.add(done, self._off_ground(scan, shape, done.pose))
 
     def register(
         self, source: object, target: object, sensor: Sensor | None = None, *, rays: object = None
@@ -274,94 +262,18 @@ class Predictor:
     @plain_torch()
     def look(self, scans: Sequence[Points], rays: Rays = ()) -> Looked:
         """What the network says of scans, in one batch, before they are completed."""
-        known = any(one is not None for one in rays)
-        config, unit = self.config.free_space, self.settings.unit
-        sights = Sights.of_objects(scans, rays, config, unit) if known else None
-        found = self._found(scans, sights)
-        seen = self._off_their_ground(scans, found)
-        least = 1 - self.config.ground_share
-        much = [i for i, kept in enumerate(seen) if len(kept) < least * len(scans[i])]
-        if much:  # the network has seen the ground, too: once more without it
-            again = self._found([seen[i] for i in much], sights and sights.part(much))
-            found = found.replaced(torch.tensor(much), again)
-            for i, kept in zip(much, self._off_their_ground([scans[i] for i in much], again)):
-                seen[i] = kept
-        return Looked(scans, seen, found, sights)
+        off_ground = self.refines and self.settings.sensor == "lidar"
+        known = self.network, self.settings, self.config
+        return looked_at(scans, rays, *known, off_ground=off_ground)
 
     @plain_torch()
     def complete_looked(
         self, looked: Looked, sensor: Sensor | None = None, *, dense: bool = True
     ) -> list[Completion]:
         """Each scan that was looked at on its own; `dense`: of twice as many points."""
-        found, seen = looked.found, [sorted_points(one) for one in looked.seen]
-        posed = self._refined(seen, found, dense) if self.refines else Posed.of(found)
-        return [self._completion(looked, i, posed, sensor) for i in range(len(looked.scans))]
-
-    def _found(self, scans: Sequence[Points], sights: Sights | None) -> Found:
-        """What the network says of scans, on the host."""
-        of = self.settings
-        inputs = network_input(scans, of.input_points, of.sensor, of.facing)
-        inputs = inputs.beside(sights, of.network.rays).to(self.device)
-        if of.facing:
-            found = look_twice(self.network, of, inputs, self.config.hypothesis, sights)
-        else:
-            found = look(self.network, of, inputs, sights)
-        return Found(*(part.cpu() for part in found))
-
-    def _off_their_ground(self, scans: Sequence[Points], found: Found) -> list[Points]:
-        """Each scan without the ground beside the object found in it."""
-        return [
-            self._off_ground(scan, shape.numpy(), SE3(rotation, translation))
-            for scan, shape, rotation, translation in zip(scans, *found[:3])
-        ]
-
-    def _refined(self, seen: list[Points], found: Found, dense: bool) -> Posed:
-        """Shapes and poses fitted to the scans (`refine.py`)."""
-        on_device = (part.to(self.device) for part in found[:3])
-        up = None if self.up is None else torch.tensor(self.up, dtype=torch.float64).to(self.device)
-        mirror, config = self.settings.network.mirror, self.config.refine
-        done = refine(seen, *on_device, mirror=mirror, up=up, config=config)
-        done = Refined(*(part.cpu() for part in done))
-        T_sensor_canonical = SE3(done.rotation, done.translation)
-        posed = T_sensor_canonical.to(torch.float32).apply(done.shapes)
-        looks = surfaces(seen, done.rotation) if self.settings.sensor == "lidar" else ()
-        points = denser(posed, partners(found.shapes, config.partner)) if dense else posed
-        return Posed(done.shapes, T_sensor_canonical, points, looks)
-
-    def _completion(
-        self, looked: Looked, i: int, posed: Posed, sensor: Sensor | None
-    ) -> Completion:
-        """Scan `i` of those looked at."""
-        scan, seen, found, sights = looked.scans[i], looked.seen[i], looked.found, looked.sights
-        config, trust = self.config, self.settings.trust
-        said = glance_of(scan, sensor, *found.said(i), self.settings, config.reasons)
-        shape, T_sensor_can, points = posed.shapes[i], posed.T_sensor_canonical[i], posed.points[i]
-        whole, solid, standing = points.numpy(), shape, None
-        shows = with_its_scan(whole, shape, seen, T_sensor_can, self.settings, config.refine)
-        if sights is not None:
-            alone = sights.part([i])
-            solid = without_free_space(shape, stack([T_sensor_can]), alone)
-            standing = alone.of(whole, 0)
-        done = Completion(
-            points=shows,
-            pose=T_sensor_can.to(torch.float64).owned(),
-            box=box_seen(solid, T_sensor_can, seen, self.settings, config.box),
-            confidence=said.confidence,
-            branch=said.branch,
-            cost=said.cost,
-            refined=self.refines,
-            warning=said.warning,
-            reasons=said.reasons,
-            features=said.features,
-        )
-        if not self.refines or self.settings.sensor == "camera":
-            return judged(done, None, None, self.settings, config.reasons)
-        rival = float(found.features[i, -1])
-        evidence = scan_features(done, seen, posed.surfaces[i], rival, standing)
-        return judged(done, trust and trust.scan, evidence, self.settings, config.reasons)
-
-    def _off_ground(self, scan: Points, shape: Points, T_sensor_canonical: SE3) -> Points:
-        """The scan without the ground beside its object, for networks that do not complete it."""
-        if not self.refines or self.settings.sensor != "lidar":
-            return scan
-        return without_skirt(scan, shape, T_sensor_canonical, LEAST_POINTS)
+        posed = Posed.of(looked.found)
+        if self.refines:
+            up = None if self.up is None else torch.tensor(self.up, dtype=torch.float64)
+            posed = refined(looked, up, self.settings, self.config.refine, self.device, dense=dense)
+        known = self.settings, self.config
+        return [completed(looked, i, posed, sensor, *known) for i in range(len(looked.scans))]

@@ -9,7 +9,7 @@ import torch
 
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.parallel.team import Team, team
-from wildshape.records import Intrinsics, Sensor, Track
+from wildshape.records import Sensor, Track
 from wildshape.simulate.config import SimulationConfig
 from wildshape.simulate.one_track import Job, RawTrack
 from wildshape.simulate.sensor import DepthCamera, SpinningLidar
@@ -68,5 +68,4 @@ def _record(raw: RawTrack, config: SimulationConfig, index: int) -> Track:
 def _sensor(device: SpinningLidar | DepthCamera) -> Sensor:
     if isinstance(device, SpinningLidar):
         return Sensor("lidar", resolution_deg=device.resolution_deg)
-    f, c = device.focal_px, device.center_px
-    return Sensor("camera", intrinsics=Intrinsics(f, f, c, c, device.size, device.size))
+    return Sensor("camera", intrinsics=device.intrinsics)

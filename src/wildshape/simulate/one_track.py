@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from wildshape.errors import BadInputError
+from wildshape.geometry.projection.pinhole import back_project
 from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.simulate.config import SimulationConfig
 from wildshape.simulate.occluder import occluders
@@ -217,15 +218,6 @@ def depth_image(scene: Scene, camera: DepthCamera, T_object_camera: np.ndarray) 
     return (hits.distance / length).reshape(camera.size, camera.size)
 
 
-def back_project(depth: np.ndarray, camera: DepthCamera) -> np.ndarray:
-    """`(n, 3)` float32 points of the finite pixels: x right, y down, z forward."""
-    v, u = np.nonzero(np.isfinite(depth))
-    z = depth[v, u]
-    x = (u + 0.5 - camera.center_px) / camera.focal_px * z
-    y = (v + 0.5 - camera.center_px) / camera.focal_px * z
-    return np.stack((x, y, z), -1).astype(np.float32)
-
-
 def view(
     scene: Scene, camera: DepthCamera, noise: float, dropout: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -234,4 +226,4 @@ def view(
     depth = depth_image(scene, camera, T_object_camera)
     depth += noise * rng.standard_normal(depth.shape)
     depth[rng.random(depth.shape) < dropout] = np.inf
-    return back_project(depth, camera), T_object_camera
+    return back_project(depth, camera.intrinsics), T_object_camera

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     import numpy as np
 
+    from wildshape.geometry.projection.pinhole import Intrinsics
+
 SensorName = Literal["hdl64", "hdl32", "os1-128", "depth-camera"]
 """The names of `SENSORS`, which the command line offers."""
 
@@ -91,6 +93,14 @@ class DepthCamera:
     def center_px(self) -> float:
         """Principal point, cx = cy, pixels."""
         return self.size / 2
+
+    @property
+    def intrinsics(self) -> "Intrinsics":
+        """As of any pinhole camera."""
+        from wildshape.geometry.projection.pinhole import Intrinsics
+
+        f, c = self.focal_px, self.center_px
+        return Intrinsics(f, f, c, c, self.size, self.size)
 
 
 def _uniform(top: float, bottom: float, count: int) -> tuple[float, ...]:

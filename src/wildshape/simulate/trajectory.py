@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wildshape.geometry.transforms.rotation import rotations_about
+
 _RATE_HZ = 10.0
 _CLEARANCE_M = 0.8  # between the sensor's way and the object's box
 
@@ -96,16 +98,7 @@ def _sensor_poses(path: np.ndarray, height: float, rng: np.random.Generator) -> 
     pitch, roll = np.radians(rng.normal(0.0, (0.4, 0.3), (v, 2))).T
     yaw = path[:, 2] + np.radians(rng.normal(0.0, 0.2, v))
     T = np.tile(np.eye(4), (v, 1, 1))
-    T[:, :3, :3] = _rotation(2, yaw) @ _rotation(1, pitch) @ _rotation(0, roll)
+    T[:, :3, :3] = rotations_about(2, yaw) @ rotations_about(1, pitch) @ rotations_about(0, roll)
     T[:, :2, 3] = path[:, :2]
     T[:, 2, 3] = height + rng.normal(0.0, 0.01, v)
     return T
-
-
-def _rotation(axis: int, angle: np.ndarray) -> np.ndarray:
-    """`(v, 3, 3)` right-handed turns about one axis, radians."""
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    R = np.tile(np.eye(3), (len(angle), 1, 1))
-    R[:, i, i] = R[:, j, j] = np.cos(angle)
-    R[:, i, j], R[:, j, i] = -np.sin(angle), np.sin(angle)
-    return R

@@ -16,11 +16,11 @@ from wildshape.evaluation.results import Limits
 from wildshape.evaluation.summary import figures_of
 from wildshape.geometry.gravity import mean_up
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.choose_hypothesis import choose_hypothesis
 from wildshape.inference.evaluation_adapter import Learned
 from wildshape.inference.predictor import Predictor
 from wildshape.io.store.store import Store
 from wildshape.method.checkpoint import ModelSettings
+from wildshape.method.choose_hypothesis import choose_hypothesis
 from wildshape.method.multiview import LossConfig, multiview_loss
 from wildshape.method.network import Poses, ShapePoseNet
 from wildshape.training.batches.views import Batch, ViewSampler

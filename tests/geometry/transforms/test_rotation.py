@@ -15,8 +15,10 @@ from wildshape.geometry.transforms.rotation import (
     rotation_angle,
     rotation_from_6d,
     rotation_from_quaternion,
+    rotation_from_vector,
     rotation_to_6d,
     rotation_z,
+    rotations_about,
 )
 
 EYE = torch.eye(3, dtype=torch.float64)
@@ -143,3 +145,11 @@ def test_random_yaw_keeps_z_and_covers_the_circle():
     counts = torch.histc(heading, 8, -math.pi, math.pi)
     assert counts.min() > 420
     assert counts.max() < 580
+
+
+def test_turns_about_an_axis_are_those_about_its_vector():
+    angle = torch.tensor((-2.0, 0.0, 0.3), dtype=torch.float64)
+    for axis in range(3):
+        vector = angle[:, None] * torch.eye(3, dtype=torch.float64)[axis]
+        found = torch.from_numpy(rotations_about(axis, angle.numpy()))
+        torch.testing.assert_close(found, rotation_from_vector(vector))

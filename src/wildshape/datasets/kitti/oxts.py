@@ -10,6 +10,7 @@ import torch
 
 from wildshape.datasets.tracks.parts import numbered
 from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.rotation import rotations_about
 from wildshape.geometry.transforms.se3 import SE3
 
 _EARTH_RADIUS_M = 6378137.0
@@ -70,19 +71,8 @@ def poses_of(records: np.ndarray) -> SE3:
     east = scale * np.radians(longitude)
     north = scale * np.log(np.tan(np.radians(90 + latitude) / 2))
     places = np.stack((east, north, altitude), axis=1)
-    rotation = _about(2, yaw) @ _about(1, pitch) @ _about(0, roll)
+    rotation = rotations_about(2, yaw) @ rotations_about(1, pitch) @ rotations_about(0, roll)
     return SE3(torch.from_numpy(rotation), torch.from_numpy(places - places[0]))
-
-
-def _about(axis: int, angle: np.ndarray) -> np.ndarray:
-    """Rotations `(n, 3, 3)` about an axis."""
-    rotation = np.zeros((len(angle), 3, 3))
-    a, b = (axis + 1) % 3, (axis + 2) % 3
-    rotation[:, axis, axis] = 1
-    rotation[:, a, a] = rotation[:, b, b] = np.cos(angle)
-    rotation[:, b, a] = np.sin(angle)
-    rotation[:, a, b] = -np.sin(angle)
-    return rotation
 
 
 def _T_velo_imu(path: Path) -> SE3:  # noqa: N802

@@ -10,7 +10,6 @@ from jaxtyping import Bool, Float, Shaped
 
 from wildshape.errors import BadInputError, load_library
 from wildshape.io.guard import reading
-from wildshape.records import Intrinsics, Points
 
 _BYTES = {"I;16": 2, "I;16B": 2, "I": 4, "L": 1, "P": 1, "1": 1}  # a pixel, of one channel
 _FREE_BYTES, _RATIO = 1 << 24, 8
@@ -78,20 +77,6 @@ def first_size(paths: Iterable[Path]) -> tuple[int, int]:
 def measured(raw: Shaped[np.ndarray, "h w"]) -> Shaped[np.ndarray, "h w"]:
     """The numbers of a depth PNG, 0 where the camera wrote the largest: beyond what it can say."""
     return np.where(raw < _LARGEST, raw, 0)
-
-
-def back_project(depth: Float[np.ndarray, "h w"], camera: Intrinsics) -> Points:
-    """Points `(n, 3)` float32 of the pixels with a depth: x right, y down, z forward, metres.
-
-    Args:
-        depth: along the optical axis, metres; not finite or not positive where nothing was seen.
-        camera: pixel i covers [i, i + 1), so that its ray leaves through i + 0.5.
-    """
-    v, u = np.nonzero(np.isfinite(depth) & (depth > 0))
-    z = depth[v, u].astype(np.float64)
-    x = (u + 0.5 - camera.cx) / camera.fx * z
-    y = (v + 0.5 - camera.cy) / camera.fy * z
-    return np.stack((x, y, z), axis=1).astype(np.float32)
 
 
 def supported(

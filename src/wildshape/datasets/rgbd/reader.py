@@ -21,13 +21,14 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
-from wildshape.datasets.rgbd.depth_image import back_project, read_png, supported
+from wildshape.datasets.rgbd.depth_image import read_png, supported
 from wildshape.datasets.rgbd.sequence import Sequence, instances_of, open_sequence
 from wildshape.datasets.tracks.gathering import Gathering
 from wildshape.datasets.tracks.parts import found_in
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
 from wildshape.geometry.projection.full_scan import FullScan, sight_lines
+from wildshape.geometry.projection.pinhole import back_project
 from wildshape.records import Intrinsics, Points, Sensor, SightLines, Track
 
 

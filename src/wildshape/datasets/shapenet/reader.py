@@ -15,12 +15,12 @@ from typing import Literal
 
 import numpy as np
 
-from wildshape.datasets.rgbd.depth_image import back_project
 from wildshape.datasets.shapenet.files import View, read_model_list, read_shape, read_view
 from wildshape.datasets.tracks.gathering import Damage
 from wildshape.datasets.tracks.parts import found_in, groups, members
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.errors import BadInputError
+from wildshape.geometry.projection.pinhole import back_project
 from wildshape.geometry.transforms.se3 import stack
 from wildshape.records import Points, Sensor, Track
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.boxes import box_seen
-from wildshape.inference.choose_hypothesis import Looked
 from wildshape.inference.predictor import BATCH, Predictor
+from wildshape.inference.single_scans import Looked
 from wildshape.records import Box, Completion, Points
 
 

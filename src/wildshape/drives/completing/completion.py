@@ -28,7 +28,6 @@ from wildshape.drives.tracking.rays import RayCutter
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.transforms.se3 import SE3, stack
-from wildshape.inference.choose_hypothesis import Looked
 from wildshape.inference.folders.complete_folder import (
     COMPLETED,
     OBJECTS,
@@ -36,6 +35,7 @@ from wildshape.inference.folders.complete_folder import (
     objects_of,
 )
 from wildshape.inference.predictor import Predictor
+from wildshape.inference.single_scans import Looked
 from wildshape.inference.tracks.pose_outliers import SensorMotion
 from wildshape.io.atomic import write_json
 from wildshape.io.boxes.detections import moved

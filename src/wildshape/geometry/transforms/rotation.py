@@ -5,6 +5,7 @@
 A rotation is a matrix `(..., 3, 3)` that acts on column vectors: `x_a = R_a_b x_b`.
 """
 
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -32,6 +33,15 @@ def rotation_z(angle: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch 3 3"]:
     zero, one = torch.zeros_like(cos), torch.ones_like(cos)
     rows = (cos, -sin, zero, sin, cos, zero, zero, zero, one)
     return torch.stack(rows, dim=-1).reshape(*angle.shape, 3, 3)
+
+
+def rotations_about(axis: int, angle: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3 3"]:
+    """Right-handed turns about x (0), y (1) or z (2), radians."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    R = np.tile(np.eye(3), (len(angle), 1, 1))
+    R[:, i, i] = R[:, j, j] = np.cos(angle)
+    R[:, i, j], R[:, j, i] = -np.sin(angle), np.sin(angle)
+    return R
 
 
 def cross_matrix(vector: Float[Tensor, "*batch 3"]) -> Float[Tensor, "*batch 3 3"]:

@@ -10,11 +10,12 @@ from torch import Tensor, nn
 
 from wildshape.geometry.centring import scan_centre
 from wildshape.geometry.projection.line_of_sight import face, roll, roll_angle
-from wildshape.inference.choose_hypothesis import NetworkInput, choose_hypothesis, in_sensor_frame
 from wildshape.inference.config import HypothesisRule
 from wildshape.inference.export.plain_confidence import confidence_plain, look_plain
 from wildshape.inference.export.plain_scores import score_plain
+from wildshape.inference.single_scans import in_sensor_frame
 from wildshape.method.checkpoint import ModelSettings
+from wildshape.method.choose_hypothesis import NetworkInput, choose_hypothesis
 from wildshape.method.network import ShapePoseNet
 
 
@@ -86,7 +87,7 @@ class CompletionGraph(nn.Module):
         return self._look_again(*state) if bool(tilted.any()) else first
 
     def _look_again(self, *state: Tensor) -> _Look:
-        """Tilted scans rolled upright and seen again (`choose_hypothesis.py`)."""
+        """Tilted scans rolled upright and seen again (`single_scans.py`)."""
         first, (sampled, turn, centre, angle, tilted) = state[:_PARTS], state[_PARTS:]
         upright = roll(angle) @ turn
         second = self._look(sampled @ upright.mT, centre, upright)

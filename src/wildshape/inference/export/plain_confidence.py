@@ -12,7 +12,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from wildshape.inference.confidence import DENSEST, OFF_AXIS, VIEW_PX
+from wildshape.inference.confidence import DENSEST, OFF_AXIS, VIEW_PX, log_of
 from wildshape.inference.config import ReasonRule
 from wildshape.inference.export.plain_scores import PlainScores
 from wildshape.method.checkpoint import ModelSettings
@@ -35,7 +35,9 @@ def look_plain(
     entropy = -(belief.exp() * belief).sum(-1)
     spread = (_of(posed, first) - _of(posed, second)).norm(dim=-1).mean(-1)
     covered = (_of(scores.to_scan, first) < COVERED_M).float().mean(-1)
-    terms = [_log(part.gather(1, first)[:, 0]) for part in (scores.observation, scores.projection)]
+    terms = [
+        log_of(part.gather(1, first)[:, 0]) for part in (scores.observation, scores.projection)
+    ]
     return torch.stack((*terms, entropy, least[:, -1] - least[:, 0], spread, covered), dim=-1)
 
 
@@ -64,8 +66,8 @@ def _foretold(
         return 1.0 / (1.0 + (cost / settings.cost_m[1]).square())
     number = _seen(scans, settings.sensor).clamp_max(DENSEST)
     distance = scans.mean(1).norm(dim=-1)
-    own = torch.stack((number.log(), _log(distance), _log(size)), dim=-1)
-    features = torch.cat((_log(cost)[:, None], seen[:, :5], own, seen[:, 5:]), dim=-1)
+    own = torch.stack((number.log(), log_of(distance), log_of(size)), dim=-1)
+    features = torch.cat((log_of(cost)[:, None], seen[:, :5], own, seen[:, 5:]), dim=-1)
     foretold = calibration.bias + features @ features.new_tensor(calibration.weights)
     beyond = (foretold - math.log(calibration.within_m)) / calibration.sigma
     return 0.5 * (1.0 - torch.erf(beyond / math.sqrt(2)))
@@ -84,7 +86,3 @@ def _of(values: Float[Tensor, "B H *rest"], chosen: Tensor) -> Tensor:
     """One hypothesis of each scan, `(B, 1)` indices."""
     index = chosen.view(-1, 1, *(1,) * (values.ndim - 2)).expand(-1, 1, *values.shape[2:])
     return values.gather(1, index)[:, 0]
-
-
-def _log(values: Float[Tensor, "B"]) -> Float[Tensor, "B"]:
-    return values.clamp_min(SMALLEST_M).log()

@@ -20,7 +20,6 @@ from wildshape.geometry.sampling import sorted_points, voxel_thin
 from wildshape.geometry.surface import mirrored
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import carried, fit_for
-from wildshape.inference.choose_hypothesis import Looked, NetworkInput
 from wildshape.inference.confidence import (
     Glance,
     glance_of,
@@ -31,6 +30,7 @@ from wildshape.inference.confidence import (
 from wildshape.inference.config import BoxConfig, InferenceConfig, ReasonRule, TrackConfig
 from wildshape.inference.free_space import Rays, Sights, without_free_space
 from wildshape.inference.refine import drawn_to, padded, shown
+from wildshape.inference.single_scans import Looked, off_ground
 from wildshape.inference.tracks.heading_vote import (
     FEWEST,
     followed_signs,
@@ -49,6 +49,7 @@ from wildshape.inference.tracks.pose_outliers import (
 )
 from wildshape.inference.tracks.track_cost import network_inputs, track_cost
 from wildshape.method.checkpoint import ModelSettings
+from wildshape.method.choose_hypothesis import NetworkInput
 from wildshape.method.trust import TrackFeatures
 from wildshape.method.trust_features import track_features
 from wildshape.ops.device import plain_torch
@@ -83,7 +84,10 @@ class Gathered:
         self._bottoms = torch.zeros(3, dtype=torch.float64)
 
     def add(self, done: Completion, scan: Points) -> None:
-        """The next scan, completed."""
+        """The next scan, completed; its ground goes, unless the network completes that, too."""
+        if done.refined and self.settings.sensor == "lidar":
+            shape = done.pose.inverse().apply_numpy(done.points)
+            scan = off_ground(scan, shape, done.pose)
         own = torch.from_numpy(done.points[: len(self._sum)]).double()
         self._odds.append(odds_of(done))
         T_canonical_sensor = done.pose.inverse()

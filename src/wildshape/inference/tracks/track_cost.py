@@ -9,8 +9,8 @@ from jaxtyping import Float
 from torch import Tensor
 
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.choose_hypothesis import NetworkInput, network_input
 from wildshape.method.checkpoint import ModelSettings
+from wildshape.method.choose_hypothesis import NetworkInput, network_input
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.records import Points
 

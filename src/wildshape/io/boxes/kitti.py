@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
+from wildshape.geometry.box import SIGNS
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import write_text
 from wildshape.io.boxes.detections import Detection, moved, pose_of
@@ -19,7 +20,6 @@ from wildshape.records import Box
 _NAMES = ("Car", "Van", "Truck", "Pedestrian", "Person", "Person_sitting", "Cyclist", "Tram")
 _TYPES = {name.lower(): name for name in _NAMES}
 _UNKNOWN, _NO_IMAGE = "Misc", (-1.0, -1.0, -1.0, -1.0)
-_SIGNS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def _image_box(box: Box, turn: float, projection: Float[np.ndarray, "3 4"]) -> t
     """
     cos, sin = math.cos(turn), math.sin(turn)
     axes = np.array(((cos, 0.0, -sin), (sin, 0.0, cos), (0.0, -1.0, 0.0)))  # a row an axis
-    corners = _SIGNS * np.asarray(box.size) / 2 @ axes + np.asarray(box.centre)
+    corners = SIGNS * np.asarray(box.size) / 2 @ axes + np.asarray(box.centre)
     u, v, depth = projection @ np.pad(corners, ((0, 0), (0, 1)), constant_values=1.0).T
     if (depth <= 0).any():
         return _NO_IMAGE

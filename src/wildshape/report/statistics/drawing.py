@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.ticker import Locator
 
 INK, SOFT, GRID = "#16191d", "#59616c", "#e3e7ec"
-_BINS, _ROSE_BINS, _NAMED = 28, 24, 8
+_BINS, _ROSE_BINS, _NAMED, _LONGEST = 28, 24, 8, 34
 
 
 def number(value: float) -> str:
@@ -145,5 +145,5 @@ def _unit(quantity: Quantity) -> str:
     return {"": "", "°": "°"}.get(quantity.unit, f" {quantity.unit}")
 
 
-def _short(text: str, limit: int = 34) -> str:
-    return text if len(text) <= limit else text[: limit - 1] + "\N{HORIZONTAL ELLIPSIS}"
+def _short(text: str) -> str:
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"

@@ -21,8 +21,8 @@ from jaxtyping import Float
 from torch import Tensor
 
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.choose_hypothesis import CostRule, choose_hypothesis
 from wildshape.inference.tracks.heading_vote import continuous_signs, turned_where
+from wildshape.method.choose_hypothesis import CostRule, choose_hypothesis
 from wildshape.method.multiview import LossConfig
 from wildshape.method.network import ShapePoseNet
 from wildshape.training.batches.views import ViewSampler

@@ -1,35 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The cheapest hypothesis speaks; tilted scans are looked at twice, the cheaper answer stays."""
-
-from pathlib import Path
+"""What a network is given of scans, and which hypothesis speaks: the cheapest."""
 
 import numpy as np
 import pytest
 import torch
+from tests.turned import SCAN, turned_scans
 
 from wildshape.geometry.centring import box_centre, frustum_centre
 from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.sampling import drawn, sorted_points
-from wildshape.geometry.transforms.rotation import random_rotation
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference import choose_hypothesis as module
-from wildshape.inference.choose_hypothesis import choose_hypothesis, look, look_twice, network_input
-from wildshape.inference.config import FreeSpaceConfig
-from wildshape.inference.free_space import Sights
 from wildshape.inference.predictor import load
+from wildshape.method.choose_hypothesis import choose_hypothesis, network_input
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.method.multiview import LossConfig
 from wildshape.method.ray_encoder import RayConfig
-
-SCAN = Path(__file__).parents[2] / "examples" / "scan.npy"
-
-
-def turned_scans(count: int) -> list[np.ndarray]:
-    points = np.load(SCAN)
-    turns = random_rotation(count, torch.Generator().manual_seed(0)).double()
-    still = torch.zeros(3, dtype=torch.float64)
-    return [SE3(turn, still).apply_numpy(points) for turn in turns]
 
 
 def test_a_network_sees_no_rays_from_another_side():
@@ -42,8 +28,7 @@ def test_a_network_sees_no_rays_from_another_side():
     given = network_input([scan], 64, "lidar", facing=True)
 
     def seen(*parts):
-        sights = Sights([scan], [SightLines.joined(parts)], FreeSpaceConfig())
-        return given.beside(sights, RayConfig()).rays
+        return given.beside([SightLines.joined(parts)], RayConfig()).rays
 
     assert torch.equal(seen(own, facing), seen(own))
     assert not torch.equal(seen(own, beside), seen(own))
@@ -70,42 +55,6 @@ def test_the_hypothesis_with_the_least_cost_less_belief_speaks(belief):
         believed = np.array(costs) - belief * found.poses.log_belief[i].numpy()
         assert int(found.branch[i]) == int(believed.argmin())
         assert float(found.cost(of.beta)[i]) == pytest.approx(costs[int(found.branch[i])], abs=1e-5)
-
-
-@torch.no_grad()
-def test_a_second_look_never_costs_more_and_is_for_tilted_scans_alone(monkeypatch):
-    predictor = load()
-    of = predictor.settings
-    scans = [np.load(SCAN), *turned_scans(7)]
-    given = network_input(scans, of.input_points, of.sensor, of.facing)
-    seen = []
-
-    def counted(network, settings, given, sights):
-        seen.append(len(given.scans))
-        return look(network, settings, given, sights)
-
-    first = look(predictor.network, of, given)
-    monkeypatch.setattr(module, "look", counted)
-    twice = look_twice(predictor.network, of, given)
-    assert seen[0] == 8
-    assert 1 <= sum(seen[1:]) <= 7, "one second look, and none at the scan that is upright"
-    assert (twice.cost <= first.cost).all()
-    changed = (twice.rotation - first.rotation).abs().amax((1, 2)) > 1e-6
-    assert not changed[0]
-    assert (twice.cost < first.cost)[changed].all()
-    torch.testing.assert_close(twice.rotation[~changed], first.rotation[~changed])
-
-
-def test_the_shipped_weights_know_a_car_at_any_roll():
-    points = np.load(SCAN)
-    predictor = load()
-    upright = predictor.complete(points).pose
-    turns = random_rotation(12, torch.Generator().manual_seed(0)).double()
-    still = torch.zeros(3, dtype=torch.float64)
-    scans = [SE3(turn, still).apply_numpy(points) for turn in turns]
-    for turn, done in zip(turns, predictor.complete_many(scans)):
-        off = (turn @ upright.rotation).mT @ done.pose.rotation
-        assert torch.rad2deg(torch.acos(((off.trace() - 1) / 2).clamp(-1, 1))) < 10
 
 
 @pytest.mark.parametrize(
