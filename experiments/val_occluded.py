@@ -46,10 +46,10 @@ def blocked_share(scan: Points, rays: SightLines, shape: Points) -> float:
     return float((through & blocked).sum() / max(through.sum(), 1))
 
 
-def occluded_tracks(drives: int) -> Iterator[Track]:
+def occluded_tracks(drives: int, seed: int = SEED) -> Iterator[Track]:
     """The tracks of the set, of so many drives."""
     config = SimulationConfig(tracks=drives, occlusion=0.999, far_m=25.0, rays=_ALL)
-    for track in simulate_tracks(config, SEED):
+    for track in simulate_tracks(config, seed):
         kept = [i for i in range(len(track.scans)) if BLOCKED[0] <= _share(track, i) <= BLOCKED[1]]
         if len(kept) >= LEAST_SCANS:
             part = track.part(kept)
@@ -74,9 +74,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--drives", type=int, default=DRIVES)
+    parser.add_argument("--seed", type=int, default=SEED, help="of another set like it")
     asked = parser.parse_args()
-    settings = {"seed": SEED, "drives": asked.drives, "blocked": BLOCKED}
-    tracks = occluded_tracks(asked.drives)
+    settings = {"seed": asked.seed, "drives": asked.drives, "blocked": BLOCKED}
+    tracks = occluded_tracks(asked.drives, asked.seed)
     command = "experiments.val_occluded"
     print(write_tracks(tracks, asked.out, "packed", command=command, settings=settings))
 
