@@ -2,9 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line's door: it imports a command, and with it torch, only when one is named."""
 
-import atexit
 import errno
-import gc
 import itertools
 import os
 import sys
@@ -44,10 +42,6 @@ _NO_MEMORY = (
     " what is finished stays valid, and the same command goes on from it, `train` with --resume."
 )
 _RESERVED_BYTES = 1 << 20  # enough to say so, also after a small allocation has failed
-
-
-# Python walks all that is left when it ends, for half a second after torch: nothing is left.
-atexit.register(gc.freeze)
 
 
 def main(argv: Sequence[str] | None = None) -> None:
