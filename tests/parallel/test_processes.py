@@ -132,6 +132,13 @@ class Who(Task):
     done_by_a_helper = done_here
 
 
+class Group(Task):
+    def done_here(self, number):
+        return os.getpgid(0)
+
+    done_by_a_helper = done_here
+
+
 class KilledOnce(Task):
     """Every second helper is killed at its item; `done` tells who did which."""
 
@@ -178,6 +185,13 @@ def test_results_come_in_order(two, tmp_path):
 def test_every_process_works(two, tmp_path):
     assert len(set(two.as_done(Who(tmp_path), range(20)))) == 2
     assert two.worked == 2
+
+
+@pytest.mark.skipif(not hasattr(os, "getpgid"), reason="groups of processes are POSIX")
+def test_ctrl_c_is_for_this_process_alone(two, tmp_path):
+    groups = set(two.as_done(Group(tmp_path), range(20)))
+    assert len(groups) == 2
+    assert os.getpgid(0) in groups
 
 
 def test_short_work_is_done_here(two, monkeypatch):

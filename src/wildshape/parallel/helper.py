@@ -130,6 +130,7 @@ def _start() -> "subprocess.Popen[bytes]":
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         env={**os.environ, "PYTHONPATH": paths, "OMP_NUM_THREADS": "1"},
+        process_group=0,  # Ctrl-C is for the parent: in its first imports this one would say so
     )
 
 
@@ -144,7 +145,7 @@ def serve() -> None:
         while True:
             pickle.dump(work.answer(*messages.get()), sink, protocol=pickle.HIGHEST_PROTOCOL)
             sink.flush()
-    except (KeyboardInterrupt, BrokenPipeError):
+    except BrokenPipeError:
         os._exit(0)
 
 
