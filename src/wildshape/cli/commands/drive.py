@@ -147,7 +147,6 @@ def run(settings: Settings) -> None:
 def _run(settings: Settings, workers: "int | Team | None") -> None:
     with uncollected():
         from wildshape.cli.terminal import say
-        from wildshape.drives.adapting.adapt import adapt_to
         from wildshape.drives.config import INFERENCE, DriveConfig
         from wildshape.drives.writing.files import DriveFiles
         from wildshape.inference.predictor import load
@@ -174,6 +173,8 @@ def _run(settings: Settings, workers: "int | Team | None") -> None:
     find = _many if several else _one
     change: Adaptation | None = None
     if adapt is not None:
+        from wildshape.drives.adapting.adapt import adapt_to
+
         first = find(replace(task, files=DriveFiles(), report=False), folders, drives, settings)
         if first.refused:  # an adaptation of the others would stand in the way of all
             _answer(first, None, settings, several=several)
