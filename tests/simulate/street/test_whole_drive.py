@@ -3,13 +3,16 @@
 """A simulated drive: what its boxes hold, who hides whom, and when each point was measured."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from tests.refusal import refused
 
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.sensor import HDL32, SENSORS
+from wildshape.simulate.shapes.vehicle import vehicle
 from wildshape.simulate.street.sweep import cast_turn
 from wildshape.simulate.street.whole_drive import PERIOD_S, StreetConfig, WholeDrive
 
@@ -55,6 +58,22 @@ def test_a_box_holds_what_was_cast_on_its_object_and_nothing_else(
         # The ground reaches a little into the box, and grass a little over the ground.
         above = _moved(np.linalg.inv(box.T_sensor_object), scan.points)[:, 2] > 0.15 - half[2]
         assert not ((inside < half - 0.05).all(1) & above & ~own).any()
+
+
+def test_a_box_is_around_the_body_of_a_vehicle_with_one_mirror(tmp_path: Path) -> None:
+    car = vehicle("sedan", np.random.default_rng(0))
+    faces = car.faces[car.parts < car.parts.max()]  # the left mirror is the last part
+    trimesh.Trimesh(car.vertices, faces, process=False).export(tmp_path / "car.ply")
+    across = car.vertices[faces][..., 1]
+    middle = np.array((0.0, -(across.min() + across.max()) / 2, 0.0))  # of the body, box frame
+    drive = WholeDrive(replace(CLEAN, speed=0.0, meshes=tmp_path), 3)
+    T_world_sensor = drive.sensor_pose(np.zeros(1))[0]
+    parked = [box for box in drive.scan(0).boxes if not box.moving and box.kind == "Car"]
+    assert parked
+    for box in parked:
+        T_world_shape = drive.street.pose(drive.actors[box.track], np.zeros(1))[0]
+        T_label_shape = np.linalg.inv(T_world_sensor @ box.T_sensor_object) @ T_world_shape
+        np.testing.assert_allclose(_moved(T_label_shape, middle), 0.0, atol=5e-3)
 
 
 def test_a_pulse_ends_at_the_nearest_of_all_things_at_its_own_time(raw: WholeDrive) -> None:

@@ -139,12 +139,16 @@ class Street:
         """An actor's surface in its own frame, box centre at the origin."""
         return _shape(self.vehicles, actor.kind, actor.seed)
 
-    def label_size(self, actor: Actor) -> tuple[float, float, float]:
-        """Length, width and height as data sets label them, metres: without mirrors."""
-        length, width, height = actor.size
-        if actor.kind != "Pedestrian":
-            width = _body_width(self.vehicles, actor.kind, actor.seed)
-        return length, width, height
+    def label(self, actor: Actor) -> tuple[tuple[float, float, float], float]:
+        """Its size as data sets label it, without mirrors, and how far left its middle then lies.
+
+        Metres; the body of a vehicle with one mirror is beside the middle of its own box.
+        """
+        if actor.kind == "Pedestrian":
+            return actor.size, 0.0
+        length, _, height = actor.size
+        right, left = _body_sides(self.vehicles, actor.kind, actor.seed)
+        return (length, left - right, height), (left + right) / 2
 
     def ground(self, low: float, high: float) -> list[Solid]:
         """The road between two places along it, and the terrain around."""
@@ -223,10 +227,9 @@ def _surface(points: np.ndarray, rows: int, columns: int) -> Solid:
 
 
 @lru_cache(maxsize=256)
-def _body_width(vehicles: Vehicles, kind: str, seed: tuple[int, ...]) -> float:
+def _body_sides(vehicles: Vehicles, kind: str, seed: tuple[int, ...]) -> tuple[float, float]:
     points, _ = on_surface(_shape(vehicles, kind, seed), 8192, np.random.default_rng(0))
-    right, left = body_sides(points[:, 1])
-    return left - right
+    return body_sides(points[:, 1])
 
 
 @lru_cache(maxsize=256)

@@ -229,9 +229,9 @@ class WholeDrive:
             turned = np.arctan2(T_sensor_object[1, 3], T_sensor_object[0, 3]) / (2 * np.pi)
             time = middle + turned * PERIOD_S
         T = self._seen(actor, time, middle if self.config.compensated else time)
-        return TrueBox(
-            actor.track, actor.kind, self.street.label_size(actor), T, points, actor.moving
-        )
+        size, left = self.street.label(actor)
+        T[:3, 3] += left * T[:3, 1]
+        return TrueBox(actor.track, actor.kind, size, T, points, actor.moving)
 
     def _seen(self, actor: Actor, time: float, sensor_time: float) -> np.ndarray:
         """`(4, 4)` T_sensor_object of an actor at one time, a sensor at another."""
