@@ -12,7 +12,7 @@ from tests.models import CONFIG, SETTINGS, scan
 
 from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.inference.confidence import VIEW_PX, features_of, odds_of
+from wildshape.inference.confidence import VIEW_PX, VIEWED_M, features_of, odds_of
 from wildshape.inference.predictor import Predictor, load
 from wildshape.method.checkpoint import save_checkpoint
 from wildshape.method.network import Poses, ShapePoseNet
@@ -26,6 +26,7 @@ from wildshape.method.trust import (
     Trust,
 )
 from wildshape.method.trust_features import rival_margin, surfaces, views_apart
+from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.simulate.sensor import DepthCamera
 
 FACING = dataclasses.replace(SETTINGS, facing=True)
@@ -62,6 +63,28 @@ def test_a_finer_camera_says_no_more_of_the_same_view(finer):
     assert camera.focal_px == VIEW_PX
     assert len(view) == 6400 * finer**2
     assert known.log_points == pytest.approx(math.log(6400))
+
+
+@pytest.mark.parametrize(("away", "known"), [(0.9, VIEWED_M[0]), (1.8, 1.8), (8.0, VIEWED_M[1])])
+def test_a_camera_elsewhere_says_what_one_says_that_calibrations_saw(away, known):
+    """Chairs no worse completed were that with 0.06 from 1.1 m, with 0.999 from 3 m."""
+    across = np.linspace(-0.25, 0.25, 80)
+    x, y = np.meshgrid(across, across)
+    view, usual = (np.stack((x, y, 0 * x + z), -1).reshape(-1, 3) for z in (away, known))
+    found, same = (
+        features_of(one.astype(np.float32), 0.1, torch.zeros(6), "camera") for one in (view, usual)
+    )
+    assert found.log_range == pytest.approx(math.log(known), abs=1e-3)
+    assert found.log_points == pytest.approx(same.log_points, abs=0.02)
+
+
+def test_the_views_that_calibrations_saw_were_so_far_away():
+    config = SimulationConfig(
+        tracks=2, scans=5, sensor="depth-camera", category="chair", shape_points=64
+    )
+    for track in simulate_tracks(config, seed=0, workers=1):
+        for seen in track.scans:
+            assert VIEWED_M[0] < np.linalg.norm(seen.mean(0)) < VIEWED_M[1]
 
 
 def test_the_confidence_is_the_product_and_says_what_is_unsure(tmp_path):

@@ -41,6 +41,7 @@ _LEAST_ODDS, _MOST_ODDS = 1e-3, 49.0
 _FEWEST_HEIGHTS = 4
 DENSEST = 40_000  # points: no calibration has seen more, and what it saw falls with them
 VIEW_PX = 240.0  # focal length of the camera that calibrations saw; finer ones say no more
+VIEWED_M = (1.6, 2.05)  # how far from it what it saw was; from elsewhere as if from there
 OFF_AXIS = 0.5  # cosine: no depth camera sees what is farther off its axis
 _OF_RESULT = ("poor_fit", "low_confidence", "unsure_heading", "unsure_box", "other_kind")
 
@@ -84,7 +85,10 @@ def features_of(
 ) -> ConfidenceFeatures:
     """All features of one completion."""
     observation, projection, entropy, margin, spread, covered = seen.tolist()
-    away = float(np.linalg.norm(scan.mean(0, dtype=np.float64)))  # float32: 2 cm off of a million
+    away, number = _away(scan), len(scan)
+    if sensor_kind == "camera":  # as if it had stood where calibrations saw from
+        nearby = min(max(away, VIEWED_M[0]), VIEWED_M[1])
+        away, number = nearby, _pixels(scan, VIEW_PX * (away / nearby))
     return ConfidenceFeatures(
         log_cost=math.log(max(cost, SMALLEST_M)),
         log_observation=observation,
@@ -92,18 +96,21 @@ def features_of(
         entropy=entropy,
         margin=margin,
         spread=spread,
-        log_points=math.log(min(_seen(scan, sensor_kind), DENSEST)),
+        log_points=math.log(min(number, DENSEST)),
         log_range=math.log(max(away, SMALLEST_M)),
         log_extent=math.log(max(extent(scan), SMALLEST_M)),
         covered=covered,
     )
 
 
-def _seen(scan: Points, sensor_kind: SensorKind) -> int:
-    """The number of points; of a camera's as many as `VIEW_PX` would have shown at most."""
-    if sensor_kind == "lidar":
-        return len(scan)
-    across, down = np.floor(scan[:, :2] / np.maximum(scan[:, 2:], SMALLEST_M) * VIEW_PX).T
+def _away(scan: Points) -> float:
+    """How far the middle of its points is; in float32 it would be 2 cm off of a million."""
+    return float(np.linalg.norm(scan.mean(0, dtype=np.float64)))
+
+
+def _pixels(scan: Points, focal_px: float) -> int:
+    """How many pixels of such a camera a scan's points fill."""
+    across, down = np.floor(scan[:, :2] / np.maximum(scan[:, 2:], SMALLEST_M) * focal_px).T
     return len(np.unique(across + 1j * down))
 
 

@@ -152,3 +152,13 @@ def test_scans_of_different_sizes_are_faced_as_each_alone(sensor):
         alone = face(scan, sensor_kind=sensor)
         assert torch.equal(turn, alone.turn)
         assert torch.equal(centre, alone.centre)
+
+
+@pytest.mark.parametrize("sensor", ["lidar", "camera"])
+def test_points_all_around_the_sensor_are_turned_by_a_rotation(sensor):
+    """Their mean direction is none: a pose of determinant 0 was written."""
+    half = torch.randn(40, 3, generator=torch.Generator().manual_seed(5))
+    for around in (torch.cat((half, -half)), torch.stack((half, -half), 1).flatten(0, 1)):
+        for turn in (face(around, sensor_kind=sensor).turn, face_each([around], sensor).turn[0]):
+            torch.testing.assert_close(turn @ turn.mT, torch.eye(3), atol=1e-6, rtol=0)
+            assert torch.linalg.det(turn) == pytest.approx(1)

@@ -19,7 +19,7 @@ from torch import Tensor
 from wildshape.geometry.box import extent
 from wildshape.geometry.projection.visibility import facing_rotation
 
-_AHEAD, _SMALLEST_M = (1.0, 0.0, 0.0), 1e-6
+_AHEAD, _SMALLEST_M, _NOWHERE = (1.0, 0.0, 0.0), 1e-6, 1e-9
 _STEPS = 200
 _NEAR = 0.01  # of the extent: no sensor comes as near to the hull of what it sees
 # Axes x forward, y left, z up of a depth camera's own x right, y down, z forward.
@@ -82,11 +82,21 @@ def _seen(points: Float[Tensor, "*batch 3"]) -> tuple[Tensor, Tensor]:
 
 
 def _towards(direction: Float[Tensor, "B 3"], sensor_kind: str) -> Float[Tensor, "B 3 3"]:
-    """Rotation that turns `direction` to +x, up as far up as can be."""
+    """Rotation that turns `direction` to +x, up as far up as can be.
+
+    Of points all around the sensor there is none: they are turned as if they lay ahead.
+    """
     if sensor_kind == "lidar":
-        return facing_rotation(direction)
+        return facing_rotation(_somewhere(direction))
     axes = direction.new_tensor(_CAMERA)
-    return facing_rotation(direction @ axes.mT) @ axes
+    return facing_rotation(_somewhere(direction @ axes.mT)) @ axes
+
+
+def _somewhere(direction: Float[Tensor, "B 3"]) -> Float[Tensor, "B 3"]:
+    """The direction, or ahead if it is none but for rounding."""
+    ahead = torch.zeros_like(direction)
+    ahead[..., 0] = (direction.norm(dim=-1) < _NOWHERE).to(direction.dtype)
+    return direction + ahead
 
 
 def roll(angle: Float[Tensor, "B"]) -> Float[Tensor, "B 3 3"]:

@@ -12,12 +12,11 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from wildshape.inference.confidence import DENSEST, OFF_AXIS, VIEW_PX, log_of
+from wildshape.inference.confidence import DENSEST, OFF_AXIS, VIEW_PX, VIEWED_M, log_of
 from wildshape.inference.config import ReasonRule
 from wildshape.inference.export.plain_scores import PlainScores
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.confidence import COVERED_M, SMALLEST_M
-from wildshape.records import SensorKind
 
 _RULE = ReasonRule()
 
@@ -64,8 +63,12 @@ def _foretold(
     calibration = settings.calibration
     if calibration is None:
         return 1.0 / (1.0 + (cost / settings.cost_m[1]).square())
-    number = _seen(scans, settings.sensor).clamp_max(DENSEST)
     distance = scans.mean(1).norm(dim=-1)
+    number = torch.ones_like(scans[..., 0]).sum(-1)
+    if settings.sensor == "camera":
+        nearby = distance.clamp(*VIEWED_M)
+        distance, number = nearby, _pixels(scans, VIEW_PX * (distance / nearby))
+    number = number.clamp_max(DENSEST)
     own = torch.stack((number.log(), log_of(distance), log_of(size)), dim=-1)
     features = torch.cat((log_of(cost)[:, None], seen[:, :5], own, seen[:, 5:]), dim=-1)
     foretold = calibration.bias + features @ features.new_tensor(calibration.weights)
@@ -73,11 +76,10 @@ def _foretold(
     return 0.5 * (1.0 - torch.erf(beyond / math.sqrt(2)))
 
 
-def _seen(scans: Float[Tensor, "B N 3"], sensor_kind: SensorKind) -> Float[Tensor, "B"]:
-    """The number of points, or of the pixels that they fill."""
-    if sensor_kind == "lidar":
-        return torch.ones_like(scans[..., 0]).sum(-1)
-    at = (scans[..., :2] / scans[..., 2:].clamp_min(SMALLEST_M) * VIEW_PX).floor().double()
+def _pixels(scans: Float[Tensor, "B N 3"], focal_px: Float[Tensor, "B"]) -> Float[Tensor, "B"]:
+    """How many pixels of such cameras the points fill."""
+    seen = scans[..., :2] / scans[..., 2:].clamp_min(SMALLEST_M)
+    at = (seen * focal_px[:, None, None]).floor().double()
     pixels = (at[..., 0] * 2.0**20 + at[..., 1]).sort(-1).values
     return 1.0 + (pixels[:, 1:] != pixels[:, :-1]).float().sum(-1)
 
