@@ -328,7 +328,9 @@ class Pipeline:
         if not self.tracked:
             found += rate_told(self.seen_s, self.step_m(T_world_sensor), self.config.tracks)
         if self.detections is not None:
-            found += self.detections.told(kept)
+            tracks = read_sightings(self.stages / "tracks.json")
+            followed = sum(len(rows) for one in tracks for rows in one.rows)
+            found += self.detections.told(kept, followed)
         if leaps := list(jumps(T_world_sensor, self.drive.moments, self.config.trajectory)):
             found.append(f"jumps of the sensor: {len(leaps)}, the first at frame {leaps[0]}")
         return tuple(found)

@@ -116,14 +116,24 @@ class Detections:
         steps = np.diff([frame for frame, row in enumerate(self.frames) if row])
         return max(round(float(np.median(steps))), 1) if len(steps) else 1
 
-    def told(self, kept: int) -> list[str]:
-        """What of them led to nothing, a sentence each; `kept`: boxes that were cut out."""
+    def told(self, kept: int, followed: int) -> list[str]:
+        """What of them led to nothing, a sentence each.
+
+        Args:
+            kept: boxes that were cut out.
+            followed: those of them that are in a track.
+        """
         placed, empty = sum(map(len, self.frames)), sum(not row for row in self.frames)
         found = [f"{empty} of {len(self.frames)} scans have no detections"] if empty else []
         if kept < placed:
             found.append(
                 f"{placed - kept} of {placed} detections are left out: they hold too few points or"
                 " those of another"
+            )
+        if followed < kept:
+            found.append(
+                f"{kept - followed} of {placed} detections are left out: without tracks of their"
+                " own, they follow each other in too few scans"
             )
         return found
 
