@@ -339,6 +339,28 @@ def test_boxes_of_other_scans_or_in_another_frame_are_refused(street, tmp_path):
     )
 
 
+@pytest.mark.parametrize(
+    ("frame_deg", "heading_deg", "told"),
+    [(0, 0, ""), (0, 90, "if each is turned by 90 degrees"), (90, 90, "beside the vehicles")],
+)
+def test_boxes_that_do_not_lie_on_the_vehicles_are_said(
+    street, tmp_path, frame_deg, heading_deg, told
+):
+    """With wrong headings a third of the vehicles were found, askew, and nothing was said."""
+    given = openpcdet(street, tmp_path)
+    scans = json.loads(given.path.read_text())
+    c, s = math.cos(math.radians(frame_deg)), math.sin(math.radians(frame_deg))
+    for scan in scans:
+        for row in scan["boxes_lidar"]:
+            x, y = row[:2]
+            row[:2] = c * x - s * y, s * x + c * y
+            row[6] += math.radians(heading_deg)
+    given.path.write_text(json.dumps(scans))
+    said = [one for one in find_detections(given, street.drive).warnings if "boxes hold" in one]
+    assert len(said) == bool(told)
+    assert told in "".join(said)
+
+
 def test_a_track_has_one_box_a_frame(street, tmp_path):
     lines = (street.root / "truth" / "0000.csv").read_text().splitlines()
     path = tmp_path / "boxes.csv"

@@ -150,6 +150,20 @@ def test_poses_that_do_not_fit_the_scans_are_said():
         assert (told or "") in "".join(found)
 
 
+def test_a_jump_of_poses_is_said_where_steps_are_uneven():
+    """By whole scans the steps themselves change more than where the poses jump."""
+    at = np.cumsum([0, *(3, 2) * 5, 3])
+    places = np.column_stack((1.4 * at, 0 * at))
+    seen = [scan(things(), place, frame) for frame, place in enumerate(places)]
+    jumped = places + np.outer(at >= 10, (1.6, 0.0))
+    for given, told in ((places, []), (jumped, ["jump at frame 4"])):
+        poses, times = path_of(given), (0.04 * at).tolist()
+        drive = Drive.of("street", ["a"] * 12, lambda frame: Turn(seen[frame]), times, poses)
+        found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
+        assert len(found) == len(told)
+        assert all(word in said for word, said in zip(told, found))
+
+
 def test_right_poses_amid_traffic_are_not_doubted():
     """Half of what is seen drives elsewhere; half a metre beside less fits."""
     seen = street(frames=8)

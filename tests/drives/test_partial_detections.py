@@ -77,11 +77,16 @@ def test_a_vehicle_detected_in_keyframes_alone_is_followed(tmp_path: Path, step)
 def test_boxes_that_led_to_nothing_and_scans_without_are_counted():
     frames = (box(0.0), box(10.0)), (), (box(0.0),)
     known = Detections(Path("boxes.json"), frames, tracked=False, warnings=())
-    assert known.told(3) == ["1 of 3 scans have no detections"]
-    assert known.told(1)[1:] == [
+    assert known.told(3, 3) == ["1 of 3 scans have no detections"]
+    assert known.told(2, 2)[1].startswith("1 of 3 detections are left out: they hold too few")
+    assert known.told(3, 1)[1:] == [
+        "2 of 3 detections are left out: without tracks of their own, they follow each other in too"
+        " few scans"
+    ]
+    assert known.told(1, 1)[1:] == [
         "2 of 3 detections are left out: they hold too few points or those of another"
     ]
-    assert Detections(Path("boxes.json"), frames[:1], tracked=True, warnings=()).told(2) == []
+    assert Detections(Path("boxes.json"), frames[:1], tracked=True, warnings=()).told(2, 2) == []
 
 
 def test_labels_of_kitti_without_a_calibration_say_which_camera_is_assumed(tmp_path: Path):

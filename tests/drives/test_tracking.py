@@ -270,6 +270,15 @@ def test_where_the_sensor_is_fast_so_is_what_goes_along_and_comes_towards_it():
     assert config.wider(0.1, step_m=2.0) == config.wider(None, step_m=2.0) == 1.0
 
 
+def test_a_fast_one_is_followed_where_steps_are_uneven():
+    """At 0.08 and 0.12 s in turn by whole scans all above 18 m/s were lost."""
+    ticks = np.cumsum([0.0, *(0.8, 1.2) * 20])
+    size = np.array(((4.5, 1.8, 1.5),))
+    seen = [Seen(float(tick), np.array(((2.4 * tick, 0.0, 0.0),)), size) for tick in ticks]
+    (found,) = link(seen, LinkConfig())
+    assert found.velocity[0] == pytest.approx(2.4)
+
+
 def test_an_object_of_which_less_is_seen_stays_the_same():
     """A lorry of 8 m, and then its rear alone: its middle jumps, its rear does not."""
     lengths = [8.0] * 5 + [0.4] * 5
@@ -300,5 +309,7 @@ def test_a_jump_is_counted_and_a_missing_scan_is_none():
     assert list(jumps(poses(steady), (0, 1, 2, 5, 6, 7), config)) == []
     assert usual_step_m(poses(steady), (0, 1, 2, 5, 6, 7)) == pytest.approx(0.8)
     assert usual_step_m(poses(steady[:1]), (0,)) == 0.0
+    uneven = tuple(np.cumsum((0.0, *(0.6, 1.4) * 5)).tolist())
+    assert list(jumps(poses([(2.7 * tick, 0.0, 0.0) for tick in uneven]), uneven, config)) == []
     leap = [*steady[:4], *((x + 30.0, y, z) for x, y, z in steady[4:])]
     assert 4 in jumps(poses(leap), (0, 1, 2, 5, 6, 7), config)

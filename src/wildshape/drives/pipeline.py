@@ -213,7 +213,7 @@ class Pipeline:
         config = self.config.tracks
         if self.detections is not None:
             config = replace(config, longest_gap=config.longest_gap * self.detections.every)
-        ticks = self.breaks.ticks(self.drive.ticks, config)
+        ticks = self.breaks.ticks(self.drive.moments, config)
         known = self.cuts, T_level_sensor
         wider = config.wider(self.seen_s, self.step_m(T_level_sensor))
         found = linked_clusters(*known, ticks, config, wider)
@@ -229,7 +229,7 @@ class Pipeline:
     def step_m(self, T_world_sensor: SE3) -> float:
         """How far the sensor goes meanwhile."""
         every = 1 if self.detections is None else self.detections.every
-        return every * usual_step_m(T_world_sensor, self.drive.ticks)
+        return every * usual_step_m(T_world_sensor, self.drive.moments)
 
     def folder(self, seen: Sightings) -> Path:
         """Of a completed object."""
@@ -328,7 +328,9 @@ class Pipeline:
         if not self.tracked:
             found += rate_told(self.seen_s, self.step_m(T_world_sensor), self.config.tracks)
         if self.detections is not None:
-            found += self.detections.told(kept)
-        if leaps := list(jumps(T_world_sensor, self.drive.ticks, self.config.trajectory)):
+            tracks = read_sightings(self.stages / "tracks.json")
+            followed = sum(len(rows) for one in tracks for rows in one.rows)
+            found += self.detections.told(kept, followed)
+        if leaps := list(jumps(T_world_sensor, self.drive.moments, self.config.trajectory)):
             found.append(f"jumps of the sensor: {len(leaps)}, the first at frame {leaps[0]}")
         return tuple(found)

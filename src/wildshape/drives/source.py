@@ -23,6 +23,7 @@ from wildshape.io.order import numbers_of
 from wildshape.io.progress import counted
 from wildshape.records import Points, Turn, as_text
 
+HALF_TICK = 0.5  # scans less apart are of one moment; a reach of whole ticks ends half a tick on
 _LONGEST_PAUSE = 1e9  # scans; more are no count
 _MOMENT_S, _LONGEST_TURN_S = 0.01, 2.0
 # Places that tell recordings apart: of all files about, of each at least and at most; bytes.

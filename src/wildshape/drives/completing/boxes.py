@@ -17,8 +17,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from wildshape.drives.completing.level_frame import Completed
-from wildshape.drives.completing.rolling_shutter import HALF_TICK, Turns
+from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.object_config import BoxConfig
+from wildshape.drives.source import HALF_TICK
 
 _ROUNDS = 10
 _ENOUGH = 4  # moments for a parabola: through three one goes whatever they are

@@ -13,9 +13,9 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
-from wildshape.drives.completing.rolling_shutter import HALF_TICK, Turns
+from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.object_config import BoxConfig
-from wildshape.drives.source import Drive
+from wildshape.drives.source import HALF_TICK, Drive
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.drives.tracking.segmentation import read_cut
 from wildshape.drives.tracking.sightings import Sightings

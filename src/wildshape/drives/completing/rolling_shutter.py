@@ -17,13 +17,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from wildshape.drives.object_config import TurnConfig
+from wildshape.drives.source import HALF_TICK
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import read_json, reading
 
 TURNS = "turns.json"
 """File of a drive's stages: what is known of its turns."""
 _LATEST = 2**53  # scans
-HALF_TICK = 0.5  # scans less apart are of one moment; a reach of whole ticks ends half a tick on
 _STEPS = 3  # where a box is shown depends on when it is met, and the reverse
 _WHOLE, _HALF = (0, 1, -1), (0, 0.5, -0.5)
 _SENSES = _WHOLE + _HALF

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 
 from wildshape.drives.config import DriveConfig
-from wildshape.drives.source import Drive
+from wildshape.drives.source import HALF_TICK, Drive
 from wildshape.drives.tracking.ground import height_above_ground
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.geometry.transforms.rotation import rotation_z
@@ -149,7 +149,7 @@ def _otherwise(drive: Drive, T: SE3, mounting: Mounting, config: DriveConfig) ->
         source, target = (_standing(drive, at, mounting, config) for at in (start, end))
         if min(len(source), len(target)) >= _FEWEST_POINTS:
             given = T[end].inverse() @ T[start]
-            motions = (given, *_others(given, drive.ticks[end] - drive.ticks[start]))
+            motions = (given, *_others(given, drive.moments[end] - drive.moments[start]))
             rows.append([float(_away(source, target, one).mean()) for one in motions])
             beside = (_away(source, target, one).mean() for one in _scan_beside(T, start, end))
             gains.append([rows[-1][0] - float(away) for away in beside])
@@ -174,7 +174,7 @@ def _scan_beside(T_world_sensor: SE3, start: int, end: int) -> list[SE3]:
     return [T_world_sensor[end + by].inverse() @ T_world_sensor[start + by] for by in steps]
 
 
-def _others(T_target_source: SE3, ticks: int) -> list[SE3]:
+def _others(T_target_source: SE3, ticks: int | float) -> list[SE3]:
     """The same motion in the other axes, at the other scales, and without each drift so long."""
     axes = torch.diag(torch.tensor((1.0, -1.0, -1.0), dtype=torch.float64))
     frames = [_turned(axes), *(_turned(rotation_z(turn)) for turn in _radians(_TURNS_DEG))]
@@ -200,7 +200,7 @@ def _jump(drive: Drive, T_world_sensor: SE3, mounting: Mounting, config: DriveCo
     Scans too far apart may have little in common; `trajectory.jumps` tells of them.
     """
     places = T_world_sensor.translation.numpy()
-    steps = np.diff(places, axis=0) / np.diff(drive.ticks)[:, None]
+    steps = np.diff(places, axis=0) / np.maximum(np.diff(drive.moments), HALF_TICK)[:, None]
     changes = np.linalg.norm(np.diff(steps, axis=0), axis=1)
     at = int(changes.argmax()) if len(changes) else 0
     if not len(changes) or changes[at] < _JUMP_M:

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from wildshape.drives.config import LinkConfig
+from wildshape.drives.source import HALF_TICK
 from wildshape.drives.tracking.segmentation import read_cuts
 from wildshape.drives.tracking.sightings import Sightings
 from wildshape.geometry.transforms.se3 import SE3
@@ -32,12 +33,12 @@ class Seen:
         sizes: `(k, 3)` along the world's axes, metres.
     """
 
-    tick: int
+    tick: int | float
     centres: Float[np.ndarray, "k 3"]
     sizes: Float[np.ndarray, "k 3"]
 
     @classmethod
-    def of(cls, tick: int, clusters: Sequence[Points]) -> "Seen":
+    def of(cls, tick: int | float, clusters: Sequence[Points]) -> "Seen":
         """What is seen of clusters, world frame: the middle and the size of each one's extent."""
         if not clusters:
             return cls(tick, np.empty((0, 3)), np.empty((0, 3)))
@@ -53,7 +54,7 @@ class Linked:
 
     centre: Float[np.ndarray, "3"]
     size: Float[np.ndarray, "3"]
-    tick: int
+    tick: int | float
     velocity: Float[np.ndarray, "3"] = field(default_factory=lambda: np.zeros(3))
     frames: list[int] = field(default_factory=list)
     rows: list[int] = field(default_factory=list)
@@ -62,7 +63,7 @@ class Linked:
 def linked_clusters(
     cuts: Path,
     T_level_sensor: SE3,
-    ticks: Sequence[int],
+    ticks: Sequence[int | float],
     config: LinkConfig,
     wider: float = 1.0,
 ) -> list[Sightings]:
@@ -98,7 +99,7 @@ def link(scans: Iterable[Seen], config: LinkConfig, wider: float = 1.0) -> list[
     every: list[Linked] = []
     live: list[Linked] = []
     for frame, seen in enumerate(scans):
-        live = [one for one in live if seen.tick - one.tick <= config.longest_gap]
+        live = [one for one in live if seen.tick - one.tick < config.longest_gap + HALF_TICK]
         pairs = _assigned(live, seen, config, wider)
         for row in range(len(seen.centres)):
             if row in pairs:
@@ -167,5 +168,5 @@ def _go_on(one: Linked, seen: Seen, row: int, config: LinkConfig) -> None:
     expected = one.centre + one.velocity * gap
     shift = _shift(expected, one.size, seen.centres[row], seen.sizes[row])
     gain = config.velocity_gain if len(one.frames) > 1 else 0.5
-    one.velocity = one.velocity + gain * shift / gap
+    one.velocity = one.velocity + gain * shift / max(gap, HALF_TICK)
     one.centre, one.size, one.tick = seen.centres[row], seen.sizes[row], seen.tick

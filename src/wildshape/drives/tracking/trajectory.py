@@ -17,7 +17,7 @@ import torch
 from jaxtyping import Float
 
 from wildshape.drives.config import DriveConfig, LinkConfig, TrajectoryConfig
-from wildshape.drives.source import Drive
+from wildshape.drives.source import HALF_TICK, Drive
 from wildshape.drives.tracking.ceiling import at_ceiling
 from wildshape.drives.tracking.given_poses import held_back, misfit
 from wildshape.drives.tracking.ground import height_above_ground
@@ -56,7 +56,7 @@ class Breaks:
             return cls()
         return read_record(path, "the breaks of a way", cls)
 
-    def ticks(self, ticks: Sequence[int], config: LinkConfig) -> list[int]:
+    def ticks(self, ticks: Sequence[int | float], config: LinkConfig) -> list[int | float]:
         """Ticks with so long a pause at each break that nothing is linked across."""
         apart = config.longest_gap + 1
         before = np.searchsorted(self.frames, np.arange(len(ticks)), side="right")
@@ -251,19 +251,22 @@ def _landmarks_of(turn: Turn, mounting: Mounting, config: DriveConfig) -> Turn:
     return landmarks(turn, heights, mounting, config)
 
 
-def usual_step_m(T_world_sensor: SE3, ticks: tuple[int, ...]) -> float:
+def usual_step_m(T_world_sensor: SE3, ticks: tuple[int | float, ...]) -> float:
     """How far the sensor goes from a scan to the next, the median."""
     if len(ticks) < 2:
         return 0.0
     return float(np.median(np.linalg.norm(_steps(T_world_sensor, ticks), axis=1)))
 
 
-def jumps(T_world_sensor: SE3, ticks: tuple[int, ...], config: TrajectoryConfig) -> Iterator[int]:
+def jumps(
+    T_world_sensor: SE3, ticks: tuple[int | float, ...], config: TrajectoryConfig
+) -> Iterator[int]:
     """The frames that no vehicle reaches from the two before them."""
     changes = np.linalg.norm(np.diff(_steps(T_world_sensor, ticks), axis=0), axis=1)
     yield from (np.flatnonzero(changes > config.jump_m) + 2).tolist()
 
 
-def _steps(T_world_sensor: SE3, ticks: tuple[int, ...]) -> Float[np.ndarray, "m 3"]:
+def _steps(T_world_sensor: SE3, ticks: tuple[int | float, ...]) -> Float[np.ndarray, "m 3"]:
     """From each frame to the next, metres a tick."""
-    return np.diff(T_world_sensor.translation.numpy(), axis=0) / np.diff(ticks)[:, None]
+    since = np.maximum(np.diff(ticks), HALF_TICK)
+    return np.diff(T_world_sensor.translation.numpy(), axis=0) / since[:, None]
