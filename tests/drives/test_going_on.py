@@ -18,6 +18,7 @@ from wildshape.drives import pipeline
 from wildshape.drives.adapting import second_pass
 from wildshape.drives.adapting.adapt import Adaptation
 from wildshape.drives.adapting.config import AdaptConfig
+from wildshape.drives.completing import selection
 from wildshape.drives.completing.completion import Completer
 from wildshape.drives.config import INFERENCE, ClusterConfig, DriveConfig
 from wildshape.drives.pipeline import Pipeline
@@ -48,7 +49,7 @@ def test_a_run_killed_at_any_stage_goes_on_to_the_same_boxes(
         (pipeline, "Cutter"),
         (pipeline, "linked_clusters"),
         (pipeline, "write_sightings"),
-        (pipeline, "judge"),
+        (selection, "judge"),
         (outputs, "rays_bytes"),
         (outputs, "rows_of"),
     ):

@@ -86,7 +86,7 @@ def test_what_is_replaced_is_kept_until_the_new_is_finished(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    "files", [None, -1, "*.ply", [None], ["**x"], ["/*"], ["../*"], ["*/../../*"]]
+    "files", [None, -1, "*.ply", [None], ["/*"], ["../*"], ["*/../../*"]]
 )
 def test_nothing_is_removed_by_patterns_that_are_none_or_lead_out(
     tmp_path: Path, files: object

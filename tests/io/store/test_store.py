@@ -80,7 +80,7 @@ def test_shards_are_ordinary_safetensors(store: Store) -> None:
 
 def test_several_processes_and_pickling(store: Store) -> None:
     assert pickle.loads(pickle.dumps(store)).fingerprint == store.fingerprint
-    with ProcessPoolExecutor(2, mp_context=get_context("fork")) as pool:
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         sums = list(pool.map(_sum, [store] * 4, range(4)))
     assert sums == [float(store.scan_points(i).sum()) for i in range(4)]
 
