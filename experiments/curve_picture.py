@@ -59,7 +59,8 @@ def main(settings: Settings) -> None:
     entries = list(whole_entries(log))
     if not any(key in entry for key in _LOSSES for entry in entries):
         raise BadInputError(f"{log}: holds no losses in metres; name a run that is not DPC's.")
-    draw(settings.out, entries)
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "wildshape", "font.size": 8}):
+        draw(settings.out, entries)
 
 
 def series(entries: list[dict[str, Any]], key: str, of: int = 1) -> tuple[np.ndarray, np.ndarray]:
@@ -71,7 +72,6 @@ def series(entries: list[dict[str, Any]], key: str, of: int = 1) -> tuple[np.nda
 
 def draw(out: Path, entries: list[dict[str, Any]]) -> None:
     mpl.use("agg")
-    mpl.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "wildshape", "font.size": 8})
     from matplotlib import pyplot as plt
     from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
