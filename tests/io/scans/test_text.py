@@ -35,6 +35,8 @@ def _read(path: Path, text: str, coordinates: Coordinates | None = None) -> list
         '"ring"\t"x"\t"y"\t"z"\n\t1\t2\t3\n9\t4\t5\t6\n',
         "ring,x,y,z\n,1,2,3\n9,4,5,6\n",
         "x,y,z,ring,\n1,2,3,,\n4,5,6\n",
+        "x,y,z\n1,2,3\n4,5,6,,\n",
+        'x,y,z,name\n1,2,3,a\n4,5,6,"b, c, d"\n',
         "x;y;z\n1,0;2,0;3,0\n4,0;5,0;6,0\n",
         "1 2 3 # the first\n4 5 6\n",
     ],
@@ -55,6 +57,8 @@ def test_an_empty_cell_is_a_missing_number_and_shifts_nothing(gap: str, tmp_path
     [
         ("1 2 3 4\n5 7 8\n", "fewer values than the first"),
         ("ring x y z\n9 1 2 3\n4 5 6\n", "fewer values than the first"),
+        ("x,y,z\n1,2,3\n1,5,2,5,3,5\n", "more values than the first"),
+        ("1,2,3,\n1,5,2,3,\n", "more values than the first"),
         ('"x" "y" "z"\n"1" 1 2 3\n', "names 3 columns"),
         ("ring x y z\n1 2 3\n", "names 4 columns"),
         ("intensity,lon,lat,alt\n1,2,3,4\n", "names x, y and z"),

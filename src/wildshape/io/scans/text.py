@@ -39,7 +39,8 @@ def read_text(path: Path) -> Float[np.ndarray, "n 3"]:
 
     Raises:
         BadInputError: no numbers where they are expected, a header that does not name x, y and z,
-            or cells that are missing where nothing but spaces separates them.
+            cells that are missing where nothing but spaces separates them, or too many of them
+            where commas do.
     """
     try:
         try:
@@ -176,4 +177,15 @@ def _rows(lines: Iterator[str], layout: _Layout, path: Path) -> Iterator[str]:
                 f"{path}: a row has fewer values than the first, which spaces do not tell apart"
                 f" ('{line[:80]}'); write commas between the columns."
             )
+        if separator == "," and line.count(",") >= cells:
+            _check_more(line, cells, path)
         yield line.replace(",", ".") if decimal_comma else line
+
+
+def _check_more(line: str, cells: int, path: Path) -> None:
+    """Refuse a row with more values than the first, as numbers with decimal commas are."""
+    if any(cell.strip() for cell in _row_cells(line, ",")[cells:]):
+        raise BadInputError(
+            f"{path}: a row has more values than the first ('{line[:80]}'); write points, not"
+            " commas, in numbers, and as many values a row."
+        )
