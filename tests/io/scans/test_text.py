@@ -25,6 +25,8 @@ def _read(path: Path, text: str, coordinates: Coordinates | None = None) -> list
         "//intensity X Y Z\n2\n9 1 2 3\n9 4 5 6\n",
         "//R,G,B,X,Y,Z\n9,9,9,1,2,3\n9,9,9,4,5,6\n",
         "# made by a program\n# ring x y z\n9 1 2 3\n9 4 5 6\n",
+        "# columns: ring x y z\n9 1 2 3\n9 4 5 6\n",
+        "#Fields: ring, x, y, z\n9 1 2 3\n9 4 5 6\n",
         "# scanned in x y z order by a program\n1 2 3\n4 5 6\n",
         "time;x_m;y_m;z_m\n9;1;2;3\n9;4;5;6\n",
         "Points:0,Points:1,Points:2,intensity\n1,2,3,9\n4,5,6,9\n",

@@ -16,6 +16,7 @@ _UNITS: dict[str, Unit] = {
     **dict.fromkeys(("mm", "millimeter", "millimeters", "millimetre", "millimetres"), "mm"),
 }
 _LONGEST_NAME = 60
+_MARK = re.compile(r"\s*(?:(?://|#)+\s*)?(?:(?:columns?|fields?|format)\s*:\s*)?", re.IGNORECASE)
 _PLACE = r"(?:points?|pos(?:ition)?s?|coord(?:inate)?s?|loc(?:ation)?|field)"
 _COLUMN = re.compile(
     rf"(?:{_PLACE}[ _.:-]?)?(?P<axis>[xyz])(?:[ _.:-]?{_PLACE})?"
@@ -82,8 +83,8 @@ def split(line: str, separator: str | None) -> list[str]:
 
 
 def _cells(line: str) -> list[str]:
-    """Of a header, trailing empty ones left away."""
-    line = re.sub(r"^\s*(?://|#)+\s*", "", line)
+    """Of a header, without what marks it; trailing empty ones left away."""
+    line = _MARK.sub("", line, count=1)
     separator = next((s for s in ";\t," if s in line), None)
     glued = re.sub(r"\s+(?=[(\[{])", "", line) if separator is None else line
     cells = [cell.strip().strip("\"'").strip() for cell in split(glued, separator)]
