@@ -140,7 +140,8 @@ def _report(loop: Loop, progress: Progress | None, values: dict[str, Any]) -> No
         if progress is not None:
             progress(loop.state.step, values)
     except (StopRequested, KeyboardInterrupt):
-        loop.halt()
+        if loop.state.step < loop.plan()[0]:  # else an older model beside it would pass as the last
+            loop.halt()
         raise
 
 
