@@ -293,6 +293,16 @@ def test_weights_that_are_not_finite_are_not_saved(car_store, tmp_path):
     assert not (tmp_path / "model.safetensors").exists()
 
 
+def test_weights_of_which_no_loss_tells_are_not_saved(car_store, tmp_path):
+    """A point of the shape that lies nowhere is no scan point's nearest."""
+    run = setup(SMALLEST, car_store, tmp_path, seed=3)
+    run.state.step = SMALLEST.optim.steps
+    for network in (run.state.network, run.state.mean):
+        network.shape.layer3.bias.data[0] = math.nan
+    refused(fit, run, match="not finite")
+    assert not (tmp_path / MODEL).exists()
+
+
 def test_a_stop_keeps_the_last_state_that_can_be_resumed(car_store, tmp_path):
     run = setup(SMALLEST, car_store, tmp_path, seed=3)
 
