@@ -122,7 +122,7 @@ def run_to_end(
             log.write(now, values)
             _report(loop, progress, values)
         if stop:
-            loop.halt()
+            _halt(loop)
             raise StopRequested
         if due:
             _save(loop, log)
@@ -130,6 +130,7 @@ def run_to_end(
 
 
 def _save(loop: Loop, log: "RunLog | _Silent") -> None:
+    _refuse_spoilt(loop.state)
     figures = loop.save()
     if figures:
         log.write(loop.state.step, figures)
@@ -140,8 +141,20 @@ def _report(loop: Loop, progress: Progress | None, values: dict[str, Any]) -> No
         if progress is not None:
             progress(loop.state.step, values)
     except (StopRequested, KeyboardInterrupt):
-        loop.halt()
+        if loop.state.step < loop.plan()[0]:  # else an older model beside it would pass as the last
+            _halt(loop)
         raise
+
+
+def _halt(loop: Loop) -> None:
+    _refuse_spoilt(loop.state)
+    loop.halt()
+
+
+def _refuse_spoilt(state: TrainState[Any]) -> None:
+    """A step may have spoilt the weights of which neither its loss nor figures tell."""
+    weights = sum(float(p.detach().sum()) for p in state.network.parameters())
+    refuse_not_finite(weights, state.step)
 
 
 def _rarely(run: Run, every: int) -> int:
@@ -158,8 +171,6 @@ def _stop_asked(run: Run, stopped: Callable[[], bool]) -> bool:
 
 def _save_state(run: Run) -> None:
     if run.processes.leads:
-        weights = sum(float(p.detach().sum()) for p in run.state.network.parameters())
-        refuse_not_finite(weights, run.state.step)  # the state of before stays
         save_state(run.folder, run.state, run.identity)
 
 
@@ -178,8 +189,7 @@ def _agree_if_due(run: Run) -> None:
     due = {int(share * run.recipe.optim.steps) for share in loss.agree_at}
     if state.step in due and run.targets is None:
         with record_function("wildshape: headings"):
-            weights = sum(float(p.detach().sum()) for p in state.mean.parameters())
-            refuse_not_finite(weights, state.step)
+            _refuse_spoilt(state)
             rules = run.recipe.self_training.headings
             state.anchors = agreed_rotations(state.mean, run.sampler, loss, rules)
         run.views.hold(state.anchors)
@@ -189,7 +199,7 @@ def checkpoint(run: Run) -> dict[str, Any]:
     """Validate the mean weights and write model and state; returns the figures.
 
     Raises:
-        BadInputError: the weights are no longer finite; the last checkpoint stays.
+        BadInputError: figures are not finite; the last checkpoint stays.
     """
     if not run.processes.leads:
         run.processes.wait()
