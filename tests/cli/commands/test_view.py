@@ -12,6 +12,8 @@ import pytest
 
 from wildshape.cli.commands.view import Settings, source_of
 from wildshape.cli.main import main
+from wildshape.cli.options import FileOptions, NetworkOptions
+from wildshape.errors import BadInputError
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +46,14 @@ def test_every_kind_of_input_can_be_shown(store, completed, evaluated):
 def test_what_cannot_be_shown_is_refused(refused, tmp_path):
     assert "no such file" in refused("view", tmp_path / "absent")
     assert "no scans" in refused("view", tmp_path)
+
+
+def test_options_that_change_nothing_are_refused(completed, store):
+    for option in ({"network": NetworkOptions(Path("car"))}, {"files": FileOptions("mm")}):
+        with pytest.raises(BadInputError, match="leave them out, or name the scans"):
+            source_of(Settings(completed, **option))
+    with pytest.raises(BadInputError, match="--inputs: "):
+        source_of(Settings(Path(store), inputs=Path(store)))
 
 
 def test_the_drive_is_named_where_its_figures_are_given(refused, tmp_path):

@@ -111,6 +111,7 @@ def _page(
     from wildshape.drives.writing.folder import is_drive
 
     if is_drive(settings.input):
+        _refuse_for_results(settings)
         from wildshape.drives.writing.finished import read_finished
         from wildshape.report.viewer.drive_page import serving_drive
 
@@ -134,10 +135,26 @@ def source_of(settings: Settings) -> "Source":
 
     folder = settings.input
     if folder.is_dir() and find(folder, OBJECTS):
+        _refuse_for_results(settings)
         return from_results(folder, settings.inputs)
     if folder.is_dir() and (folder / METRICS).is_file():
         return _evaluated(settings)
+    if settings.inputs is not None:
+        raise BadInputError(f"--inputs: {folder} holds scans themselves, no results; leave it out.")
     return _scans(settings, folder)
+
+
+def _refuse_for_results(settings: Settings) -> None:
+    """Refuse options that would change nothing of results, which are shown as they lie there.
+
+    Raises:
+        BadInputError: one is given.
+    """
+    if (settings.network, settings.files) != (DEFAULT_NETWORK, DEFAULT_FILES):
+        raise BadInputError(
+            f"{settings.input}: holds results, of which --model, --device, --unit and --origin"
+            " change nothing; leave them out, or name the scans."
+        )
 
 
 def _scans(settings: Settings, path: Path) -> "Source":
