@@ -85,9 +85,7 @@ def test_what_is_replaced_is_kept_until_the_new_is_finished(tmp_path: Path) -> N
     assert {path.read_text() for path in out.rglob("*.ply")} == {"3"}
 
 
-@pytest.mark.parametrize(
-    "files", [None, -1, "*.ply", [None], ["/*"], ["../*"], ["*/../../*"]]
-)
+@pytest.mark.parametrize("files", [None, -1, "*.ply", [None], ["/*"], ["../*"], ["*/../../*"]])
 def test_nothing_is_removed_by_patterns_that_are_none_or_lead_out(
     tmp_path: Path, files: object
 ) -> None:

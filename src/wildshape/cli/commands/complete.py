@@ -156,7 +156,9 @@ def _to_stdout(settings: Settings) -> None:
     if mesh is not None and settings.scans.json:
         raise BadInputError("--mesh: with --json stdout holds points; leave one of the two away.")
     if settings.cloud_format != "ply" and (mesh is not None or settings.scans.json):
-        raise BadInputError("--cloud-format: with --mesh or --json stdout holds no cloud; drop one.")
+        raise BadInputError(
+            "--cloud-format: with --mesh or --json stdout holds no cloud; drop one."
+        )
     if not settings.scans.json:
         refuse_terminal()
     track = _one_scan(settings)

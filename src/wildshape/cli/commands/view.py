@@ -169,11 +169,11 @@ def _scans(settings: Settings, path: Path) -> "Source":
 
 def _evaluated(settings: Settings) -> "Source":
     """The data of an evaluation, the worst object first, completed once more."""
-    from wildshape.baselines.compare import OURS
     from wildshape.io.guard import read_json, reading
     from wildshape.io.inputs import open_tracks
     from wildshape.io.scans.points import SENSOR_METRES
     from wildshape.records import as_text
+    from wildshape.report.page.metrics import is_ours
     from wildshape.report.results import METRICS, SCORES, coordinates_of
     from wildshape.report.viewer.live_completion import from_model
     from wildshape.report.viewer.sources import worst_first
@@ -183,7 +183,7 @@ def _evaluated(settings: Settings) -> "Source":
         asked = (said.get("provenance") or {}).get("settings") or {}
         data = settings.inputs or (Path(asked["data"]) if asked.get("data") else None)
         methods = list(said.get("methods") or {})
-        ours = OURS if OURS in methods else methods[-1]
+        ours = next(filter(is_ours, methods), methods[-1])
     if "folder" in asked:
         raise BadInputError(
             f"{settings.input}: holds figures of a drive; name what `drive` wrote:"
