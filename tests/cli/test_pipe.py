@@ -121,6 +121,12 @@ def test_a_mesh_is_no_json(refused, scan_file):
     assert "--mesh: with --json stdout holds points" in said
 
 
+@pytest.mark.parametrize("other", ["--mesh", "--json"])
+def test_a_mesh_or_json_is_no_cloud(refused, scan_file, other):
+    said = refused("complete", scan_file, "--out", "-", other, "--cloud-format", "pcd")
+    assert "--cloud-format: with --mesh or --json" in said
+
+
 def test_meshes_of_a_folder_are_coloured(wildshape, scan_file, trained, tmp_path):
     order = ("complete", scan_file, "--out", tmp_path / "c", "--model", trained, "--mesh")
     assert wildshape(*order, "--mesh-colours", "confidence", "--mesh-format", "obj").code == 0

@@ -33,6 +33,9 @@ def test_demo_on_simulated_and_on_own_scans(wildshape, refused, dataset, tmp_pat
     assert found.code == 0, found.err
     said = json.loads(found.out)
     assert "could not be measured" in said["verdict"][0]
+    page = (out / "report.html").read_text("utf-8")
+    assert "not chosen by any error" in page
+    assert "by the error of the model just trained" not in page
     written = {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()}
     ours = {str(path.relative_to(out)) for pattern in FILES for path in out.glob(pattern)}
     assert written - ours == {"wildshape.json"}

@@ -100,5 +100,14 @@ def test_the_first_file_that_cannot_be_read_is_named(wildshape, dataset, tmp_pat
     assert "copy or write it again" in found.err
 
 
+def test_tracks_that_cannot_be_read_make_no_sample(wildshape, dataset, tmp_path):
+    data = shutil.copytree(dataset, tmp_path / "data")
+    (data / "000001" / "poses.txt").write_text("no numbers\n")
+    said = wildshape("info", data).out
+    assert "The points of 5 of 6 tracks can be read." in said
+    assert "scans per track: 5 of 6 tracks" in said
+    assert "sample" not in said
+
+
 def test_a_sample_below_nothing_is_refused(refused, store):
     assert "--sample -3: expected 0 or more" in refused("info", store, "--sample", -3)

@@ -3,6 +3,7 @@
 """`wildshape view` without a browser; tests/report/viewer opens the page in one."""
 
 import json
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -12,6 +13,8 @@ import pytest
 
 from wildshape.cli.commands.view import Settings, source_of
 from wildshape.cli.main import main
+from wildshape.cli.options import FileOptions, NetworkOptions
+from wildshape.errors import BadInputError
 
 
 @pytest.fixture(scope="module")
@@ -41,9 +44,29 @@ def test_every_kind_of_input_can_be_shown(store, completed, evaluated):
     assert "Worst object first" in source.note
 
 
+def test_objects_are_in_the_order_of_the_report(evaluated, tmp_path):
+    folder = shutil.copytree(evaluated, tmp_path / "two")
+    for name in ("metrics.json", "scores.json"):
+        text = (folder / name).read_text()
+        (folder / name).write_text(text.replace('"wildshape"', '"cars"'))
+    said = json.loads((folder / "metrics.json").read_text())
+    said["methods"]["cars, track"] = said["methods"]["cars"]
+    (folder / "metrics.json").write_text(json.dumps(said))
+    assert "by cars in this evaluation" in source_of(Settings(folder)).note
+
+
 def test_what_cannot_be_shown_is_refused(refused, tmp_path):
     assert "no such file" in refused("view", tmp_path / "absent")
     assert "no scans" in refused("view", tmp_path)
+
+
+def test_options_that_change_nothing_are_refused(completed, store):
+    other = NetworkOptions(Path("car"))
+    for asked in (Settings(completed, other), Settings(completed, files=FileOptions("mm"))):
+        with pytest.raises(BadInputError, match="leave them out, or name the scans"):
+            source_of(asked)
+    with pytest.raises(BadInputError, match="--inputs: "):
+        source_of(Settings(Path(store), inputs=Path(store)))
 
 
 def test_the_drive_is_named_where_its_figures_are_given(refused, tmp_path):

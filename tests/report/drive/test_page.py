@@ -151,9 +151,28 @@ def test_the_scene_plays_and_a_click_on_a_vehicle_opens_it(found, tmp_path):
         page.wait("document.querySelector('#drive_card h3').textContent === '0003'")
         page.ask("document.querySelector('#drive_play').click()")
         page.wait("document.querySelector('#drive_now').textContent == 'frame 5, 0.5 of 0.5 s'")
+        assert page.ask(_SOUGHT) == 1, "the slider does nothing while the scene plays"
         _check_on_a_phone(page)
         assert page.complaints() == []
         assert [url for url in page.loads() if not url.startswith(("file:", "data:"))] == []
+
+
+_SOUGHT = """(() => {
+  const time = document.querySelector('#drive_time');
+  const real = [requestAnimationFrame, performance.now];
+  const later = [], until = (at) => { clock = at; later.splice(0).forEach((act) => act(at)); };
+  let clock = 0;
+  window.requestAnimationFrame = (act) => later.push(act);
+  performance.now = () => clock;
+  document.querySelector('#drive_play').click();
+  until(350);
+  time.value = 1;
+  time.dispatchEvent(new Event('input'));
+  until(370);
+  [window.requestAnimationFrame, performance.now] = real;
+  document.querySelector('#drive_play').click();
+  return Number(time.value);
+})()"""
 
 
 def _resize(page: Page, width: int) -> None:

@@ -155,6 +155,10 @@ def _to_stdout(settings: Settings) -> None:
     mesh = _mesh(settings)
     if mesh is not None and settings.scans.json:
         raise BadInputError("--mesh: with --json stdout holds points; leave one of the two away.")
+    if settings.cloud_format != "ply" and (mesh is not None or settings.scans.json):
+        raise BadInputError(
+            "--cloud-format: with --mesh or --json stdout holds no cloud; drop one."
+        )
     if not settings.scans.json:
         refuse_terminal()
     track = _one_scan(settings)

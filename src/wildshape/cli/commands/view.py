@@ -111,6 +111,7 @@ def _page(
     from wildshape.drives.writing.folder import is_drive
 
     if is_drive(settings.input):
+        _refuse_for_results(settings)
         from wildshape.drives.writing.finished import read_finished
         from wildshape.report.viewer.drive_page import serving_drive
 
@@ -134,10 +135,26 @@ def source_of(settings: Settings) -> "Source":
 
     folder = settings.input
     if folder.is_dir() and find(folder, OBJECTS):
+        _refuse_for_results(settings)
         return from_results(folder, settings.inputs)
     if folder.is_dir() and (folder / METRICS).is_file():
         return _evaluated(settings)
+    if settings.inputs is not None:
+        raise BadInputError(f"--inputs: {folder} holds scans themselves, no results; leave it out.")
     return _scans(settings, folder)
+
+
+def _refuse_for_results(settings: Settings) -> None:
+    """Refuse options that would change nothing of results, which are shown as they lie there.
+
+    Raises:
+        BadInputError: one is given.
+    """
+    if (settings.network, settings.files) != (DEFAULT_NETWORK, DEFAULT_FILES):
+        raise BadInputError(
+            f"{settings.input}: holds results, of which --model, --device, --unit and --origin"
+            " change nothing; leave them out, or name the scans."
+        )
 
 
 def _scans(settings: Settings, path: Path) -> "Source":
@@ -152,11 +169,11 @@ def _scans(settings: Settings, path: Path) -> "Source":
 
 def _evaluated(settings: Settings) -> "Source":
     """The data of an evaluation, the worst object first, completed once more."""
-    from wildshape.baselines.compare import OURS
     from wildshape.io.guard import read_json, reading
     from wildshape.io.inputs import open_tracks
     from wildshape.io.scans.points import SENSOR_METRES
     from wildshape.records import as_text
+    from wildshape.report.page.metrics import is_ours
     from wildshape.report.results import METRICS, SCORES, coordinates_of
     from wildshape.report.viewer.live_completion import from_model
     from wildshape.report.viewer.sources import worst_first
@@ -166,7 +183,7 @@ def _evaluated(settings: Settings) -> "Source":
         asked = (said.get("provenance") or {}).get("settings") or {}
         data = settings.inputs or (Path(asked["data"]) if asked.get("data") else None)
         methods = list(said.get("methods") or {})
-        ours = OURS if OURS in methods else methods[-1]
+        ours = next(filter(is_ours, methods), methods[-1])
     if "folder" in asked:
         raise BadInputError(
             f"{settings.input}: holds figures of a drive; name what `drive` wrote:"

@@ -179,8 +179,7 @@ def draw(
 
 
 _NOTE = (
-    "Objects are the best, the median and the worst by the error of the model just trained; "
-    "identity aligns centroids only, local-icp chains point-to-point ICP, one-scan is the scan "
+    "Identity aligns centroids only, local-icp chains point-to-point ICP, one-scan is the scan "
     f"itself as its completion. Only {_MAX_SCANS} scans of a track count, so local-icp's steps are "
     "wider than the sensor's: with all scans it is better."
 )

@@ -72,6 +72,8 @@ def read_line(found: Statistics) -> str:
     """What was read to find that out."""
     if found.read == found.tracks:
         return "The points of all tracks were read."
+    if found.unusable and found.scans is not None:
+        return f"The points of {found.read:,} of {found.tracks:,} tracks can be read."
     return (
         f"Points were read of a sample of {counted(found.read, 'track')}, drawn by chance, seed 0."
     )

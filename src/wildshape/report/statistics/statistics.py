@@ -126,7 +126,7 @@ def statistics_of_tracks(
     """The numbers of tracks in files, of which the chosen ones are read, one held at a time.
 
     Raises:
-        BadInputError: not a single one can be used; the message is that of the last.
+        BadInputError: not a single one can be used; the message is that of the first.
     """
     distribution, counted = (
         RunningDistribution(),
@@ -149,7 +149,7 @@ def statistics_of_tracks(
     if not totals["tracks"]:
         raise BadInputError(next(iter(unusable.values())))
     whole = len(chosen) == len(source)
-    of = _of_tracks(len(chosen), len(source))
+    of = _of_tracks(totals["tracks"], len(source), sampled=not whole)
     return Statistics(
         tracks=len(source),
         scans=totals["scans"] if whole else None,
@@ -226,8 +226,9 @@ def _sensor_words(sensor: Sensor) -> str:
     return sensor.kind
 
 
-def _of_tracks(chosen: int, count: int) -> str:
-    return "all" if chosen == count else f"a sample of {chosen:,} of {count:,}"
+def _of_tracks(read: int, count: int, *, sampled: bool = True) -> str:
+    """Which tracks were read; where they are no sample, the others cannot be."""
+    return "all" if read == count else f"{'a sample of ' * sampled}{read:,} of {count:,}"
 
 
 def _part(measured: int, of: int, what: str) -> str:

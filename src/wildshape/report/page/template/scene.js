@@ -196,12 +196,15 @@
   // ---- what the reader does
 
   function go(to) { now = Math.max(0, Math.min(frames.length - 1, to)); write(); redraw(); }
+  function seek(to) { go(to); clock(); } // by the reader: what plays goes on from there
+  function clock() { began = performance.now() - frames[now].time / rate() * 1000; }
 
   function choose(number, told = true) {
     chosen = number;
     if (number >= 0 && !seen(number)) { // to when it is best seen
       const { points } = vehicles[number];
       now = points.indexOf(Math.max(...points));
+      clock();
     }
     if (number >= 0 && told) document.dispatchEvent(new CustomEvent("vehicle", { detail: number }));
     write();
@@ -250,7 +253,7 @@
     canvas.addEventListener("contextmenu", (e) => e.preventDefault());
     canvas.addEventListener("wheel", (e) => { if (e.ctrlKey || e.metaKey) { e.preventDefault(); zoom(Math.exp(e.deltaY * 0.002)); } }, { passive: false });
     canvas.addEventListener("keydown", (e) => {
-      const act = { ArrowLeft: () => go(now - 1), ArrowRight: () => go(now + 1), " ": toggle, Escape: () => choose(-1) }[e.key];
+      const act = { ArrowLeft: () => seek(now - 1), ArrowRight: () => seek(now + 1), " ": toggle, Escape: () => choose(-1) }[e.key];
       if (act) { e.preventDefault(); act(); }
     });
   }
@@ -272,13 +275,13 @@
     playing = !playing;
     $("play").textContent = playing ? "⏸" : "▶";
     if (playing && now === frames.length - 1) now = 0;
-    began = performance.now() - frames[now].time / rate() * 1000;
+    clock();
     if (playing) requestAnimationFrame(step);
   }
   const rate = () => Number($("speed").value);
-  function step(clock) {
+  function step(moment) {
     if (!playing) return;
-    const at = (clock - began) / 1000 * rate();
+    const at = (moment - began) / 1000 * rate();
     let to = now;
     while (to < frames.length - 1 && frames[to + 1].time <= at) to++;
     if (to !== now) go(to);
@@ -312,9 +315,9 @@
 
   function start() {
     $("time").max = frames.length - 1;
-    $("time").addEventListener("input", () => go(Number($("time").value)));
+    $("time").addEventListener("input", () => seek(Number($("time").value)));
     $("play").addEventListener("click", toggle);
-    $("speed").addEventListener("change", () => { began = performance.now() - frames[now].time / rate() * 1000; });
+    $("speed").addEventListener("change", clock);
     $("closer").addEventListener("click", () => zoom(1 / 1.25));
     $("farther").addEventListener("click", () => zoom(1.25));
     for (const box of [...layers, $("follow")]) box.addEventListener("change", redraw);
