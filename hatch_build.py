@@ -56,7 +56,13 @@ def _uncompiled(reason: str) -> str:
 
 def compile_library(folder: Path) -> str:
     """Compile the C files of a folder into one library there; the reason where it failed."""
-    compiler = shlex.split(os.environ.get("CC") or "cc")
+    asked = os.environ.get("CC") or "cc"
+    try:
+        compiler = shlex.split(asked)
+    except ValueError:
+        compiler = []
+    if not compiler:
+        return f"CC={asked!r} names no compiler"
     sources = sorted(str(path) for path in folder.glob("*.c"))
     if not os.access(folder, os.W_OK):
         return f"{folder} cannot be written"

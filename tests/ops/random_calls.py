@@ -117,8 +117,9 @@ def call_connected(random: Random) -> None:
     """Parts are for `test_connected.py`."""
     points = (torch.randint(-9, 9, (most(random), 3)) * random.choice((1.0, 0.1, 1e6))).numpy()
     cell, reach = random.choice((0.1, 1.0, 7.0)), random.choice((0.1, 1.0, 7.0))
+    kind = random.choice((np.int64, np.int32))
     pairs = np.random.default_rng(0).integers(max(len(points), 1), size=(len(points) // 9, 2))
-    part = connected_parts(points[::-1], reach, cell, pairs)
+    part = connected_parts(points[::-1], reach, cell, pairs.astype(kind))
     assert len(part) == len(points)
     assert set(part.tolist()) == set(range(int(part.max(initial=-1)) + 1))
     if len(points):
@@ -127,7 +128,8 @@ def call_connected(random: Random) -> None:
 
 def call_spans(random: Random) -> None:
     points = torch.randn(1 + most(random), 3).numpy()[:: random.choice((1, 2, -1))]
-    level_axes = torch.randn(2, random.choice((1, 7, 90)), dtype=torch.float64).numpy()
+    kind = random.choice((torch.float64, torch.float32))
+    level_axes = torch.randn(2, random.choice((1, 7, 90)), dtype=kind).numpy()
     for found, expected in zip(spans(points, level_axes), spans_numpy(points, level_axes)):
         assert np.array_equal(found, expected)
 
@@ -192,6 +194,8 @@ def call_wrongly(random: Random) -> None:
     bins, depth = torch.zeros(2, 9, dtype=torch.int64), torch.rand(2, 9)
     found = nearest(a, b)
     squared, index = found.distance_squared, found.index
+    rows, outside = a[0].numpy(), random.choice((-1, a.shape[1], 2**40))
+    onto, centre = b[0], a[:, 0]
     refused: list[Callable[[], object]] = [
         lambda: nearest(a, b[:1]),
         lambda: nearest(a[:1], b),
@@ -214,11 +218,17 @@ def call_wrongly(random: Random) -> None:
         lambda: column_argmax_native(a[0].to(other)),
         lambda: column_argmax_native(a[0, :0]),
         lambda: column_argmax_native(a),
+        lambda: connected_parts(rows, 0.1, 0.01, np.array([[0, outside]])),
+        lambda: planes_native(a[:1], index[..., None] * 0),
+        lambda: planes_native(a, index[..., None] * 0 + outside),
+        lambda: point_to_plane_native(a, centre, onto, onto[:-1], index * 0 + len(onto) - 1, 1, 1),
+        lambda: point_to_plane_native(a, centre, onto, onto, index[:, :-1], 1, 1),
+        lambda: point_to_plane_native(a, centre[:1], onto, onto, index, 1, 1),
     ]
     number = random.randrange(len(refused))
     try:
         refused[number]()
-    except BadInputError:
+    except (BadInputError, IndexError):
         return
     raise AssertionError(f"wrong call {number} was not refused")
 

@@ -46,6 +46,12 @@ def test_without_a_compiler_it_says_so_and_goes_on(hook, sources, monkeypatch):
     assert hook.compile_library(sources) == "no C compiler `no-such-compiler`"
 
 
+@pytest.mark.parametrize("asked", [" ", "'cc"])
+def test_what_names_no_compiler_is_quoted(hook, sources, monkeypatch, asked):
+    monkeypatch.setenv("CC", asked)
+    assert hook.compile_library(sources) == f"CC={asked!r} names no compiler"
+
+
 @pytest.mark.skipif(not shutil.which("cc"), reason="no C compiler")
 def test_a_failing_compiler_is_quoted(hook, sources, monkeypatch):
     monkeypatch.delenv("CC", raising=False)

@@ -54,6 +54,13 @@ def test_pairs_are_one_part_and_so_are_the_points_of_a_cell():
 
 
 @pytest.mark.usefixtures("either")
+@pytest.mark.parametrize("outside", [-1, 3, 2**40])
+def test_pairs_of_points_that_are_not_there_are_refused(outside):
+    with pytest.raises(IndexError, match="outside of 3"):
+        connected_parts(np.eye(3, dtype=np.float32), 0.1, 0.01, np.array([[0, outside]]))
+
+
+@pytest.mark.usefixtures("either")
 def test_steps_of_the_whole_reach_count_and_longer_ones_across_a_cube_do_not():
     ends = np.array([[0, 0, 0], [3, 4, 0]], np.float32)
     assert connected_parts(ends, 5.0, 0.1).tolist() == [0, 0]

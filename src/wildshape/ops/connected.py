@@ -25,15 +25,18 @@ def connected_parts(
         pairs: rows of points that are one part however far apart they are.
 
     Raises:
+        IndexError: a pair names a row that is not there.
         MemoryError: no room.
     """
+    if pairs.size and not 0 <= pairs.min() <= pairs.max() < len(points):
+        raise IndexError(f"a pair names a row outside of {len(points)} points.")
     if not len(points):
         return np.zeros(0, dtype=np.int64)
     kernel = added_kernel("parts")
     if kernel is None:
         return connected_trees(points, reach, cell, pairs)
     part = np.empty(len(points), np.int64)
-    dense, joined = np.ascontiguousarray(points, np.float32), np.ascontiguousarray(pairs)
+    dense, joined = np.ascontiguousarray(points, np.float32), np.ascontiguousarray(pairs, np.int64)
     given = dense.ctypes.data, len(dense), reach, cell, joined.ctypes.data, len(joined)
     if kernel(*given, part.ctypes.data):
         raise MemoryError(f"no room to join {len(points)} points.")

@@ -19,13 +19,16 @@ def planes_native(
         around: places in the cloud of the k points of each neighbourhood.
 
     Raises:
-        IndexError: neighbourhoods of no points, or with places outside of the cloud.
+        IndexError: neighbourhoods of no points, with places outside of the cloud, or of other
+            clouds.
     """
     kernel = added_kernel("planes")
     assert kernel is not None  # whoever calls has asked
     (clouds, count, size), most = around.shape, points.shape[1]
     if not size:
         raise IndexError("a neighbourhood has no points.")
+    if len(points) != clouds:
+        raise IndexError(f"neighbourhoods are of {clouds} clouds, and there are {len(points)}.")
     check_places(around, most)
     first = most * torch.arange(clouds, device=around.device)
     places = (around + first[:, None, None]).contiguous()

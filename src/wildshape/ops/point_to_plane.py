@@ -65,11 +65,21 @@ def point_to_plane_native(
     width: float,
     holding: float,
 ) -> Equations:
-    """By `native/point_to_plane.c`, in double precision; no gradient."""
+    """By `native/point_to_plane.c`, in double precision; no gradient.
+
+    Raises:
+        IndexError: a counterpart without a point or a normal, a point without a counterpart, or a
+            scan without a centre.
+    """
     kernel = added_kernel("point_to_plane")
     assert kernel is not None  # whoever calls has asked
-    check_places(counterpart, len(onto))
+    check_places(counterpart, min(len(onto), len(normals)))
     scans, count, _ = points.shape
+    if counterpart.shape != (scans, count) or len(centre) != scans:
+        raise IndexError(
+            f"{scans} scans of {count} points have {len(centre)} centres and counterparts"
+            f" {tuple(counterpart.shape)}."
+        )
     given = [part.detach().contiguous() for part in (points, centre.double(), onto, normals)]
     for part in (given[0], *given[2:]):
         check_memory("point_to_plane", part, torch.float32)

@@ -20,7 +20,10 @@ def spans(
     kernel = added_kernel("spans")
     if kernel is None:
         return spans_numpy(points, directions)
-    dense, level = np.ascontiguousarray(points, np.float32), np.ascontiguousarray(directions)
+    dense, level = (
+        np.ascontiguousarray(part, kind)
+        for part, kind in ((points, np.float32), (directions, np.float64))
+    )
     count = level.shape[1]
     found = np.empty((2, count))
     least, most = found
