@@ -41,7 +41,7 @@ def written(tmp_path):
 
 
 @every_kind
-@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("packed", [False, True, "messages"])
 def test_every_scan_comes_back_in_time(written, kind, packed):
     path = written(kind, {TOPIC: scans()}, packed=packed, extra=["/notes"])
     (path.parent / f"._{path.name}").write_bytes(b"left by macOS")
