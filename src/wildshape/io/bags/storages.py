@@ -210,7 +210,7 @@ class Mcap(Storage):
         size = record.uncompressed_size
         data = unpacked(self.path, record.compression, record.data, size)
         reader = load_library("mcap.stream_reader", "MCAP needs mcap", INSTALL)
-        return reader.breakup_chunk(replace(record, compression="", data=data))
+        return reader.breakup_chunk(replace(record, compression="", data=data), validate_crc=True)
 
 
 class Ros1(Storage):
