@@ -324,6 +324,17 @@ def test_a_chunk_that_is_not_as_it_was_written_is_damaged(tmp_path):
     assert "recording.mcap is cut off or damaged (crc" in told
 
 
+def test_a_file_that_is_packed_as_a_whole_is_refused(written):
+    """One of several was not missed."""
+    path = written("db3", {TOPIC: scans()})
+    packed = path.with_name("recording_1.db3.zstd")
+    packed.write_bytes(b"")
+    for source in (path.parent, packed):
+        refused(open_drive, source, match="unpack it: unzstd recording_1.db3.zstd")
+    path.rename(path.with_name("recording_1.db3"))  # `unzstd` keeps what it unpacks
+    assert len(open_drive(path.parent)) == 6
+
+
 def test_a_missing_library_is_named(written, monkeypatch):
     path = written("mcap", {TOPIC: scans(1)})
     monkeypatch.setitem(__import__("sys").modules, "mcap.stream_reader", None)
