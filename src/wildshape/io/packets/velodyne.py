@@ -18,7 +18,7 @@ import numpy as np
 
 from wildshape.errors import BadInputError, load_library
 from wildshape.io.guard import first_line, reading
-from wildshape.io.packets.clock import gone_on
+from wildshape.io.packets.clock import gone_on, set_told
 from wildshape.records import Turn
 
 _INSTALL = "pip install 'wildshape[pcap]'"
@@ -144,11 +144,7 @@ def open_velodyne(path: Path) -> VelodyneTurns:
         if damaged:
             warnings.append(f"{damaged} packets end in another model than most and are left out")
     times, by_s = gone_on([turn.stamp for turn in found], [turn.micros for turn in found])
-    if by_s:
-        warnings.append(
-            f"the clock of {path.name} was set {'ahead' if by_s > 0 else 'back'} by"
-            f" {abs(by_s):.2g} s; later turns are taken to have gone on at the usual pace"
-        )
+    warnings += set_told(f"the clock of {path.name}", by_s)
     whole_times = tuple(compress(times, sound))
     return VelodyneTurns(path, whole_times, tuple(warnings), source, whole, described)
 
