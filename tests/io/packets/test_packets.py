@@ -321,6 +321,14 @@ def test_a_cut_recording_is_read_up_to_there(turns, tmp_path):
     )
 
 
+def test_of_a_cut_recording_of_the_next_generation_is_said_why(turns, tmp_path):
+    path = write_velodyne(tmp_path / "street.pcapng", turns)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) * 5 // 6])
+    (told,) = open_drive(path).warnings
+    assert "()" not in told
+
+
 def test_packets_that_were_not_recorded_whole(turns, tmp_path):
     """The file was said to end there."""
     path = write_velodyne(tmp_path / "street.pcap", turns)

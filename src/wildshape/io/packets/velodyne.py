@@ -123,7 +123,8 @@ def open_velodyne(path: Path) -> VelodyneTurns:
                 _count(packet, turns.setdefault(packet.source, []))
                 models.setdefault(packet.source, Counter())[packet.data[-1]] += 1
     except Exception as error:  # noqa: BLE001 - whatever it is, the packets before it are good
-        warnings.append(f"{path.name} is cut off or damaged ({first_line(error)})")
+        why = first_line(error) or type(error).__name__
+        warnings.append(f"{path.name} is cut off or damaged ({why})")
     source = max(turns, key=lambda one: sum(turn.packets for turn in turns[one]), default=None)
     if source is not None and len(turns) > 1:
         others = " and ".join(_named(one) for one in turns if one != source)
