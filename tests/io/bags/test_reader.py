@@ -312,7 +312,7 @@ def test_a_chunk_that_is_not_as_it_was_written_is_damaged(tmp_path):
         kind = writer.register_schema(CLOUD, "ros2msg", b"")
         channel = writer.register_channel(TOPIC, "cdr", kind)
         for at, points in enumerate(scans(), 1):
-            writer.add_message(channel, at * 10**8, cloud(points, at * 10**8), at * 10**8)
+            writer.add_message(channel, at * 10**8, bytes(cloud(points, at * 10**8)), at * 10**8)
         writer.finish()
     whole, point = path.read_bytes(), scans()[4][1000, :1].tobytes()
     assert open_drive(path).warnings == ()

@@ -88,4 +88,5 @@ def test_a_pause_of_an_ouster_s_recording_stays(tmp_path):
     stamps = [10**15 + number * TENTH + pause[number] for number in range(6)]
     write_ouster(tmp_path / "street.pcap", stamps, [10**18 + one for one in stamps])
     drive = open_drive(tmp_path / "street.pcap")
+    assert drive.times is not None
     assert np.diff(drive.times) == pytest.approx([0.1, 0.1, 30.1, 0.1, 0.1])
