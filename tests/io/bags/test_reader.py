@@ -24,6 +24,7 @@ from wildshape.io.bags.storages import CLOUD, unpacked
 pytest.importorskip("rosbags")
 pytest.importorskip("mcap")
 
+from mcap.writer import CompressionType, Writer
 from tests.io.bags.write import KINDS, Fields, cloud, write_bag
 
 TOPIC = "/velodyne_points"
@@ -41,7 +42,7 @@ def written(tmp_path):
 
 
 @every_kind
-@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("packed", [False, True, "messages"])
 def test_every_scan_comes_back_in_time(written, kind, packed):
     path = written(kind, {TOPIC: scans()}, packed=packed, extra=["/notes"])
     (path.parent / f"._{path.name}").write_bytes(b"left by macOS")
@@ -300,6 +301,38 @@ def test_where_all_messages_are_beside_the_file_that_is_an_error(written, tmp_pa
     refused(open_drive, tmp_path / "crashed", match=r"-wal file: .*; /velodyne_points holds no")
     (tmp_path / "crashed" / path.name).write_bytes(b"")  # not even the tables are in it
     refused(open_drive, tmp_path / "crashed", match="-wal file: sqlite3 recording.db3 'PRAGMA")
+
+
+def test_a_chunk_that_is_not_as_it_was_written_is_damaged(tmp_path):
+    """Where nothing is packed other points came out, and no word of it."""
+    path = tmp_path / "recording.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, compression=CompressionType.NONE, chunk_size=1)
+        writer.start()
+        kind = writer.register_schema(CLOUD, "ros2msg", b"")
+        channel = writer.register_channel(TOPIC, "cdr", kind)
+        for at, points in enumerate(scans(), 1):
+            writer.add_message(channel, at * 10**8, bytes(cloud(points, at * 10**8)), at * 10**8)
+        writer.finish()
+    whole, point = path.read_bytes(), scans()[4][1000, :1].tobytes()
+    assert open_drive(path).warnings == ()
+    assert whole.count(point) == 1
+    path.write_bytes(whole.replace(point, bytes(4)))
+    drive = open_drive(path)
+    assert len(drive) == 4
+    (told,) = drive.warnings
+    assert "recording.mcap is cut off or damaged (crc" in told
+
+
+def test_a_file_that_is_packed_as_a_whole_is_refused(written):
+    """One of several was not missed."""
+    path = written("db3", {TOPIC: scans()})
+    packed = path.with_name("recording_1.db3.zstd")
+    packed.write_bytes(b"")
+    for source in (path.parent, packed):
+        refused(open_drive, source, match="unpack it: unzstd recording_1.db3.zstd")
+    path.rename(path.with_name("recording_1.db3"))  # `unzstd` keeps what it unpacks
+    assert len(open_drive(path.parent)) == 6
 
 
 def test_a_missing_library_is_named(written, monkeypatch):

@@ -72,6 +72,7 @@ def write_bag(
 
     Args:
         scans: of each topic.
+        packed: whether; in MCAP its chunks, or each of its `messages`.
         stamps: of each scan, nanoseconds.
         times: of each scan's points, as they are recorded.
         extra: topics of text.
@@ -85,7 +86,8 @@ def write_bag(
         plugin = StoragePlugin.MCAP if kind == "mcap" else StoragePlugin.SQLITE3
         writer, types = Ros2Writer(path, version=9, storage_plugin=plugin), _ROS2
         if packed:
-            mode = CompressionMode.STORAGE if kind == "mcap" else CompressionMode.MESSAGE
+            chunks = kind == "mcap" and packed != "messages"
+            mode = CompressionMode.STORAGE if chunks else CompressionMode.MESSAGE
             writer.set_compression(mode, CompressionFormat.ZSTD)
         path = path / f"{path.name}.{kind}"
     with writer:

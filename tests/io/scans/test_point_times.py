@@ -41,6 +41,11 @@ def test_a_clock_that_counts_within_the_hour_goes_on_past_it(unit, kind):
     assert seconds_since(values, 1.7e9) == pytest.approx(TURN, abs=2e-6)
 
 
+def test_whole_numbers_may_lie_farther_apart_than_their_type_counts():
+    values = np.rint(TURN * 1e4 * 64 - 32000).astype("i2")  # microseconds
+    assert seconds_since(values, 1.7e9) == pytest.approx(TURN * 0.64 - 0.032, abs=1e-6)
+
+
 def test_points_that_did_not_come_back_do_not_take_the_times_of_the_others(tmp_path):
     """Drivers fill their rows with zeros, the time too."""
     path, stamp = tmp_path / "scan.ply", 1.7e9

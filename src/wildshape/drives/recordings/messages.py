@@ -15,7 +15,7 @@ def find_bag(path: Path) -> bool:
     """Whether a path is such a recording.
 
     Raises:
-        BadInputError: no file can have that name.
+        BadInputError: no file can have that name, or one is packed as a whole.
     """
     with reading(path, "a recording"):
         return bool(bag_files(path))

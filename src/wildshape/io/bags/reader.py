@@ -23,6 +23,7 @@ from wildshape.records import Turn
 _FEWEST_POINTS = 1000  # of a whole scan
 _SOME = 3  # scans that tell what a clock says
 _LONGEST_LAG_NS = 10e9  # of a recorder behind the stamps
+_PACKED = (".db3.zstd", ".mcap.zstd")  # as `ros2 bag record --compression-mode file` does
 
 
 class _Scan(NamedTuple):
@@ -95,13 +96,19 @@ def bag_files(path: Path) -> list[Path]:
     """The files of a recording of ROS: the path itself, or the .db3 or .mcap of a folder.
 
     Empty if it is none.
+
+    Raises:
+        BadInputError: a file of it is packed as a whole.
     """
-    if path.is_file():
-        return [path] if path.suffix.lower() in STORAGES else []
-    if not path.is_dir():
-        return []
-    files = (file for file in path.iterdir() if not file.name.startswith("."))
-    return sorted(file for file in files if file.suffix.lower() in (".db3", ".mcap"))
+    if path.is_dir():
+        files = sorted(file for file in path.iterdir() if not file.name.startswith("."))
+        suffixes = {".db3", ".mcap"}
+    else:
+        files, suffixes = [path] if path.is_file() else [], {*STORAGES}
+    for file in files:
+        if file.name.lower().endswith(_PACKED) and not file.with_suffix("").is_file():
+            raise BadInputError(f"{file}: is packed as a whole; unpack it: unzstd {file.name}.")
+    return [file for file in files if file.suffix.lower() in suffixes]
 
 
 def open_bag(path: Path, topic: str | None = None) -> Bag:

@@ -67,6 +67,14 @@ class Storage(ABC):
         """Whether a topic holds point clouds."""
         return self.topics[topic] == CLOUD
 
+    def _message(self, data: bytes) -> bytes:
+        """Of a bag whose messages are packed, and any other as it is."""
+        if not data.startswith(_ZSTD):
+            return data
+        zstandard = load_library("zstandard", "compressed bags need zstandard", INSTALL)
+        size = zstandard.frame_content_size(data)
+        return unpacked(self.path, "zstd", data, size if size >= 0 else _LARGEST_MESSAGE)
+
 
 class Sqlite(Storage):
     """`.db3` of ROS 2; the key holds the row."""
@@ -103,14 +111,6 @@ class Sqlite(Storage):
         with closing(self._open()) as database:
             found = database.execute("SELECT data FROM messages WHERE id = ?", key[:1]).fetchone()
             return self._message(found[0])
-
-    def _message(self, data: bytes) -> bytes:
-        """Of a bag whose messages are packed, and any other as it is."""
-        if not data.startswith(_ZSTD):
-            return data
-        zstandard = load_library("zstandard", "compressed bags need zstandard", INSTALL)
-        size = zstandard.frame_content_size(data)
-        return unpacked(self.path, "zstd", data, size if size >= 0 else _LARGEST_MESSAGE)
 
     def _open(self) -> sqlite3.Connection:
         address = self.path.resolve().as_uri() + "?mode=ro&immutable=1"
@@ -190,7 +190,8 @@ class Mcap(Storage):
                         case "Message" if self.has_cloud(channels[part.channel_id].topic):
                             channel = channels[part.channel_id]
                             key, cdr = (begin, place), channel.message_encoding == "cdr"
-                            yield Message(channel.topic, part.log_time, key, part.data, cdr)
+                            data = self._message(part.data)
+                            yield Message(channel.topic, part.log_time, key, data, cdr)
                 begin = file.tell()
 
     def data(self, key: Key) -> bytes:
@@ -200,7 +201,7 @@ class Mcap(Storage):
             file.seek(key[0])
             bounded = _Bounded(file, self.path.stat().st_size)
             record = next(reader.StreamReader(bounded, skip_magic=True, emit_chunks=True).records)
-            return self._parts(record)[key[1]].data
+            return self._message(self._parts(record)[key[1]].data)
 
     def _parts(self, record: Any) -> list[Any]:
         """The records of a chunk; any other record alone."""
@@ -209,7 +210,7 @@ class Mcap(Storage):
         size = record.uncompressed_size
         data = unpacked(self.path, record.compression, record.data, size)
         reader = load_library("mcap.stream_reader", "MCAP needs mcap", INSTALL)
-        return reader.breakup_chunk(replace(record, compression="", data=data))
+        return reader.breakup_chunk(replace(record, compression="", data=data), validate_crc=True)
 
 
 class Ros1(Storage):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The clock of what recorded a sensor's packets, where it was set amid the recording."""
+"""The clock of turns, a recorder's or a sensor's own, where it was set amid the recording."""
 
 import numpy as np
 
@@ -12,13 +12,13 @@ _GOES_ON = 5.0  # usual steps; a pause ends so soon after whole hours once in th
 def gone_on(stamps: list[float], micros: list[int]) -> tuple[tuple[float, ...], float]:
     """Times of turns that go on where a clock was set, and by how much it was in all, seconds.
 
-    A leap ahead is a pause of the recording unless the sensor's own clock, which counts within an
-    hour, does not show one: it goes on at the usual pace, or tells of a shorter pause. Times that
-    rise less often than not stay as they are.
+    A leap ahead is a pause of the recording unless the other clock, of which only what is past
+    the hour counts, does not show one: it goes on at the usual pace, or tells of a shorter pause.
+    Times that rise less often than not stay as they are.
 
     Args:
-        stamps: when each turn was recorded, seconds.
-        micros: the sensor's own clock then, microseconds past its hour.
+        stamps: of each turn by the recorder's or the sensor's clock, seconds.
+        micros: the other clock then, microseconds.
     """
     steps = np.diff(stamps)
     falls = steps <= 0
@@ -35,3 +35,13 @@ def gone_on(stamps: list[float], micros: list[int]) -> tuple[tuple[float, ...], 
         return tuple(stamps), 0.0
     later = np.concatenate(([0.0], np.cumsum(by)))
     return tuple((np.array(stamps) - later).tolist()), float(by.sum())
+
+
+def set_told(clock: str, by_s: float) -> list[str]:
+    """A sentence if a clock was set."""
+    if not by_s:
+        return []
+    return [
+        f"{clock} was set {'ahead' if by_s > 0 else 'back'} by {abs(by_s):.2g} s; later turns are"
+        " taken to have gone on at the usual pace"
+    ]

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Int
 
 from wildshape.errors import load_library
 from wildshape.io.guard import reading
+from wildshape.io.packets.clock import gone_on, set_told
 from wildshape.records import Turn
 
 _INSTALL = "pip install 'wildshape[ouster]'"
@@ -25,7 +26,8 @@ class OusterTurns:
 
     Attributes:
         described: what the sensor says of itself, JSON.
-        times: of each turn's first column, on the sensor's clock, seconds.
+        times: of each turn's first column, on the sensor's clock, seconds; they go on where it
+            was set.
         warnings: what is odd about it, a sentence each.
     """
 
@@ -60,15 +62,18 @@ def open_ouster(path: Path, described: Path) -> OusterTurns:
     with reading(path, f"Ouster's packets of the sensor of {described.name}"):
         source, _ = _opened(path, described)
         window = getattr(source.sensor_info[0].format, "column_window", None)
-        times, numbers = [], []
+        times, numbers, recorded = [], [], []
         for number, (frame, *_) in enumerate(source):
             there = _columns(frame)
             if there[columns_sent(window, len(there))].mean() >= _WHOLE:
                 times.append(float(frame.timestamp[there].min()) * _S_PER_NS)
                 numbers.append(number)
+                recorded.append(int(frame.packet_timestamp.max()) // 1000)
         left = len(source) - len(numbers)
-    told = (f"{left} turns lack packets and were left out",) if left else ()
-    return OusterTurns(path, described, tuple(times), told, tuple(numbers))
+    told = [f"{left} turns lack packets and were left out"] if left else []
+    gone, by_s = gone_on(times, recorded)
+    told += set_told(f"the sensor's clock in {path.name}", by_s)
+    return OusterTurns(path, described, gone, tuple(told), tuple(numbers))
 
 
 def columns_sent(window: tuple[int, int] | None, count: int) -> Int[np.ndarray, "n"]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from wildshape.errors import BadInputError, load_library
 from wildshape.io.guard import first_line, reading
-from wildshape.io.packets.clock import gone_on
+from wildshape.io.packets.clock import gone_on, set_told
 from wildshape.records import Turn
 
 _INSTALL = "pip install 'wildshape[pcap]'"
@@ -123,7 +123,8 @@ def open_velodyne(path: Path) -> VelodyneTurns:
                 _count(packet, turns.setdefault(packet.source, []))
                 models.setdefault(packet.source, Counter())[packet.data[-1]] += 1
     except Exception as error:  # noqa: BLE001 - whatever it is, the packets before it are good
-        warnings.append(f"{path.name} is cut off or damaged ({first_line(error)})")
+        why = first_line(error) or type(error).__name__
+        warnings.append(f"{path.name} is cut off or damaged ({why})")
     source = max(turns, key=lambda one: sum(turn.packets for turn in turns[one]), default=None)
     if source is not None and len(turns) > 1:
         others = " and ".join(_named(one) for one in turns if one != source)
@@ -144,11 +145,7 @@ def open_velodyne(path: Path) -> VelodyneTurns:
         if damaged:
             warnings.append(f"{damaged} packets end in another model than most and are left out")
     times, by_s = gone_on([turn.stamp for turn in found], [turn.micros for turn in found])
-    if by_s:
-        warnings.append(
-            f"the clock of {path.name} was set {'ahead' if by_s > 0 else 'back'} by"
-            f" {abs(by_s):.2g} s; later turns are taken to have gone on at the usual pace"
-        )
+    warnings += set_told(f"the clock of {path.name}", by_s)
     whole_times = tuple(compress(times, sound))
     return VelodyneTurns(path, whole_times, tuple(warnings), source, whole, described)
 

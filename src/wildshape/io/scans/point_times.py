@@ -44,6 +44,8 @@ def seconds_since(
     if unit is None:
         return None
     first = values.min()
+    if values.dtype.kind == "i":  # steps between them may be beyond their type
+        values = values.astype(np.int64)
     return (values - first) * unit + _first_seconds(float(first) * unit, scan_time)
 
 
