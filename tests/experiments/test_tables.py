@@ -6,6 +6,7 @@ import json
 from dataclasses import asdict, replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -200,7 +201,7 @@ def test_size_keeps_what_is_minimised():
 
 def test_a_rung_of_the_ladder_changes_nothing_but_the_method():
     for size in ("test", "tiny", "hour", "small"):
-        made = [row.recipe for row in ladder.rungs(Sources(SIZES[size]))]
+        made: list[Any] = [row.recipe for row in ladder.rungs(Sources(SIZES[size]))]
         widths = {(r.network.encoder, r.network.decoder, r.network.points) for r in made}
         assert len(widths) == len({(r.optim, r.views.points) for r in made}) == 1
     with pytest.raises(BadInputError, match="--size full"):
