@@ -24,6 +24,7 @@ from experiments.trust_data import Both, Known
 from experiments.trust_parts import STREETS, Parts
 
 from wildshape.cli.main import in_a_sentence
+from wildshape.errors import BadInputError
 from wildshape.evaluation.calibration import auroc, calibration
 from wildshape.io.atomic import write_json
 from wildshape.io.output import provenance
@@ -76,6 +77,10 @@ def main(settings: Settings) -> None:
     settings.out.mkdir(parents=True, exist_ok=True)
     model = weights_file(settings.model)
     parts = Parts(settings.out, model, settings.streets, settings.share)
+    names = [*parts.names, *(path.name for path in settings.check)]
+    for path in settings.check:
+        if names.count(path.name) > 1:
+            raise BadInputError(f"{path}: other data are called {path.name} too; rename one.")
     fitted = parts.simulated(settings.workers)
     others = {path.name: parts.real(path) for path in settings.check}
     others |= {f"{_UNSEEN} {seed}": parts.street(seed) for seed in settings.unseen}

@@ -20,6 +20,7 @@ import numpy as np
 import torch
 import tyro
 from experiments.mesh_credits import rows_of
+from experiments.tables.data import key
 from safetensors import safe_open
 
 from wildshape.cli.main import in_a_sentence
@@ -44,7 +45,7 @@ class Settings:
     """What to calibrate.
 
     Attributes:
-        out: folder to write; drives simulated by an earlier call are used again.
+        out: folder to write; what an earlier call simulated of the same choice is used again.
         model: checkpoint, or the name of weights shipped; the LiDAR's by default.
         cad: folder of CAD meshes with a manifest; without it procedural vehicles alone.
         write: where to write the weights with their calibration.
@@ -97,8 +98,8 @@ class Measured(NamedTuple):
 
 
 def drives(settings: Settings) -> Store:
-    """What is fitted to, simulated once."""
-    path = settings.out / "train"
+    """What is fitted to, simulated once for each choice of it."""
+    path = settings.out / f"train-{key(settings.configs, settings.cad)}"
     if not is_finished_store(path):
         with TemporaryDirectory() as folder, StoreWriter(path, {}, overwrite=True) as store:
             for config, seed in _sources(settings, Path(folder)):

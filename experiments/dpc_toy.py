@@ -61,6 +61,7 @@ def right_share(method: Dpc, trained: Track, tested: Track) -> dict[str, float]:
     known, found = (canonical(method, track) for track in (trained, tested))
     aligned = torch.rad2deg(rotation_angle(most(known).mT @ found))
     pairs = torch.rad2deg(rotation_angle(found[:, None].mT @ found[None]))
+    pairs = pairs[~torch.eye(len(found), dtype=torch.bool)]  # none with itself
     return {
         "aligned_within_15": float((aligned < CLOSE_DEG).double().mean()),
         "aligned_within_30": float((aligned < 2 * CLOSE_DEG).double().mean()),

@@ -6,7 +6,8 @@ python experiments/drives.py --out DRIVES --first 21 --count 20 --scans 60
 
 simulates, runs and measures one drive after the other and writes `table.md` into
 `DRIVES/21-40-of-60-scans`. A killed run goes on with the same command: finished drives are not
-done again, a half-finished one is begun again, as its time is measured.
+done again by the same weights, a half-finished one is begun again, as its time is measured. The
+table names every commit that found a part of it.
 """
 
 import json
@@ -23,6 +24,7 @@ import tyro
 from wildshape.cli.main import in_a_sentence
 from wildshape.io.atomic import write_text
 from wildshape.io.output import MARKER
+from wildshape.method.checkpoint import fingerprint
 
 _HEADING = (
     "seed",
@@ -65,16 +67,17 @@ def main(settings: Settings) -> None:
     seeds = [str(settings.first + number) for number in range(settings.count)]
     everything = f"{seeds[0]}-{seeds[-1]}"
     out = settings.out / f"{everything}-of-{settings.scans}-scans"
+    by = out / f"by-{fingerprint(None)}"
     for seed in seeds:
-        street, found = out / "streets" / seed, out / "found" / seed
+        street, found = out / "streets" / seed, by / "found" / seed
         drive = ("--drive", "--scans", str(settings.scans), "--seed", seed)
         _step(street, "simulate", str(street), *drive)
         scans = str(street / "velodyne" / "0000")
         workers = ("--workers", str(settings.workers))
         _step(found, "drive", scans, "--out", str(found), *workers, "--overwrite")
-        _measure(out / "evaluation" / seed, found, street)
-    _measure(out / "evaluation" / everything, out / "found", out / "streets")
-    text = _table(out, seeds, everything, settings.scans)
+        _measure(by / "evaluation" / seed, found, street)
+    _measure(by / "evaluation" / everything, by / "found", out / "streets")
+    text = _table(by, seeds, everything, settings.scans)
     write_text(out / "table.md", text)
     print(text, end="")
 
@@ -93,7 +96,8 @@ def _step(folder: Path, *line: str) -> None:
 
 def _table(out: Path, seeds: list[str], everything: str, scans: int) -> str:
     """A line a drive, their mean and standard deviation, all drives as one; then the stages."""
-    results = [_read(out / "found" / seed / MARKER)["result"] for seed in seeds]
+    records = [_read(out / "found" / seed / MARKER) for seed in seeds]
+    results = [record["result"] for record in records]
     measured = [_figures(out / "evaluation" / seed) for seed in seeds]
     spent = [sum(result["seconds"].values()) / (scans * _PERIOD_S) for result in results]
     rows = np.array([(*of, seconds) for of, seconds in zip(measured, spent)], float)
@@ -110,7 +114,10 @@ def _table(out: Path, seeds: list[str], everything: str, scans: int) -> str:
     said = ", ".join(
         f"{name} {seconds / (scans * _PERIOD_S):.2f}" for name, seconds in stages.items()
     )
-    return "\n".join(lines) + f"\n\nSeconds a second of drive, mean, by stage: {said}.\n"
+    made = ", ".join(sorted({record["provenance"]["code"][:7] for record in records}))
+    return "\n".join(lines) + (
+        f"\n\nSeconds a second of drive, mean, by stage: {said}.\n\nFound at commit {made}.\n"
+    )
 
 
 def _figures(evaluation: Path) -> tuple[float, ...]:

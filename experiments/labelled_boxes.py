@@ -24,6 +24,7 @@ from jaxtyping import Float
 
 import wildshape
 from wildshape.cli.main import in_a_sentence
+from wildshape.errors import BadInputError
 from wildshape.evaluation.drives.overlap import UprightBox, overlaps
 from wildshape.evaluation.drives.rectangles import l_shape, smallest_rectangle
 from wildshape.evaluation.metrics import true_box
@@ -63,7 +64,7 @@ def main(settings: Settings) -> None:
     torch.set_num_threads(1)
     models = {name: wildshape.load(name) for name in settings.model}
     for path in settings.data:
-        tracks = [_spread(track, settings.scans) for track in _tracks(path, settings.most)]
+        tracks = [_spread(track, settings.scans) for track in labelled(path)[: settings.most]]
         scans = sum(len(track.scans) for track in tracks)
         print(f"\n{path.name}: {len(tracks)} objects, {scans} scans; metres\n")
         print("| boxes | " + " | ".join(COLUMNS) + " |\n| --- |" + " ---: |" * len(COLUMNS))
@@ -72,11 +73,22 @@ def main(settings: Settings) -> None:
             print(f"| {name} | " + " | ".join(map(shown, COLUMNS, np.mean(rows, axis=0))) + " |")
 
 
-def _tracks(path: Path, most: int) -> Iterator[Track]:
+def labelled(path: Path) -> list[Track]:
+    """The tracks of a data set whose boxes are known.
+
+    Raises:
+        BadInputError: there is none.
+    """
     source = open_tracks(path)
-    found = (source[i] for i in range(len(source)))
-    labelled = (track for track in found if track.label_size_m or track.shape is not None)
-    yield from (track for _, track in zip(range(most), labelled))
+    found = [source[i] for i in range(len(source))]
+    found = [track for track in found if track.T_sensor_object is not None]
+    found = [track for track in found if track.label_size_m or track.shape is not None]
+    if not found:
+        raise BadInputError(
+            f"{path}: no track has true poses and a labelled size or a true shape; convert labelled"
+            " data."
+        )
+    return found
 
 
 def _spread(track: Track, scans: int) -> Track:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import torch
 import tyro
-from experiments.labelled_boxes import COLUMNS, errors, shown, upright
+from experiments.labelled_boxes import COLUMNS, errors, labelled, shown, upright
 
 import wildshape
 from wildshape.cli.main import in_a_sentence
@@ -25,7 +25,6 @@ from wildshape.drives.adapting.fine_tuning import taught
 from wildshape.drives.adapting.measures import measure
 from wildshape.drives.adapting.second_pass import like
 from wildshape.inference.predictor import Predictor
-from wildshape.io.inputs import open_tracks
 from wildshape.method.checkpoint import fingerprint
 from wildshape.records import Track
 
@@ -52,9 +51,8 @@ class Settings:
 def main(settings: Settings) -> None:
     """Print a line an object, and the means before and after."""
     torch.set_num_threads(1)
-    base, source = wildshape.load(settings.model), open_tracks(settings.data)
+    base, tracks = wildshape.load(settings.model), labelled(settings.data)
     config = AdaptConfig(steps=settings.steps)
-    tracks = [source[i] for i in range(len(source))]
     examples = [_example(track, base).some(config.scans) for track in tracks]
     before, after, kept = [], [], 0
     for i, track in enumerate(tracks[: settings.most]):

@@ -19,6 +19,7 @@ from wildshape.errors import BadInputError
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import atomic_write
 from wildshape.io.inputs import open_tracks
+from wildshape.method.checkpoint import fingerprint
 from wildshape.method.trust import ScanFeatures, TrackFeatures
 from wildshape.parallel.team import team
 from wildshape.simulate.config import SimulationConfig
@@ -53,22 +54,32 @@ class Parts:
     streets: tuple[int, ...] = STREETS
     share: float = 1.0
 
+    @property
+    def made_by(self) -> str:
+        """Of the weights, and of how much is simulated: what is kept serves no others."""
+        return f"{fingerprint(self.model)}, share {self.share:g}"
+
+    @property
+    def names(self) -> list[str]:
+        """Of all simulated parts."""
+        return [*(f"street{seed}" for seed in self.streets), *_TRACKS]
+
     def simulated(self, workers: int = 1) -> dict[str, Both]:
         """All simulated parts by name, so many at once."""
-        names = [*(f"street{seed}" for seed in self.streets), *_TRACKS]
+        names = self.names
         with team(workers) as helpers:
             made = helpers.in_order(partial(_made, self), names)
-            return {name: _read(path) for name, path in zip(names, made, strict=True)}
+            return {name: self._read(path) for name, path in zip(names, made, strict=True)}
 
     def street(self, seed: int) -> Both:
         """Another one."""
-        return _read(_made(self, f"street{seed}"))
+        return self._read(_made(self, f"street{seed}"))
 
     def real(self, path: Path) -> Both:
         """Labelled tracks, without rays."""
         source = open_tracks(path)
         tracks = [source[i] for i in range(len(source)) if source[i].label_size_m]
-        return _read(self.kept(path.name, lambda model: of_tracks(model, tracks, rays=False)))
+        return self._read(self.kept(path.name, lambda model: of_tracks(model, tracks, rays=False)))
 
     def kept(self, name: str, make: Callable[[Predictor], Both]) -> Path:
         """The file of a part that was completed before, or is now."""
@@ -81,9 +92,22 @@ class Parts:
                 for name, values in known._asdict().items()
             }
             with atomic_write(path) as file:
-                np.savez(file, **columns)
+                np.savez(file, made_by=self.made_by, **columns)
             print(f"{path.stem}: {len(made.scan.pose)} scans", flush=True)
         return path
+
+    def _read(self, path: Path) -> Both:
+        with np.load(path) as found:
+            if "made_by" not in found or str(found["made_by"]) != self.made_by:
+                raise BadInputError(
+                    f"{path}: was completed by other weights or with another --share; give another"
+                    " --out."
+                )
+            both = Both(*(Known(*(found[f"{p}_{n}"] for n in Known._fields)) for p in Both._fields))
+        wide = [known.features.shape[1] for known in both]
+        if wide != [len(ScanFeatures._fields), *[len(TrackFeatures._fields)] * 2]:
+            raise BadInputError(f"{path}: was completed with other features; give another --out.")
+        return both
 
 
 def _made(parts: Parts, name: str) -> Path:
@@ -106,12 +130,3 @@ def _behind(parts: Parts, name: str, predictor: Predictor) -> Both:
     tracks = list(simulate_tracks(config, seed, workers=1))
     found = [of_tracks(predictor, tracks, rays) for rays in (False, True)]
     return Both(*map(Known.joined, zip(*found)))
-
-
-def _read(path: Path) -> Both:
-    with np.load(path) as found:
-        both = Both(*(Known(*(found[f"{p}_{n}"] for n in Known._fields)) for p in Both._fields))
-    wide = [known.features.shape[1] for known in both]
-    if wide != [len(ScanFeatures._fields), *[len(TrackFeatures._fields)] * 2]:
-        raise BadInputError(f"{path}: was completed with other features; give another --out.")
-    return both

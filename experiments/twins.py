@@ -16,16 +16,23 @@ from pathlib import Path
 import numpy as np
 import torch
 import tyro
-from experiments.labelled_boxes import COLUMNS, errors, shown, upright, upright_labels
+from experiments.labelled_boxes import (
+    COLUMNS,
+    errors,
+    labelled,
+    shown,
+    upright,
+    upright_labels,
+)
 from experiments.mesh_credits import rows_of
 from scipy.spatial import KDTree
 
 import wildshape
 from wildshape.cli.main import in_a_sentence
+from wildshape.errors import BadInputError
 from wildshape.evaluation.drives.overlap import UprightBox
 from wildshape.evaluation.metrics import true_box
 from wildshape.inference.predictor import Predictor
-from wildshape.io.inputs import open_tracks
 from wildshape.records import Track
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.scan import Returns, scan
@@ -61,8 +68,9 @@ def main(settings: Settings) -> None:
     """Print a row for the real scans and each kind of twin."""
     torch.set_num_threads(1)
     model = wildshape.load()
-    source = open_tracks(settings.data)
-    real = [track for track in map(source.__getitem__, range(len(source))) if track.label_size_m]
+    real = [track for track in labelled(settings.data) if track.label_size_m]
+    if len(real) <= _DRAWN:
+        raise BadInputError(f"{settings.data}: {_DRAWN + 1} labelled cars are needed; give more.")
     sets = {"real": real}
     for name, maker in _makers(settings.cad).items():
         through = _THROUGH if name == "seen through" else 0.0

@@ -22,6 +22,7 @@ import tyro
 from experiments.meshes import stretched
 
 from wildshape.cli.main import in_a_sentence
+from wildshape.errors import BadInputError
 from wildshape.io.output import provenance
 from wildshape.io.store.store import is_finished_store, open_store
 from wildshape.io.store.writer import StoreWriter
@@ -87,6 +88,8 @@ def main(settings: Settings) -> None:
     settings.out.mkdir(parents=True, exist_ok=True)
     if not is_finished_store(data):
         make_data(settings, data)
+    if (held := open_store(data).track(0).category) != settings.category:
+        raise BadInputError(f"{data}: holds views of {held}s; give another --out.")
     recipe = views()
     first = replace(recipe, optim=replace(recipe.optim, steps=settings.steps))
     model = train(settings, first, "first")

@@ -15,6 +15,7 @@ from experiments.tables.sources import Sources
 from experiments.tables.table import Block, Table, Trained
 from experiments.tables.train import Workshop, model_of
 
+from wildshape.errors import BadInputError
 from wildshape.evaluation.cases import Case, prepare
 from wildshape.evaluation.examples import pick
 from wildshape.evaluation.method import Completer
@@ -31,8 +32,16 @@ def rungs(sources: Sources) -> tuple[Trained, ...]:
     """What is added, in order; each keeps what stands before it.
 
     Turned scans come with the bins, the window and the beta that were chosen for them.
+
+    Raises:
+        BadInputError: size full, where the two ends differ in widths, points and steps, too.
     """
     size, data = sources.size, sources.drives("train")
+    if size.steps is None:
+        raise BadInputError(
+            "--size full: the paper's preset and ours differ in widths and steps, too; the ladder"
+            " wants --size small."
+        )
     base, goal = paper_form(size, data), small()
     if size.own_schedule:  # all rungs have one schedule
         base = replace(base, recipe=replace(base.recipe, optim=_ours(sources).recipe.optim))

@@ -5,9 +5,17 @@
 import math
 
 import numpy as np
-from experiments.calibrate_confidence import fit, held
+import pytest
+import torch
+from experiments.calibrate_confidence import Settings, fit, held, main
 from experiments.trust_data import Known
+from experiments.trust_parts import Parts
+from tests.models import CONFIG, SETTINGS
 
+from wildshape.errors import BadInputError
+from wildshape.io.write_tracks import write_tracks
+from wildshape.method.checkpoint import save_checkpoint
+from wildshape.method.network import ShapePoseNet
 from wildshape.method.trust import OF_SCAN, ScanFeatures
 
 NAMES = ScanFeatures._fields
@@ -43,3 +51,25 @@ def test_the_front_is_the_end_that_most_have():
     other = one._replace(turn=180 - one.turn)
     np.testing.assert_array_equal(one.pose, other.pose)
     assert np.isnan(one.pose).sum() == 300
+
+
+def test_what_other_weights_completed_is_not_taken_for_these(cars, tmp_path):
+    models = [tmp_path / f"{seed}.safetensors" for seed in range(2)]
+    for seed, model in enumerate(models):
+        torch.manual_seed(seed)
+        save_checkpoint(model, ShapePoseNet(CONFIG).eval(), SETTINGS)
+    data = tmp_path / "real"
+    tracks = [cars[0].part(range(2))]
+    write_tracks(tracks, data, "packed", command="test", settings={})
+    one = Parts(tmp_path, models[0])
+    np.testing.assert_array_equal(one.real(data).scan.turn, one.real(data).scan.turn)
+    for other in (Parts(tmp_path, models[1]), Parts(tmp_path, models[0], share=0.1)):
+        with pytest.raises(BadInputError, match=r"real\.npz: was completed by other weights"):
+            other.real(data)
+
+
+@pytest.mark.parametrize("places", [("one/kitti", "other/kitti"), ("hdl64",)])
+def test_data_of_one_name_are_not_taken_for_each_other(tmp_path, places):
+    check = tuple(tmp_path / place for place in places)
+    with pytest.raises(BadInputError, match="other data are called"):
+        main(Settings(tmp_path / "out", check=check))

@@ -9,6 +9,7 @@ from experiments.confidence import Settings, drives
 from tests.cars import drive_by
 
 from experiments import confidence
+from wildshape.io.store.store import is_finished_store
 from wildshape.simulate.shapes.meshes import mesh_files
 
 KINDS = {"bus": 2, "car": 30, "truck": 20}
@@ -48,9 +49,20 @@ def test_a_few_tracks_are_of_every_common_kind_and_each_sensor_sees_others(meshe
     assert meshes("another") == found
 
 
-def test_drives_that_a_stop_left_half_made_are_made_again(meshes, tmp_path, half_written):
-    half_written(tmp_path / "one" / "train")
+def test_drives_that_a_stop_left_half_made_are_made_again(meshes, monkeypatch, half_written):
+    def left_half_made(path):
+        half_written(path)
+        return is_finished_store(path)
+
+    monkeypatch.setattr(confidence, "is_finished_store", left_half_made)
     assert set(meshes("one")) == {"hdl64", "hdl32"}
+
+
+def test_another_category_in_the_same_folder_is_not_calibrated_on_drives(tmp_path):
+    assert {track.category for track in drives(Settings(tmp_path, tracks=1))} == {"car"}
+    chairs = drives(Settings(tmp_path, tracks=1, category="chair"))
+    assert {track.category for track in chairs} == {"chair"}
+    assert len(drives(Settings(tmp_path, tracks=2, category="chair"))) == 2
 
 
 def test_weights_do_not_speak_of_meshes_that_were_not_there(tmp_path):

@@ -24,3 +24,16 @@ def test_other_drives_in_the_same_folder_are_kept_apart(tmp_path, monkeypatch):
         main(Settings(tmp_path, first, count=2, scans=scans))
         assert pooled[-1] == {str(first), str(first + 1)}
     assert len(set(folders)) == len(folders)
+
+
+def test_what_other_weights_found_is_not_measured_as_ones_own(tmp_path, monkeypatch):
+    done = []
+    monkeypatch.setattr(drives, "_step", lambda folder, *line: done.append((line[0], folder)))
+    monkeypatch.setattr(drives, "_table", lambda *of: "")
+    for weights in ("one", "other"):
+        monkeypatch.setattr(drives, "fingerprint", lambda _, weights=weights: weights)
+        main(Settings(tmp_path, 1, count=2, scans=20))
+    places = {kind: [folder for name, folder in done if name == kind] for kind, _ in done}
+    for kind in ("drive", "evaluate-drive"):
+        assert len(set(places[kind])) == len(places[kind])
+    assert len(set(places["simulate"])) == 2

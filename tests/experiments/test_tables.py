@@ -4,11 +4,13 @@
 
 import json
 from dataclasses import asdict, replace
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from experiments.tables import data, make, train  # pyright: ignore
+from experiments.tables import data, ladder, make, train  # pyright: ignore
 from experiments.tables.__main__ import TABLES, Settings, main  # pyright: ignore
 from experiments.tables.data import Simulated, as_values, store_of  # pyright: ignore
 from experiments.tables.measure import Measured, as_results  # pyright: ignore
@@ -94,11 +96,12 @@ def test_figures_of_objects_and_codes(folder):
     assert len(places) == SIZES["test"].test
 
 
-@pytest.mark.parametrize("size", SIZES.values(), ids=SIZES)
-@pytest.mark.parametrize("name", TABLES)
+@pytest.mark.parametrize(
+    ("name", "size"), [one for one in product(TABLES, SIZES) if one != ("ladder", "full")]
+)
 def test_tables_as_declared(name, size):
     """No two rows of a table are called alike or trained alike; every size and table exists."""
-    table = TABLES[name](Sources(size, Path("cad"), Path("kitti")))
+    table = TABLES[name](Sources(SIZES[size], Path("cad"), Path("kitti")))
     for block in table.blocks:
         names = [row.name for row in block.rows]
         keys = [(r.key, r.answer) for r in block.rows if isinstance(r, Trained)]
@@ -194,6 +197,15 @@ def test_size_keeps_what_is_minimised():
     assert tiny.optim.steps == SIZES["tiny"].steps
     for preset in PRESETS.values():
         assert sized(preset(), SIZES["full"]) == preset()
+
+
+def test_a_rung_of_the_ladder_changes_nothing_but_the_method():
+    for size in ("test", "tiny", "hour", "small"):
+        made: list[Any] = [row.recipe for row in ladder.rungs(Sources(SIZES[size]))]
+        widths = {(r.network.encoder, r.network.decoder, r.network.points) for r in made}
+        assert len(widths) == len({(r.optim, r.views.points) for r in made}) == 1
+    with pytest.raises(BadInputError, match="--size full"):
+        ladder.table(Sources(SIZES["full"]))
 
 
 def test_size_small_keeps_the_papers_schedule_shortened_evenly():

@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Weights for depth views: the data are whole before anything is trained."""
 
+import pytest
 from experiments.views_weights import Settings, main
 
 from experiments import views_weights
+from wildshape.errors import BadInputError
 from wildshape.io.store.store import open_store
 
 
@@ -17,3 +19,12 @@ def test_views_that_a_stop_left_half_made_are_made_again(cad, tmp_path, monkeypa
     main(Settings(tmp_path, cad, "car"))
     assert len(open_store(tmp_path / "data")) == 3
     assert len(trained) == 1
+
+
+def test_weights_of_a_category_are_not_made_of_anothers_views(cad, tmp_path, monkeypatch):
+    monkeypatch.setattr(views_weights, "train", lambda *of: None)
+    monkeypatch.setattr(views_weights, "ship", lambda *of: None)
+    monkeypatch.setattr(views_weights, "_COPIES", 1)
+    main(Settings(tmp_path, cad, "car"))
+    with pytest.raises(BadInputError, match="holds views of cars"):
+        main(Settings(tmp_path, cad, "chair"))
