@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Planes of neighbourhoods against eigenvectors; turns about vectors against the exponential."""
 
+import pytest
 import torch
 
-from wildshape.geometry.surface import planes, thinnest_axis
+from wildshape.geometry.surface import planes, planes_torch, thinnest_axis
 from wildshape.geometry.transforms.rotation import cross_matrix, rotation_from_vector
 
 PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
@@ -32,6 +33,27 @@ def test_flat_needle_and_point():
     torch.testing.assert_close(found[0].abs(), torch.tensor((0.0, 0, 1)).double())
     assert abs(float(found[1, 2])) < 1e-6
     assert found.isfinite().all()
+
+
+@pytest.mark.parametrize("size", [1e-12, 1e-4, 1.0, 1e4])
+@pytest.mark.parametrize("find", [planes, planes_torch])
+def test_planes_do_not_hang_on_the_size_of_a_cloud(find, size):
+    generator = torch.Generator().manual_seed(1)
+    points = torch.randn(1, 40, 3, generator=generator, dtype=torch.float64)
+    around = torch.randint(0, 40, (1, 30, 6), generator=generator)
+    expected, found = find(points, around)[1], find(size * points, around)[1]
+    torch.testing.assert_close((found * expected).sum(-1).abs(), torch.ones(1, 30).double())
+
+
+@pytest.mark.parametrize("size", [1e-12, 1.0])
+@pytest.mark.parametrize("find", [planes, planes_torch])
+def test_normals_of_needles_are_unit_vectors_across_them(find, size):
+    generator = torch.Generator().manual_seed(2)
+    along = torch.nn.functional.normalize(torch.randn(8, 1, 3, generator=generator), dim=-1)
+    points = size * torch.randn(8, 40, 1, generator=generator) * along
+    normal = find(points, torch.randint(0, 40, (8, 30, 6), generator=generator))[1]
+    torch.testing.assert_close(normal.norm(dim=-1), torch.ones(8, 30))
+    assert float((normal * along).sum(-1).abs().max()) < 1e-6
 
 
 def test_turn_about_a_vector():

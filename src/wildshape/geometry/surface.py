@@ -11,7 +11,8 @@ from torch import Tensor
 from wildshape.ops.library import added_kernel
 from wildshape.ops.planes import planes_native
 
-_TINY = 1e-30
+# Squared: how far off a line a neighbourhood is at least that has a plane, of its size.
+_LINE = 1e-20
 
 
 def gathered(points: Float[Tensor, "B P 3"], index: Int64[Tensor, "B *n"]) -> Tensor:
@@ -78,7 +79,8 @@ def thinnest_axis(moments: Float[Tensor, "6 *batch"]) -> Float[Tensor, "*batch 3
     """Unit eigenvector of the smallest eigenvalue of symmetric matrices, in closed form.
 
     Eigenvalues by Smith (1961). The rows of `A - l` lie across the eigenvector: it is the longest
-    of their three cross products. Where two eigenvalues are equal any such vector is given.
+    of their three cross products. Where two eigenvalues are equal any such vector is given. The
+    rows are shares of the matrix's spread: a small cloud is as a large one.
 
     Args:
         moments: xx, xy, xz, yy, yz, zz of each matrix; in float64, for products are subtracted.
@@ -86,20 +88,27 @@ def thinnest_axis(moments: Float[Tensor, "6 *batch"]) -> Float[Tensor, "*batch 3
     middle = (moments[0] + moments[3] + moments[5]) / 3
     a, d, f = (moments[i] - middle for i in (0, 3, 5))
     b, c, e = moments[1], moments[2], moments[4]
-    spread = ((a * a + d * d + f * f + 2 * (b * b + c * c + e * e)) / 6).clamp_min(_TINY).sqrt()
+    spread = ((a * a + d * d + f * f + 2 * (b * b + c * c + e * e)) / 6).sqrt()
+    share = torch.where(spread > 0, 1 / spread, 0.0)
+    a, b, c, d, e, f = (value * share for value in (a, b, c, d, e, f))
     determinant = a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d)
-    angle = (determinant / (2 * spread**3)).clamp(-1, 1).acos() / 3
-    least = 2 * spread * torch.cos(angle + 2 * math.pi / 3)
+    least = 2 * torch.cos((determinant / 2).clamp(-1, 1).acos() / 3 + 2 * math.pi / 3)
     a, d, f = a - least, d - least, f - least
-    crossed = (
-        (b * e - c * d, c * b - a * e, a * d - b * b),
-        (b * f - c * e, c * c - a * f, a * e - b * c),
-        (d * f - e * e, e * c - b * f, b * e - d * c),
-    )
-    best, longest = (torch.zeros_like(a), torch.zeros_like(a), torch.ones_like(a)), 0 * a + _TINY
-    for vector in crossed:
-        length = vector[0].square() + vector[1].square() + vector[2].square()
-        longer = length > longest
-        best = tuple(torch.where(longer, new, old) for new, old in zip(vector, best))
-        longest = torch.where(longer, length, longest)
-    return torch.nn.functional.normalize(torch.stack(best, dim=-1), dim=-1)
+    rows = torch.stack([torch.stack(row, -1) for row in ((a, b, c), (b, d, e), (c, e, f))])
+    crossed = rows[[0, 0, 1]].cross(rows[[1, 2, 2]], dim=-1)
+    found = _longest(crossed)
+    line = found.square().sum(-1, keepdim=True) <= _LINE
+    found = torch.where(line, _across(_longest(rows)), found)
+    return torch.nn.functional.normalize(found, dim=-1)
+
+
+def _longest(vectors: Float[Tensor, "k *batch 3"]) -> Float[Tensor, "*batch 3"]:
+    """Of each k of them."""
+    best = vectors.square().sum(-1).argmax(0)
+    return vectors.gather(0, best[None, ..., None].expand(1, *best.shape, 3))[0]
+
+
+def _across(vectors: Float[Tensor, "*batch 3"]) -> Float[Tensor, "*batch 3"]:
+    """Some vector at right angles to each."""
+    unit = torch.nn.functional.one_hot(vectors.abs().argmin(-1), 3)
+    return vectors.cross(unit.to(vectors.dtype), dim=-1)

@@ -86,8 +86,7 @@ class JointIcpConfig:
         widest_m: width of the robust kernel at first.
         narrower: it narrows by this factor a round.
         narrowest_m: at last.
-        normal_of: points of all scans together that normals are taken from.
-        normal_points: of them, around each point.
+        normal_points: around each point, from which its normal is taken.
         normal_rounds: after so many rounds normals are taken anew.
         holding: how much a point is held in every direction, against sliding; of its normal's 1.
         step: share of a Gauss-Newton step that is taken.
@@ -97,11 +96,10 @@ class JointIcpConfig:
 
     rounds: int = 7
     points: int = 128
-    most: int = 16_384
+    most: int = 8192
     widest_m: float = 0.5
     narrower: float = 0.65
     narrowest_m: float = 0.06
-    normal_of: int = 1024
     normal_points: int = 24
     normal_rounds: int = 4
     holding: float = 0.1
@@ -109,7 +107,7 @@ class JointIcpConfig:
     ridge: float = 1e-3
 
 
-_FINE = JointIcpConfig(rounds=12, points=512, most=4096, widest_m=0.2, holding=0.02)
+_FINE = JointIcpConfig(rounds=12, points=512, normal_rounds=6, widest_m=0.2, holding=0.02)
 _ONTO = JointIcpConfig(points=256)
 
 

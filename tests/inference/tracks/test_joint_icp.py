@@ -20,8 +20,10 @@ from wildshape.inference.tracks.joint_icp import (
     key_scans,
     refine_checked,
     refine_jointly,
+    sampled,
     surest,
     surface_normals,
+    taken_once,
 )
 
 BOXY = drive_by(scans=9, step=2.0, heading=0.3, side=5.0)
@@ -141,6 +143,17 @@ def test_the_normals_of_a_plane_and_a_sphere():
     sphere = 2 * torch.nn.functional.normalize(torch.randn(4000, 3, generator=generator), dim=1)
     cosine = (surface_normals(sphere) * sphere / 2).sum(1).abs()
     assert float(cosine.mean()) > 0.99
+
+
+def test_points_taken_again_say_nothing_about_a_plane():
+    """Scans of 9 and more points, each taken until there are 100."""
+    small = [scan[: 9 + i] for i, scan in enumerate(SCANS)]
+    points = TRUE.to(torch.float32).inverse().apply(torch.from_numpy(sampled(small, 100)))
+    once = taken_once(small, 100)
+    assert once.sum(1).tolist() == [len(scan) for scan in small]
+    found = surface_normals(points.flatten(0, 1), distinct=once.flatten()).view_as(points)
+    assert torch.equal(found[once], surface_normals(points[once]))
+    assert torch.equal(found[0, :9], found[0, 90:99])
 
 
 def test_the_surer_half_and_all_that_are_nearly_as_sure():

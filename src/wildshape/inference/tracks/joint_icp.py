@@ -140,7 +140,7 @@ def refine_jointly(
     if len(scans) < 2:
         return T_sensor_object
     each = max(1, min(config.points, config.most // len(scans)))
-    points = torch.from_numpy(sampled(scans, each))
+    points, first = torch.from_numpy(sampled(scans, each)), taken_once(scans, each)
     start = T_sensor_object.to(torch.float32).inverse()
     T_object_sensor = start
     onto = torch.arange(len(scans)) if onto is None else onto
@@ -148,7 +148,8 @@ def refine_jointly(
     for step in range(config.rounds):
         moved = T_object_sensor.apply(points)
         if step % config.normal_rounds == 0:
-            normals = surface_normals(moved[onto].flatten(0, 1), config).view_as(normals)
+            seen = moved[onto].flatten(0, 1)
+            normals = surface_normals(seen, config, first[onto].flatten()).view_as(normals)
         found = _counterparts(moved, Surface(moved[onto], normals), onto, mirror)
         T_object_sensor = _moved(T_object_sensor, moved, *found, _width(step, config), config)
     back = _as_a_whole(start[onto], T_object_sensor[onto], points[onto], mirror)
@@ -165,9 +166,11 @@ def fused_surface(
     scans: list[Points], T_sensor_object: SE3, config: JointIcpConfig, *, mirror: bool
 ) -> Surface:
     """What some scans show together, `most` points (with `mirror` twice as many), object frame."""
-    points = torch.from_numpy(sampled(scans, config.most // len(scans)))
+    each = config.most // len(scans)
+    points = torch.from_numpy(sampled(scans, each))
     points = T_sensor_object.to(torch.float32).inverse().apply(points).flatten(0, 1)
-    surface = Surface(points, surface_normals(points, config))
+    normals = surface_normals(points, config, taken_once(scans, each).flatten())
+    surface = Surface(points, normals)
     return Surface(*(mirrored(part[None])[0] for part in surface)) if mirror else surface
 
 
@@ -200,14 +203,22 @@ def sampled(scans: list[Points], count: int) -> Float[np.ndarray, "V n 3"]:
     return np.stack([scan[row] for scan, row in zip(scans, rows)])
 
 
+def taken_once(scans: list[Points], count: int) -> Bool[Tensor, "V n"]:
+    """Which of the points that `sampled` gives are no repetition: small scans are taken again."""
+    sizes = torch.tensor([len(scan) for scan in scans])
+    return torch.arange(count) < sizes[:, None]
+
+
 def surface_normals(
-    points: Float[Tensor, "n 3"], config: JointIcpConfig = _TRACK.coarse
+    points: Float[Tensor, "n 3"],
+    config: JointIcpConfig = _TRACK.coarse,
+    distinct: Bool[Tensor, "n"] | None = None,
 ) -> Float[Tensor, "n 3"]:
     """Unit normals: the direction in which the neighbourhood is thinnest.
 
-    Neighbours are taken of every so many points alone, so that they reach beyond the noise.
+    Neighbours are those that are no repetition (`distinct`): one point many times has no plane.
     """
-    some = points[:: max(1, len(points) // config.normal_of)]
+    some = points if distinct is None else points[distinct]
     around = nearest_k(points[None], some[None], min(config.normal_points, len(some))).index
     return planes(some[None], around)[1][0]
 

@@ -9,26 +9,40 @@
 
 #include "vectors.h"
 
-static const double TINY = 1e-30, TURN = 2.0943951023931953; /* a third of a whole one */
+/* LINE: squared, how far off a line a neighbourhood is at least that has a plane, of its size. */
+static const double LINE = 1e-20, TURN = 2.0943951023931953; /* a third of a whole one */
+
+/* Some vector across `row`. */
+static void across(const double *row, double *out)
+{
+    int least = 0;
+    for (int i = 1; i < 3; i++)
+        if (fabs(row[i]) < fabs(row[least]))
+            least = i;
+    const double unit[3] = {least == 0, least == 1, least == 2};
+    cross(row, unit, out);
+}
 
 /* Unit eigenvector of the smallest eigenvalue of a symmetric matrix xx, xy, xz, yy, yz, zz: Smith
- * (1961). It lies across the rows of the matrix less the eigenvalue. */
+ * (1961). It lies across the rows of the matrix less the eigenvalue. These are shares of the
+ * spread: a small cloud is as a large one. */
 static void thinnest_axis(const double *m, double *axis)
 {
-    const double middle = (m[0] + m[3] + m[5]) / 3, b = m[1], c = m[2], e = m[4];
-    double a = m[0] - middle, d = m[3] - middle, f = m[5] - middle;
-    double spread = (a * a + d * d + f * f + 2 * (b * b + c * c + e * e)) / 6;
-    spread = sqrt(spread > TINY ? spread : TINY);
+    const double middle = (m[0] + m[3] + m[5]) / 3;
+    double a = m[0] - middle, b = m[1], c = m[2], d = m[3] - middle, e = m[4], f = m[5] - middle;
+    const double spread = sqrt((a * a + d * d + f * f + 2 * (b * b + c * c + e * e)) / 6);
+    axis[0] = axis[1] = 0;
+    axis[2] = 1;
+    if (!(spread > 0))
+        return;
+    a /= spread, b /= spread, c /= spread, d /= spread, e /= spread, f /= spread;
     const double determinant = a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d);
-    const double cosine = determinant / (2 * spread * spread * spread);
-    const double least = 2 * spread * cos(acos(fmin(fmax(cosine, -1), 1)) / 3 + TURN);
+    const double least = 2 * cos(acos(fmin(fmax(determinant / 2, -1), 1)) / 3 + TURN);
     a -= least;
     d -= least;
     f -= least;
-    const double rows[3][3] = {{a, b, c}, {b, d, e}, {c, e, f}};
-    double longest = TINY;
-    axis[0] = axis[1] = 0;
-    axis[2] = 1;
+    const double rows[3][3] = {{a, b, c}, {b, d, e}, {c, e, f}}, *longest_row = rows[0];
+    double longest = LINE;
     for (int k = 0; k < 3; k++) {
         double crossed[3];
         cross(rows[k == 2], rows[2 - (k == 0)], crossed);
@@ -37,7 +51,11 @@ static void thinnest_axis(const double *m, double *axis)
             longest = length;
             memcpy(axis, crossed, sizeof crossed);
         }
+        if (dot(rows[k], rows[k]) > dot(longest_row, longest_row))
+            longest_row = rows[k];
     }
+    if (longest == LINE)
+        across(longest_row, axis);
     const double length = sqrt(dot(axis, axis));
     for (int i = 0; i < 3; i++)
         axis[i] /= length;
