@@ -21,10 +21,10 @@ from wildshape.drives.object_config import (
 )
 from wildshape.inference.config import InferenceConfig, JointIcpConfig, TrackConfig
 
-_FEW = JointIcpConfig(rounds=6, normal_points=16, normal_rounds=6)
 INFERENCE = InferenceConfig(
     track=TrackConfig(
-        coarse=_FEW, fine=replace(_FEW, points=256, most=4096, widest_m=0.2, holding=0.02)
+        coarse=JointIcpConfig(rounds=6, normal_points=16, normal_rounds=6),
+        fine=replace(TrackConfig().fine, rounds=6, points=256),
     )
 )
 """How `drive` completes objects: tracks in fewer rounds; boxes are as good."""
