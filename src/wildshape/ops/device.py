@@ -35,7 +35,7 @@ def choose_device(device: str | torch.device) -> str:
         kind = ""
     if kind not in ("cpu", "cuda"):
         raise BadInputError(f"device {device!r}: there are cpu, cuda and auto.")
-    if device == "cpu":
+    if kind == "cpu":
         _take_workspace()
     return device
 

@@ -112,6 +112,11 @@ def test_numpy_keeps_its_type_and_float64_digits():
     np.testing.assert_array_equal(np.asarray(T), T.matrix.numpy())
 
 
+def test_whole_numbers_are_not_cut_off():
+    T = SE3(torch.eye(3), torch.tensor([0.5, 0.0, 0.0]))
+    assert T.apply_numpy(np.array([[1, 0, 0]])).tolist() == [[1.5, 0.0, 0.0]]
+
+
 def _with(row, column, value):
     matrix = np.eye(4)
     matrix[row, column] = value

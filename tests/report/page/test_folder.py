@@ -153,7 +153,7 @@ def test_an_evaluation_s_objects_by_our_error(tmp_path: Path) -> None:
     (tmp_path / "scores.json").write_text(json.dumps({"runs": runs}), encoding="utf-8")
     methods = {"identity": {"acc30": 0.31}, "dpc-lidar": {"acc30": 0.5}, "wildshape": {}}
     metrics = {"rotate": "yaw", "methods": methods}
-    methods["wildshape"] = {"acc30": 0.82, "rot_median_deg": 3.0, "trans_median_m": 0.1}
+    methods["wildshape"] = {"acc30": 0.996, "rot_median_deg": 3.0, "trans_median_m": 0.1}
     trust = {"p_pose_error": 0.02, "p_pose_brier": 0.05, "p_pose_brier_constant": 0.08}
     methods["wildshape"] |= trust
     (tmp_path / "metrics.json").write_text(json.dumps(metrics), encoding="utf-8")
@@ -164,7 +164,7 @@ def test_an_evaluation_s_objects_by_our_error(tmp_path: Path) -> None:
     )
     assert report.tables[0].emphasis == (2,)
     reading = report.findings[0]
-    assert "wildshape brings 82 % of them within 30°" in reading
+    assert "wildshape brings 99.6 % of them within 30°" in reading
     assert "best of the others: dpc-lidar, 50 %" in reading
     assert "a right heading that wildshape states is 2 % off" in report.findings[1]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Real
 from torch import Tensor
 
 from wildshape.errors import BadInputError
@@ -128,13 +128,13 @@ class SE3:
         """Carry points `(..., n, 3)` of frame b to frame a."""
         return points @ self.rotation.mT + self.translation[..., None, :]
 
-    def apply_numpy(self, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    def apply_numpy(self, points: Real[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         """`apply` for one array of points, computed in float64, returned in the array's type.
 
-        What this type cannot hold is infinite.
+        What this type cannot hold is infinite. Whole numbers become floating ones.
         """
         rotation, translation = self.rotation.double().numpy(), self.translation.double().numpy()
-        moved = np.empty_like(points)
+        moved = np.empty(points.shape, np.result_type(points, np.float16))
         for start in range(0, len(points), ROWS):
             part = slice(start, start + ROWS)
             with np.errstate(over="ignore"):

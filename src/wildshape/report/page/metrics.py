@@ -199,7 +199,7 @@ def of_run(record: Mapping[str, Any]) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %"
+    return f"{100 * share:.3g} %"
 
 
 def _metres(value: float) -> str:
