@@ -63,3 +63,12 @@ def test_a_second_pass_counts_on_from_the_first_and_from_itself(at, tmp_path: Pa
 def test_a_damaged_file_is_named(tmp_path: Path):
     (tmp_path / "seconds.json").write_text('{"clusters": "soon"}')
     refused(Clock(silent).going_on, tmp_path / "seconds.json", match=r"seconds\.json")
+
+
+def test_who_watches_is_told_how_much_of_which_stage_is_done(tmp_path: Path):
+    told = []
+    watched = Clock(lambda *said: told.append(said)).going_on(tmp_path / "seconds.json", "second ")
+    with watched.stage("completion", 2) as done:
+        done(1)
+        done(2)
+    assert told == [("second completion", 1, 2), ("second completion", 2, 2)]

@@ -59,6 +59,8 @@ def test_the_command_that_is_kept_finds_the_same(tmp_path):
     )
     other = replace(DriveConfig(), trajectory=TrajectoryConfig(voxel_m=1.0))
     assert "from Python" in line_of(Path("a"), Path("out"), None, other, None)
+    plain = line_of(Path("a"), Path("out"), None, DriveConfig(), None)
+    assert plain == "wildshape drive a --out out"
     save_checkpoint(tmp_path / "model.safetensors", ShapePoseNet(CONFIG).eval(), SETTINGS)
     assert load(tmp_path).named == tmp_path
     assert load().named is None

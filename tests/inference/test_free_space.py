@@ -72,6 +72,12 @@ def test_shape_in_free_space_costs_and_what_is_hidden_does_not(track: Track) -> 
     assert float(plain.cost(0.25)) == float(plain.observation + 0.25 * plain.projection)
 
 
+def test_rays_of_which_none_need_agree_are_not_used() -> None:
+    plane, _, sights = half_hidden()
+    assert sights.of(plane, 0) is not None
+    assert sights._replace(config=replace(CONFIG, nearest=0)).of(plane, 0) is None
+
+
 def test_free_space_costs_each_hypothesis_its_own_however_the_scan_is_turned() -> None:
     """Of a wall over half of the view, as above: one shape is half behind it, one is all."""
     plane, scan, sights = half_hidden()

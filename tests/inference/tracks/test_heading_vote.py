@@ -37,6 +37,17 @@ def test_a_scan_that_is_not_sure_at_all_counts_a_little_and_the_shape_twice():
         assert voted_signs(gain, torch.zeros(2), torch.zeros(3)).tolist() == [1.0, sign, 1.0]
 
 
+@pytest.mark.parametrize("odd", [0, 1, 2])
+def test_where_scans_do_not_follow_each_other_the_next_ones_are_heard_too(odd):
+    """The shape speaks a little against one scan; it is turned, unless the others look its way."""
+    gain = torch.full((3,), 1.0)
+    gain[odd] = -0.1
+    turned = [-1.0 if i == odd else 1.0 for i in range(3)]
+    for alike, signs in ((1.0, [1.0] * 3), (0.0, turned), (-1.0, turned)):
+        links = torch.tensor([alike if odd in (i, i + 1) else 1.0 for i in range(2)])
+        assert voted_signs(gain, links, torch.zeros(3)).tolist() == signs
+
+
 def test_of_a_scan_turned_about_the_middle_the_next_says_the_opposite():
     """Wherever the middle lies in the object's frame."""
     middle = 2.5
