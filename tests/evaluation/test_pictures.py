@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects chosen by their error, and how they are drawn."""
 
+import resource
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +26,17 @@ from wildshape.evaluation.pictures import (
 from wildshape.evaluation.protocol import run
 from wildshape.evaluation.results import MethodScores, Results, pooled
 from wildshape.evaluation.summary import curve_of
+
+
+@contextmanager
+def little_room():
+    """No file may grow beyond 5 kB, as on a full disk."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_examples_are_picked_by_error():
@@ -75,6 +88,14 @@ def test_the_pictures_are_of_all_seeds_as_metrics_json_is():
     assert figure is not None
     assert curve is not None
     assert figure.axes[0].lines[0].get_ydata() == pytest.approx(curve.risk)
+
+
+def test_a_figure_that_the_disk_has_no_room_for_is_named_and_not_half_there(tmp_path):
+    results = Results("yaw", 0, (MethodScores("m", (completion("a", 0.1, 0.0),), (), ()),))
+    with pytest.raises(OSError, match="File too large") as error, little_room():
+        write_figures(tmp_path, results, [])
+    assert error.value.filename == str(tmp_path / "errors.png")
+    assert not list(tmp_path.iterdir())
 
 
 def test_examples_and_figures(tmp_path):
