@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects chosen by their error, and how they are drawn."""
 
-import resource
-from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from tests.cars import drive_by
+from tests.disk import full_disk
 from tests.evaluation.scores import completion
 
 from wildshape.baselines.icp import LocalIcp
@@ -26,17 +25,6 @@ from wildshape.evaluation.pictures import (
 from wildshape.evaluation.protocol import run
 from wildshape.evaluation.results import MethodScores, Results, pooled
 from wildshape.evaluation.summary import curve_of
-
-
-@contextmanager
-def little_room():
-    """No file may grow beyond 5 kB, as on a full disk."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_examples_are_picked_by_error():
@@ -92,9 +80,8 @@ def test_the_pictures_are_of_all_seeds_as_metrics_json_is():
 
 def test_a_figure_that_the_disk_has_no_room_for_is_named_and_not_half_there(tmp_path):
     results = Results("yaw", 0, (MethodScores("m", (completion("a", 0.1, 0.0),), (), ()),))
-    with pytest.raises(OSError, match="File too large") as error, little_room():
+    with full_disk(5_000, tmp_path / "errors.png"):
         write_figures(tmp_path, results, [])
-    assert error.value.filename == str(tmp_path / "errors.png")
     assert not list(tmp_path.iterdir())
 
 
