@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.cars import drive_by
+from tests.disk import full_disk
 from tests.evaluation.scores import completion
 
 from wildshape.baselines.icp import LocalIcp
@@ -75,6 +76,13 @@ def test_the_pictures_are_of_all_seeds_as_metrics_json_is():
     assert figure is not None
     assert curve is not None
     assert figure.axes[0].lines[0].get_ydata() == pytest.approx(curve.risk)
+
+
+def test_a_figure_that_the_disk_has_no_room_for_is_named_and_not_half_there(tmp_path):
+    results = Results("yaw", 0, (MethodScores("m", (completion("a", 0.1, 0.0),), (), ()),))
+    with full_disk(5_000, tmp_path / "errors.png"):
+        write_figures(tmp_path, results, [])
+    assert not list(tmp_path.iterdir())
 
 
 def test_examples_and_figures(tmp_path):

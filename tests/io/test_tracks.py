@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 from tests.cars import poses_of, shape_of
+from tests.disk import full_disk
 from tests.io.store.stores import assert_same
 from tests.refusal import refused
 
@@ -156,3 +157,9 @@ def test_names_that_would_not_sort_in_time_become_numbers(track: Track, tmp_path
         found = read_track(folder)
         assert found.scan_names == ("000000", "000001", "000002")
         assert [len(scan) for scan in found.scans] == [60, 20, 33]
+
+
+def test_a_full_disk_names_the_scan(tmp_path: Path) -> None:
+    track = Track("t", (np.ones((1000, 3), np.float32),), ("000000",))
+    with full_disk(5_000, tmp_path / "t" / "scans" / "000000.ply"):
+        write_track(tmp_path / "t", track)

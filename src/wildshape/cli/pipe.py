@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 
 from wildshape.cli.options import is_pipe
 from wildshape.errors import BadInputError
+from wildshape.io.atomic import naming
 
 
 @contextmanager
@@ -32,7 +33,8 @@ def as_file(path: Path, kind: str) -> Iterator[Path]:
     data = _all_of_stdin()
     with TemporaryDirectory(prefix="wildshape.") as folder:
         file = Path(folder) / f"stdin{_suffix(data, kind)}"
-        file.write_bytes(data)
+        with naming(file):
+            file.write_bytes(data)
         try:
             yield file
         except BadInputError as error:

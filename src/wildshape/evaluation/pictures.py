@@ -17,6 +17,7 @@ from wildshape.evaluation.metrics import ACCURATE_DEG
 from wildshape.evaluation.results import MethodScores, Results
 from wildshape.evaluation.risk_coverage import risk_coverage
 from wildshape.evaluation.summary import stated
+from wildshape.io.atomic import atomic_write
 from wildshape.records import Points
 
 if TYPE_CHECKING:
@@ -159,7 +160,6 @@ def draw_confidence(results: Results) -> Figure | None:
 
 def write_figures(folder: Path, results: Results, examples: Sequence[Example]) -> list[Path]:
     """Write `errors.png`, and `confidence.png` and `examples.png` where there is what they show."""
-    folder.mkdir(parents=True, exist_ok=True)
     drawn = {"errors.png": draw_errors(results)}
     confidence = draw_confidence(results)
     if confidence is not None:
@@ -167,5 +167,6 @@ def write_figures(folder: Path, results: Results, examples: Sequence[Example]) -
     if examples:
         drawn["examples.png"] = draw_examples(examples)
     for name, figure in drawn.items():
-        figure.savefig(folder / name, dpi=130)
+        with atomic_write(folder / name) as file:
+            figure.savefig(file, format="png", dpi=130)
     return [folder / name for name in drawn]

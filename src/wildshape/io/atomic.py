@@ -166,6 +166,14 @@ def hold_folder(path: Path) -> Callable[[], None]:
     return let_go
 
 
+def release_folder(path: Path) -> None:
+    """Give up a claim of `lock_folder`, if there is one: another process may go on there."""
+    with suppress(FileNotFoundError):
+        status = path.stat()
+        if (folder := _held.pop((status.st_dev, status.st_ino), None)) is not None:
+            os.close(folder)
+
+
 def release_folders() -> None:
     """Give up all claims of this process."""
     _writers.clear()

@@ -16,7 +16,7 @@ from numpy import ndarray
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.io.atomic import write_json
+from wildshape.io.atomic import naming, write_json
 from wildshape.io.guard import read_json
 from wildshape.io.order import out_of_order
 from wildshape.io.poses import read_poses, write_poses
@@ -337,7 +337,8 @@ def _write_scans(folder: Path, track: Track) -> None:
     shutil.rmtree(aside, ignore_errors=True)  # of a writer that was killed
     aside.mkdir()
     for name, points in zip(file_names(track.scan_names), track.scans):
-        (aside / f"{name}.ply").write_bytes(ply_bytes(points))
+        with naming(folder / "scans" / f"{name}.ply"):
+            (aside / f"{name}.ply").write_bytes(ply_bytes(points))
     aside.replace(folder / "scans")
 
 

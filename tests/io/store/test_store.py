@@ -1,10 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-import errno
 import gc
 import json
 import pickle
-import resource
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
@@ -13,12 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from tests.disk import full_disk
 from tests.io.store.stores import assert_same
 from tests.refusal import refused
 from tests.stopping import stopped_at
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.io.store.index import IndexWriter
 from wildshape.io.store.store import Store, StoreWriter, is_store, open_store
 from wildshape.records import Sensor, Track
 
@@ -108,15 +108,15 @@ def test_verify_names_the_damaged_file(store: Store) -> None:
 
 
 def test_a_full_disk_names_the_shard(tmp_path: Path) -> None:
-    cloud = np.ones((10_000, 3), np.float32)
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, hard))
-    try:
-        with pytest.raises(OSError, match="points-") as full, StoreWriter(tmp_path, {}) as writer:
-            writer.add(Track("large", (cloud,), ("0",)))
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert full.value.errno == errno.EFBIG
+    cloud, shard = np.ones((10_000, 3), np.float32), tmp_path / "points-00000.safetensors"
+    with full_disk(50_000, shard), StoreWriter(tmp_path, {}) as writer:
+        writer.add(Track("large", (cloud,), ("0",)))
+
+
+def test_a_full_disk_names_a_column_of_the_index(tmp_path: Path) -> None:
+    writer = IndexWriter(tmp_path)
+    with full_disk(50_000, tmp_path / ".scan_sizes.part"):
+        writer.extend("scan_sizes", np.zeros(10_000, np.int64))
 
 
 def test_half_written_stores_are_refused(track: Track, tmp_path: Path) -> None:

@@ -4,8 +4,10 @@
 
 import pytest
 from tests.drives.street import street, write_scans
+from tests.io.test_atomic_lock import held
 
-from wildshape.drives.result import REPORT
+from wildshape.drives.result import REPORT, DriveResult
+from wildshape.errors import BadInputError
 from wildshape.inference.predictor import load
 from wildshape.report.drive.many import DriveAndPage, drive_many
 
@@ -34,3 +36,15 @@ def test_several_drives_at_once(tmp_path, request):
         there = tmp_path / "out" / "monday" / name
         assert there.read_bytes() == (alone.out / name).read_bytes(), name
     assert (tmp_path / "out" / "monday" / REPORT).is_file()
+
+
+def test_a_drive_of_many_is_left_to_other_workers(tmp_path):
+    """With --adapt there is a second pass: the worker of the first kept the folder to itself."""
+    scans, out = tmp_path / "scans", tmp_path / "out"
+    write_scans(scans, [scan[::40] for scan in street().scans[:3]])
+    task = DriveAndPage(load(), workers=1, report=False)
+    refused, found = task((tmp_path, out))[1], task((scans, out))[1]
+    assert isinstance(refused, BadInputError)
+    assert isinstance(found, DriveResult)
+    with held(out):
+        pass

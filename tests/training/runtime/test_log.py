@@ -9,6 +9,7 @@ import threading
 import pytest
 from tensorboardX.proto.event_pb2 import Event  # pyright: ignore[reportAttributeAccessIssue]
 from tensorboardX.record_writer import RecordWriter
+from tests.disk import full_disk
 
 from wildshape.training.runtime.log import RunLog
 
@@ -63,3 +64,8 @@ def test_only_whole_entries_are_kept(tmp_path):
     with RunLog(tmp_path, 5):
         pass
     assert (tmp_path / "log.jsonl").read_bytes() == whole
+
+
+def test_a_full_disk_names_the_log(tmp_path):
+    with full_disk(5_000, tmp_path / "log.jsonl"), RunLog(tmp_path, 0) as log:
+        log.write(1, {"note": "x" * 10_000})

@@ -26,7 +26,7 @@ from wildshape.drives.tracking.rays import RayCutter
 from wildshape.drives.writing.folder import SHAPES, TRACKS, TRAJECTORY, TUM
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.complete_folder import COMPLETED, OBJECTS
-from wildshape.io.atomic import write_text
+from wildshape.io.atomic import naming, write_text
 from wildshape.io.boxes.detections import detections_of, pose_of
 from wildshape.io.boxes.table import BoxRow
 from wildshape.io.guard import read_json
@@ -105,7 +105,8 @@ class RayWriter:
         for (path, _), rays in zip(files, found):
             if rays is not None:
                 path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_bytes(rays_bytes(rays))
+                with naming(path):
+                    path.write_bytes(rays_bytes(rays))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import IO
 
 import numpy as np
 
-from wildshape.io.atomic import atomic_write
+from wildshape.io.atomic import atomic_write, naming
 from wildshape.io.store.layout import DTYPES, EXTRAS, INDEX, INDEX_TENSORS, FileRecord
 
 _CODES = {"int64": "q", "int32": "i", "float64": "d", "uint8": "B"}
@@ -128,7 +128,7 @@ class _Column:
         self.path.unlink(missing_ok=True)
 
     def _flush(self) -> None:
-        with self.path.open("ab") as file:
+        with naming(self.path), self.path.open("ab") as file:
             self._recent.tofile(file)
         self._recent = array(_CODES[self._kind])
 

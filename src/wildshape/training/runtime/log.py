@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from wildshape.io.atomic import write_text
+from wildshape.io.atomic import naming, write_text
 
 
 class RunLog:
@@ -27,8 +27,9 @@ class RunLog:
 
     def write(self, step: int, values: dict[str, Any]) -> None:
         """One entry; numbers also go to TensorBoard."""
-        self._file.write(json.dumps({"step": step, **values}) + "\n")
-        self._file.flush()
+        with naming(self.path):
+            self._file.write(json.dumps({"step": step, **values}) + "\n")
+            self._file.flush()
         if self._board is not None:
             self._board.add(step, values)
 
@@ -41,7 +42,8 @@ class RunLog:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._file.close()
+        with naming(self.path):
+            self._file.close()
         if self._board is not None:
             self._board.close()
 
