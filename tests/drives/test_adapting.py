@@ -120,6 +120,20 @@ def test_a_better_model_is_kept_and_says_what_the_first_one_knew(
     assert adapt_to([out], moved, predictor, FEW).model == str(moved / "adapted" / MODEL)
 
 
+def test_half_a_model_is_never_the_adapted_one(out, predictor, tmp_path, monkeypatch):
+    measured(monkeypatch, replace(GOOD, cost_m=0.09))
+
+    def killed(source, target, *_):
+        target.write(source.read(1000))
+        raise Killed
+
+    with monkeypatch.context() as patched, suppress(Killed):
+        patched.setattr(shutil, "copyfileobj", killed)
+        adapt_to([out], tmp_path, predictor, FEW)
+    assert (tmp_path / "adapted" / "run" / "candidate.safetensors").is_file()
+    assert not (tmp_path / "adapted" / MODEL).exists()
+
+
 def test_an_adaptation_of_other_drives_weights_or_steps_is_not_gone_on_with(
     out, predictor, tmp_path, monkeypatch
 ):

@@ -14,6 +14,7 @@ import torch
 import trimesh
 from pyarrow import feather
 from tests.drives.street import HEIGHT
+from tests.io.test_atomic_lock import held
 from tests.refusal import refused
 
 import wildshape
@@ -273,6 +274,8 @@ def test_three_scans_an_empty_and_a_damaged_one_are_warnings(recording, tmp_path
         "3 scans with points: too few to tell which vehicles move",
     )
     assert few.vehicles
+    with held(few.out):  # by `wildshape drive` in a terminal, say
+        pass
 
 
 def test_what_is_no_drive_is_refused(tmp_path):

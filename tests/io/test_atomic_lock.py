@@ -11,7 +11,7 @@ import pytest
 from tests.refusal import refused
 
 from wildshape.errors import BadInputError
-from wildshape.io.atomic import hold_folder, lock_folder, release_folders
+from wildshape.io.atomic import hold_folder, lock_folder, release_folders, released_after
 
 pytest.importorskip("fcntl", reason="this system has no locks of folders")
 HOLDER = (
@@ -76,3 +76,18 @@ def test_after_a_writer_other_processes_may_write(tmp_path):
     with held(tmp_path), pytest.raises(BadInputError, match="another process"):
         hold_folder(tmp_path)
     hold_folder(tmp_path)
+
+
+def test_claims_end_with_the_outermost_block_and_earlier_ones_stay(tmp_path):
+    out, below, before = tmp_path / "out", tmp_path / "out" / "below", tmp_path / "out" / "before"
+    lock_folder(before)
+    with released_after(out):
+        with released_after(out):
+            lock_folder(out)
+            lock_folder(below)
+        with pytest.raises(AssertionError), held(out):  # refused: the outer block is at work
+            pass
+    with held(out), held(below):
+        pass
+    with pytest.raises(AssertionError), held(before):
+        pass

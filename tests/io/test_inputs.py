@@ -12,6 +12,7 @@ from tests.packed import packed
 from tests.refusal import refused
 
 from wildshape.errors import BadInputError
+from wildshape.io.fingerprint import fingerprint_of
 from wildshape.io.inputs import open_tracks
 from wildshape.io.rays import write_rays
 from wildshape.io.scans.points import Coordinates, read_points
@@ -99,6 +100,19 @@ def test_bad_scans_are_counted_and_listed_once(dataset: Path) -> None:
         assert [len(track.scans) for track in source] == [2]
     names = [name for name, _ in source.skipped]
     assert names == ["a/000011.ply", "b/000010.ply", "b/000011.ply", "b/000012.ply", "b"]
+
+
+def test_a_scan_whose_link_leads_nowhere_is_skipped_and_told(dataset: Path) -> None:
+    away, scan = dataset / "on a disk that is away.ply", dataset / "a" / "scans" / "000011.ply"
+    scan.rename(away)
+    scan.symlink_to(away)
+    there = fingerprint_of(dataset)
+    away.rename(away.with_suffix(""))
+    source = open_tracks(dataset)
+    assert [len(track.scans) for track in source] == [2, 3]
+    ((name, why),) = source.skipped
+    assert (name, why.endswith("no such file; check the path.")) == ("a/000011.ply", True)
+    assert fingerprint_of(dataset) != there
 
 
 def test_dropped_points_are_listed(tmp_path: Path, cloud: np.ndarray) -> None:

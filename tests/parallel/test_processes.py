@@ -13,12 +13,18 @@ from itertools import count
 from pathlib import Path
 from threading import Event, Thread
 
+import numpy as np
 import pytest
 
+from wildshape.datasets.tracks.conversion import Part
+from wildshape.drives.tracking.sightings import Sightings
 from wildshape.errors import BadInputError
+from wildshape.io import inputs
 from wildshape.parallel import processes
 from wildshape.parallel.handout import Handout
+from wildshape.parallel.helper import name_of
 from wildshape.parallel.team import ALONE, cores, team
+from wildshape.records import Track
 
 PLAIN_SCRIPT = """
 import time
@@ -229,8 +235,26 @@ def test_what_a_killed_helper_held_is_done_again_and_once(two, tmp_path):
 
 
 def test_what_kills_every_helper_is_given_up(two, tmp_path):
-    with pytest.raises(BadInputError, match=r"^\d+: the process .* ended early 3 times"):
+    with pytest.raises(BadInputError, match=r"^number \d+: the process .* ended early 3 times"):
         list(two.as_done(KilledAlways(tmp_path), range(10)))
+
+
+SEEN = [Sightings(f"{number:04d}", (0, 1), ((0,), (1,)), (40, 50)) for number in range(16)]
+
+
+@pytest.mark.parametrize(
+    ("item", "name"),
+    [
+        (Part(3, "sequence 03"), "sequence 03"),
+        (inputs.Part(0, Track("car-17", (np.zeros((20, 3), np.float32),), ("0",)), 0, 1), "car-17"),
+        ((Path("raw/monday"), Path("out/monday")), str(Path("raw/monday"))),
+        (SEEN, "0000 and 15 more"),
+        (SEEN[4:5], "0004"),
+        (np.arange(5), "some of the work"),
+    ],
+)
+def test_a_lost_item_is_told_by_a_short_name(item, name):
+    assert name_of(item) == name
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from wildshape.drives.tracking.detections import DetectionFile, find_detections
 from wildshape.drives.writing.files import DriveFiles
 from wildshape.drives.writing.folder import BOXES, FRAMES
 from wildshape.inference.predictor import Predictor, load
+from wildshape.io.atomic import released_after
 from wildshape.io.output import begin, finished, keep_apart, remove_leftovers
 from wildshape.method.checkpoint import weights_file
 from wildshape.parallel.team import ALONE, Team, team
@@ -78,25 +79,26 @@ def drive(
     keep_apart(out, source, predictor.named and weights_file(predictor.named))
     settings = settings_of(source, recording, topic, config, predictor, detections)
     line = line_of(source, out, topic, config, detections, predictor.named)
-    second_pass.put_in_place(out)
-    run = Pipeline(recording, out, config, predictor, ALONE, given, Clock(watch))
-    done = None if overwrite else finished(out, "drive", settings, parts=(BOXES, FRAMES))
-    if done is None:
-        output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
-        soon = Pipeline.__module__ if len(recording) >= _LONG else None
-        with output.abandoned_if_refused(), team(workers, soon=soon) as helpers:
-            clock = run.clock.going_on(run.stages / SECONDS)
-            found = replace(run, helpers=helpers, clock=clock).perform()
-        output.finish(result={**asdict(found), "out": str(out)})
-    else:
-        remove_leftovers(out)  # of a second pass, or of the files asked for
-        found = earlier_result(out, done)
-    if isinstance(adapt, AdaptConfig):
-        from wildshape.drives.adapting.adapt import adapt_to
+    with released_after(out):
+        second_pass.put_in_place(out)
+        run = Pipeline(recording, out, config, predictor, ALONE, given, Clock(watch))
+        done = None if overwrite else finished(out, "drive", settings, parts=(BOXES, FRAMES))
+        if done is None:
+            output = begin(out, "drive", settings, FILES, overwrite=overwrite, line=line)
+            soon = Pipeline.__module__ if len(recording) >= _LONG else None
+            with output.abandoned_if_refused(), team(workers, soon=soon) as helpers:
+                clock = run.clock.going_on(run.stages / SECONDS)
+                found = replace(run, helpers=helpers, clock=clock).perform()
+            output.finish(result={**asdict(found), "out": str(out)})
+        else:
+            remove_leftovers(out)  # of a second pass, or of the files asked for
+            found = earlier_result(out, done)
+        if isinstance(adapt, AdaptConfig):
+            from wildshape.drives.adapting.adapt import adapt_to
 
-        adapt = adapt_to([out], out, predictor, adapt, watch=watch)
-    if adapt is not None and adapt.model and not second_pass.is_done(out, adapt.model):
-        with team(workers) as helpers:
-            found = replace(run, helpers=helpers).again(adapt.model, found)
-    files.write(out)
-    return found
+            adapt = adapt_to([out], out, predictor, adapt, watch=watch)
+        if adapt is not None and adapt.model and not second_pass.is_done(out, adapt.model):
+            with team(workers) as helpers:
+                found = replace(run, helpers=helpers).again(adapt.model, found)
+        files.write(out)
+        return found

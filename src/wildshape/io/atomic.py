@@ -28,8 +28,9 @@ _TAKEN = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES)
 _MASK = Lock()  # between setting and setting back, another thread would read what is set
 _CLAIM = Lock()
 _Folder = tuple[int, int]  # device and inode
-_held: dict[_Folder, int] = {}
+_held: dict[_Folder, tuple[int, Path]] = {}  # its descriptor and place
 _writers: dict[_Folder, object] = {}
+_kept: set[Path] = set()
 
 
 @contextmanager
@@ -129,7 +130,7 @@ def lock_folder(path: Path) -> None:
                 " another place to write."
             ) from error
         return
-    _held[status.st_dev, status.st_ino] = folder
+    _held[status.st_dev, status.st_ino] = folder, path.resolve()
 
 
 def hold_folder(path: Path) -> Callable[[], None]:
@@ -161,21 +162,34 @@ def hold_folder(path: Path) -> Callable[[], None]:
             return
         del _writers[folder]
         if mine is not None and _held.get(folder) == mine:
-            os.close(_held.pop(folder))
+            os.close(_held.pop(folder)[0])
 
     return let_go
 
 
-def release_folder(path: Path) -> None:
-    """Give up a claim of `lock_folder`, if there is one: another process may go on there."""
-    with suppress(FileNotFoundError):
-        status = path.stat()
-        if (folder := _held.pop((status.st_dev, status.st_ino), None)) is not None:
-            os.close(folder)
+@contextmanager
+def released_after(path: Path) -> Iterator[None]:
+    """Claims of `lock_folder` in the block on a folder, and below it, end with the block.
+
+    Those that were there before stay, and within such a block around this one all do.
+    """
+    place, before = path.resolve(), set(_held)
+    if place in _kept:
+        yield
+        return
+    _kept.add(place)
+    try:
+        yield
+    finally:
+        _kept.discard(place)
+        for folder, (descriptor, at) in tuple(_held.items()):
+            if folder not in before and at.is_relative_to(place):
+                del _held[folder]
+                os.close(descriptor)
 
 
 def release_folders() -> None:
     """Give up all claims of this process."""
     _writers.clear()
     while _held:
-        os.close(_held.popitem()[1])
+        os.close(_held.popitem()[1][0])

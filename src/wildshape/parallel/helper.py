@@ -14,6 +14,7 @@ import subprocess
 import sys
 import traceback
 from collections.abc import Callable
+from pathlib import Path
 from queue import SimpleQueue
 from threading import Lock, Thread
 from typing import Any, BinaryIO, cast
@@ -73,8 +74,8 @@ class Helper:
                 raise made
             return made
         raise LostWorkersError(
-            f"{item}: the process that worked on it ended early {_ATTEMPTS} times, perhaps for"
-            " lack of memory; see its message above, or use fewer --workers."
+            f"{name_of(item)}: the process that worked on it ended early {_ATTEMPTS} times, perhaps"
+            " for lack of memory; see its message above, or use fewer --workers."
         )
 
     def close(self) -> None:
@@ -121,6 +122,23 @@ class Helper:
             self._process.kill()
             self._process.communicate()
             self._process = None
+
+
+def name_of(item: object) -> str:
+    """What a message calls an item: its text would be a page, or a bare number."""
+    match item:
+        case str() | Path():
+            return str(item)
+        case int():
+            return f"number {item}"
+        case (Path() as source, _):
+            return str(source)
+        case list() if item:
+            more = f" and {len(item) - 1} more" if len(item) > 1 else ""
+            return name_of(item[0]) + more
+        case _:
+            name = getattr(item, "name", getattr(getattr(item, "track", None), "name", None))
+            return name if isinstance(name, str) else "some of the work"
 
 
 def _start() -> "subprocess.Popen[bytes]":

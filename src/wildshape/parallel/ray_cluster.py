@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from uuid import uuid4
 
 from wildshape.errors import BadInputError, LostWorkersError, load_library
-from wildshape.parallel.helper import guarded
+from wildshape.parallel.helper import guarded, name_of
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -100,7 +100,7 @@ class RayCluster:
             made = self._ray.get(done)
         except self._ray.exceptions.RayError as lost:
             raise LostWorkersError(
-                f"{item}: the Ray workers that worked on it were lost {_RETRIES + 1} times"
+                f"{name_of(item)}: the Ray workers that worked on it were lost {_RETRIES + 1} times"
                 f" ({type(lost).__name__}); look at the cluster's logs, then repeat the command."
             ) from lost
         if isinstance(made, Exception):

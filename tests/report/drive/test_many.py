@@ -9,6 +9,7 @@ from tests.io.test_atomic_lock import held
 from wildshape.drives.result import REPORT, DriveResult
 from wildshape.errors import BadInputError
 from wildshape.inference.predictor import load
+from wildshape.report.drive import many
 from wildshape.report.drive.many import DriveAndPage, drive_many
 
 pytest.importorskip("kiss_icp")
@@ -36,6 +37,23 @@ def test_several_drives_at_once(tmp_path, request):
         there = tmp_path / "out" / "monday" / name
         assert there.read_bytes() == (alone.out / name).read_bytes(), name
     assert (tmp_path / "out" / "monday" / REPORT).is_file()
+
+
+def test_a_drive_is_claimed_until_its_report_is_written(tmp_path, monkeypatch):
+    scans, out = tmp_path / "scans", tmp_path / "out"
+    write_scans(scans, [scan[::40] for scan in street().scans[:3]])
+    claimed = []
+
+    def report(*_):
+        with pytest.raises(AssertionError), held(out):
+            pass
+        claimed.append(out)
+
+    monkeypatch.setattr(many, "write_drive_report", report)
+    DriveAndPage(load(), workers=1).find(scans, out)
+    assert claimed == [out]
+    with held(out):
+        pass
 
 
 def test_a_drive_of_many_is_left_to_other_workers(tmp_path):

@@ -133,6 +133,7 @@ def run(settings: Settings) -> None:
         BadInputError: a source, the model or the output cannot be used.
         MissingExtraError: a library is not installed.
     """
+    from wildshape.io.atomic import released_after
     from wildshape.parallel.team import team
 
     work = settings.work
@@ -140,7 +141,8 @@ def run(settings: Settings) -> None:
         _run(settings, work.workers)
         return
     # A helper imports what it needs while this process does.
-    with team(work.workers, soon="wildshape.drives.pipeline") as helpers:
+    soon = "wildshape.drives.pipeline"
+    with released_after(settings.out), team(work.workers, soon=soon) as helpers:
         _run(settings, helpers)
 
 
@@ -241,8 +243,7 @@ def _answer(
         data["workers"] = done.workers
     answer("\n".join(said), data, as_json=settings.json)
     if done.refused:
-        reasons = " ".join(done.refused.values())
-        count = len(done.refused)
+        count, reasons = len(done.refused), " ".join(done.refused.values())
         raise BadInputError(f"{count} of {count + len(done.found)} drives not done: {reasons}")
 
 
@@ -350,8 +351,7 @@ def _sentence(found: "DriveResult") -> str:
 
     for warning in found.warnings:
         say(f"{found.out.name}: {warning}")
-    page = found.out / REPORT
-    vehicles = counted(len(found.vehicles), "vehicle")
+    page, vehicles = found.out / REPORT, counted(len(found.vehicles), "vehicle")
     return (
         f"found {vehicles}, {found.moving} of them moving, in {counted(found.frames, 'scan')}"
         f" in {duration(sum(found.seconds.values()))} with {counted(found.workers, 'worker')};"

@@ -21,7 +21,7 @@ from wildshape.drives.clock import Watch, silent
 from wildshape.drives.result import identity_of
 from wildshape.errors import BadInputError
 from wildshape.inference.predictor import Predictor
-from wildshape.io.atomic import write_json
+from wildshape.io.atomic import atomic_write, write_json
 from wildshape.io.guard import read_json, read_record, reading, record_of
 from wildshape.io.output import MARKER, begin, finished, is_begun
 from wildshape.io.progress import counted, duration
@@ -185,7 +185,8 @@ class _Adapting:
         worse = after.worse_than(before)
         model = None if worse else self.folder / MODEL
         if model is not None:
-            shutil.copyfile(candidate, model)
+            with candidate.open("rb") as made, atomic_write(model, flush=True) as file:
+                shutil.copyfileobj(made, file)
         return Adaptation(
             None if model is None else _weights_in(self.folder),
             len(trained),

@@ -135,7 +135,9 @@ class ScanFile:
 
 def is_scan_file(path: Path) -> bool:
     """Whether the suffix is one that `read_points` knows and the file is not hidden."""
-    return path.suffix.lower() in _READERS and not path.name.startswith(".") and path.is_file()
+    if path.suffix.lower() not in _READERS or path.name.startswith("."):
+        return False
+    return path.is_file() or (path.is_symlink() and not path.exists())  # a lost one is to be told
 
 
 def read_points(

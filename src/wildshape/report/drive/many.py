@@ -15,7 +15,7 @@ from wildshape.drives.tracking.detections import DetectionFile
 from wildshape.drives.writing.files import DriveFiles
 from wildshape.errors import BadInputError
 from wildshape.inference.predictor import Predictor
-from wildshape.io.atomic import release_folder
+from wildshape.io.atomic import released_after
 from wildshape.io.progress import SILENT, Progress
 from wildshape.parallel.team import Team, cores, team
 from wildshape.report.drive.page import write_drive_report
@@ -53,7 +53,7 @@ class DriveAndPage:
             BadInputError: source, detections or output cannot be used.
             MissingExtraError: a library is not installed.
         """
-        with team(self.workers) as helpers:
+        with released_after(out), team(self.workers) as helpers:
             found = drive(
                 source,
                 out,
@@ -80,8 +80,6 @@ class DriveAndPage:
             return source, self.find(source, out)
         except BadInputError as error:
             return source, error
-        finally:
-            release_folder(out)  # the next pass over it may be another worker's
 
 
 @dataclass(frozen=True)
