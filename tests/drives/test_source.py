@@ -177,6 +177,8 @@ def test_what_cannot_be_a_drive_is_refused_in_a_sentence(folder, tmp_path):
     refused(open_drive, folder, match="not finite")
     (folder / "times.txt").write_text("100\n200\n300\n500\n")
     refused(open_drive, folder, match="100 s from one scan to the next; write its times in seconds")
+    (folder / "times.txt").write_text("".join(f"{at / 600}\n" for at in range(4)))  # minutes
+    refused(open_drive, folder, match="0.00166667 s from one scan .*; write its times in seconds")
     (folder / "times.txt").unlink()
     (folder / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
     refused(open_drive, folder, match="1 lines of poses for 4 scans")

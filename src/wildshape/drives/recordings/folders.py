@@ -32,6 +32,7 @@ _TEXT = (".txt", ".csv")
 _RECORDINGS = (*STORAGES, *SUFFIXES)  # that are one file each
 _FEWEST_POINTS = 1000  # of a whole scan
 _LONGEST_STEP_S = 20.0  # more are milliseconds, or smaller units
+_SHORTEST_STEP_S = 0.005  # less are minutes, hours or days: no sensor takes so many scans
 _OBJECTS = "velodyne_objects_xyz0"  # a drive of KITTI raw cut down to its vehicles
 
 
@@ -131,8 +132,8 @@ def _drive(
             raise BadInputError(
                 f"{path}: {len(times)} times for {len(files)} scans; give a line a scan."
             )
-        step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-        if step > _LONGEST_STEP_S:
+        step = float(np.median(np.diff(times))) if len(times) > 1 else _LONGEST_STEP_S
+        if step > _LONGEST_STEP_S or 0 < step < _SHORTEST_STEP_S:
             raise BadInputError(
                 f"{path}: {step:.6g} s from one scan to the next; write its times in seconds."
             )
