@@ -189,6 +189,18 @@ def test_evaluate_says_that_true_poses_are_the_wrong_way_round(
     assert "poses.txt holds T_sensor_object" in found.err
 
 
+def test_evaluate_says_so_of_later_tracks_too(wildshape, dataset, trained, tmp_path):
+    for name in ("a", "b", "c", "d"):
+        poses = shutil.copytree(dataset / "000000", tmp_path / "data" / name) / "poses.txt"
+        if name in "bd":
+            write_poses(poses, read_poses(poses).inverse())
+    words = ("--model", trained, "--baselines", "none", "--seeds", "2", "--rotate", "yaw")
+    found = wildshape("evaluate", tmp_path / "data", "--out", tmp_path / "out", *words)
+    assert found.err.count("by its true poses") == 1
+    assert "b: by its true poses its scans lie " in found.err
+    assert "m off its true shape (1 more track likewise)" in found.err
+
+
 def test_what_the_model_was_not_made_for_is_said(wildshape, dataset, trained, tmp_path):
     scans = dataset / "000000" / "scans"
     for i in range(2):

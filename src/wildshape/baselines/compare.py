@@ -22,7 +22,7 @@ from wildshape.inference.evaluation_adapter import Learned
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.inputs import TrackSource, open_tracks
 from wildshape.io.output import begin, keep_apart
-from wildshape.io.progress import SILENT, Progress
+from wildshape.io.progress import SILENT, Progress, counted
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates
 from wildshape.io.store.store import is_store, open_store
 from wildshape.method.checkpoint import MODEL, fingerprint, weights_file
@@ -35,6 +35,10 @@ OURS = "wildshape"
 
 FILES = ("metrics.json", "scores.json", "table.md", "errors.png", "confidence.png", "examples.png")
 Model = Predictor | Dpc
+_POSES_CURE = (
+    "poses.txt holds T_sensor_object, shape.ply is in the object's frame and of the scans' unit,"
+    " label_size_m is length, width, height in metres"
+)
 
 
 @dataclass(frozen=True)
@@ -121,11 +125,8 @@ def compare(
     baselines = {name: baseline(name) for name in options.baselines if name != "none"}
     source = open_tracks(data, options.coordinates)
     first = _first_with_poses(source)
-    if odd := misplaced(first):
-        progress.say(
-            f"{first.name}: {odd}; poses.txt holds T_sensor_object, shape.ply is in the object's"
-            " frame and of the scans' unit, label_size_m is length, width, height in metres"
-        )
+    if told := misplaced(first):  # at once: what follows may take hours
+        progress.say(f"{first.name}: {told}; {_POSES_CURE}")
     models = load_models(options.models, options.device, raw=options.raw)
     for told in _other_sensors(source, models):
         progress.say(told)
@@ -144,11 +145,23 @@ def compare(
     output = begin(out, "evaluate", identity, FILES, overwrite=options.overwrite, progress=progress)
     with output.abandoned_if_refused(), team(options.workers, options.ray) as helpers:
         measure = partial(evaluate_once, progress=progress, helpers=helpers)
+        odd: dict[str, str] = {}
         runs = [
-            measure(source, {**baselines, **rows}, options.rotate, seed, options.max_scans)
+            measure(
+                source,
+                {**baselines, **rows},
+                options.rotate,
+                seed,
+                options.max_scans,
+                odd=None if seed else odd,
+            )
             for seed, rows in enumerate(evaluated)
         ]
         workers = helpers.worked
+    if others := [(name, told) for name, told in odd.items() if name != first.name]:
+        name, told = others[0]
+        more = f" ({counted(len(others) - 1, 'more track')} likewise)" if others[1:] else ""
+        progress.say(f"{name}: {told}{more}; {_POSES_CURE}")
     for told in (*source.doubts, *_of_two_kinds(source), *_seen_in_training(data, models)):
         progress.say(told)
     if pooled:

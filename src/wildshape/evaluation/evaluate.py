@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from wildshape.datasets.tracks.truth import misplaced
 from wildshape.evaluation.examples import gather
 from wildshape.evaluation.method import Method
 from wildshape.evaluation.protocol import run as run_protocol
@@ -16,6 +17,7 @@ from wildshape.evaluation.tables import markdown, write_table
 from wildshape.io.inputs import TrackSource
 from wildshape.io.progress import SILENT, Progress
 from wildshape.parallel.team import ALONE, Team
+from wildshape.records import Track
 
 
 def evaluate_once(
@@ -26,6 +28,7 @@ def evaluate_once(
     max_scans: int | None,
     progress: Progress = SILENT,
     helpers: Team = ALONE,
+    odd: dict[str, str] | None = None,
 ) -> Results:
     """The protocol under one seed; what cannot be read is skipped in every row.
 
@@ -37,13 +40,22 @@ def evaluate_once(
         max_scans: take this many scans of a longer track, evenly.
         progress: is told how many tracks are done.
         helpers: who does the work.
+        odd: is told, by track, where true poses put scans elsewhere (`misplaced`).
     """
     limits = Limits(max_scans=max_scans)
+    tracks = source if odd is None else _looked_at(source, odd)
     with progress.bar(f"evaluating, seed {seed}", len(source)) as bar:
-        found = run_protocol(methods, source, rotate, seed, bar.at, limits=limits, helpers=helpers)
+        found = run_protocol(methods, tracks, rotate, seed, bar.at, limits=limits, helpers=helpers)
     unusable = tuple(_unusable(source))
     rows = tuple(replace(row, skipped=(*row.skipped, *unusable)) for row in found.methods)
     return replace(found, methods=rows)
+
+
+def _looked_at(source: TrackSource, odd: dict[str, str]) -> Iterator[Track]:
+    for track in source:
+        if track.T_sensor_object is not None and (told := misplaced(track)):
+            odd[track.name] = told
+        yield track
 
 
 def _unusable(source: TrackSource) -> Iterator[Skipped]:
