@@ -140,7 +140,7 @@ def refine_jointly(
     if len(scans) < 2:
         return T_sensor_object
     each = max(1, min(config.points, config.most // len(scans)))
-    points, first = torch.from_numpy(sampled(scans, each)), taken_once(scans, each)
+    points, once = torch.from_numpy(sampled(scans, each)), taken_once(scans, each)
     start = T_sensor_object.to(torch.float32).inverse()
     T_object_sensor = start
     onto = torch.arange(len(scans)) if onto is None else onto
@@ -149,7 +149,7 @@ def refine_jointly(
         moved = T_object_sensor.apply(points)
         if step % config.normal_rounds == 0:
             seen = moved[onto].flatten(0, 1)
-            normals = surface_normals(seen, config, first[onto].flatten()).view_as(normals)
+            normals = surface_normals(seen, config, once[onto].flatten()).view_as(normals)
         found = _counterparts(moved, Surface(moved[onto], normals), onto, mirror)
         T_object_sensor = _moved(T_object_sensor, moved, *found, _width(step, config), config)
     back = _as_a_whole(start[onto], T_object_sensor[onto], points[onto], mirror)
