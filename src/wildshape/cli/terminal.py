@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
@@ -118,6 +118,26 @@ class Terminal:
 
 
 TERMINAL = Terminal()
+
+
+@contextmanager
+def stage_bars(first: str = "") -> Iterator[Callable[[str, int, int], None]]:
+    """A bar of progress a stage, told by its name, what is done, and the total.
+
+    `first` is said before the first: after all that is refused before any work.
+    """
+    with ExitStack() as stack:
+        bars: dict[str, Bar] = {}
+
+        def watch(stage: str, done: int, total: int) -> None:
+            if not bars and first:
+                say(first)
+            if stage not in bars:
+                stack.pop_all().close()
+                bars[stage] = stack.enter_context(TERMINAL.bar(stage, total))
+            bars[stage].at(done)
+
+        yield watch
 
 
 class _Lines:

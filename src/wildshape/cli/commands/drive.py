@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`wildshape drive`: every vehicle of a raw recording, without labels."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -28,7 +26,6 @@ from wildshape.errors import BadInputError
 if TYPE_CHECKING:
     from wildshape.drives.adapting.adapt import Adaptation
     from wildshape.drives.adapting.config import AdaptConfig
-    from wildshape.drives.clock import Watch
     from wildshape.drives.result import DriveResult
     from wildshape.drives.tracking.detections import DetectionFile
     from wildshape.drives.writing.files import DriveFiles
@@ -148,7 +145,7 @@ def run(settings: Settings) -> None:
 
 def _run(settings: Settings, workers: "int | Team | None") -> None:
     with uncollected():
-        from wildshape.cli.terminal import say
+        from wildshape.cli.terminal import say, stage_bars
         from wildshape.drives.config import INFERENCE, DriveConfig
         from wildshape.drives.writing.files import DriveFiles
         from wildshape.inference.predictor import load
@@ -181,7 +178,7 @@ def _run(settings: Settings, workers: "int | Team | None") -> None:
         if first.refused:  # an adaptation of the others would stand in the way of all
             _answer(first, None, settings, several=several)
         outs = [found.out for found in first.found]
-        with _bars("") as watch:
+        with stage_bars() as watch:
             change = adapt_to(
                 outs, settings.out, task.predictor, adapt, overwrite=task.overwrite, watch=watch
             )
@@ -203,11 +200,12 @@ def _adapt(settings: Settings) -> "AdaptConfig | None":
 def _one(
     task: "DriveAndPage", folders: dict[Path, Path], drives: dict[Path, str], settings: Settings
 ) -> "DrivesResult":
+    from wildshape.cli.terminal import stage_bars
     from wildshape.report.drive.many import DrivesResult
 
     del settings
     ((source, out),) = folders.items()
-    with _bars(drives[source]) as watch:
+    with stage_bars(drives[source]) as watch:
         found = task.find(source, out, watch)
     return DrivesResult([found], {}, found.workers)
 
@@ -243,7 +241,8 @@ def _answer(
         data["workers"] = done.workers
     answer("\n".join(said), data, as_json=settings.json)
     if done.refused:
-        count, reasons = len(done.refused), " ".join(done.refused.values())
+        reasons = " ".join(done.refused.values())
+        count = len(done.refused)
         raise BadInputError(f"{count} of {count + len(done.found)} drives not done: {reasons}")
 
 
@@ -322,28 +321,6 @@ def _folders(settings: Settings, drives: list[Path]) -> dict[Path, Path]:
     return found
 
 
-@contextmanager
-def _bars(taken_for: str) -> "Iterator[Watch]":
-    """A bar of progress a stage; before the first: after all that is refused before any work."""
-    from contextlib import ExitStack
-
-    from wildshape.cli.terminal import TERMINAL, say
-    from wildshape.io.progress import Bar
-
-    with ExitStack() as stack:
-        bars: dict[str, Bar] = {}
-
-        def watch(stage: str, done: int, total: int) -> None:
-            if not bars and taken_for:
-                say(taken_for)
-            if stage not in bars:
-                stack.pop_all().close()
-                bars[stage] = stack.enter_context(TERMINAL.bar(stage, total))
-            bars[stage].at(done)
-
-        yield watch
-
-
 def _sentence(found: "DriveResult") -> str:
     from wildshape.cli.terminal import say
     from wildshape.drives.result import REPORT
@@ -351,7 +328,8 @@ def _sentence(found: "DriveResult") -> str:
 
     for warning in found.warnings:
         say(f"{found.out.name}: {warning}")
-    page, vehicles = found.out / REPORT, counted(len(found.vehicles), "vehicle")
+    page = found.out / REPORT
+    vehicles = counted(len(found.vehicles), "vehicle")
     return (
         f"found {vehicles}, {found.moving} of them moving, in {counted(found.frames, 'scan')}"
         f" in {duration(sum(found.seconds.values()))} with {counted(found.workers, 'worker')};"
