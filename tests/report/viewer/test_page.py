@@ -5,8 +5,9 @@
 import time
 from dataclasses import replace
 
+import numpy as np
 import pytest
-from tests.report.viewer.shown import source
+from tests.report.viewer.shown import SIZE, source
 
 pytest.importorskip("viser", reason="did not run: viser is not installed (extra view)")
 from wildshape.errors import BadInputError
@@ -41,3 +42,13 @@ def test_a_track_that_cannot_be_read_does_not_leave_another_in_its_place():
         page.choose(0)
         _wait(page, "car &lt;b&gt;")
         assert page.stage is not None
+
+
+def test_the_whole_object_is_looked_at_though_little_of_it_was_seen():
+    good = source()
+    corner = replace(good.track(0), scans=tuple(scan[:2] for scan in good.track(0).scans))
+    with serving(replace(good, track=lambda _: corner)) as page:
+        page.opened = True
+        _wait(page, "confidence")
+        far = np.linalg.norm(page.server.initial_camera.position)
+        assert far > max(SIZE)

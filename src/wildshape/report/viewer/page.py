@@ -132,9 +132,12 @@ class Page:
         self.stage = stage
         self.status = "completing ..."
         self.panel.fit(stage.track)
-        size = stage.extent()
-        aim(self.server, np.zeros(3), size * np.array((0.75, -0.95, 0.65)))
+        self._aim(stage)
         self.refresh()
+
+    def _aim(self, stage: Stage) -> None:
+        """Show the whole object: as large as its box, or before there is one, as its scan."""
+        aim(self.server, np.zeros(3), stage.extent() * np.array((0.75, -0.95, 0.65)))
 
     def _make(self, number: int, turn: int) -> None:
         """Whatever is made of the scans goes to the scene as it comes, the one shown first."""
@@ -150,6 +153,8 @@ class Page:
                 if turn != self.turn:
                     return
                 stage.add(scan, done)
+                if len(stage.completions) == 1:
+                    self._aim(stage)
                 of = counted(total, "scan")
                 self.status = f"completed {len(stage.completions)} of {of} ..."
                 due = time.monotonic() - spoke > _SPEAK_SECONDS
