@@ -16,7 +16,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import tyro
@@ -53,6 +53,7 @@ class Settings:
         count: drives.
         scans: of each.
         workers: processes of each.
+        sensor: whose scans they are.
     """
 
     out: Path
@@ -60,18 +61,20 @@ class Settings:
     count: int = 3
     scans: int = 80
     workers: int = 2
+    sensor: Literal["hdl64", "hdl32", "os1-128"] = "hdl64"
 
 
 def main(settings: Settings) -> None:
     """Run every drive, then write and print the table."""
     seeds = [str(settings.first + number) for number in range(settings.count)]
     everything = f"{seeds[0]}-{seeds[-1]}"
-    out = settings.out / f"{everything}-of-{settings.scans}-scans"
+    named = "" if settings.sensor == "hdl64" else f"-{settings.sensor}"
+    out = settings.out / f"{everything}-of-{settings.scans}-scans{named}"
     by = out / f"by-{fingerprint(None)}"
     for seed in seeds:
         street, found = out / "streets" / seed, by / "found" / seed
         drive = ("--drive", "--scans", str(settings.scans), "--seed", seed)
-        _step(street, "simulate", str(street), *drive)
+        _step(street, "simulate", str(street), *drive, "--sensor", settings.sensor)
         scans = str(street / "velodyne" / "0000")
         workers = ("--workers", str(settings.workers))
         _step(found, "drive", scans, "--out", str(found), *workers, "--overwrite")

@@ -244,8 +244,8 @@ def test_a_scan_is_read_once_for_the_way_and_its_clusters(recording, tmp_path):
     frames = []
     object.__setattr__(drive, "read", lambda frame: frames.append(frame) or read(frame))
     cutter = Cutter(drive, LEVEL, tmp_path / "cuts", DriveConfig())
-    turns = map(cutter.landmarks, range(len(drive)))
-    found = find_trajectory(drive, LEVEL, DriveConfig(), turns=turns)
+    scans = map(cutter.landmarks, range(len(drive)))
+    found = find_trajectory(drive, LEVEL, DriveConfig(), scans=scans)
     assert frames == list(range(len(drive)))
     assert cutter.missing() == []
     alone = find_trajectory(drive, LEVEL, DriveConfig())

@@ -64,24 +64,22 @@ def test_points_are_where_one_place_sees_them_and_the_way_is_truer(simulated):
     assert off < 0.9 * off_without
 
 
-@pytest.mark.parametrize("stamped_s", [-0.05, 0.05])
+@pytest.mark.parametrize("stamped_s", [-0.05, 0.0, 0.05])
 def test_the_way_is_as_true_where_a_scan_is_stamped_at_its_first_or_last_point(stamped_s):
     """About the first point an error of the speed came back in the next step, turned round."""
     street = WholeDrive(StreetConfig(scans=40, sensor="hdl32", speed=10.0), 3)
     scans = [street.scan(frame) for frame in range(40)]
 
-    def stamped(off_s):
-        turns = [Turn(scan.points, scan.times - off_s) for scan in scans]
-        at = [scan.time + off_s for scan in scans]
-        names = [f"{frame:06d}" for frame in range(40)]
-        drive = Drive.of("street", names, turns.__getitem__, at)
-        way = find_trajectory(drive, find_mounting(drive, CONFIG.mounting), CONFIG)
-        assert way.breaks.frames == ()
-        true = np.stack([street.sensor_pose(np.array([time]))[0] for time in at])
-        true = np.linalg.inv(true[0]) @ true
-        return np.abs(way.T_world_sensor.matrix.numpy() - true)[:, :3, 3].max()
-
-    assert stamped(stamped_s) < 1.5 * stamped(0.0)
+    turns = [Turn(scan.points, scan.times - stamped_s) for scan in scans]
+    at = [scan.time + stamped_s for scan in scans]
+    names = [f"{frame:06d}" for frame in range(40)]
+    drive = Drive.of("street", names, turns.__getitem__, at)
+    way = find_trajectory(drive, find_mounting(drive, CONFIG.mounting), CONFIG)
+    assert way.breaks.frames == ()
+    true = np.stack([street.sensor_pose(np.array([time]))[0] for time in at])
+    true = np.linalg.inv(true[0]) @ true
+    off = np.abs(way.T_world_sensor.matrix.numpy() - true)[:, :3, 3]
+    assert off.max() < 0.12  # of 40 m; the sensor sways within a turn
 
 
 def test_the_way_is_as_true_where_the_first_scan_is_empty(simulated):

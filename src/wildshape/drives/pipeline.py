@@ -163,8 +163,8 @@ class Pipeline:
         with self.clock.stage("trajectory", len(self.drive)) as at:
             if not path.is_file():
                 cutter = self.cutter(mounting)
-                turns = self.helpers.in_order(cutter.landmarks, range(len(self.drive)))
-                found = find_trajectory(self.drive, mounting, self.config, at, turns)
+                scans = self.helpers.in_order(cutter.landmarks, range(len(self.drive)))
+                found = find_trajectory(self.drive, mounting, self.config, at, scans)
                 write_json(self.stages / "breaks.json", asdict(found.breaks))
                 write_trajectories(self.out, self.drive, found.T_world_sensor)
             return read_poses(path, len(self.drive))

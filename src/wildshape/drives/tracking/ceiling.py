@@ -16,7 +16,7 @@ def at_ceiling(
     level: Points, away: Float[np.ndarray, "n"], config: TrajectoryConfig
 ) -> Bool[np.ndarray, "n"]:
     """Which points lie at a ceiling or above it, if what is overhead nearby has one height."""
-    overhead = (away < config.ground_m) & (level[:, 2] > config.overhead * away)
+    overhead = (away < config.overhead_m) & (level[:, 2] > config.overhead * away)
     if overhead.sum() < _FEWEST_POINTS:
         return np.zeros(len(level), bool)
     height, far = level[overhead, 2], away[overhead]

@@ -19,6 +19,7 @@ from jaxtyping import Float
 from wildshape.drives.config import MountingConfig
 from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.rotation import smallest_turn
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points
 
@@ -122,12 +123,8 @@ class Mounting:
 
     def levelling(self) -> SE3:
         """`T_level_sensor`: the smallest turn after which z is vertical; the origin stays."""
-        up = torch.tensor(self.up, dtype=torch.float64)
-        x, y, z = self.up
-        axis = torch.tensor(((0.0, 0.0, -x), (0.0, 0.0, -y), (x, y, 0.0)), dtype=torch.float64)
-        # Rodrigues' formula; `axis` is the cross product's matrix times the sine.
-        turn = torch.eye(3, dtype=torch.float64) + axis + axis @ axis / (1.0 + z)
-        return SE3(turn, torch.zeros_like(up))
+        turn = torch.from_numpy(smallest_turn(np.array(self.up), np.array((0.0, 0.0, 1.0))))
+        return SE3(turn, torch.zeros(3, dtype=torch.float64))
 
     def level(self, scan: Points) -> Points:
         """A scan with z vertical."""

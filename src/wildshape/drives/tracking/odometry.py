@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""From scan to scan by KISS-ICP (Vizzo et al., RA-L 2023); what is done where one does not fit."""
+"""From scan to scan by KISS-ICP (Vizzo et al., RA-L 2023); what is done where one does not fit.
+
+KISS-ICP lays points on points. A sensor's lines on walls rise or fall as it comes nearer, which
+turns its pitch a little in each scan. The ground holds it level.
+"""
 
 from itertools import product
 from typing import TYPE_CHECKING
@@ -10,6 +14,7 @@ import torch
 from jaxtyping import Float
 
 from wildshape.drives.config import TrajectoryConfig
+from wildshape.drives.tracking.ground_map import GroundMap
 from wildshape.errors import load_library
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import Twist
@@ -30,14 +35,16 @@ class Odometry:
 
     Attributes:
         motion: of the sensor, after the last scan.
+        up: the vertical in the sensor frame, unit length.
+        ground: that holds it level.
         lost: frames that did not fit.
         timed: how many scans had times of their points.
         untimed: the other frames.
     """
 
-    def __init__(self, config: TrajectoryConfig, motion: Twist) -> None:
-        self.config, self.motion = config, motion
-        self.kiss = _kiss_icp(config)
+    def __init__(self, config: TrajectoryConfig, motion: Twist, up: Float[np.ndarray, "3"]) -> None:
+        self.config, self.motion, self.up = config, motion, up
+        self.kiss, self.ground = _kiss_icp(config), GroundMap(config, up)
         self.lost: list[int] = []
         self.timed, self.untimed = 0, list[int]()
         self._before: Float[np.ndarray, "n 3"] | None = None
@@ -59,8 +66,8 @@ class Odometry:
         step = SE3.from_matrix(self.kiss.last_delta)
         self.motion = Twist.between(SE3.identity(), step, seconds)
 
-    def follow(self, scan: Points, frame: int) -> None:
-        """Go one scan on."""
+    def follow(self, scan: Points, ground: Points, frame: int) -> None:
+        """Go one scan on; `scan`: what stands on the ground."""
         pose, step = self.kiss.last_pose, self.kiss.last_delta
         there = _registered(self.kiss, scan)
         fit = 1.0 if self._before is None else self._fit(there)
@@ -68,10 +75,17 @@ class Odometry:
             self.kiss, there = found
         elif fit < self.config.least_fit:
             self.lost.append(frame)
-            self.kiss = _kiss_icp(self.config)
+            self.kiss, self.ground = _kiss_icp(self.config), GroundMap(self.config, self.up)
             self.kiss.last_pose, self.kiss.last_delta = pose, step
             there = _registered(self.kiss, scan)
         self._before, self._scan_before = there, scan
+        self._level(ground)
+
+    def _level(self, ground: Points) -> None:
+        found = self.kiss.last_pose
+        levelled = self.ground.levelled(found, ground)
+        self.kiss.last_delta = self.kiss.last_delta @ np.linalg.inv(found) @ levelled
+        self.kiss.last_pose = levelled
 
     def _from_afar(
         self, scan: Points, pose: Float[np.ndarray, "4 4"]

@@ -16,12 +16,12 @@ from wildshape.drives.source import Drive
 from wildshape.drives.tracking.ceiling import at_ceiling
 from wildshape.drives.tracking.clusters import find_clusters
 from wildshape.drives.tracking.ground import height_above_ground
+from wildshape.drives.tracking.landmarks import Landmarks, landmarks
 from wildshape.drives.tracking.mounting import Mounting
-from wildshape.drives.tracking.trajectory import landmarks
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import atomic_write
 from wildshape.io.guard import reading
-from wildshape.records import Points, Turn
+from wildshape.records import Points
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class Cutter:
         scan = self.drive.corrected(frame, turn)
         self._write(frame, scan, self._heights(scan), turn.points)
 
-    def landmarks(self, frame: int) -> Turn:
+    def landmarks(self, frame: int) -> Landmarks:
         """What odometry sees of a frame, which is cut on the way.
 
         One whose points have times is not: it must be corrected for the motion first.

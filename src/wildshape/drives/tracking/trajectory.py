@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The way of the sensor through a drive, by LiDAR odometry.
 
-Rings of a level sensor on a flat road look the same wherever it
-stands and hold the odometry back, so ground is used near the sensor alone, for height and tilt. So
-do those of a flat ceiling, of which nothing is used.
+Rings of a level sensor on a flat road look the same wherever it stands and hold the odometry back,
+so the ground tells height and tilt alone. So do those of a flat ceiling, of which nothing is used.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -18,16 +17,14 @@ from jaxtyping import Float
 
 from wildshape.drives.config import DriveConfig, LinkConfig, TrajectoryConfig
 from wildshape.drives.source import HALF_TICK, Drive
-from wildshape.drives.tracking.ceiling import at_ceiling
 from wildshape.drives.tracking.given_poses import held_back, misfit
-from wildshape.drives.tracking.ground import height_above_ground
+from wildshape.drives.tracking.landmarks import Landmarks, landmarks_of
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.drives.tracking.odometry import FEWEST_POINTS, Odometry
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import STANDING, Twist
 from wildshape.io.guard import read_record
 from wildshape.io.progress import counted
-from wildshape.ops.connected import first_of_cells
 from wildshape.records import Turn
 
 FIRST_SCANS = 3  # tell the motion at the beginning, and whether points have times
@@ -97,7 +94,7 @@ def find_trajectory(
     mounting: Mounting,
     config: DriveConfig,
     at: Callable[[int], None] = lambda _: None,
-    turns: Iterable[Turn] | None = None,
+    scans: Iterable[Landmarks] | None = None,
 ) -> Way:
     """The way of the sensor; the world is the sensor frame of the first frame.
 
@@ -112,7 +109,7 @@ def find_trajectory(
         mounting: of its sensor.
         config: see there.
         at: told how many scans are done.
-        turns: the landmarks of each frame, in order; by default they are found here.
+        scans: the landmarks of each frame, in order; by default they are found here.
 
     Raises:
         MissingExtraError: KISS-ICP is not installed.
@@ -120,36 +117,41 @@ def find_trajectory(
     if drive.T_world_sensor is not None:
         breaks = Breaks(misfit=misfit(drive, mounting, config))
         return Way(drive.T_world_sensor[0].inverse() @ drive.T_world_sensor, breaks)
-    if turns is None:
-        turns = (_landmarks_of(drive.turn(frame), mounting, config) for frame in range(len(drive)))
-    rest = iter(turns)
+    if scans is None:
+        scans = (landmarks_of(drive.turn(frame), mounting, config) for frame in range(len(drive)))
+    up = np.array(mounting.up)
+    rest = iter(scans)
     begin = list(islice(rest, _TRIED_SCANS))
     first = begin[:FIRST_SCANS]
     motion = STANDING
-    if any(turn.seconds is not None for turn in first):  # the first scan may be empty
-        motion = _follow(drive, first, config, motion)[1].motion
-    poses, odometry = _follow(drive, chain(begin, rest), config, motion, at)
+    if any(scan.standing.seconds is not None for scan in first):  # the first scan may be empty
+        motion = _follow(drive, first, config, motion, up)[1].motion
+    poses, odometry = _follow(drive, chain(begin, rest), config, motion, up, at)
     T_world_sensor = SE3.from_matrix(np.linalg.inv(poses[0]) @ np.stack(poses))
     untimed = tuple(odometry.untimed) if odometry.timed else ()
     wrong = ""
     if not odometry.lost:
         wrong = held_back(drive, T_world_sensor, mounting, config)
-        if not wrong and _far(poses[: len(begin)]) < _GOES_M:
-            wrong = _may_drive(drive, begin, config)
+        if not wrong and _far(poses[:FIRST_SCANS]) < _GOES_M:
+            wrong = _may_drive(drive, begin, config, up)
     return Way(T_world_sensor, Breaks(tuple(odometry.lost), wrong, untimed))
 
 
-def _may_drive(drive: Drive, turns: list[Turn], config: DriveConfig) -> str:
+def _may_drive(
+    drive: Drive, scans: list[Landmarks], config: DriveConfig, up: Float[np.ndarray, "3"]
+) -> str:
     """A sentence if a sensor that is taken to stand goes on if it is taken to drive.
 
-    What goes along with it, and walls that look alike all along, fit where it stands.
+    What goes along with it, and walls that look alike all along, fit where it stands. The ground
+    fits wherever it is taken to be and holds it there.
     """
-    if len(turns) < 2 or min(len(turn.points) for turn in turns) < FEWEST_POINTS:
+    if len(scans) < 2 or min(len(scan.standing.points) for scan in scans) < FEWEST_POINTS:
         return ""
     ahead = torch.tensor((_TRIED_M, 0.0, 0.0), dtype=torch.float64)
     step = SE3(torch.eye(3, dtype=torch.float64), ahead)
     driving = Twist.between(SE3.identity(), step, _seconds(drive, 0, 1))
-    poses, odometry = _follow(drive, turns, config, driving)
+    held = (Landmarks(scan.whole, scan.ground) for scan in scans)
+    poses, odometry = _follow(drive, held, config, driving, up)
     if odometry.lost or _far(poses[-2:]) < _GOES_M:
         return ""
     return (
@@ -165,22 +167,26 @@ def _far(poses: "list[Float[np.ndarray, '4 4']]") -> float:
 
 def _follow(
     drive: Drive,
-    turns: Iterable[Turn],
+    scans: Iterable[Landmarks],
     config: DriveConfig,
     motion: Twist,
+    up: Float[np.ndarray, "3"],
     at: Callable[[int], None] = lambda _: None,
 ) -> "tuple[list[Float[np.ndarray, '4 4']], Odometry]":
-    """Poses of the first frames, and the odometry after them; `motion`: before them.
+    """Poses of the first frames, and the odometry after them.
+
+    `motion`: of the sensor before them; `up`: the vertical in its frame.
 
     A turn is followed at its own middle, wherever in it the scan's stamp lies. About its first
     point, an error of the speed would come back in the next step as large, and turned round. A
     step takes half of what a turn lasts at least: stamps may be late. A scan of hardly any points
     is placed, and else left out as if it were missing.
     """
-    odometry = Odometry(config.trajectory, motion)
+    odometry = Odometry(config.trajectory, motion, up)
     longest = _longest_guess(drive, config.trajectory)
     poses, last, step, before = [], 0, 0, 0.0  # of the last scan followed; before: its middle
-    for frame, turn in enumerate(turns):
+    for frame, scan in enumerate(scans):
+        turn = scan.standing
         few = len(turn.points) < FEWEST_POINTS
         middle = 0.0 if few else _middle(turn)
         since = _seconds(drive, last, frame) + middle - before
@@ -193,7 +199,8 @@ def _follow(
         since = max(since, _lasts(turn) / 2)
         if drive.ticks[frame] - drive.ticks[last] != step:  # KISS-ICP guesses the last step again
             odometry.expect(min(since, longest))
-        odometry.follow(_since(turn, middle).carried(odometry.motion), frame)
+        seen = (_since(one, middle).carried(odometry.motion) for one in (turn, scan.ground))
+        odometry.follow(*seen, frame)
         if frame:
             odometry.learn(since)
         pose = odometry.kiss.last_pose.copy()
@@ -230,25 +237,6 @@ def _longest_guess(drive: Drive, config: TrajectoryConfig) -> float:
     """How long a motion is believed to go on: seconds, or scans where no times are known."""
     steps = np.diff(drive.times or drive.ticks)
     return config.longest_guess * float(np.median(steps)) if len(steps) else 0.0
-
-
-def landmarks(
-    turn: Turn, heights: Float[np.ndarray, "n"], mounting: Mounting, config: DriveConfig
-) -> Turn:
-    """What stands on the ground, and the ground near the sensor: a point a cell, as in KISS-ICP."""
-    level = mounting.level(turn.points)
-    away = np.hypot(level[:, 0], level[:, 1])
-    used = (away < config.trajectory.ground_m) | (heights > config.trajectory.standing_m)
-    kept = np.flatnonzero(used & ~at_ceiling(level, away, config.trajectory))
-    some = turn.points.take(kept, axis=0)
-    first = first_of_cells(some, config.trajectory.voxel_m / 2)
-    kept = kept[first]
-    return Turn(some.take(first, axis=0), None if turn.seconds is None else turn.seconds[kept])
-
-
-def _landmarks_of(turn: Turn, mounting: Mounting, config: DriveConfig) -> Turn:
-    heights = height_above_ground(mounting.level(turn.points), mounting.height_m, config.ground)
-    return landmarks(turn, heights, mounting, config)
 
 
 def usual_step_m(T_world_sensor: SE3, ticks: tuple[int | float, ...]) -> float:

@@ -51,6 +51,20 @@ def cross_matrix(vector: Float[Tensor, "*batch 3"]) -> Float[Tensor, "*batch 3 3
     return torch.stack((zero, -z, y, z, zero, -x, -y, x, zero), dim=-1).unflatten(-1, (3, 3))
 
 
+def smallest_turn(
+    start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "3 3"]:
+    """The smallest rotation that takes one unit vector to another, by Rodrigues' formula.
+
+    Args:
+        start: unit vector.
+        end: unit vector, not opposite to it.
+    """
+    x, y, z = np.cross(start, end)
+    axis = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))  # times the angle's sine
+    return np.eye(3) + axis + axis @ axis / (1.0 + start @ end)
+
+
 def rotation_from_vector(vector: Float[Tensor, "*batch 3"]) -> Float[Tensor, "*batch 3 3"]:
     """The turn about a vector by its length in radians (Rodrigues)."""
     angle = vector.norm(dim=-1)[..., None, None]
