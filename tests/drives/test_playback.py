@@ -14,6 +14,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from tests.drives.finished_drive import CARS, FRAMES, HEIGHT, SIZE, finished_drive
+from tests.refusal import refused
 
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.detections import DetectionFile, find_detections
@@ -161,6 +162,23 @@ def test_a_library_that_is_absent_is_named_before_any_work(monkeypatch, module, 
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(MissingExtraError, match=rf"wildshape\[{extra}\]"):
         DriveFiles(mcap=extra == "mcap", rerun=extra == "rerun").check()
+
+
+@pytest.mark.parametrize(
+    ("file", "instead", "said"),
+    [
+        ("trajectory.tum", "", "5 poses for 6 scans"),
+        ("frames.csv", "1,000001,,3400\n", "damaged"),
+        ("frames.csv", "1,000001,0.5,3400\n", "its times do not rise"),
+    ],
+)
+def test_a_drive_of_which_a_line_was_changed_is_refused(tmp_path, file, instead, said):
+    """It would be read with the times of other scans."""
+    path = finished_drive(tmp_path).out / file
+    lines = path.read_text().splitlines(keepends=True)
+    lines[2] = instead
+    path.write_text("".join(lines))
+    refused(read_finished, path.parent, match=f"{file}: .*{said}")
 
 
 def test_without_the_recording_there_are_no_scans(found, tmp_path):
