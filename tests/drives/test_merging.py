@@ -80,3 +80,13 @@ def test_those_that_stand_are_compared_once_and_only_where_they_may_touch(monkey
     assert len(compared) == 1
     assert there.overlap(one, far) == 0.0
     assert len(compared) == 1
+
+
+def test_two_share_a_place_if_they_do_around_their_completed_scans():
+    """Ways that lead apart before and after; one vehicle seen badly twice."""
+    frames = tuple(range(10, 15))
+    one, other = (
+        completed([(f, 0.1 * side * (f - 12), 0.0, 0.0) for f in frames], frames, name=str(side))
+        for side in (-1, 1)
+    )
+    assert places(30).share(one, other)
