@@ -20,13 +20,16 @@ from tests.stopping import Killed
 from wildshape.drives.adapting import adapt, second_pass
 from wildshape.drives.adapting.adapt import adapt_to
 from wildshape.drives.adapting.config import AdaptConfig
-from wildshape.drives.adapting.examples import examples_of
+from wildshape.drives.adapting.examples import Example, examples_of, split
 from wildshape.drives.adapting.fine_tuning import recipe_of
-from wildshape.drives.adapting.measures import Measures
+from wildshape.drives.adapting.measures import Measures, clear_headed
 from wildshape.drives.result import DriveResult
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.predictor import Predictor, load
+from wildshape.inference.tracks.heading_vote import turned_where
 from wildshape.method.checkpoint import MODEL, load_checkpoint
 from wildshape.method.network import ShapePoseNet
+from wildshape.records import Box, Completion
 from wildshape.training import loop
 from wildshape.training.setup import split_tracks
 
@@ -64,6 +67,47 @@ def test_an_example_looks_where_its_boxes_look(out):
         _, _, yaw = places[0]
         fronts = found[f"found-{name}"].fronts
         assert fronts == pytest.approx(np.tile((np.cos(yaw), np.sin(yaw), 0.0), (3, 1)), abs=1e-6)
+
+
+def test_a_scan_whose_box_was_taken_away_is_refused(tmp_path):
+    out = finished_drive(tmp_path).out
+    lines = (out / "boxes.csv").read_text().splitlines(keepends=True)
+    (out / "boxes.csv").write_text(
+        "".join(one for one in lines if not one.startswith("2,0.2,0003"))
+    )
+    refused(examples_of, [out], FEW, match="boxes.csv: no box of track '0003' in scan 000002")
+
+
+def test_headings_are_the_share_that_looks_as_the_boxes_do(out):
+    one = examples_of([out], FEW)[0]
+    fronts = torch.from_numpy(one.fronts)
+    across = torch.stack((-fronts[:, 1], fronts[:, 0], fronts[:, 2]), -1)
+    up = torch.tensor((0.0, 0.0, 1.0)).double().expand(len(fronts), 3)
+    T_sensor_object = SE3(torch.stack((fronts, across, up), -1), torch.zeros_like(fronts))
+    turned = turned_where(T_sensor_object, torch.tensor((1.0, -1.0, 1.0)), 0.0)
+    box = Box((0.0, 0.0, 0.0), (4.0, 2.0, 1.5), (1.0, 0.0, 0.0, 0.0))
+    nothing = np.empty((0, 3), np.float32)
+    done = [Completion(nothing, turned[i], box, 0.5, branch=0, cost=0.1) for i in range(3)]
+    assert one.share_alike(done) == pytest.approx(2 / 3)
+
+
+def test_a_share_of_whole_tracks_is_held_out():
+    examples = [Example(f"{i}", (), np.empty((0, 3)), False) for i in range(12)]
+    trained, held = split(examples, AdaptConfig(held_out=0.25))
+    assert (len(trained), len(held)) == (9, 3)
+    assert {one.name for one in trained + held} == {one.name for one in examples}
+
+
+def test_only_what_drives_or_looks_clearly_one_way_is_learnt_from(out, predictor, monkeypatch):
+    examples = examples_of([out], FEW)
+
+    def kept(share):
+        monkeypatch.setattr(Example, "share_alike", lambda *_: share)
+        found = clear_headed(predictor, examples, replace(FEW, clear=0.75), lambda _: None)
+        return {one.name for one in found}
+
+    assert kept(0.75) == {one.name for one in examples}
+    assert kept(0.5) == {one.name for one in examples if one.moving}
 
 
 def test_examples_after_a_second_pass_are_of_the_first(tmp_path):

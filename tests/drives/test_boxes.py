@@ -62,6 +62,13 @@ def test_two_scans_of_one_moment_tell_no_velocity():
     assert off(smooth(pairs, still(82), BoxConfig())) < 1.0
 
 
+def test_short_gaps_have_boxes_and_long_ones_none():
+    one = completed([(0.0, 0.0, 0.0, 0.0)] * 2, (0, 40))
+    seen = replace(one, seen=one.seen.part([0, 1, 11, 40]))
+    way = smooth(seen, still(41), BoxConfig(longest_gap=10))
+    assert way.frames == (*range(12), 40)
+
+
 def test_what_stands_takes_no_more_memory_in_a_longer_drive():
     one, turns = completed([(0.0, 0.0, 0.0, 0.0)] * 3), still(20000)
     tracemalloc.start()

@@ -38,11 +38,13 @@ def test_one_scan_that_looks_aside_turns_no_other_around():
     np.testing.assert_array_equal(found.boxes[:, 3], yaws)
 
 
-def test_one_scan_turns_no_vehicle_around_that_creeps():
-    boxes = [(0.28 * f, 0.0, 0.0, 0.0 if f else math.pi) for f in range(12)]
+@pytest.mark.parametrize("yaw", [0.0, 2.0])
+def test_one_scan_turns_no_vehicle_around_that_creeps(yaw):
+    x, y = 0.28 * math.cos(yaw), 0.28 * math.sin(yaw)
+    boxes = [(x * f, y * f, 0.0, yaw if f else yaw + math.pi) for f in range(12)]
     found = faced(completed(boxes, tuple(range(0, 48, 4))), still(48), BoxConfig())
     assert not found.turned
-    assert np.abs(np.sin(found.boxes[:, 3] / 2)).max() < 1e-6
+    assert np.abs(np.sin((found.boxes[:, 3] - yaw) / 2)).max() < 1e-6
 
 
 def test_a_stray_place_at_the_end_turns_no_vehicle_around():

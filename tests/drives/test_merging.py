@@ -12,7 +12,7 @@ from tests.models import CONFIG, SETTINGS
 
 from wildshape.drives.clock import Clock, silent
 from wildshape.drives.completing import merging
-from wildshape.drives.completing.cluster_association import associate
+from wildshape.drives.completing.cluster_association import associate, in_box
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.config import BoxConfig, DriveConfig, MergeConfig
 from wildshape.drives.pipeline import Pipeline
@@ -80,3 +80,21 @@ def test_those_that_stand_are_compared_once_and_only_where_they_may_touch(monkey
     assert len(compared) == 1
     assert there.overlap(one, far) == 0.0
     assert len(compared) == 1
+
+
+def test_two_share_a_place_if_they_do_around_their_completed_scans():
+    """Ways that lead apart before and after; one vehicle seen badly twice."""
+    frames = tuple(range(10, 15))
+    one, other = (
+        completed([(f, 0.1 * side * (f - 12), 0.0, 0.0) for f in frames], frames, name=str(side))
+        for side in (-1, 1)
+    )
+    assert places(30).share(one, other)
+
+
+def test_points_just_around_a_box_belong_to_it():
+    box, size = np.array((0.0, 0.0, 0.0, np.pi / 2)), (4.0, 2.0, 1.5)
+    ends = np.diag((1.0, 2.0, 0.75)).astype(np.float32)  # its length lies along y
+    for sign in (1, -1):
+        assert in_box(sign * (ends + 0.15 * np.eye(3, dtype=np.float32)), box, size, 0.2).all()
+        assert not in_box(sign * (ends + 0.25 * np.eye(3, dtype=np.float32)), box, size, 0.2).any()

@@ -11,17 +11,24 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from tests.drives.finished_drive import CARS, FRAMES, HEIGHT, SIZE, finished_drive
+from tests.refusal import refused
 
+from wildshape.drives.completing.level_frame import boxes_in_scans
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.detections import DetectionFile, find_detections
 from wildshape.drives.writing.files import DriveFiles, detections_of
 from wildshape.drives.writing.finished import read_finished
 from wildshape.drives.writing.playback.mcap import write_mcap
 from wildshape.errors import MissingExtraError
+from wildshape.geometry.transforms.rotation import rotation_from_vector
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.folders.box_files import BoxFiles
+from wildshape.io.boxes.table import BoxRow, write_box_table
+from wildshape.io.poses import write_poses
 from wildshape.records import Turn
 
 
@@ -161,6 +168,41 @@ def test_a_library_that_is_absent_is_named_before_any_work(monkeypatch, module, 
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(MissingExtraError, match=rf"wildshape\[{extra}\]"):
         DriveFiles(mcap=extra == "mcap", rerun=extra == "rerun").check()
+
+
+@pytest.mark.parametrize(
+    ("file", "instead", "said"),
+    [
+        ("trajectory.tum", "", "5 poses for 6 scans"),
+        ("frames.csv", "1,000001,,3400\n", "damaged"),
+        ("frames.csv", "1,000001,0.5,3400\n", "its times do not rise"),
+    ],
+)
+def test_a_drive_of_which_a_line_was_changed_is_refused(tmp_path, file, instead, said):
+    """It would be read with the times of other scans."""
+    path = finished_drive(tmp_path).out / file
+    lines = path.read_text().splitlines(keepends=True)
+    lines[2] = instead
+    path.write_text("".join(lines))
+    refused(read_finished, path.parent, match=f"{file}: .*{said}")
+
+
+def test_boxes_seen_by_a_tilted_sensor_are_read_as_they_were(tmp_path):
+    out = finished_drive(tmp_path).out
+    tilted = torch.tensor([(0.1, -0.2, 0.3 * frame) for frame in range(FRAMES)]).double()
+    T_world_sensor = SE3(rotation_from_vector(tilted), torch.ones(FRAMES, 3).double())
+    places = np.tile((9.0, -4.0, -0.8, 2.5), (FRAMES, 1))
+    boxes = boxes_in_scans(places, SIZE, T_world_sensor)
+    write_poses(out / "trajectory.txt", T_world_sensor)
+    rows = [
+        BoxRow(i, 0.1 * i, "a", *box.centre, *box.size, box.yaw, 0.9, 200, moving=False)
+        for i, box in enumerate(boxes)
+    ]
+    write_box_table(out / "boxes.csv", rows)
+    (found,) = read_finished(out).vehicles
+    for one, box in zip(found.boxes, boxes, strict=True):
+        assert one.centre == pytest.approx(box.centre, abs=1e-3)
+        assert one.quaternion_wxyz == pytest.approx(box.quaternion_wxyz, abs=1e-3)
 
 
 def test_without_the_recording_there_are_no_scans(found, tmp_path):

@@ -245,6 +245,14 @@ def test_an_object_out_of_sight_goes_on_and_one_gone_too_long_does_not():
     assert len(link(gone, config)) == 2
 
 
+def test_the_longer_one_was_out_of_sight_the_farther_off_it_may_be():
+    config = LinkConfig()
+    at = (0.0, config.gate_m + 2 * config.gate_per_tick_m)
+    for unseen, count in ((0, 2), (3, 1)):
+        scans = [*(seen(i, (0.0, 0.0)) for i in range(5)), seen(5 + unseen, at)]
+        assert len(link(scans, config)) == count
+
+
 def test_a_fast_one_is_followed_from_its_first_scan_on():
     scans = [seen(i, (60.0 - 2.7 * i, 3.0), (5.0, -3.0)) for i in range(12)]  # 97 km/h
     assert [one.frames for one in link(scans, LinkConfig())] == [list(range(12))] * 2

@@ -15,7 +15,8 @@ from wildshape.drives.adapting.second_pass import first_pass_of
 from wildshape.drives.completing.completion import CATEGORY
 from wildshape.drives.tracking.mounting import Mounting
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle, read_finished
-from wildshape.drives.writing.folder import TRACKS
+from wildshape.drives.writing.folder import BOXES, TRACKS
+from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detections import pose_of
 from wildshape.io.guard import read_record
@@ -86,11 +87,17 @@ def split(examples: Sequence[Example], config: AdaptConfig) -> tuple[list[Exampl
 def _example(
     drive: FinishedDrive, one: FoundVehicle, T_level_sensor: SE3, config: AdaptConfig
 ) -> Example:
-    track = read_track(first_pass_of(drive.out) / TRACKS / one.name)
-    place = {name: frame for frame, name in enumerate(drive.scan_names)}
-    boxes = dict(zip(one.frames, one.boxes))
+    found = first_pass_of(drive.out)
+    track = read_track(found / TRACKS / one.name)
+    boxes = dict(zip((drive.scan_names[frame] for frame in one.frames), one.boxes))
+    for name in track.scan_names:
+        if name not in boxes:
+            raise BadInputError(
+                f"{found / BOXES}: no box of track '{one.name}' in scan {name}; run"
+                " `wildshape drive` anew with --overwrite."
+            )
     full = [
-        (boxes[place[name]], scan)
+        (boxes[name], scan)
         for name, scan in zip(track.scan_names, track.scans)
         if len(scan) >= config.fewest_points
     ]

@@ -249,6 +249,10 @@ def read_finished(out: Path | str, boxes_in: Path | None = None) -> FinishedDriv
         rising = all(before < after for before, after in pairwise(at))
         if not rising or not all(abs(time) < _LATEST_S for time in at):
             raise BadInputError(f"{path}: its times do not rise, or are none; write it anew.")
+    if len(ticks) != len(names):
+        raise BadInputError(
+            f"{out / TUM}: {len(ticks)} poses for {len(names)} scans; write it anew."
+        )
     rows: dict[str, list[BoxRow]] = defaultdict(list)
     table = (boxes_in or out) / BOXES
     for row in read_box_table(table):
@@ -289,10 +293,11 @@ def _read_frames(
 ) -> tuple[tuple[str, ...], tuple[float, ...] | None, tuple[int, ...]]:
     with reading(path, "a list of frames"), path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-        times = tuple(float(row["time"]) for row in rows if row["time"])
+        times = [row["time"] for row in rows]
         names = tuple(row["scan"] for row in rows)
         points = tuple(int(row["points"]) for row in rows)
-    return names, times if len(times) == len(names) else None, points
+        seconds = tuple(map(float, times)) if any(times) else None
+    return names, seconds, points
 
 
 def _vehicle(rows: list[BoxRow], T_level_sensor: SE3) -> FoundVehicle:
