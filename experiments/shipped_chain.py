@@ -35,11 +35,18 @@ from torch.nn.functional import normalize
 from experiments import calibrate_confidence, confidence, views_weights
 from wildshape.cli.main import in_a_sentence
 from wildshape.cli.terminal import TERMINAL, stoppable
+from wildshape.errors import BadInputError
 from wildshape.io.atomic import write_text
 from wildshape.io.output import provenance
 from wildshape.io.store.store import Store, is_finished_store, open_store
 from wildshape.io.store.writer import StoreWriter
-from wildshape.method.checkpoint import MODEL, load_checkpoint, save_checkpoint, weights_file
+from wildshape.method.checkpoint import (
+    MODEL,
+    fingerprint,
+    load_checkpoint,
+    save_checkpoint,
+    weights_file,
+)
 from wildshape.ops.device import choose_device
 from wildshape.ops.threads import exact_on
 from wildshape.parallel.team import Team, cores, team
@@ -125,12 +132,30 @@ def main(settings: Settings) -> None:
     weights.mkdir(parents=True, exist_ok=True)
     write_text(weights / "NOTICE", notice(settings.cad))
     if "default" in settings.only:
+        _refuse_of_other_start(settings)
         for name in settings.unfinished:
             trained(name, settings)
         _shipped(settings.finished(settings.rounds[-1]), settings, "vehicle")
     for category in VIEWS:
         if category in settings.only:
             _views(category, settings)
+
+
+def _refuse_of_other_start(settings: Settings) -> None:
+    """A last round that other weights taught is not the one that is asked for."""
+    last = settings.finished(settings.rounds[-1])
+    if not last.exists():
+        return
+    made = load_checkpoint(last)[1].provenance
+    if settings.start is None:
+        other = " --start " in made["command"]
+    else:
+        other = made["identity"]["teacher"] != fingerprint(settings.start)
+    if other:
+        raise BadInputError(
+            f"{last}: was made by `{made['command']}`, of other weights; repeat that, or choose"
+            " another --out."
+        )
 
 
 def trained(name: str, settings: Settings) -> None:

@@ -208,3 +208,25 @@ def test_the_input_is_never_overwritten(refused, dataset, store, trained, tmp_pa
     ):
         assert "holds the input" in refused(*command, "--overwrite")
     assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("target", ["nowhere", "out"])  # or to itself
+def test_a_link_that_leads_nowhere_is_no_place_to_write(
+    refused, dataset, store, trained, tmp_path, target
+):
+    out, model = tmp_path / "out", ("--model", trained)
+    out.symlink_to(target)
+    for command in (
+        ("complete", dataset, "--out", out, *model),
+        ("register", dataset, "--out", out / "below", *model),
+        ("evaluate", store, "--out", out, *model),
+        ("train", store, "--out", out),
+        ("convert", "folder", dataset, out),
+        ("simulate", out, "--tracks", 1, "--layout", "folders"),
+    ):
+        said = refused(*command)
+        assert f"{out}: is a link that leads nowhere; " in said or "Symlink loop" in said
+    file = tmp_path / "out.ply"
+    file.symlink_to(target)
+    assert "pass --overwrite" in refused("fuse", dataset / "000000", "--out", file, *model)
+    assert (out.is_symlink(), file.is_symlink()) == (True, True)

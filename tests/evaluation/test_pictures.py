@@ -3,9 +3,11 @@
 """Objects chosen by their error, and how they are drawn."""
 
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
+import torch
 from tests.cars import drive_by
 from tests.disk import full_disk
 from tests.evaluation.scores import completion
@@ -53,6 +55,25 @@ def test_an_object_whose_scans_are_refused_is_drawn_without_their_fusion():
     tracks = [drive_by(scans=3, points=100)]
     results = run({"m": Refusing()}, tracks)
     assert [one.fused for one in gather(tracks, results, "m", Refusing())] == 3 * [None]
+
+
+class Counting(Method):
+    threads: ClassVar[set[int]] = set()
+
+    def complete(self, points, sensor):
+        self.threads.add(torch.get_num_threads())
+        return super().complete(points, sensor)
+
+
+def test_what_is_drawn_is_made_on_one_thread_as_what_is_measured():
+    """Sums depend on the number of threads: on other cores the picture showed other shapes."""
+    tracks, before = [drive_by(scans=3, points=100)], torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        gather(tracks, run({"m": Counting()}, tracks), "m", Counting())
+        assert (Counting.threads, torch.get_num_threads()) == ({1}, 2)
+    finally:
+        torch.set_num_threads(before)
 
 
 def test_the_picture_counts_a_tracks_cloud_for_each_of_its_scans():

@@ -5,11 +5,13 @@
 from dataclasses import replace
 from functools import partial
 
+import pytest
 import torch
 from experiments.shipped_chain import Settings, driving, trained
 from experiments.shipped_rounds import DATA, ROUNDS
 
 from experiments import shipped_chain, shipped_rounds
+from wildshape.errors import BadInputError
 from wildshape.method.checkpoint import load_checkpoint
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.training.config import ValidationConfig
@@ -48,6 +50,10 @@ def test_the_last_round_goes_on_from_weights_that_teach_it(
     assert not torch.equal(next(one.parameters()), next(other.parameters()))
     assert [of.provenance["round"] for of in (of_one, of_other)] == ["taught", LAST]
     assert of_other.provenance["command"].endswith(f"--share 0.0001 --start {taught.name}")
+    full = replace(few, share=1.0, only=("default",))
+    for other in (full, replace(full, start=few.finished("first"))):
+        with pytest.raises(BadInputError, match=f"{last.name}: was made by .* of other weights"):
+            shipped_chain.main(other)
 
 
 def test_where_a_vehicle_goes_is_where_it_looks():

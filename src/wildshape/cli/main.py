@@ -124,7 +124,7 @@ def in_a_sentence() -> Iterator[None]:
     reserved: list[bytearray] = []
     try:
         reserved.append(bytearray(_RESERVED_BYTES))
-        with terminable(), _letters_checked():
+        with terminable(), _names_checked():
             yield
     except (BadInputError, MissingExtraError) as error:
         _leave(str(error), _BAD_INPUT)
@@ -148,10 +148,14 @@ def in_a_sentence() -> Iterator[None]:
 
 
 @contextmanager
-def _letters_checked() -> Iterator[None]:
-    """A name that this locale has no letters for is bad input."""
+def _names_checked() -> Iterator[None]:
+    """A name that this locale has no letters for, or a link round in a circle, is bad input."""
     try:
         yield
+    except RuntimeError as error:
+        if not str(error).startswith("Symlink loop"):  # as Python says it until 3.12
+            raise
+        raise BadInputError(f"{error}; check the path.") from error
     except UnicodeEncodeError as error:
         if error.encoding == "utf-8":
             raise
@@ -225,6 +229,8 @@ def _stopped() -> str:
 def _system_sentence(error: OSError) -> str:
     place = f"{error.filename}: " if error.filename else ""
     reason = (error.strerror or str(error)).lower()
+    if error.errno == errno.EEXIST and error.filename and Path(error.filename).is_symlink():
+        return f"{place}is a link that leads nowhere; make what it points to, or choose another."
     if error.errno not in _NO_ROOM:
         return f"{place}{reason}; check the path and its permissions."
     return (

@@ -13,6 +13,7 @@ from wildshape.evaluation.method import Completer, Method, Registrar
 from wildshape.evaluation.protocol import complete_scans
 from wildshape.evaluation.results import MethodScores, Results
 from wildshape.inference.registration import fuse_scans
+from wildshape.parallel.team import ALONE
 from wildshape.records import Points, Track
 
 
@@ -82,12 +83,17 @@ def gather(
         for track in tracks
         if track.name in wanted
     }
-    made = ((_example(label, cd, cases[t], method), cases[t]) for label, (t, cd) in chosen.items())
-    return [
-        replace(example, rivals=_rivals(case, fused_by, completed_by), method=name)
-        for example, case in made
-        if example is not None
-    ]
+
+    def made(label: str) -> Example | None:
+        track, cd = chosen[label]
+        example = _example(label, cd, cases[track], method)
+        if example is None:
+            return None
+        rivals = _rivals(cases[track], fused_by, completed_by)
+        return replace(example, rivals=rivals, method=name)
+
+    # As in the run, whose sums are of one thread: a machine of other cores draws the same.
+    return [example for example in ALONE.in_order(made, chosen) if example is not None]
 
 
 def _rivals(

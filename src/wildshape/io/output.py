@@ -222,7 +222,7 @@ def refuse_file(path: Path, *, overwrite: bool) -> None:
     """
     if path.is_dir():
         raise BadInputError(f"{path}: is a folder; --out names a file to write.")
-    if path.exists() and not overwrite:
+    if os.path.lexists(path) and not overwrite:  # a link that leads nowhere, too
         raise BadInputError(f"{path}: exists; pass --overwrite to replace it.")
 
 

@@ -6,6 +6,7 @@ import pytest
 import torch
 from tests import naive
 from tests.strategies import clouds
+from torch.utils._python_dispatch import TorchDispatchMode
 
 from wildshape.method.encoders.pcn import PCNEncoder
 from wildshape.method.encoders.pcn_winners import distinct_rows, encode_winners
@@ -125,3 +126,19 @@ def test_a_search_in_bfloat16_loses_no_more_than_its_rounding():
     assert bool((found >= exact - 0.03 * size).all())
     assert 0 < float((found < exact - 1e-6 * size).float().mean()) < 0.5
     assert all(bool(p.grad.isfinite().all()) for p in net.parameters() if p.grad is not None)
+
+
+def test_no_gradient_is_summed_in_an_order_that_threads_decide():
+    """torch adds with `index_put` by all threads at once: two trainings of one seed differed."""
+    called = set()
+
+    class Watched(TorchDispatchMode):
+        def __torch_dispatch__(self, func, types, args=(), kwargs=None):
+            called.add(func.overloadpacket.__name__)
+            return func(*args, **(kwargs or {}))
+
+    net = encoder()
+    with Watched():
+        encode_winners(net, clouds(0, 5, 63, 3)).sum().backward()
+    assert "index_add" in called
+    assert not {"index_put", "index_put_", "_index_put_impl_"} & called

@@ -52,7 +52,8 @@ def _code_of_winners(
     pooled_at, code_at = position.split((pooled_row.shape[1], code_row.shape[1]), dim=1)
     local = encoder.point2(relu(encoder.point1(points.reshape(-1, 3)[active])))
     pooled = local.gather(0, pooled_at)
-    joined = encoder.join_point(local) + encoder.join_pooled(pooled)[active // size]
+    # Not `[...]`: its gradient is summed by all threads at once, in any order.
+    joined = encoder.join_point(local) + encoder.join_pooled(pooled).index_select(0, active // size)
     code = _GatherDot.apply(relu(joined), encoder.point4.weight, code_at)
     return code + encoder.point4.bias  # pyright: ignore[reportOperatorIssue, reportReturnType]
 
