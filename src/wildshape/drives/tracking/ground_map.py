@@ -28,7 +28,7 @@ class GroundMap:
     def __init__(self, config: TrajectoryConfig, up: Float[np.ndarray, "3"]) -> None:
         import small_gicp
 
-        self.config, self.up = config, up
+        self.config, self.up = config, up / np.linalg.norm(up)
         self._cells = small_gicp.GaussianVoxelMap(config.ground_cell_m)
 
     def levelled(

@@ -199,8 +199,8 @@ def _follow(
         since = max(since, _lasts(turn) / 2)
         if drive.ticks[frame] - drive.ticks[last] != step:  # KISS-ICP guesses the last step again
             odometry.expect(min(since, longest))
-        seen = (_since(one, middle).carried(odometry.motion) for one in (turn, scan.ground))
-        odometry.follow(*seen, frame)
+        ground = _since(scan.ground, middle).carried(odometry.motion)
+        odometry.follow(_since(turn, middle).carried(odometry.motion), ground, frame)
         if frame:
             odometry.learn(since)
         pose = odometry.kiss.last_pose.copy()
