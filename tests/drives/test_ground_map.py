@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ground holds the sensor level; of the way along it says nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
+from tests.drives.street import HEIGHT, STEP_DEG, things
 
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.source import Drive
@@ -13,9 +16,11 @@ from wildshape.drives.tracking.mounting import find_mounting
 from wildshape.drives.tracking.trajectory import find_trajectory
 from wildshape.geometry.transforms.rotation import rotation_from_vector, smallest_turn
 from wildshape.records import Turn
-from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
+from wildshape.simulate.raycast import Scene
+from wildshape.simulate.shapes.solid import Solid, box
 
 CONFIG = DriveConfig().trajectory
+BEAMS_DEG = np.linspace(-30.67, 10.67, 32)
 
 
 def pose(place, vector):
@@ -66,14 +71,50 @@ def test_the_smallest_turn_takes_one_direction_to_the_other_about_their_common_n
     np.testing.assert_allclose(turn @ np.cross(start, end), np.cross(start, end), atol=1e-12)
 
 
-def test_a_sensor_of_few_beams_does_not_climb():
-    """By points on points alone its pitch was off by half a degree after 20 m."""
-    street = WholeDrive(StreetConfig(scans=20, sensor="hdl32", speed=10.0), 23)
-    scans = [street.scan(frame) for frame in range(20)]
-    turns = [Turn(scan.points.astype(np.float32)) for scan in scans]
-    drive = Drive.of("street", [f"{frame:06d}" for frame in range(20)], turns.__getitem__)
+def hill(x):
+    """Height and slope of a road that rises by 2 m over 40 m, by 8 % at most."""
+    turn = 2 * np.pi * x / 80.0
+    return 1.0 - np.cos(turn), np.sin(turn) * 2 * np.pi / 80.0
+
+
+def over_the_hill(scans):
+    """Scans and poses of a sensor that drives up between houses and parked cars."""
+    x = np.arange(-80.0, 141.0)
+    left, right = (np.column_stack((x, np.full(len(x), y), hill(x)[0])) for y in (80.0, -80.0))
+    row = np.arange(len(x) - 1)
+    faces = [(row, row + len(x), row + 1), (row + 1, row + len(x), row + 1 + len(x))]
+    faces = np.concatenate([np.column_stack(one) for one in faces])
+    none = np.zeros(len(faces), bool)
+    road = Solid(np.concatenate((left, right)) - (0, 0, HEIGHT), faces, none, none.astype(int))
+    cars = [
+        box((x, y - 0.9, -HEIGHT - 0.3), (x + 4.2, y + 0.9, 1.5 - HEIGHT))
+        for x in np.arange(-40.0, 100.0, 11.0).tolist()
+        for y in (-4.0, 4.0)
+    ]
+    standing = [
+        body.moved(np.array((0, 0, hill(body.vertices[:, 0].mean())[0])))
+        for body in (*things()[1:], *cars)
+    ]
+    scene = Scene([replace(road, closed=False), *standing])
+    up, around = np.deg2rad(BEAMS_DEG), np.deg2rad(np.arange(0, 360, STEP_DEG))
+    e, a = (grid.ravel() for grid in np.meshgrid(up, around, indexing="ij"))
+    rays = np.column_stack((np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)))
+    poses = [pose((x, 0, hill(x)[0]), (0, -np.arctan(hill(x)[1]), 0)) for x in range(scans)]
+    seen = []
+    for frame, T in enumerate(poses):
+        origins = np.broadcast_to(T[:3, 3], rays.shape)
+        away = scene.cast(origins, rays @ T[:3, :3].T).distance
+        noisy = away + np.random.default_rng(frame).normal(scale=0.015, size=len(away))
+        hit = away < 80.0
+        seen.append((rays[hit] * noisy[hit, None]).astype(np.float32))
+    return seen, np.stack(poses)
+
+
+def test_a_road_that_rises_is_followed():
+    """By points on points alone the way of a sensor with 32 beams was 0.8 m off after 30 m."""
+    seen, true = over_the_hill(31)
+    turns = [Turn(scan) for scan in seen]
+    drive = Drive.of("hill", [f"{frame:06d}" for frame in range(31)], turns.__getitem__)
     way = find_trajectory(drive, find_mounting(drive, DriveConfig().mounting), DriveConfig())
-    true = np.stack([scan.T_world_sensor for scan in scans])
-    off = np.linalg.inv(np.linalg.inv(true[0]) @ true) @ way.T_world_sensor.matrix.numpy()
-    assert np.rad2deg(np.arcsin(-off[5:, 2, 0]).mean()) == pytest.approx(0.0, abs=0.25)
-    assert np.abs(off[:, 2, 3]).max() < 0.1
+    off = way.T_world_sensor.matrix.numpy() - true
+    assert np.abs(off[:, :3, 3]).max() < 0.1
