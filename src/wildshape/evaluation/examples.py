@@ -13,7 +13,7 @@ from wildshape.evaluation.method import Completer, Method, Registrar
 from wildshape.evaluation.protocol import complete_scans
 from wildshape.evaluation.results import MethodScores, Results
 from wildshape.inference.registration import fuse_scans
-from wildshape.parallel.team import ALONE
+from wildshape.ops.threads import alone
 from wildshape.records import Points, Track
 
 
@@ -93,7 +93,8 @@ def gather(
         return replace(example, rivals=rivals, method=name)
 
     # As in the run, whose sums are of one thread: a machine of other cores draws the same.
-    return [example for example in ALONE.in_order(made, chosen) if example is not None]
+    with alone(1) as thread:
+        return [example for example in thread.map(made, chosen) if example is not None]
 
 
 def _rivals(
