@@ -44,8 +44,10 @@ def test_height_and_tilt_come_from_the_ground_and_the_way_from_the_pose(mounted_
     true = pose((1.0, 0.3, 0.05), (0.01, -0.02, 0.2)) @ mounted
     off = true @ pose((0.0, 0.0, 0.1), (0.02, 0.015, 0.0))
     found = GroundMap(CONFIG, up)
-    found.levelled(mounted, ground(mounted, 1).astype(np.float32))
-    levelled = found.levelled(off, ground(true, 2).astype(np.float32))
+    found.see(ground(mounted, 1).astype(np.float32))
+    found.add(mounted)
+    found.see(ground(true, 2).astype(np.float32))
+    levelled = found.levelled(off)
     np.testing.assert_allclose(levelled[:3, :3] @ up, true[:3, :3] @ up, atol=1e-3)
     vertical = true[:3, :3] @ up
     assert vertical @ (levelled - true)[:3, 3] == pytest.approx(0.0, abs=0.01)
@@ -59,8 +61,11 @@ def test_height_and_tilt_come_from_the_ground_and_the_way_from_the_pose(mounted_
 def test_hardly_any_ground_changes_nothing():
     T = pose((1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
     found = GroundMap(CONFIG, np.array((0.0, 0.0, 1.0)))
-    assert found.levelled(T, np.empty((0, 3), np.float32)) is T
-    assert found.levelled(T, ground(T, 1)[:10]) is T
+    found.see(ground(T, 1))
+    found.add(T)
+    for few in (0, 10):
+        found.see(ground(T, 2)[:few])
+        assert found.levelled(T) is T
 
 
 def test_the_smallest_turn_takes_one_direction_to_the_other_about_their_common_normal():

@@ -6,6 +6,8 @@ Laid on it by voxelized GICP (Koide et al., ICRA 2021), small_gicp's, from surfa
 the way along the ground it says nothing.
 """
 
+from typing import Any
+
 import numpy as np
 from jaxtyping import Float
 
@@ -30,35 +32,38 @@ class GroundMap:
 
         self.config, self.up = config, up / np.linalg.norm(up)
         self._cells = small_gicp.GaussianVoxelMap(config.ground_cell_m)
+        self._seen: Any = None
 
-    def levelled(
-        self, T_world_sensor: Float[np.ndarray, "4 4"], ground: Points
-    ) -> Float[np.ndarray, "4 4"]:
-        """A pose lifted and tilted so that the scan's ground lies on the map; it is added to it.
-
-        Args:
-            T_world_sensor: a pose near by.
-            ground: `(g, 3)` points, sensor frame, metres.
-        """
+    def see(self, ground: Points) -> None:
+        """Take the ground of the next scan: `(g, 3)` points, sensor frame, metres."""
         import small_gicp
 
-        if len(ground) < _FEWEST_POINTS:
+        self._seen = None
+        if len(ground) >= _FEWEST_POINTS:
+            self._seen = small_gicp.PointCloud(ground.astype(np.float64))
+            small_gicp.estimate_covariances(self._seen, small_gicp.KdTree(self._seen), _NEAR)
+
+    def levelled(self, T_world_sensor: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "4 4"]:
+        """A pose near by, lifted and tilted so that what is seen lies on the map."""
+        import small_gicp
+
+        if self._seen is None or not self._cells.size():
             return T_world_sensor
-        cloud = small_gicp.PointCloud(ground.astype(np.float64))
-        small_gicp.estimate_covariances(cloud, small_gicp.KdTree(cloud), _NEAR)
-        if self._cells.size():
-            found = small_gicp.align(
-                self._cells,
-                cloud,
-                init_T_target_source=T_world_sensor,
-                max_correspondence_distance=self.config.ground_reach_m,
-                max_iterations=_ROUNDS,
-                rotation_epsilon=self.config.settled,
-                translation_epsilon=self.config.settled,
-            )
-            T_world_sensor = _levelled(T_world_sensor, found.T_target_source, self.up)
-        self._cells.insert(cloud, T_world_sensor)
-        return T_world_sensor
+        found = small_gicp.align(
+            self._cells,
+            self._seen,
+            init_T_target_source=T_world_sensor,
+            max_correspondence_distance=self.config.ground_reach_m,
+            max_iterations=_ROUNDS,
+            rotation_epsilon=self.config.settled,
+            translation_epsilon=self.config.settled,
+        )
+        return _levelled(T_world_sensor, found.T_target_source, self.up)
+
+    def add(self, T_world_sensor: Float[np.ndarray, "4 4"]) -> None:
+        """What is seen belongs to the map."""
+        if self._seen is not None:
+            self._cells.insert(self._seen, T_world_sensor)
 
 
 def _levelled(

@@ -7,7 +7,7 @@ turns its pitch a little in each scan. The ground holds it level.
 """
 
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -44,7 +44,8 @@ class Odometry:
 
     def __init__(self, config: TrajectoryConfig, motion: Twist, up: Float[np.ndarray, "3"]) -> None:
         self.config, self.motion, self.up = config, motion, up
-        self.kiss, self.ground = _kiss_icp(config), GroundMap(config, up)
+        self.ground = GroundMap(config, up)
+        self.kiss = _kiss_icp(config, self.ground)
         self.lost: list[int] = []
         self.timed, self.untimed = 0, list[int]()
         self._before: Float[np.ndarray, "n 3"] | None = None
@@ -69,23 +70,21 @@ class Odometry:
     def follow(self, scan: Points, ground: Points, frame: int) -> None:
         """Go one scan on; `scan`: what stands on the ground."""
         pose, step = self.kiss.last_pose, self.kiss.last_delta
+        self.ground.see(ground)
         there = _registered(self.kiss, scan)
         fit = 1.0 if self._before is None else self._fit(there)
         if fit < self.config.good_fit and (found := self._from_afar(scan, pose)) is not None:
             self.kiss, there = found
+            _hold(self.kiss, self.ground)
         elif fit < self.config.least_fit:
             self.lost.append(frame)
-            self.kiss, self.ground = _kiss_icp(self.config), GroundMap(self.config, self.up)
+            self.ground = GroundMap(self.config, self.up)
+            self.ground.see(ground)
+            self.kiss = _kiss_icp(self.config, self.ground)
             self.kiss.last_pose, self.kiss.last_delta = pose, step
             there = _registered(self.kiss, scan)
+        self.ground.add(self.kiss.last_pose)
         self._before, self._scan_before = there, scan
-        self._level(ground)
-
-    def _level(self, ground: Points) -> None:
-        found = self.kiss.last_pose
-        levelled = self.ground.levelled(found, ground)
-        self.kiss.last_delta = self.kiss.last_delta @ np.linalg.inv(found) @ levelled
-        self.kiss.last_pose = levelled
 
     def _from_afar(
         self, scan: Points, pose: Float[np.ndarray, "4 4"]
@@ -108,6 +107,17 @@ class Odometry:
         return float((away < self.config.fits_m**2).float().mean())
 
 
+class _Levelled:
+    """KISS-ICP's registration; then the ground lifts and tilts the pose, with which both go on."""
+
+    def __init__(self, registration: Any, ground: GroundMap) -> None:
+        self._registration, self._ground = registration, ground
+
+    def align_points_to_map(self, **known: Any) -> Float[np.ndarray, "4 4"]:
+        """As KISS-ICP calls it."""
+        return self._ground.levelled(self._registration.align_points_to_map(**known))
+
+
 def _registered(kiss: "KissICP", scan: Points) -> Float[np.ndarray, "n 3"]:
     """Go one scan on; some of its points, in the world."""
     _, some = kiss.register_frame(scan.astype(np.float64), np.zeros(len(scan)))
@@ -115,7 +125,7 @@ def _registered(kiss: "KissICP", scan: Points) -> Float[np.ndarray, "n 3"]:
     return some @ T[:3, :3].T + T[:3, 3]
 
 
-def _kiss_icp(config: TrajectoryConfig) -> "KissICP":
+def _kiss_icp(config: TrajectoryConfig, ground: GroundMap | None = None) -> "KissICP":
     load_library("kiss_icp.kiss_icp", "the sensor's way is found by KISS-ICP", _INSTALL)
     from kiss_icp.config import load_config
     from kiss_icp.kiss_icp import KissICP
@@ -126,4 +136,13 @@ def _kiss_icp(config: TrajectoryConfig) -> "KissICP":
     settings.data.min_range, settings.data.max_range = config.nearest_m, config.range_m
     settings.registration.convergence_criterion = config.settled
     settings.mapping.voxel_size = config.voxel_m
-    return KissICP(settings)
+    kiss = KissICP(settings)
+    if ground is not None:
+        _hold(kiss, ground)
+    return kiss
+
+
+def _hold(kiss: "KissICP", ground: GroundMap) -> None:
+    """Its poses are levelled from now on."""
+    level = _Levelled(kiss.registration, ground)
+    kiss.registration = level  # pyright: ignore[reportAttributeAccessIssue]
