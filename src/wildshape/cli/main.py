@@ -226,10 +226,14 @@ def _stopped() -> str:
     return "stopped; what is finished stays, and the same command goes on from there."
 
 
+def _leads_nowhere(path: Path) -> bool:
+    return path.is_symlink() and not path.exists()
+
+
 def _system_sentence(error: OSError) -> str:
     place = f"{error.filename}: " if error.filename else ""
     reason = (error.strerror or str(error)).lower()
-    if error.errno == errno.EEXIST and error.filename and Path(error.filename).is_symlink():
+    if error.errno == errno.EEXIST and error.filename and _leads_nowhere(Path(error.filename)):
         return f"{place}is a link that leads nowhere; make what it points to, or choose another."
     if error.errno not in _NO_ROOM:
         return f"{place}{reason}; check the path and its permissions."

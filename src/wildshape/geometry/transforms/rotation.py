@@ -60,8 +60,7 @@ def smallest_turn(
         start: unit vector.
         end: unit vector, not opposite to it.
     """
-    x, y, z = np.cross(start, end)
-    axis = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))  # times the angle's sine
+    axis = cross_matrix(torch.from_numpy(np.cross(start, end))).numpy()  # times the angle's sine
     return np.eye(3) + axis + axis @ axis / (1.0 + start @ end)
 
 
