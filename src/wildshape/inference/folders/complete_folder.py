@@ -85,10 +85,10 @@ class FolderOptions:
         """What decides the output's content, as JSON values."""
         found = {"input": str(source.resolve()), **asdict(self.coordinates)}
         found["model"] = fingerprint(self.model)
-        if source.is_dir():  # one scan is done or not
-            found["files"] = fingerprint_of(source)
+        found["files"] = fingerprint_of(source)
         uses = {"uses": "track"} if self.track else {}
-        uses |= {"rays": str(self.rays.resolve())} if self.rays else {}
+        if self.rays is not None:
+            uses |= {"rays": str(self.rays.resolve()), "rays_file": fingerprint_of(self.rays)}
         clouds = {} if self.clouds == "ply" else {"clouds": self.clouds}
         mesh = {"mesh": self.mesh.kind} if self.mesh else {}
         colours = {"mesh_colours": "confidence"} if self.mesh and self.mesh.coloured else {}
