@@ -116,13 +116,14 @@ def test_an_output_stays_where_nothing_can_replace_it(wildshape, refused, datase
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
 
-@pytest.mark.parametrize("command", ["complete", "convert"])
+@pytest.mark.parametrize("command", ["complete", "convert", "evaluate"])
 def test_work_on_scans_that_changed_is_not_gone_on_with(
     wildshape, refused, dataset, trained, tmp_path, command
 ):
     data, out = shutil.copytree(dataset, tmp_path / "data"), tmp_path / "out"
     line = {
         "complete": ("complete", data, "--out", out, "--model", trained),
+        "evaluate": ("evaluate", data, "--out", out, "--model", trained, "--baselines", "none"),
         "convert": ("convert", "folder", data, out, "--layout", "folders", "--workers", 1),
     }[command]
     assert wildshape(*line).code == 0
@@ -133,6 +134,21 @@ def test_work_on_scans_that_changed_is_not_gone_on_with(
     cloud[cloud.index(b"end_header\n") + 11 :] = bytes(len(cloud) - cloud.index(b"end_header") - 11)
     scan.write_bytes(cloud)  # as large as it was
     assert "of other data (not as it was: files); repeat" in refused(*line)
+    marker.write_text(marker.read_text().replace('"running"', '"finished"'))
+    assert "with other settings or of other data; pass --overwrite" in refused(*line)
+
+
+def test_one_scan_that_changed_is_completed_again(wildshape, dataset, trained, tmp_path):
+    """An interrupted command was finished with the shape of the scan as it had been."""
+    scan, (one, other, *_) = tmp_path / "scan.ply", sorted(dataset.glob("*/scans/*.ply"))
+    shapes = []
+    for name, file in (("out", one), ("new", other), ("out", other)):
+        shutil.copy(file, scan)
+        assert wildshape("complete", scan, "--out", tmp_path / name, "--model", trained).code == 0
+        marker = tmp_path / name / "wildshape.json"
+        marker.write_text(marker.read_text().replace('"finished"', '"running"'))
+        shapes.append((tmp_path / name / "scan" / "completed" / "scan.ply").read_bytes())
+    assert shapes[0] != shapes[1] == shapes[2]
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from itertools import count
 import numpy as np
 import pytest
 import torch
+from safetensors.torch import load_file
 from tests.drives.finished_drive import CARS, finished_drive
 from tests.models import CONFIG, SETTINGS
 from tests.refusal import refused
@@ -162,6 +163,17 @@ def test_a_better_model_is_kept_and_says_what_the_first_one_knew(
     assert adapt_to([out], tmp_path, predictor, FEW) == found
     moved = tmp_path.rename(tmp_path.with_name("moved"))
     assert adapt_to([out], moved, predictor, FEW).model == str(moved / "adapted" / MODEL)
+
+
+def test_weights_that_were_removed_are_put_there_again(out, predictor, tmp_path, monkeypatch):
+    """They were said to be there: the drive's second pass then asked for another checkpoint."""
+    measured(monkeypatch, replace(GOOD, cost_m=0.09))
+    found = adapt_to([out], tmp_path, predictor, FEW)
+    weights = load_file(tmp_path / "adapted" / MODEL)
+    (tmp_path / "adapted" / MODEL).unlink()
+    assert adapt_to([out], tmp_path, predictor, FEW).model == found.model
+    again = load_file(tmp_path / "adapted" / MODEL)
+    assert all(torch.equal(again[name], weights[name]) for name in weights)
 
 
 def test_half_a_model_is_never_the_adapted_one(out, predictor, tmp_path, monkeypatch):

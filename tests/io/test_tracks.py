@@ -151,12 +151,21 @@ def test_a_track_whose_parts_do_not_fit_is_refused_before_scans_are_lost(
 
 
 def test_names_that_would_not_sort_in_time_become_numbers(track: Track, tmp_path: Path) -> None:
-    for names in (("10", "9", "8"), ("a/b", "c", "d"), ("a", "a", "b")):
+    for names in (("10", "9", "8"), ("a/b", "c", "d"), ("a", "a", "b"), ("a", "a-b", "c")):
         folder = tmp_path / names[0].replace("/", "-") / names[1]
         write_track(folder, replace(track, scan_names=names))
         found = read_track(folder)
         assert found.scan_names == ("000000", "000001", "000002")
         assert [len(scan) for scan in found.scans] == [60, 20, 33]
+
+
+def test_names_whose_files_sort_in_time_are_kept(track: Track, tmp_path: Path) -> None:
+    """`a-b.ply` is before `a.ply`, though `a` is before `a-b`: scans came back in another order."""
+    names = ("a-b", "a", "c")
+    write_track(tmp_path / "t", replace(track, scan_names=names))
+    found = read_track(tmp_path / "t")
+    assert found.scan_names == names
+    assert [len(scan) for scan in found.scans] == [60, 20, 33]
 
 
 def test_a_full_disk_names_the_scan(tmp_path: Path) -> None:

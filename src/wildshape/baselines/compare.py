@@ -20,6 +20,7 @@ from wildshape.evaluation.method import Method
 from wildshape.evaluation.results import Results, Rotate
 from wildshape.inference.evaluation_adapter import Learned
 from wildshape.inference.predictor import Predictor, load
+from wildshape.io.fingerprint import fingerprint_of
 from wildshape.io.inputs import TrackSource, open_tracks
 from wildshape.io.output import begin, keep_apart
 from wildshape.io.progress import SILENT, Progress, counted
@@ -92,6 +93,7 @@ class ComparisonOptions:
             **asdict(self.coordinates),
             "baselines": ",".join(self.baselines),
             "data": str(data.resolve()),
+            "files": fingerprint_of(data),
             "models": [fingerprint(model) for model in self.models or (None,)],
         }
 

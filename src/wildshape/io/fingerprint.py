@@ -4,7 +4,7 @@
 
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from wildshape.io.scans.points import is_scan_file
@@ -25,8 +25,12 @@ def fingerprint_of(path: Path) -> str:
     """
     if is_store(path):
         return open_store(path).fingerprint
-    files = [path] if path.is_file() else _files_in(path)
-    lines = sorted(os.fsencode(file.relative_to(path)) + _glance(file) for file in files)
+    return fingerprint_of_files([path] if path.is_file() else _files_in(path), path)
+
+
+def fingerprint_of_files(files: Iterable[Path], folder: Path) -> str:
+    """The same of files below a folder."""
+    lines = sorted(os.fsencode(file.relative_to(folder)) + _glance(file) for file in files)
     return hashlib.sha256(b"".join(lines)).hexdigest()[:16]
 
 

@@ -344,6 +344,6 @@ def _write_scans(folder: Path, track: Track) -> None:
 
 def file_names(scans: Sequence[str]) -> list[str]:
     """Names of a track's files that sort in time order: the scans' own if they do, else numbers."""
-    names = list(scans)
-    usable = names == sorted(set(names)) and all(Path(n).name == n and n for n in names)
-    return names if usable else [f"{i:06d}" for i in range(len(names))]
+    files = [f"{name}.ply" for name in scans]  # `a-b.ply` is before `a.ply`
+    usable = files == sorted(set(files)) and all(Path(n).name == n and n for n in scans)
+    return list(scans) if usable else [f"{i:06d}" for i in range(len(scans))]

@@ -34,6 +34,22 @@ def test_the_users_meshes_drive_there(wildshape, tmp_path):
     assert len({tuple(row.split(",")[6:9]) for row in rows}) == 1
 
 
+@pytest.mark.parametrize("kind", [DRIVE, ("--tracks", 4, "--scans", 2, "--layout", "folders")])
+def test_other_meshes_are_not_mixed_in(wildshape, refused, tmp_path, kind):
+    """A mesh was replaced after an interrupted run: some scans would be of either."""
+    meshes, out = tmp_path / "meshes", tmp_path / "out"
+    meshes.mkdir()
+    trimesh.creation.box((4.2, 1.7, 1.4)).export(meshes / "car.ply")
+    line = ("simulate", out, *kind, "--meshes", meshes)
+    assert wildshape(*line).code == 0
+    marker = out / "wildshape.json"
+    marker.write_text(marker.read_text().replace('"finished"', '"running"'))
+    assert wildshape(*line).code == 0
+    marker.write_text(marker.read_text().replace('"finished"', '"running"'))
+    trimesh.creation.box((4.6, 1.9, 1.6)).export(meshes / "car.ply")
+    assert "not as it was: mesh_files" in refused(*line)
+
+
 @pytest.mark.parametrize(
     ("more", "said"),
     [

@@ -5,13 +5,17 @@
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
 from wildshape.cli.options import AsJson, Layout, Overwrite, option
 from wildshape.errors import BadInputError
 from wildshape.simulate.sensor import SensorName
+
+if TYPE_CHECKING:
+    from wildshape.simulate.config import SimulationConfig
+    from wildshape.simulate.street.whole_drive import StreetConfig
 
 EXAMPLES = (
     "wildshape simulate cars.store --tracks 200 --seed 1",
@@ -133,7 +137,7 @@ def _drive(settings: Settings) -> None:
     )
     _doubt(config.meshes)
     drive = WholeDrive(config, settings.seed)
-    identity = {**asdict(config), "seed": settings.seed, "point_times": settings.point_times}
+    identity = {**_identity(config, settings), "point_times": settings.point_times}
     output = begin(
         settings.out,
         "simulate",
@@ -152,6 +156,18 @@ def _drive(settings: Settings) -> None:
     )
     data = {"out": str(settings.out), **asdict(written), "seconds": round(seconds, 3)}
     answer(text, data, as_json=settings.json)
+
+
+def _identity(config: "StreetConfig | SimulationConfig", settings: Settings) -> dict[str, Any]:
+    """What decides the scans; meshes may be added or replaced between two runs."""
+    from wildshape.io.fingerprint import fingerprint_of_files
+    from wildshape.simulate.shapes.meshes import mesh_files
+
+    known = {**asdict(config), "seed": settings.seed}
+    if config.meshes is not None:
+        files = mesh_files(config.meshes)
+        known["mesh_files"] = fingerprint_of_files(files, config.meshes)
+    return known
 
 
 def _doubt(meshes: Path | None) -> None:
@@ -185,7 +201,7 @@ def _tracks(settings: Settings) -> None:
         varied=settings.varied,
     )
     _doubt(config.meshes if config.is_lidar else None)
-    identity = {**asdict(config), "seed": settings.seed}
+    identity = _identity(config, settings)
     written = write_tracks(
         simulate_tracks(config, settings.seed, settings.workers),
         settings.out,

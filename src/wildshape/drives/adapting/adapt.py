@@ -126,7 +126,9 @@ def adapt_to(
     if done is not None:
         with reading(place / MARKER, "what an adaptation says of itself"):
             found = record_of(Adaptation, done["result"], {})
-        return replace(found, model=found.model and _weights_in(place))
+        if found.model is None or (place / MODEL).is_file():
+            return replace(found, model=found.model and _weights_in(place))
+        write_json(place / MARKER, {**done, "status": "running"})  # its weights were removed
     if (
         not overwrite
         and is_begun(place)

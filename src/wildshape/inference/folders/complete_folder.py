@@ -85,7 +85,7 @@ class FolderOptions:
         """What decides the output's content, as JSON values."""
         found = {"input": str(source.resolve()), **asdict(self.coordinates)}
         found["model"] = fingerprint(self.model)
-        if source.is_dir():  # one scan is done or not
+        if source.is_dir():  # one scan is completed again
             found["files"] = fingerprint_of(source)
         uses = {"uses": "track"} if self.track else {}
         uses |= {"rays": str(self.rays.resolve())} if self.rays else {}
@@ -196,7 +196,7 @@ def write_results(
 
     def done(name: str) -> bool:
         before = _written_before(output.path / file_name(name) / OBJECTS)
-        if before is None:
+        if before is None or source.path.is_file():  # it, or its rays, may be others by now
             return False
         earlier.extend((f"{name}/{scan}", reason) for scan, reason in before)
         summary.finished_before += 1
