@@ -20,6 +20,7 @@ from wildshape.evaluation.drives.labels import (
 from wildshape.evaluation.drives.overlap import UprightBox
 from wildshape.evaluation.drives.protocol import DriveScores, evaluate_drives
 from wildshape.evaluation.drives.results import as_json, markdown
+from wildshape.geometry.footprint import footprint
 from wildshape.geometry.transforms.se3 import SE3
 
 CAR = UprightBox(15.0, 2.0, -0.9, 4.0, 1.8, 1.5, 0.1)
@@ -131,6 +132,19 @@ def test_the_table_says_where_only_a_camera_s_view_counts() -> None:
         assert as_json(scores, Counting(), {})["cameras"] == drives
         told = "only what the camera sees within 60 m counts: 1" in markdown(scores, Counting())
         assert told == bool(drives)
+
+
+def test_the_picture_of_a_turned_box_holds_its_corners() -> None:
+    """Cut at the edge; none of a box that reaches behind the camera."""
+    box = CAR._replace(yaw=0.7)
+    corners = footprint(np.array((*box[:3], box.yaw)), box[3:5])
+    u = 600 - 700 * corners[:, 1] / corners[:, 0]
+    v = [180 - 700 * (box.z + up * box.height / 2) / corners[:, 0] for up in (-1, 1)]
+    view = View(AHEAD, Counting())
+    assert view.picture(box) == pytest.approx((u.min(), np.min(v), u.max(), np.max(v)))
+    left, top, right, bottom = view.picture(box._replace(x=4.0, y=3.0)) or (1, 1, 1, 1)
+    assert (left, top < 375, right < 600, bottom) == (0, True, True, 375)
+    assert view.picture(box._replace(x=1.0)) is None
 
 
 def test_boxes_in_regions_that_nobody_cared_to_label() -> None:
