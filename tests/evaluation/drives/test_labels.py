@@ -60,6 +60,7 @@ def test_boxes_their_points_and_the_way_are_where_the_street_has_them(training):
                 assert {one.track: one.counted for one in labels}[label.track] == counts
     way = [np.linalg.inv(T_world_velo[0]) @ T for T in T_world_velo]
     found = truth.T_world_sensor
+    assert found is not None
     np.testing.assert_allclose((found[0].inverse() @ found).matrix, way, atol=1e-3)
 
 
