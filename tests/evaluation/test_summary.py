@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 from tests.evaluation.scores import completion, scores
 
+from wildshape.evaluation.metrics import RegistrationScore
 from wildshape.evaluation.protocol import ONE_SCAN
 from wildshape.evaluation.results import (
     MethodScores,
@@ -30,6 +31,18 @@ def test_figures_by_hand():
     assert figures["rot_median_deg"] == 40
     assert figures["rot_sym_median_deg"] == 30
     assert figures["trans_median_m"] == pytest.approx(0.2)
+
+
+def test_shapes_have_means_and_poses_medians():
+    """Of three, of which one is far off: the mean is twice the median."""
+    shapes = tuple(completion("a", 0.1 * n, 0.2 * n) for n in (1, 1, 4))
+    poses = tuple(RegistrationScore("a", "0", 10.0 * n, 5.0 * n, 0.1 * n) for n in (1, 1, 4))
+    figures = figures_of(MethodScores("ours", shapes, poses, ()))
+    means = {"cd": 0.6, "precision": 0.2, "coverage": 0.4}
+    means |= {f"{name}_partial": value / 2 for name, value in means.items()}
+    medians = {"rot_median_deg": 10.0, "rot_sym_median_deg": 5.0, "trans_median_m": 0.1}
+    for name, value in {**means, **medians}.items():
+        assert figures[name] == pytest.approx(value)
 
 
 def test_mean_and_std_over_seeds():

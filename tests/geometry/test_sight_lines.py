@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from tests.refusal import refused
 
-from wildshape.geometry.projection.sight_lines import SightLines, standing
+from wildshape.geometry.projection.sight_lines import SightLines, seen_alike, standing
 from wildshape.geometry.transforms.rotation import rotation_z
 
 
@@ -74,6 +74,15 @@ def test_what_sensors_on_two_sides_saw_is_not_free() -> None:
     assert standing(between, scan, rays).free.mean() < 0.01
     outside = np.array([[10.0, 0.0, 4.0]])  # where both sensors' rays passed
     assert standing(outside, scan, rays).free.all()
+
+
+def test_places_within_45_degrees_around_an_object_see_the_same_side() -> None:
+    middle, angles = np.array((3.0, -2.0, 1.0)), np.radians((0, 30, 44, 46, 89, 180, -44, -46))
+    around = np.stack((np.cos(angles), np.sin(angles), 0 * angles), axis=1)
+    expected = [True, True, True, False, False, False, True, False]
+    for near, far in ((0.2, 0.5), (5.0, 30.0), (30.0, 5.0)):
+        found = seen_alike(middle + far * around, middle + near * around[0], middle)
+        assert found.tolist() == expected
 
 
 def test_rays_move_with_what_they_are_held_against() -> None:

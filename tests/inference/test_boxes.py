@@ -11,6 +11,7 @@ import pytest
 import torch
 from tests.method.small import settings
 
+from wildshape.geometry.box import FittedBox
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.boxes import _nth_largest, box_seen, carried, fit_to_scans
@@ -37,6 +38,20 @@ def test_a_shape_alone_has_its_own_box():
     fitted = fit_to_scans(surface(), [], mirror=True)
     torch.testing.assert_close(fitted.size, SIZE, atol=0.02, rtol=0)
     torch.testing.assert_close(fitted.rotation, torch.eye(3).double())
+
+
+def test_a_box_is_carried_with_every_point_of_it():
+    """Of a levelled shape in a tilted sensor's frame; x, y, z as shares of the size."""
+    turn = rotation_from_quaternion(torch.tensor((0.8, -0.3, 0.4, 0.6), dtype=torch.float64))
+    T = SE3(turn, torch.tensor((9.0, -4.0, -1.0), dtype=torch.float64))
+    fitted = FittedBox(torch.tensor((0.3, -0.2, 0.1), dtype=torch.float64), SIZE, about_y(20.0))
+    within = torch.tensor(((0.5, 0.5, 0.5), (0.5, -0.5, 0.1), (-0.2, 0.3, -0.5))).double() * SIZE
+    box = carried(fitted, T)
+    R_sensor_box = rotation_from_quaternion(torch.tensor(box.quaternion_wxyz).double())
+    found = within @ R_sensor_box.T + torch.tensor(box.centre).double()
+    expected = T.apply(within @ fitted.rotation.T + fitted.centre)
+    torch.testing.assert_close(found, expected, atol=1e-5, rtol=0)
+    torch.testing.assert_close(torch.tensor(box.size).double(), SIZE)
 
 
 def test_what_little_sticks_out_is_no_part_of_a_body():

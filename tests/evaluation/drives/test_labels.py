@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from tests.datasets.street import street
-from tests.datasets.write_kitti_tracking import EYE, IDS, write_sequence
+from tests.datasets.street import SIZE, moved, street
+from tests.datasets.write_kitti_tracking import EYE, IDS, T_EGO_VELO, write_sequence
 from tests.refusal import refused
 
 from wildshape.evaluation.drives.labels import Counting, read_labels
@@ -39,6 +39,29 @@ def test_boxes_points_and_trajectory(training):
     assert label.vehicle
     assert label.counted == truth.view.sees(label.box)
     np.testing.assert_allclose(truth.frames[0].regions, [[505.05, 167.89, 564.47, 197.36]])
+
+
+def test_boxes_their_points_and_the_way_are_where_the_street_has_them(training):
+    """By plain matrices, in the LiDAR's frame."""
+    scene = street(SCANS, points=3000, eye=EYE)
+    T_world_velo = [T @ T_EGO_VELO for T in scene.T_world_ego]
+    truth = read_labels(training, Counting(range_m=math.inf, points=1))
+    things = {track: thing for thing, track in IDS.items()}
+    for i, frame in enumerate(truth.frames):
+        for label in frame.labels:
+            T_world_object = scene.T_world_object[things[label.track]][i]
+            T = np.linalg.inv(T_world_velo[i]) @ T_world_object
+            yaw = math.atan2(T[1, 0], T[0, 0])
+            np.testing.assert_allclose(label.box, (*T[:3, 3], *SIZE, yaw), atol=1e-3)
+            own = moved(np.linalg.inv(T_world_object), scene.clouds[i])
+            inside = int((np.abs(own) < np.array(SIZE) / 2 + 1e-3).all(1).sum())
+            for points, counts in ((inside // 2, label.counted), (2 * inside, False)):
+                labels = read_labels(training, Counting(points, math.inf)).frames[i].labels
+                assert {one.track: one.counted for one in labels}[label.track] == counts
+    way = [np.linalg.inv(T_world_velo[0]) @ T for T in T_world_velo]
+    found = truth.T_world_sensor
+    assert found is not None
+    np.testing.assert_allclose((found[0].inverse() @ found).matrix, way, atol=1e-3)
 
 
 def test_few_points_and_what_is_far_or_unseen_does_not_count(training):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from wildshape.errors import BadInputError
 from wildshape.evaluation.drives.found import Found, FoundDrive
@@ -19,6 +20,8 @@ from wildshape.evaluation.drives.labels import (
 from wildshape.evaluation.drives.overlap import UprightBox
 from wildshape.evaluation.drives.protocol import DriveScores, evaluate_drives
 from wildshape.evaluation.drives.results import as_json, markdown
+from wildshape.geometry.footprint import footprint
+from wildshape.geometry.transforms.se3 import SE3
 
 CAR = UprightBox(15.0, 2.0, -0.9, 4.0, 1.8, 1.5, 0.1)
 FAR = CAR._replace(x=30.0)
@@ -74,7 +77,9 @@ def test_what_is_right_is_right_everywhere() -> None:
 def test_boxes_that_are_off() -> None:
     """Shifted along by 1 m of 4: IoU 3/5 in bird's eye view; half as high, too: 3/8 of space."""
     off = CAR._replace(x=CAR.x + np.cos(0.1), y=CAR.y + np.sin(0.1))
-    assert _precisions(_evaluated([[off]], [[_label(CAR)]])) == [1, 0, 1, 0]
+    scores = _evaluated([[off]], [[_label(CAR)]])
+    assert _precisions(scores) == [1, 0, 1, 0]
+    assert scores.rows[0].vehicles[0].found == 1
     low = off._replace(height=0.75, z=CAR.z - 0.375)
     scores = _evaluated([[low]], [[_label(CAR)]])
     assert _precisions(scores) == [1, 0, 0, 0]
@@ -129,12 +134,33 @@ def test_the_table_says_where_only_a_camera_s_view_counts() -> None:
         assert told == bool(drives)
 
 
+def test_the_picture_of_a_turned_box_holds_its_corners() -> None:
+    """Cut at the edge; none of a box that reaches behind the camera."""
+    box = CAR._replace(yaw=0.7)
+    corners = footprint(np.array((*box[:3], box.yaw)), box[3:5])
+    u = 600 - 700 * corners[:, 1] / corners[:, 0]
+    v = [180 - 700 * (box.z + up * box.height / 2) / corners[:, 0] for up in (-1, 1)]
+    view = View(AHEAD, Counting())
+    assert view.picture(box) == pytest.approx((u.min(), np.min(v), u.max(), np.max(v)))
+    left, top, right, bottom = view.picture(box._replace(x=4.0, y=3.0)) or (1, 1, 1, 1)
+    assert (left, top < 375, right < 600, bottom) == (0, True, True, 375)
+    assert view.picture(box._replace(x=1.0)) is None
+
+
 def test_boxes_in_regions_that_nobody_cared_to_label() -> None:
     view = View(AHEAD, Counting())
     left, top, right, bottom = view.picture(CAR) or (0, 0, 0, 0)
-    whole = np.array([[left, top, right, bottom]])
-    third = np.array([[left, top, left + (right - left) / 3, bottom]])
-    for regions, expected in ((whole, 1), (third, 0.5), (NOWHERE, 0.5)):
+    wide, tall = (right - left) / 3, (bottom - top) / 3
+    thirds = (
+        (left, top, left + wide, bottom),
+        (right - wide, top, right, bottom),
+        (left, top, right, top + tall),
+        (left, bottom - tall, right, bottom),
+    )
+    beside = ((right, top, 2 * right - left, bottom), (left, bottom, right, 2 * bottom - top))
+    whole, apart = (left, top, right, bottom), [(one, 0.5) for one in (*thirds, *beside)]
+    for region, expected in ((whole, 1), *apart, (None, 0.5)):
+        regions = NOWHERE if region is None else np.array([region])
         scores = _evaluated([[CAR, FAR]], [[_label(FAR)]], view=view, regions=regions)
         assert _precisions(scores)[0] == pytest.approx(expected)
 
@@ -149,6 +175,19 @@ def test_drives_are_measured_as_one_and_their_tracks_apart() -> None:
     assert row.detections[0].average_precision == pytest.approx(0.5)
     assert (row.purity.vehicles, row.purity.vehicles_found) == (2, 1)
     assert [v.drive for v in row.vehicles] == [0, 1]
+
+
+def test_trajectories_drift_in_percent_of_the_labelled_way() -> None:
+    """10 m too far at the end of 10 m."""
+    eye = torch.eye(3, dtype=torch.float64).expand(2, 3, 3)
+    places = torch.tensor([[0.0, 0, 0], [10, 0, 0]], dtype=torch.float64)
+    labelled = tuple(LabelledFrame((_label(CAR),), NOWHERE) for _ in range(2))
+    truth = LabelledDrive(Path("labels"), labelled, (), None, SE3(eye, places), Counting())
+    found = FoundDrive(Path("none"), ((), ()), SE3(eye, 2 * places))
+    (error,) = evaluate_drives([found], [truth]).trajectories
+    assert error is not None
+    assert error.way_m == 10
+    assert error.drift_percent == pytest.approx(100)
 
 
 def test_nothing_counts() -> None:

@@ -28,11 +28,11 @@ SHAPE = SHAPE[(SHAPE.abs() == 1).any(1)] * HALF
 SURE = torch.full((9,), 0.9, dtype=torch.float64)
 
 
-def passing(count: int = 9) -> SE3:
-    """`T_sensor_object` of a sensor that drives past along x, turning by two degrees a scan."""
+def passing(count: int = 9, degrees: float = 2.0) -> SE3:
+    """`T_sensor_object` of a sensor that drives past along x, turning by some degrees a scan."""
     x = torch.linspace(8, -8, count, dtype=torch.float64)
     place = torch.stack((x, torch.full_like(x, 3.0), torch.full_like(x, 1.5)), -1)
-    rotation = rotation_z(0.3 + torch.arange(count) * math.radians(2)).double()
+    rotation = rotation_z(0.3 + torch.arange(count) * math.radians(degrees)).double()
     return SE3(rotation, -(rotation @ place[..., None])[..., 0])
 
 
@@ -107,6 +107,17 @@ def test_unsure_scans_in_a_row_are_put_where_the_surer_ones_say(rows):
     degrees, metres = off_by(put_back(gone_astray(true, rows), true, sure), true)
     assert degrees < 1e-4
     assert metres < 0.1
+
+
+@pytest.mark.parametrize(("rows", "degrees"), [([7, 8], -10), ([0, 1], 10)])
+def test_unsure_scans_are_held_against_the_nearest_of_the_surer_ones(rows, degrees):
+    """Those turn by 60 degrees: the farthest of them is posed as the unsure ones are."""
+    poses = passing(degrees=degrees)
+    sure = SURE.clone()
+    sure[rows] = 0.3
+    turned, moved = off_by(put_back(gone_astray(poses, rows), poses, sure), poses)
+    assert turned < 25
+    assert moved < 0.5
 
 
 def test_of_three_scans_the_unsure_one_is_put_back():
