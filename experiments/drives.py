@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """How well `wildshape drive` finds the vehicles of simulated drives, and how long it takes.
 
-python experiments/drives.py --out DRIVES --first 21 --count 20 --scans 60
+python -m experiments.drives --out DRIVES --first 21 --count 20 --scans 60
 
 simulates, runs and measures one drive after the other and writes `table.md` into
 `DRIVES/21-40-of-60-scans`. A killed run goes on with the same command: finished drives are not
 done again by the same weights, a half-finished one is begun again, as its time is measured. The
-table names every commit that found a part of it.
+table names every commit that found a part of it. With `--cad CAD` the vehicles are meshes of split
+`test`, of forms that nothing was trained on or fitted to.
 """
 
 import json
@@ -20,6 +21,7 @@ from typing import Any, Literal
 
 import numpy as np
 import tyro
+from experiments.meshes import unseen_vehicles
 
 from wildshape.cli.main import in_a_sentence
 from wildshape.io.atomic import write_text
@@ -54,6 +56,7 @@ class Settings:
         scans: of each.
         workers: processes of each.
         sensor: whose scans they are.
+        cad: folder of CAD meshes with a manifest; else vehicles are procedural.
     """
 
     out: Path
@@ -62,6 +65,7 @@ class Settings:
     scans: int = 80
     workers: int = 2
     sensor: Literal["hdl64", "hdl32", "os1-128"] = "hdl64"
+    cad: Path | None = None
 
 
 def main(settings: Settings) -> None:
@@ -69,12 +73,17 @@ def main(settings: Settings) -> None:
     seeds = [str(settings.first + number) for number in range(settings.count)]
     everything = f"{seeds[0]}-{seeds[-1]}"
     named = "" if settings.sensor == "hdl64" else f"-{settings.sensor}"
+    vehicles: tuple[str, ...] = ()
+    if settings.cad is not None:
+        meshes = settings.out / "cad-vehicles"
+        unseen_vehicles(settings.cad, meshes)
+        named, vehicles = f"{named}-cad", ("--meshes", str(meshes))
     out = settings.out / f"{everything}-of-{settings.scans}-scans{named}"
     by = out / f"by-{fingerprint(None)}"
     for seed in seeds:
         street, found = out / "streets" / seed, by / "found" / seed
         drive = ("--drive", "--scans", str(settings.scans), "--seed", seed)
-        _step(street, "simulate", str(street), *drive, "--sensor", settings.sensor)
+        _step(street, "simulate", str(street), *drive, "--sensor", settings.sensor, *vehicles)
         scans = str(street / "velodyne" / "0000")
         workers = ("--workers", str(settings.workers))
         _step(found, "drive", scans, "--out", str(found), *workers, "--overwrite")

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""CAD meshes of the train split, as they are and in other proportions, for training data."""
+"""CAD meshes as they are and in other proportions: of split `train` to train on, `test` to test."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,6 +55,21 @@ def road_vehicles(cad: Path, into: Path, count: int, seed: int) -> None:
             mesh.vertices = warped(np.asarray(mesh.vertices), sizes, rng)
         seen.add(name)
         mesh.export(into / f"{place:04d}_{Path(name).stem}.ply")
+
+
+def unseen_vehicles(cad: Path, into: Path) -> None:
+    """Write the vehicles of split `test`, each once, stretched to a size that is seen on roads."""
+    import trimesh
+
+    into.mkdir(parents=True, exist_ok=True)
+    for row in rows_of(cad, "test"):
+        if row["category"] not in ROAD_SIZES:
+            continue
+        sizes = ROAD_SIZES[row["category"]]
+        mesh = trimesh.load(cad / row["file"], force="mesh", process=False)
+        size = np.ptp(mesh.vertices, axis=0)
+        mesh.vertices = mesh.vertices * (np.clip(size, sizes.least_m, sizes.most_m) / size)
+        mesh.export(into / f"{row['category']}_{Path(row['file']).stem}.ply")
 
 
 def warped(vertices: np.ndarray, sizes: Sizes, rng: np.random.Generator) -> np.ndarray:

@@ -9,7 +9,7 @@ from experiments.drives import Settings, main
 from experiments import drives
 
 
-def test_other_drives_in_the_same_folder_are_kept_apart(tmp_path, monkeypatch):
+def test_other_drives_in_the_same_folder_are_kept_apart(cad, tmp_path, monkeypatch):
     pooled, folders = [], []
 
     def noted(folder, *line):
@@ -20,8 +20,8 @@ def test_other_drives_in_the_same_folder_are_kept_apart(tmp_path, monkeypatch):
 
     monkeypatch.setattr(drives, "_step", noted)
     monkeypatch.setattr(drives, "_table", lambda *of: "")
-    for first, scans in ((21, 60), (101, 60), (101, 20)):
-        main(Settings(tmp_path, first, count=2, scans=scans))
+    for first, scans, meshes in ((21, 60, None), (101, 60, None), (101, 20, None), (101, 60, cad)):
+        main(Settings(tmp_path, first, count=2, scans=scans, cad=meshes))
         assert pooled[-1] == {str(first), str(first + 1)}
     assert len(set(folders)) == len(folders)
 

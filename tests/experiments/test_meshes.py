@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 import trimesh
 from experiments.mesh_credits import notice
-from experiments.meshes import COPY_STRETCH, ROAD_SIZES, road_vehicles, stretched, warped
+from experiments.meshes import (
+    COPY_STRETCH,
+    ROAD_SIZES,
+    road_vehicles,
+    stretched,
+    unseen_vehicles,
+    warped,
+)
 
 from wildshape.errors import BadInputError
 
@@ -44,6 +51,19 @@ def test_buses_are_drawn_four_times_as_often_and_copies_fit_on_roads(cad, tmp_pa
         themselves = [np.allclose(s, own[name], atol=1e-4) for s in found]
         assert sum(themselves) == 1
         assert sum(fits) == len(found) - 1
+
+
+def test_unseen_vehicles_are_of_the_test_split_and_fit_on_roads(cad, tmp_path):
+    own = (cad / "manifest.csv").read_text("utf-8").replace("blue.ply,test", "red.ply,test")
+    for name, text, size in (("blue", None, (4.0, 1.8, 1.5)), ("red", own, (4.5, 2.1, 2.1))):
+        folder = tmp_path / name
+        folder.mkdir()
+        for path in cad.glob("*.ply"):
+            (folder / path.name).symlink_to(path)
+        (folder / "manifest.csv").write_text(text or (cad / "manifest.csv").read_text("utf-8"))
+        unseen_vehicles(folder, folder / "out")
+        ((found,),) = boxes(folder / "out").values()
+        np.testing.assert_allclose(found, size, atol=1e-4)
 
 
 def limits(name):
