@@ -21,7 +21,6 @@ from wildshape.drives.completing.surroundings import crowded
 from wildshape.drives.completing.vehicles import (
     judge,
     stated,
-    surer_if_driving,
     vehicle_confidence,
     vehicle_sized,
 )
@@ -146,22 +145,6 @@ def test_a_doubtful_vehicle_is_none_where_a_wall_goes_on_beyond_its_box():
 
     assert names(car, ground) == set()
     assert names(car, ground, wall) == {"a"}
-
-
-def test_what_drives_where_it_looks_is_a_vehicle_whatever_its_shape():
-    config, frames = VehicleConfig(), tuple(range(0, 20, 4))
-
-    def kind(step, yaw, p_kind):
-        boxes = [(step * frame, 0.0, 0.0, yaw) for frame in frames]
-        one = replace(completed(boxes, frames), p_kind=p_kind, confidence=0.1)
-        found = surer_if_driving(one, still(20), BoxConfig(), config)
-        assert (found.confidence > one.confidence) == (found.p_kind > p_kind)
-        return found.p_kind
-
-    assert kind(0.5, 0.1, 0.5) == kind(0.5, math.pi, 0.5) == config.driving_kind
-    assert kind(0.5, math.pi / 2, 0.5) == 0.5  # sideways
-    assert kind(0.0, 0.1, 0.5) == 0.5
-    assert kind(0.5, 0.1, 0.3) == 0.3
 
 
 def test_points_of_a_lorry_are_as_large_as_a_vehicle_and_those_of_a_wall_are_not():

@@ -1,13 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""What drives by its points alone, and what does not."""
+"""What drives, by its points alone or by its boxes, and what does not."""
+
+import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
+from tests.drives.cuts import write_cut
+from tests.drives.objects import completed, still
 
 from wildshape.drives.completing.driving import drives
-from wildshape.drives.object_config import DrivingConfig
+from wildshape.drives.completing.vehicles import surer_if_driving
+from wildshape.drives.object_config import BoxConfig, DrivingConfig, VehicleConfig
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 
@@ -60,3 +66,36 @@ def test_what_else_does_not(ways, height):
 def test_two_scans_tell_nothing():
     clouds, T_level_cloud = seen(np.array((0.0, 20.0)))
     assert not drives(clouds, T_level_cloud, np.array((0, 20)), CONFIG)
+
+
+@pytest.mark.parametrize(
+    ("step", "off", "p_kind", "sides", "surer"),
+    [
+        (0.5, 0.1, 0.5, (0.1, 0.1), True),
+        (0.5, math.pi, 0.5, (0.1, 0.1), True),
+        (0.5, math.pi / 2, 0.5, (4.0, 1.8), False),  # sideways
+        (0.0, 0.1, 0.5, (4.0, 1.8), False),
+        (0.5, 0.1, 0.3, (4.0, 1.8), False),  # not far enough for so small a probability
+        (0.8, 0.1, 0.3, (0.1, 1.8), True),  # a car from behind
+        (0.8, math.pi, 0.3, (4.0, 0.1), True),  # and from the side
+        (0.8, math.pi / 2, 0.3, (4.0, 1.8), False),
+        (0.8, 0.1, 0.01, (4.0, 1.8), False),
+        (0.8, 0.1, 0.3, (1.8, 0.6), False),  # a cyclist
+    ],
+)
+@pytest.mark.parametrize("course", [0.0, 1.0, -2.5])
+def test_what_drives_where_it_looks_is_a_vehicle_whatever_its_shape(
+    tmp_path, step, off, p_kind, sides, surer, course
+):
+    config, frames = VehicleConfig(), tuple(range(0, 20, 4))
+    ahead = np.array((math.cos(course), math.sin(course)))
+    beside = np.array((-ahead[1], ahead[0]))
+    corners = np.array(((-1, -1), (-1, 1), (1, -1), (1, 1))) / 2 * sides
+    for frame in range(frames[-1] + 1):
+        places = step * frame * ahead + corners @ np.stack((ahead, beside))
+        write_cut(tmp_path, frame, [np.column_stack((places, (-0.5, 0.5, 0.5, -0.5)))], 4)
+    boxes = [(*(step * frame * ahead), 0.0, course + off) for frame in frames]
+    one = replace(completed(boxes, frames), p_kind=p_kind, confidence=0.1)
+    found = surer_if_driving(one, tmp_path, still(20), BoxConfig(), config)
+    assert found.p_kind == (config.driving_kind if surer else p_kind)
+    assert (found.confidence > one.confidence) == surer

@@ -88,6 +88,10 @@ class VehicleConfig:
         least_driving: no object of a smaller one is made surer by its motion. On 58 streets four of
             0.17 to 0.35 seemed to drive, and none was a vehicle.
         driving_m: what gets so far drives if it looks the way it goes.
+        far_m: what gets so far drives, too, if it is not less likely than `least_far`: on 60
+            streets all such were vehicles.
+        least_far: see there.
+        far_sides_m: and if it is seen as long, or as wide, as that: cyclists are not.
         driving_deg: to so many degrees.
         driving_kind: the probability of those that drive is at least this.
         driving_confidence: and so is what is stated of them: their heading is known.
@@ -116,6 +120,9 @@ class VehicleConfig:
     least_kind: float = 0.5
     least_driving: float = 0.4
     driving_m: float = 3.5
+    far_m: float = 10.0
+    least_far: float = 0.05
+    far_sides_m: tuple[float, float] = (2.5, 1.2)
     driving_deg: float = 15.0
     driving_kind: float = 0.9
     driving_confidence: float = 0.5

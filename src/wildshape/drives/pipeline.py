@@ -288,7 +288,8 @@ class Pipeline:
         known = self.drive, self.cuts, self.config, self.tracked, self.helpers.in_order
         with self.clock.stage("vehicles", 1) as at:
             judged = [
-                surer_if_driving(one, turns, boxes, self.config.vehicles) for one in completed
+                surer_if_driving(one, self.cuts, turns, boxes, self.config.vehicles)
+                for one in completed
             ]
             found, said = Selector(*known)(judged, places)
             write_judged(self.completing / "vehicles.json", objects, said)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from wildshape.drives.completing.boxes import moves, velocity_of
-from wildshape.drives.completing.level_frame import Completed
+from wildshape.drives.completing.level_frame import Completed, as_box_sees
 from wildshape.drives.completing.merging import Places
 from wildshape.drives.completing.rolling_shutter import Turns
 from wildshape.drives.object_config import BoxConfig, VehicleConfig
@@ -64,27 +64,44 @@ def judge(objects: list[Completed], places: Places, config: VehicleConfig) -> li
 
 
 def surer_if_driving(
-    one: Completed, turns: Turns, boxes: BoxConfig, config: VehicleConfig
+    one: Completed, cuts: Path, turns: Turns, boxes: BoxConfig, config: VehicleConfig
 ) -> Completed:
     """What gets far and looks the way it goes is a vehicle, whatever is said of its shape."""
     kind = one.p_kind
-    if kind is None or kind < config.least_driving:
+    if kind is None or kind < config.least_far or len(one.frames) < _FEWEST_OF_A_WAY:
         return one
-    if len(one.frames) < _FEWEST_OF_A_WAY or not _drives(one, turns, boxes, config):
+    way = _driven(one, turns, boxes, config)
+    if kind < config.least_driving:
+        drives = way >= config.far_m and _seen_large(one, cuts, turns, config)
+    else:
+        drives = way >= config.driving_m
+    if not drives:
         return one
     surer = max(kind, config.driving_kind)
     stated = max(one.confidence * surer / kind, config.driving_confidence)
     return replace(one, p_kind=surer, confidence=min(stated, 1.0))
 
 
-def _drives(one: Completed, turns: Turns, boxes: BoxConfig, config: VehicleConfig) -> bool:
+def _driven(one: Completed, turns: Turns, boxes: BoxConfig, config: VehicleConfig) -> float:
+    """How far it gets, metres, if it looks the way it goes; else 0."""
     at = np.take(turns.ticks, one.frames) + one.phases
+    if not moves(at, one.boxes, boxes):
+        return 0.0
     velocity = velocity_of(at, one.boxes[:, :2])
-    if not moves(at, one.boxes, boxes) or np.hypot(*velocity) * np.ptp(at) < config.driving_m:
-        return False
     course = np.arctan2(velocity[1], velocity[0])
     off = np.abs(np.arcsin(np.sin(one.boxes[:, 3] - course)))  # front or rear ahead
-    return bool(np.median(off) <= np.deg2rad(config.driving_deg))
+    looks_ahead = np.median(off) <= np.deg2rad(config.driving_deg)
+    return float(np.hypot(*velocity) * np.ptp(at)) if looks_ahead else 0.0
+
+
+def _seen_large(one: Completed, cuts: Path, turns: Turns, config: VehicleConfig) -> bool:
+    """Whether its points, in the middle one of its scans, are as long or as wide as a vehicle."""
+    rows = [one.seen.frames.index(frame) for frame in one.frames]
+    sides = []
+    for frame, cloud, box in zip(one.frames, one.seen.part(rows).clouds(cuts), one.boxes):
+        seen = as_box_sees(turns.T_level_sensor[frame].apply_numpy(cloud), box)
+        sides.append(np.ptp(seen[:, :2], axis=0))
+    return bool((np.median(sides, axis=0) >= config.far_sides_m).any())
 
 
 def likely(objects: list[Completed], least: float, config: VehicleConfig) -> list[Completed]:
