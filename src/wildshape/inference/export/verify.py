@@ -18,7 +18,7 @@ from wildshape.inference.config import ExportRule
 from wildshape.inference.export import onnx
 from wildshape.inference.export.onnx import INPUTS
 from wildshape.inference.predictor import Predictor, load
-from wildshape.io.atomic import lock_folder, released_after
+from wildshape.io.atomic import lock_folder, naming, released_after
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.records import Completion, Points
 
@@ -83,12 +83,12 @@ def export_model(model: Path | None, out: Path, scans: int = 24) -> Difference:
 
 @contextmanager
 def _checked_before(path: Path) -> Iterator[Path]:
-    """A file that gets its final name only if the block ends without an error.
+    """A file that gets its final name only if the block ends without an error, which names that.
 
     Its folder has one name for all runs: what a killed one left there goes with the next.
     """
     folder = path.with_name(f".{path.name}.part")
-    with released_after(folder):
+    with naming(path), released_after(folder):
         lock_folder(folder)
         try:
             draft = folder / f"model{path.suffix.lower()}"
