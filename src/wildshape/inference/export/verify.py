@@ -3,9 +3,10 @@
 """An exported file held against the predictor that it was made from."""
 
 import math
-from collections.abc import Callable, Sequence
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from wildshape.inference.config import ExportRule
 from wildshape.inference.export import onnx
 from wildshape.inference.export.onnx import INPUTS
 from wildshape.inference.predictor import Predictor, load
+from wildshape.io.atomic import lock_folder, naming, released_after
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.records import Completion, Points
 
@@ -71,14 +73,29 @@ def export_model(model: Path | None, out: Path, scans: int = 24) -> Difference:
         )
     write = onnx.write_onnx if suffix == ".onnx" else onnx.write_torch
     out.parent.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(dir=out.parent, prefix=".export.") as folder:
-        draft = Path(folder) / f"model{suffix}"  # no file under its final name before it is checked
+    with _checked_before(out) as draft:
         write(draft, onnx.trace(predictor), onnx.describe(predictor))
         rehearsed = rehearsal_scans(predictor.settings, scans)
         found = compare(open_exported(draft), predictor, rehearsed)
         _refuse_other(out, found)
-        draft.replace(out)
     return found
+
+
+@contextmanager
+def _checked_before(path: Path) -> Iterator[Path]:
+    """A file that gets its final name only if the block ends without an error, which names that.
+
+    Its folder has one name for all runs: what a killed one left there goes with the next.
+    """
+    folder = path.with_name(f".{path.name}.part")
+    with naming(path), released_after(folder):
+        lock_folder(folder)
+        try:
+            draft = folder / f"model{path.suffix.lower()}"
+            yield draft
+            draft.replace(path)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def _refuse_other(path: Path, found: Difference) -> None:
