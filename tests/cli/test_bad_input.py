@@ -241,7 +241,8 @@ def test_a_link_that_leads_nowhere_is_no_place_to_write(
         ("simulate", out, "--tracks", 1, "--layout", "folders"),
     ):
         said = refused(*command)
-        assert f"{out}: is a link that leads nowhere; " in said or "Symlink loop" in said
+        circle = "Symlink loop" in said or "symbolic links" in said  # before Python 3.13, and since
+        assert f"{out}: is a link that leads nowhere; " in said or circle
     file = tmp_path / "out.ply"
     file.symlink_to(target)
     assert "pass --overwrite" in refused("fuse", dataset / "000000", "--out", file, *model)
