@@ -85,8 +85,8 @@ class VehicleConfig:
         usual_confidence: of the completions; more speaks for a vehicle.
         least_confidence: objects of less are left out.
         least_kind: the same where the weights state the probability.
-        least_driving: no object of a smaller one is made surer by its motion. On 58 streets four of
-            0.17 to 0.35 seemed to drive, and none was a vehicle.
+        least_driving: no object of a smaller one is made surer by a short way. On 58 streets four
+            of 0.17 to 0.35 seemed to drive, and none was a vehicle.
         driving_m: what gets so far drives if it looks the way it goes.
         far_m: what gets so far drives, too, if it is not less likely than `least_far`: on 60
             streets all such were vehicles.
