@@ -104,6 +104,7 @@ def test_reasons_of_probabilities(pose, box, kind, expected):
         ((1.41, 2.33, 1.46, 2.25, 1.44, 2.36, 1.41, 2.26), ("scans_disagree",)),  # car and van
         ((1.41, 1.45, 1.46, 1.52, 1.44, 1.38, 1.41, 2.26), ()),  # one went wrong
         ((1.41, 2.33, 1.46), ()),  # too few to tell
+        ((3.2, 3.6, 3.2, 3.6, 3.2, 3.6), ()),  # a lorry: it is the share that counts
     ],
 )
 def test_a_track_of_two_vehicles_disagrees_on_its_height(heights, expected):
