@@ -32,9 +32,7 @@ from wildshape.simulate.street.sweep import (
 )
 def test_so_many_pulses_come_back(distance, cosine, ground, glass, share) -> None:
     shape = (100, 200)
-    echoes = Echoes(
-        *(np.full(shape, value) for value in (distance, cosine, NOBODY, ground, glass))
-    )
+    echoes = Echoes(*(np.full(shape, value) for value in (distance, cosine, NOBODY, ground, glass)))
     kept = returned(echoes, HDL64, 0.1, 0.2, np.random.default_rng(0))
     assert kept.mean() == pytest.approx(share, abs=0.01)
 
