@@ -59,6 +59,7 @@ def test_reasons_of_a_scan(scan, sensor, expected):
         ([[1, 0, 0], [0, 1, 0], [0, 0, 1]], False),
         ([[1, 0, 0], [0, -1, 0], [0, 0, -1]], True),  # OpenGL: y up, z backward
         ([[0, 0, 1], [-1, 0, 0], [0, -1, 0]], True),  # ROS' body: x forward, y left, z up
+        ([[0, 0, 1], [-1, 0, 0], [0, 1, 0]], True),  # z down: a little ahead, far beside
     ],
 )
 def test_a_camera_that_does_not_look_along_z_is_told_its_axes(axes, told):
