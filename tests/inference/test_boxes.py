@@ -150,18 +150,20 @@ def test_of_four_scans_one_alone_is_not_believed():
 
 @pytest.mark.parametrize("degrees", [-3.0, -1.0, 0.0, 2.0])
 def test_a_canonical_frame_that_leans_is_made_level(degrees):
-    leaning = about_y(degrees)
-    fitted = fit_to_scans(surface() @ leaning.mT, [], mirror=True)
+    leaning, middle = about_y(degrees), torch.tensor((5.0, 0.0, 2.0), dtype=torch.float64)
+    fitted = fit_to_scans(surface() @ leaning.mT + middle, [], mirror=True)
     torch.testing.assert_close(fitted.rotation, leaning, atol=1e-6, rtol=0)
+    torch.testing.assert_close(fitted.centre, middle, atol=0.02, rtol=0)
     torch.testing.assert_close(fitted.size, SIZE, atol=0.03, rtol=0)
 
 
 @pytest.mark.parametrize("degrees", [-40.0, 23.0])
 def test_a_canonical_frame_of_depth_views_may_have_any_pitch(degrees):
     """As that of the shipped chairs, whose boxes were half as long again and stood askew."""
-    tipped = about_y(degrees)
-    fitted = fit_to_scans(surface() @ tipped.mT, [], mirror=True, body=False)
+    tipped, middle = about_y(degrees), torch.tensor((0.5, 0.0, 0.2), dtype=torch.float64)
+    fitted = fit_to_scans(surface() @ tipped.mT + middle, [], mirror=True, body=False)
     torch.testing.assert_close(fitted.rotation, tipped, atol=1e-6, rtol=0)
+    torch.testing.assert_close(fitted.centre, middle, atol=0.02, rtol=0)
     torch.testing.assert_close(fitted.size, SIZE, atol=0.03, rtol=0)
 
 

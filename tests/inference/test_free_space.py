@@ -57,6 +57,17 @@ def half_hidden() -> tuple[np.ndarray, np.ndarray, Sights]:
     return plane, scan, Sights([scan], [SightLines.of_returns(ends)], CONFIG)
 
 
+def test_what_rays_of_any_scan_passed_is_taken_off() -> None:
+    plane, scan, sights = half_hidden()
+    ends = plane * np.where(plane[:, 1:2] < 1, 0.5, 2.0).astype(np.float32)
+    rays = [*sights.rays, SightLines.of_returns(ends)]
+    both = Sights([scan, scan], rays, replace(CONFIG, least_kept=0.0))
+    kept = without_free_space(torch.from_numpy(plane), stack([SE3.identity()] * 2), both)
+    above = kept[kept[:, 2] > -1 + CONFIG.low_m]
+    assert -0.2 < float(above[:, 1].min()) < float(above[:, 1].max()) < 1.2
+    assert len(above) > 100
+
+
 def test_shape_in_free_space_costs_and_what_is_hidden_does_not(track: Track) -> None:
     """A wall stands in front of half of a plane; the other half is in the way of rays."""
     plane, scan, sights = half_hidden()

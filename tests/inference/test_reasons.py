@@ -59,6 +59,7 @@ def test_reasons_of_a_scan(scan, sensor, expected):
         ([[1, 0, 0], [0, 1, 0], [0, 0, 1]], False),
         ([[1, 0, 0], [0, -1, 0], [0, 0, -1]], True),  # OpenGL: y up, z backward
         ([[0, 0, 1], [-1, 0, 0], [0, -1, 0]], True),  # ROS' body: x forward, y left, z up
+        ([[0, 0, 1], [-1, 0, 0], [0, 1, 0]], True),  # z down: a little ahead, far beside
     ],
 )
 def test_a_camera_that_does_not_look_along_z_is_told_its_axes(axes, told):
@@ -104,6 +105,7 @@ def test_reasons_of_probabilities(pose, box, kind, expected):
         ((1.41, 2.33, 1.46, 2.25, 1.44, 2.36, 1.41, 2.26), ("scans_disagree",)),  # car and van
         ((1.41, 1.45, 1.46, 1.52, 1.44, 1.38, 1.41, 2.26), ()),  # one went wrong
         ((1.41, 2.33, 1.46), ()),  # too few to tell
+        ((3.2, 3.6, 3.2, 3.6, 3.2, 3.6), ()),  # a lorry: it is the share that counts
     ],
 )
 def test_a_track_of_two_vehicles_disagrees_on_its_height(heights, expected):

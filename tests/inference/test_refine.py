@@ -19,6 +19,7 @@ from wildshape.inference.refine import (
     Fit,
     _allowed,
     drawn_to,
+    fit_to_scans,
     padded,
     refine,
 )
@@ -70,21 +71,36 @@ def pose_errors(i, R, t):
 
 
 def test_pose_and_size_come_nearer():
-    """Median over a track: what one scan cannot tell of one angle, another tells."""
-    before, after = [], []
+    """Median over a track: what one scan cannot tell of one angle, another tells.
+
+    Sides that no scan shows move with the size, too.
+    """
+    given, before, after = SHAPE / STRETCH, [], []
     for i, scan in enumerate(TRACK.scans):
         R, t = spoilt(i)
-        found = refined(scan, SHAPE / STRETCH, R, t, mirror=True)
+        found = refined(scan, given, R, t, mirror=True)
         size = np.ptp(found.shape, axis=0) / np.ptp(SHAPE, axis=0)
-        before.append((*pose_errors(i, R, t), np.abs(np.log(STRETCH)).mean()))
-        after.append(
-            (*pose_errors(i, found.rotation, found.translation), np.abs(np.log(size)).mean())
-        )
+        apart = [np.linalg.norm(one - SHAPE, axis=1).mean() for one in (given, found.shape)]
+        before.append((*pose_errors(i, R, t), np.abs(np.log(STRETCH)).mean(), apart[0]))
+        errors = pose_errors(i, found.rotation, found.translation)
+        after.append((*errors, np.abs(np.log(size)).mean(), apart[1]))
         np.testing.assert_allclose(found.rotation @ found.rotation.T, np.eye(3), atol=1e-9)
-    turned, moved, sized = np.median(after, axis=0) / np.median(before, axis=0)
+    turned, moved, sized, apart = np.median(after, axis=0) / np.median(before, axis=0)
     assert turned < 0.4
     assert moved < 0.7
     assert sized < 0.7
+    assert apart < 0.7
+
+
+def test_the_network_s_answer_is_believed_as_much_as_is_said():
+    """Of a plate that a scan sees 2 cm off: the mean of both places by their inverse variances."""
+    config = RefineConfig(effective_points=1.0, error_m=0.1, prior_m=0.05)
+    x, y = torch.meshgrid(*[torch.linspace(-2, 2, 41, dtype=torch.float64)] * 2, indexing="ij")
+    plate = torch.stack((x.flatten(), y.flatten(), 0 * x.flatten()), 1)[None]
+    seen = padded([plate[0, ::7] + torch.tensor((0.0, 0.0, 0.02))])
+    fit = fit_to_scans(seen, plate, torch.eye(3)[None], torch.zeros(1, 3), config=config)
+    scan, prior = config.error_m**-2, config.prior_m**-2
+    assert float(fit.translation[0, 2]) == pytest.approx(0.02 * scan / (scan + prior), rel=0.05)
 
 
 def test_a_perfect_answer_stays():

@@ -22,10 +22,18 @@ from wildshape.method.trust import (
     Calibrator,
     LogisticRegression,
     ScanFeatures,
+    Surface,
     TrackFeatures,
     Trust,
 )
-from wildshape.method.trust_features import rival_margin, surfaces, views_apart
+from wildshape.method.trust_features import (
+    rival_margin,
+    scan_features,
+    surfaces,
+    track_features,
+    views_apart,
+)
+from wildshape.records import Box
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 from wildshape.simulate.sensor import DepthCamera
 
@@ -183,3 +191,47 @@ def test_what_a_surface_is_like():
     few = scans[2][:40]
     assert surfaces([few, *scans], torch.eye(3).repeat(5, 1, 1))[1:] == found
     assert surfaces([few], upright[:1]) == surfaces([few, *scans], torch.eye(3).repeat(5, 1, 1))[:1]
+
+
+def test_a_scan_of_few_points_is_as_rough_as_its_own_neighbourhoods_are():
+    scan = patch(1, 30, 0.03)[:60]
+    thick = []
+    for point in scan.astype(np.float64):
+        near = scan[np.argsort(((scan - point) ** 2).sum(1))[:12]].astype(np.float64)
+        thick.append(math.sqrt(np.linalg.eigvalsh(np.cov(near.T, bias=True))[0]))
+    (found,) = surfaces([scan], torch.eye(3)[None])
+    assert found.rough == pytest.approx(math.log(np.quantile(thick, 0.9)), abs=1e-3)
+
+
+def test_what_is_known_of_a_track_is_the_mean_of_its_scans_the_fuller_the_heavier():
+    made = trusting().complete(scan())
+    base = ScanFeatures(*np.linspace(0.1, 1.4, 14))
+    few = base._replace(rival=0.1, square=0.6, log_points=math.log(100), log_length=1.4)
+    many = base._replace(rival=0.3, square=0.9, log_points=math.log(4000), log_length=1.6)
+    done = [dataclasses.replace(made, evidence=tuple(one)) for one in (few, many)]
+    poses = SE3(torch.eye(3).repeat(2, 1, 1), torch.tensor(((8.0, 0.0, 0.0), (9.0, 0.0, 0.0))))
+    cost = torch.tensor((0.05, 0.2))
+    of_few, of_many = track_features(done, torch.arange(2), poses, (4.3, 1.8, 1.5), cost)
+    share = math.sqrt(500) / (math.sqrt(100) + math.sqrt(500))  # of no more than 500 points
+    assert of_few.rival == pytest.approx(0.1 + 0.2 * share)
+    assert of_few.square == pytest.approx(0.6 + 0.3 * share)
+    assert of_few.log_points == pytest.approx(math.log(4000))
+    assert of_few.length_spread == pytest.approx(0.1)
+    assert of_few.size_off == pytest.approx(0)
+    assert of_few == of_many._replace(scan_cost=of_few.scan_cost)
+    assert (of_few.scan_cost, of_many.scan_cost) == pytest.approx((math.log(0.05), math.log(0.2)))
+
+
+def test_a_scan_is_deep_in_its_box_where_it_is_farther_in_than_labels_err():
+    c, s = math.cos(0.5), math.sin(0.5)
+    box = Box((10.0, 2.0, 0.5), (4.0, 2.0, 1.5), (math.cos(0.25), 0.0, 0.0, math.sin(0.25)))
+    made = dataclasses.replace(trusting().complete(scan()), box=box)
+    x, y, z = np.meshgrid(np.linspace(-2, 2, 41), np.linspace(-1, 1, 21), np.linspace(-0.7, 0.7, 8))
+    inside = np.stack((x.ravel(), y.ravel(), z.ravel()), 1)
+    turned = inside @ np.array(((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)))
+    points = (turned + box.centre).astype(np.float32)
+    found = scan_features(made, points, Surface(1.0, 0.0, 0.0), 0.1, None)
+    expected = (np.abs(inside) < np.array((1.75, 0.75, 0.5))).all(1).mean()
+    assert found.deep == pytest.approx(expected, abs=0.03)
+    assert found.seen_length == pytest.approx(1.0, abs=0.02)
+    assert found.seen_width == pytest.approx(1.0, abs=0.02)

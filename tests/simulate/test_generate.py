@@ -11,10 +11,14 @@ from scipy.spatial import KDTree
 from tests.cars import poses_of, shape_of
 
 from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.rotation import rotations_about
 from wildshape.records import Track
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
+from wildshape.simulate.occluder import occluders
+from wildshape.simulate.scan import Turn
 from wildshape.simulate.sensor import SensorName
 from wildshape.simulate.shapes.solid import box
+from wildshape.simulate.varied_scans import cut_above_ground
 
 
 def _bytes(track: Track) -> bytes:
@@ -73,6 +77,36 @@ def test_half_of_the_varied_scans_are_cut_off_above_the_ground() -> None:
             lowest.append(np.sort(z)[3] - floor)
     share = np.mean(np.array(lowest) > 0.12)
     assert 0.2 < share < 0.7
+
+
+def test_a_scan_is_cut_off_at_one_height_above_the_ground_however_its_sensor_leans() -> None:
+    rng, target = np.random.default_rng(0), box((-2.0, -0.9, -0.75), (2.0, 0.9, 0.75))
+    T = np.eye(4)
+    T[:3, :3] = (rotations_about(2, np.array([0.7])) @ rotations_about(1, np.array([0.2])))[0]
+    T[:3, 3] = 5.0, -3.0, 1.0
+    at = rng.uniform(-0.75, 0.75, (400, 3))
+    turn = Turn((at - T[:3, 3]) @ T[:3, :3], 400, 0.0, np.zeros((0, 3)))
+    heights = []
+    for _ in range(20):
+        kept = cut_above_ground(turn, T, target, rng).points
+        z = np.sort((kept @ T[:3, :3].T + T[:3, 3])[:, 2])
+        np.testing.assert_allclose(z, np.sort(at[:, 2])[-len(z) :])
+        heights += [z[0] + 0.75] if len(z) < 400 else []
+    assert 5 < len(heights) < 15
+    assert 0.05 < min(heights) < max(heights) < 0.36
+
+
+def test_occluders_stand_on_the_ground_of_the_object_clear_of_it_and_of_the_sensor() -> None:
+    rng, target = np.random.default_rng(0), box((-2.0, -0.9, -0.75), (2.0, 0.9, 0.75))
+    sensors = np.column_stack((np.linspace(-12, 12, 25), np.full(25, 6.0), np.full(25, 1.0)))
+    things = [thing for _ in range(40) for thing in occluders(target, sensors, rng)]
+    assert len(things) > 40
+    for low, high in (thing.bounds for thing in things):
+        assert low[2] == pytest.approx(-0.75, abs=0.05)
+        apart = np.maximum(low - target.bounds[1], target.bounds[0] - high)[:2]
+        assert apart.max() > 0.199
+        outside = np.maximum(low[:2] - sensors[:, :2], sensors[:, :2] - high[:2]).max(1)
+        assert outside.min() > 1.0
 
 
 def test_occluders_reduce_points() -> None:

@@ -9,7 +9,7 @@ from wildshape.geometry.projection.pinhole import back_project
 from wildshape.simulate.one_track import depth_image, random_pose, view
 from wildshape.simulate.raycast import Scene
 from wildshape.simulate.sensor import DEPTH_CAMERA
-from wildshape.simulate.shapes.solid import box
+from wildshape.simulate.shapes.solid import box, ellipsoid
 from wildshape.simulate.shapes.unit_shapes import airplane
 
 
@@ -30,6 +30,25 @@ def test_a_unit_sphere_of_directions_fits_and_fills_the_image() -> None:
     """A sphere of diameter 1 at distance 2 reaches 0.484 of the half width 0.5."""
     edge = 0.5 / np.sqrt(2.0**2 - 0.5**2) * DEPTH_CAMERA.focal_px
     assert 0.9 * 64 < edge < 64
+
+
+def test_views_are_from_elevations_as_stated() -> None:
+    rng = np.random.default_rng(0)
+    at = np.array([random_pose(DEPTH_CAMERA, rng)[:3, 3] for _ in range(400)])
+    elevation = np.degrees(np.arcsin(at[:, 2] / np.linalg.norm(at, axis=1)))
+    low, high = DEPTH_CAMERA.elevation_deg
+    assert low <= elevation.min() < low + 3
+    assert high - 3 < elevation.max() <= high
+
+
+def test_noise_and_losses_of_a_view_are_as_stated() -> None:
+    ball = Scene([ellipsoid((0.0, 0.0, 0.0), (0.4, 0.4, 0.4))])
+    clean, lost, noisy = (
+        view(ball, DEPTH_CAMERA, *how, np.random.default_rng(0))[0]
+        for how in ((0.0, 0.0), (0.0, 0.3), (0.01, 0.0))
+    )
+    assert len(lost) == pytest.approx(0.7 * len(clean), rel=0.05)
+    assert (noisy[:, 2] - clean[:, 2]).std() == pytest.approx(0.01, rel=0.05)
 
 
 @pytest.mark.parametrize("seed", range(3))

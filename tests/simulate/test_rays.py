@@ -24,6 +24,9 @@ def test_no_ray_that_came_back_passed_through_the_object() -> None:
     for i, (scan, rays) in enumerate(zip(track.scans, track.rays)):
         assert rays is not None
         assert 100 < len(rays.returned) < len(rays) <= 2048
+        sky = rays.directions[:, 2] > 0.0  # the car is lower than the sensor
+        assert sky.any()
+        assert np.isinf(rays.ranges[sky]).mean() > 0.5
         posed = (poses_of(track)[i].apply_numpy(one) for one in (body, larger))
         true, wrong = (standing(shape, scan, rays).free.mean() for shape in posed)
         assert true < 0.03 < 0.1 < wrong

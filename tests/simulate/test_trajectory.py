@@ -3,27 +3,33 @@
 """Drive-bys: the ranges, speeds and headings that are promised."""
 
 import numpy as np
+import pytest
 
 from wildshape.simulate.trajectory import drive_by
 
 _HALF = np.array((2.2, 0.9, 0.75))
 
 
-def _drives(count: int = 200) -> list:
+_LORRY = np.array((6.0, 1.25, 1.8))
+
+
+def _drives(count: int = 200, half: np.ndarray = _HALF) -> list:
     rng = np.random.default_rng(0)
-    return [drive_by(1.73, _HALF, 4.0, 30.0, rng) for _ in range(count)]
+    return [drive_by(1.73, half, 4.0, 30.0, rng) for _ in range(count)]
 
 
-def test_ranges_steps_and_height() -> None:
-    for drive in _drives():
+@pytest.mark.parametrize("half", [_HALF, _LORRY])
+def test_ranges_steps_and_height(half: np.ndarray) -> None:
+    """Nor does the sensor pass through a lorry that stands across the road."""
+    for drive in _drives(half=half):
         T = drive.T_object_sensor
         if len(T) < 2:
             continue
         ground_range = np.hypot(T[:, 0, 3], T[:, 1, 3])
         assert ground_range.min() >= 4.0 - 1e-9
         assert ground_range.max() <= 30.0 + 1e-9
-        np.testing.assert_allclose(T[:, 2, 3], 1.73 - 0.75, atol=0.08)
-        assert (np.abs(T[:, :2, 3]) - _HALF[:2]).max(1).min() > 0.8
+        np.testing.assert_allclose(T[:, 2, 3], 1.73 - half[2], atol=0.08)
+        assert (np.abs(T[:, :2, 3]) - half[:2]).max(1).min() > 0.8
         step = np.linalg.norm(np.diff(T[:, :2, 3], axis=0), axis=1)
         assert np.median(step) >= 0.29
         assert np.median(step) <= 1.21

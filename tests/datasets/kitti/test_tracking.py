@@ -191,3 +191,9 @@ def test_missing_scans_and_damaged_oxts_are_named(scene, tmp_path):
     for scan in (training / "velodyne" / "0001").iterdir():
         scan.unlink()
     refused(training, r"velodyne.0001: no \.bin scans")
+
+
+def test_a_sequence_of_which_no_scan_can_be_read_is_refused(training):
+    for scan in (training / "velodyne" / "0001").iterdir():
+        scan.write_bytes(scan.read_bytes()[:-5])
+    refused(training, r"000000\.bin: \d+ bytes, expected a multiple of 16")

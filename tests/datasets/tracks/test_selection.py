@@ -47,6 +47,22 @@ def test_scans_of_scenes_are_left_out_and_named(tmp_path, points, said):
     assert len(next(iter(all_tracks(wide))).scans) == 2
 
 
+def test_how_far_away_a_scan_is_a_stray_point_does_not_say():
+    near = Selection(min_points=1, range_m=(5.0, 15.0))
+    car = np.concatenate(([[30.0, 0.0, 0.0]], scene(3.5) * 0.3 + (9, 0, 0))).astype(np.float32)
+    assert near.objection_to_scan(car) == ""
+    assert near.objection_to_scan(2 * car) == "scan: not within 5 to 15 m"
+
+
+@pytest.mark.parametrize(("mean", "kept"), [(70, 1), (71, 0)])
+def test_the_scans_of_an_object_have_so_many_points_on_average(tmp_path, mean, kept):
+    car = (scene(3.5) * (0.5, 0.25, 0.3) + (9, 0, 0)).astype(np.float32)
+    for name, count in (("0", 40), ("1", 100)):
+        write_ply(tmp_path / "a" / "scans" / f"{name}.ply", car[:count])
+    source = Folder(tmp_path, Selection(min_points=16, min_mean_points=mean))
+    assert len(list(all_tracks(source))) == kept
+
+
 def test_a_folder_of_full_scans_is_refused(tmp_path, capsys):
     from wildshape.cli.main import main
 

@@ -20,6 +20,8 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Track
 
+AROUND = ((-0.02, 0.02), (0.3, 1.5))  # heights of the ground and of what stands on it
+
 
 def test_scans_of_a_drive_meet_on_the_objects_surface():
     track = drive_by(scans=9)
@@ -118,3 +120,15 @@ def test_a_label_that_is_not_where_the_scans_are_is_told():
 def test_no_poses_no_truth():
     with pytest.raises(BadInputError, match=r"drive: no poses"):
         shape_partial(replace(drive_by(scans=2), T_sensor_object=None))
+
+
+def test_the_ground_is_taken_off_although_a_point_lies_below_it():
+    rng = np.random.default_rng(0)
+    ground, body = (rng.uniform((-2, -1, low), (2, 1, high), (600, 3)) for low, high in AROUND)
+    cloud = np.concatenate((ground, body, [[0.0, 0.0, -1.0]])).astype(np.float32)
+    one = SE3(torch.eye(3)[None], torch.zeros(1, 3))
+    shaped = TruthBuilder(outliers="none", strip=0.2).with_shape(
+        Track("a", (cloud,), ("0",), T_sensor_object=one)
+    )
+    assert shaped is not None
+    assert shape_of(shaped)[:, 2].min() > 0.15

@@ -86,7 +86,7 @@ def test_neighbours_turn_scans_around_however_sure_these_are():
     back = torch.zeros(128, dtype=torch.bool)
     back[60:68] = True
     rotation = rotation_z(torch.where(back, yaw + torch.pi, yaw))
-    sure = torch.full((128,), 0.99, dtype=torch.float64)
+    sure = torch.ones(128, dtype=torch.float64)
     assert torch.equal(followed_signs(rotation, sure) < 0, back)
 
 

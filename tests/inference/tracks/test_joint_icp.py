@@ -79,6 +79,16 @@ def test_poses_spoilt_a_little_come_back(seed):
     assert metres[1] < 0.025
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_scans_of_few_points_come_back_too(seed):
+    """Each is taken several times over: points on top of each other would make planes of no use."""
+    few, middle = [scan[:60] for scan in SCANS], len(TRUE) // 2
+    T = refine_jointly(few, spoilt(TRUE, seed=seed), mirror=False, config=LONG)
+    error = TRUE.inverse() @ TRUE[middle] @ T[middle].inverse() @ T
+    assert float(torch.rad2deg(error.angle()).max()) < 3.0
+    assert float(error.translation.norm(dim=-1).median()) < 0.08
+
+
 def test_true_poses_stay():
     degrees, metres = off(refine_jointly(SCANS, TRUE, mirror=True, config=FINE), TRUE)
     assert degrees < 0.5

@@ -89,6 +89,29 @@ def test_quarter_turns_are_found_and_put_back_where_their_scans_are(rows):
     assert torch.equal(found.translation[kept], true.translation[kept])
 
 
+def test_a_scan_put_back_lies_on_its_object_in_whichever_frame_that_is_known():
+    """Behind a lorry: as far ahead as its rear, its middle where that is; as high as before it.
+
+    The sensor leans, the object's origin is not its middle, and of the scan the highest and lowest
+    points are missing and one is astray.
+    """
+    straight, off_centre = following(), torch.tensor((0.7, -0.3, 0.4), dtype=torch.float64)
+    straight.translation[:, 1] += 0.5
+    lean = rotation_from_vector(torch.tensor((0.2, -0.1, 0.0), dtype=torch.float64))
+    T_leaning_sensor = SE3(lean, torch.zeros(3, dtype=torch.float64))
+    T_object_middle = SE3(torch.eye(3, dtype=torch.float64), off_centre)
+    true = T_leaning_sensor @ straight @ T_object_middle.inverse()
+    scans = seen_in(T_leaning_sensor @ straight)
+    height = scans[7] @ true[7].rotation.numpy()[:, 2]
+    between = scans[7][(height > height.min() + 0.2) & (height < height.max() - 0.15)]
+    scans[7] = np.concatenate((between, between[:1] * 0.3))
+    given = gone_astray(true, [7])
+    found = without_outliers(given, scans, SHAPE + off_centre, SURE[:8])
+    degrees, metres = off_by(found, true)
+    assert degrees < 1e-4
+    assert metres < 0.1
+
+
 def test_what_no_quarter_turn_explains_takes_its_neighbours_attitude():
     true = passing()
     askew = gone_astray(true, [3])
@@ -127,6 +150,26 @@ def test_of_three_scans_the_unsure_one_is_put_back():
     assert degrees < 1e-4
 
 
+def test_of_three_scans_one_nearly_as_sure_stays():
+    true = following(3)
+    turned = gone_astray(true, [2])
+    assert put_back(turned, true, torch.tensor([0.9, 0.9, 0.8], dtype=torch.float64)) is turned
+
+
+def test_a_scan_surer_than_the_others_stays():
+    true, sure = passing(), SURE.clone()
+    sure[4] = 0.95
+    turned = gone_astray(true, [4])
+    assert put_back(turned, true, sure) is turned
+
+
+def test_a_few_scans_however_sure_turn_no_longer_run():
+    true = following()
+    turned = gone_astray(true, [6, 7])
+    sure = torch.tensor([0.6] * 6 + [0.9] * 2, dtype=torch.float64)
+    assert put_back(turned, true, sure) is turned
+
+
 def test_a_run_as_sure_as_the_others_stays():
     true = following()
     turned = gone_astray(true, [5, 6, 7])
@@ -152,6 +195,17 @@ def test_no_vehicle_turns_by_a_quarter_within_two_seconds(rows, turns):
     degrees, metres = off_by(found, true)
     assert degrees < 1e-4
     assert metres < 0.1
+
+
+def test_the_longer_between_two_scans_the_more_a_vehicle_may_turn():
+    """By 80 degrees in the 3.6 s in which all scans are astray; those before and after stay."""
+    true, rows = passing(degrees=20), [2, 3, 4]
+    motion = SensorMotion(torch.eye(3, dtype=torch.float64).expand(9, 3, 3), 0.9 * torch.arange(9))
+    given = gone_astray(true, rows)
+    found = without_leaps(given, seen_in(true), SHAPE, SURE, motion)
+    assert off_by(found, true)[0] < 1e-4
+    kept = [i for i in range(9) if i not in rows]
+    assert torch.equal(found.translation[kept], true.translation[kept])
 
 
 def test_one_scan_gone_astray_leads_no_others_with_it():
@@ -204,6 +258,16 @@ def test_a_scan_must_differ_from_both_neighbours(degrees, off):
     """Those about it lie 20 degrees apart: from one of them it differs by 40, and then by 50."""
     yaw = torch.tensor([0.0, 0.0, degrees, 20.0, 20.0], dtype=torch.float64)
     assert torch.nonzero(outliers(rotation_z(torch.deg2rad(yaw))))[:, 0].tolist() == off
+
+
+def test_a_scan_that_as_many_neighbours_are_for_as_against_stays():
+    yaw = torch.tensor([0, 0, 0, 60, 0, 0, 60, 0, 0, 0], dtype=torch.float64)
+    assert torch.nonzero(outliers(rotation_z(torch.deg2rad(yaw))))[:, 0].tolist() == [3, 6]
+
+
+def test_at_least_half_of_the_scans_stay_whichever_are_turned():
+    turned = torch.cartesian_prod(*[torch.tensor((0.0, math.pi / 2), dtype=torch.float64)] * 8)
+    assert max(int(outliers(rotation_z(yaw)).sum()) for yaw in turned) <= 4
 
 
 @pytest.mark.parametrize("degrees", [10, 35, 60])

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a shape costs in each scan of a track, however many scans are looked at at once."""
 
+from dataclasses import replace
+
 import torch
 from tests.cars import car_surface, drive_by, poses_of
 from tests.models import SETTINGS
@@ -14,8 +16,8 @@ TRACK = drive_by(scans=5, step=2.0, heading=0.3, side=5.0)
 SHAPE = torch.from_numpy(car_surface(600)[0])
 
 
-def costs(poses):
-    return track_cost(SHAPE, poses, network_inputs(list(TRACK.scans), SETTINGS), SETTINGS)
+def costs(poses, settings=SETTINGS):
+    return track_cost(SHAPE, poses, network_inputs(list(TRACK.scans), settings), settings)
 
 
 def test_each_scan_is_held_against_its_own_pose(monkeypatch):
@@ -28,3 +30,11 @@ def test_each_scan_is_held_against_its_own_pose(monkeypatch):
     assert torch.nonzero(off > right + 0.3)[:, 0].tolist() == [3]
     monkeypatch.setattr(module, "_BATCH", 2)
     torch.testing.assert_close(costs(moved), off)
+
+
+def test_a_shape_costs_as_much_where_scans_are_turned_towards_it():
+    facing = replace(SETTINGS, facing=True)
+    turned = [inputs.turn for inputs in network_inputs(list(TRACK.scans), facing)]
+    assert float((turned[0] - torch.eye(3)).abs().amax()) > 0.5
+    plain, found = costs(poses_of(TRACK)), costs(poses_of(TRACK), facing)
+    torch.testing.assert_close(found, plain, atol=0.03, rtol=0)

@@ -90,6 +90,7 @@ CLOCKS = {
     "offset_time": ("u4", 1e6, 0.0),
     "time": ("f4", 1.0, 0.0),  # Velodyne
     "timestamp": ("f8", 1.0, 1e9),  # Hesai: the stamp's clock
+    "time_stamp": ("f8", 1.0, 1e9 - 0.05),  # the same, stamped in the turn's middle
     "gps_time": ("f8", 1e9, 4e5),  # another clock: its first point is the scan's time
 }
 
@@ -98,13 +99,14 @@ CLOCKS = {
 def test_times_of_points_are_seconds_since_the_scan_s_time(written, name):
     kind, unit, start = CLOCKS[name]
     since = np.linspace(0.0, 0.1, 2000)
-    recorded = [(start + since + frame / 10 * (start == 1e9)) * unit for frame in range(2)]
+    recorded = [(start + since + frame / 10 * (start > 1e8)) * unit for frame in range(2)]
     drive = open_drive(
         written("mcap", {TOPIC: scans(2)}, Fields(clock=(name, kind)), times=recorded)
     )
     for frame in range(2):
         turn = drive.turn(frame)
-        assert turn.seconds == pytest.approx(since, abs=2e-6)
+        first = start - 1e9 if start > 1e8 else 0.0
+        assert turn.seconds == pytest.approx(since + first, abs=2e-6)
         assert np.array_equal(turn.points, scans()[frame])
 
 

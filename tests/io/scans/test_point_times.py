@@ -20,6 +20,11 @@ def test_values_on_the_scan_s_own_clock_are_counted_from_its_time(stamp):
     assert seconds_since(TURN + stamp, stamp) == pytest.approx(TURN, abs=1e-6)
 
 
+@pytest.mark.parametrize("late", [0.05, 0.1])
+def test_a_scan_may_bear_the_time_of_its_middle_or_its_end(late):
+    assert seconds_since(1.7e9 + TURN, 1.7e9 + late) == pytest.approx(TURN - late, abs=1e-6)
+
+
 @pytest.mark.parametrize("stamp", [0.3, 5.0, 1.7e9])
 @pytest.mark.parametrize("first", [-0.05, 0.0])
 def test_values_since_the_scan_s_time_are_taken_as_they_are(stamp, first):

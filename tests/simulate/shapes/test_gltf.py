@@ -102,6 +102,22 @@ def test_strips_strides_small_numbers_and_corners_left_out(code: int, tmp_path: 
     _same(path)
 
 
+@pytest.mark.parametrize(("code", "kind"), [(5120, "<i1"), (5122, "<i2"), (5123, "<u2")])
+@pytest.mark.parametrize("normalized", [False, True])
+def test_points_in_whole_numbers(code: int, kind: str, normalized: bool, tmp_path: Path) -> None:
+    """As shares of the largest number of their type if they are normalised (glTF 2.0, 3.6.2.2)."""
+    info = np.iinfo(kind)
+    points = np.array([[0, 0, 0], [info.max, 0, 0], [0, 7, 0], [0, 0, max(info.min, -100)]], kind)
+    binary = np.pad(points, ((0, 0), (0, 1))).tobytes()  # rows begin at multiples of 4 bytes
+    position = {**_POSITION, "componentType": code, "normalized": normalized}
+    header = _header(len(binary), accessors=[position, _INDICES])
+    header["bufferViews"][0]["byteStride"] = len(binary) // 4
+    path = tmp_path / "car.glb"
+    path.write_bytes(_glb(header, binary + _CORNERS))
+    largest = info.max if normalized else 1
+    np.testing.assert_allclose(read_gltf(path)[0], points / largest)
+
+
 def test_buffers_inside_of_the_text_and_beside_the_file(tmp_path: Path) -> None:
     (tmp_path / "a car.bin").write_bytes(_POINTS + _CORNERS)
     encoded = base64.b64encode(_POINTS + _CORNERS).decode()

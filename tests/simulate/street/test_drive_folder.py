@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from tests.cars import poses_of
 
+from wildshape.datasets.kitti.calibration import read_calibration, rigid
+from wildshape.datasets.kitti.oxts import read_oxts
 from wildshape.datasets.kitti.tracking import KittiTracking
 from wildshape.datasets.kitti.tracking_labels import read_boxes
 from wildshape.datasets.tracks.selection import Selection
@@ -85,6 +87,16 @@ def test_pedestrians_are_labelled_as_such(drive: WholeDrive, written: Path) -> N
 def test_parked_vehicles_stand_still_in_the_world_of_the_gps(written: Path) -> None:
     parked = Selection(min_points=50, motion="parked")
     assert list(KittiTracking(written, parked).tracks_of("0000"))
+
+
+def test_the_way_of_the_gps_is_the_sensor_s(drive: WholeDrive, written: Path) -> None:
+    path = written / "calib" / "0000.txt"
+    T_velo_imu = rigid(read_calibration(path, ""), ("Tr_imu_velo",), path)
+    T_world_velo = read_oxts(written / "oxts" / "0000.txt") @ T_velo_imu.inverse()
+    true = np.stack([drive.scan(i).T_world_sensor for i in range(4)])
+    relative = (T_world_velo[0].inverse() @ T_world_velo).matrix.numpy()
+    np.testing.assert_allclose(relative, np.linalg.inv(true[0]) @ true, atol=1e-6)
+    np.testing.assert_allclose(T_world_velo.rotation[:, 2], true[:, 2, :3], atol=1e-9)
 
 
 def test_poses_times_and_truth(drive: WholeDrive, written: Path) -> None:

@@ -118,6 +118,20 @@ def test_points_are_measured_from_where_the_sensor_is_then(
     assert 0.2 < way.max() < 2.0
 
 
+def test_a_box_of_what_moves_is_where_the_beam_met_it(raw: WholeDrive) -> None:
+    scan, far = raw.scan(20), []
+    for box in scan.boxes:
+        x, y = box.T_sensor_object[:2, 3]
+        since = np.interp(np.arctan2(y, x), raw._turn.azimuth, raw._turn.times)
+        time, actor = np.array((scan.time + since,)), raw.actors[box.track]
+        T = np.linalg.inv(raw.sensor_pose(time)[0]) @ raw.street.pose(actor, time)[0]
+        T[:3, 3] += raw.street.label(actor)[1] * T[:3, 1]
+        np.testing.assert_allclose(box.T_sensor_object, T, atol=5e-3)
+        way = raw.street.pose(actor, np.array((scan.time,)))[0] - raw.street.pose(actor, time)[0]
+        far.append(np.linalg.norm(way[:3, 3]))
+    assert max(far) > 0.1
+
+
 def test_standing_still_there_is_nothing_to_compensate() -> None:
     still = replace(CLEAN, speed=0.0)
     as_measured = WholeDrive(still, 3).scan(5)
@@ -168,6 +182,22 @@ def test_the_ground_is_not_flat_and_the_road_falls_to_its_sides(raw: WholeDrive)
     assert np.ptp(middle) > 0.2
     assert np.abs(np.diff(middle) / 0.5).max() < 0.08
     np.testing.assert_allclose(pavement - kerb, 0.12, atol=0.02)
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.5 * np.pi, np.pi, -2.0])
+def test_what_stands_on_the_road_leans_as_the_road_does(raw: WholeDrive, heading: float) -> None:
+    """Its wheels are on the ground, before, behind, to the left and to the right."""
+    s, lateral = np.arange(-80.0, 120.0, 0.5), -1.65
+    T = raw.street.standing(s, lateral, heading, 0.0)
+    wheels = np.array(((1.3, 0.0, 0.0), (-1.3, 0.0, 0.0), (0.0, 0.7, 0.0), (0.0, -0.7, 0.0)))
+    off = []
+    for x, y, _ in wheels:
+        along = x * np.cos(heading) - y * np.sin(heading)
+        aside = x * np.sin(heading) + y * np.cos(heading)
+        ground = raw.street.height(s + along, np.full(len(s), lateral + aside))
+        off.append(_moved(T, np.array((x, y, 0.0)))[:, 2] - ground)
+    assert np.abs(off).max() < 0.01
+    assert np.abs(T[:, 2, 0]).max() > 0.01
 
 
 @pytest.mark.parametrize(

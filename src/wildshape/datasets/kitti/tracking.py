@@ -77,6 +77,7 @@ class KittiTracking:
             read = partial(read_velodyne, path) if path else lambda: None
             crop_objects(objects, f"{frame:06d}", read, self.crop, gathering)
             yield from gathering.finished(before=frame + 1)
+        yield from gathering.finished()  # nothing is left; says so if no file could be read
 
     def _training(self) -> Path:
         root = Path(self.root)

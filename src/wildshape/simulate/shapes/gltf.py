@@ -80,13 +80,20 @@ class _File:
         return [p for p in primitives if p.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP)]
 
     def _surface(self, primitive: dict[str, Any]) -> Triangles:
-        points = self._numbers(primitive["attributes"]["POSITION"], "VEC3")
+        points = self._points(primitive["attributes"]["POSITION"])
         if "indices" in primitive:
             corners = self._numbers(primitive["indices"], "SCALAR")[:, 0]
         else:
             corners = np.arange(len(points))
         strip = primitive.get("mode") == _STRIP
         return used(points, _of_strip(corners) if strip else corners.reshape(-1, 3))
+
+    def _points(self, accessor: int) -> np.ndarray:
+        """Whole numbers may be shares of their type's largest (KHR_mesh_quantization)."""
+        points = self._numbers(accessor, "VEC3")
+        if points.dtype.kind == "f" or not self.header["accessors"][accessor].get("normalized"):
+            return points
+        return np.maximum(points / np.iinfo(points.dtype).max, -1.0)
 
     def _count(self, accessor: int) -> int:
         count = self.header["accessors"][accessor]["count"]

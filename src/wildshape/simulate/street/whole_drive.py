@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.rotation import rotations_about
 from wildshape.simulate.sensor import SENSORS, SensorName, SpinningLidar
 from wildshape.simulate.shapes.meshes import mesh_files, read_mesh
 from wildshape.simulate.shapes.solid import Solid, union
@@ -185,7 +186,9 @@ class WholeDrive:
         sway = np.radians(_SWAY_DEG) * np.sin(
             2 * np.pi * np.outer((0.9, 1.3), times) + self._sway[:2, None]
         )
-        return T @ _leaning(*(self._tilt[:, None] + (0.0 if ego.speed == 0 else 1.0) * sway))
+        pitch, roll = self._tilt[:, None] + (0.0 if ego.speed == 0 else 1.0) * sway
+        T[:, :3, :3] = T[:, :3, :3] @ (rotations_about(1, pitch) @ rotations_about(0, roll))
+        return T
 
     def _scan(
         self,
@@ -288,13 +291,3 @@ def _road(street: Street, end: float) -> np.ndarray:
     """`(n, 3)` circles that cover road and pavements."""
     middle = street.middle(-2 * LEAD_M, end + LEAD_M)
     return np.column_stack((middle, np.full(len(middle), street.half_m + street.walk_m)))
-
-
-def _leaning(pitch: np.ndarray, roll: np.ndarray) -> np.ndarray:
-    """`(n, 4, 4)` turns about y and then x, radians."""
-    T = np.tile(np.eye(4), (len(pitch), 1, 1))
-    (cp, sp), (cr, sr) = ((np.cos(angle), np.sin(angle)) for angle in (pitch, roll))
-    T[:, 0, :3] = np.stack((cp, sp * sr, sp * cr), -1)
-    T[:, 1, 1:3] = np.stack((cr, -sr), -1)
-    T[:, 2, :3] = np.stack((-sp, cp * sr, cp * cr), -1)
-    return T
