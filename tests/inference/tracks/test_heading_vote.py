@@ -90,6 +90,11 @@ def test_neighbours_turn_scans_around_however_sure_these_are():
     assert torch.equal(followed_signs(rotation, sure) < 0, back)
 
 
+def test_most_scans_stay_where_none_says_anything_of_itself():
+    links, nothing = torch.tensor([1.0, -1.0, 1.0, 1.0]).double(), torch.zeros(5).double()
+    assert voted_signs(nothing, links, nothing, leaps=True).tolist() == [-1.0] * 2 + [1.0] * 3
+
+
 def test_the_signs_have_the_most_votes():
     """Of all there are, for poses that turn at random and speak for or against themselves."""
     generator = torch.Generator().manual_seed(0)

@@ -146,7 +146,7 @@ def _agreed(single: Float[Tensor, "V"], links: Float[Tensor, "W"]) -> Float[Tens
     count = len(single)
     votes = single.new_zeros(count + 1, count + 1)
     row = torch.arange(count)
-    votes[row, count] = single
+    votes[row, count] = single + 1e-9  # where no scan says anything, most stay
     votes[row[:-1], row[1:]] = links
     eigenvector = torch.linalg.eigh(votes + votes.T).eigenvectors[:, -1]
     signs = eigenvector[:-1] * eigenvector[-1]
