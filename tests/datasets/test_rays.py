@@ -36,3 +36,16 @@ def test_rays_end_where_the_frame_saw_something_else(name, tmp_path):
             came = rays.returned
             ends = came.starts + came.directions * came.ranges[:, None]
             assert (KDTree(scan).query(ends)[0] > 1e-5).all()
+            assert _aside(ends, scan).max() < 1.5 * (_aside(scan, scan).max() + _margin(scan))
+
+
+def _aside(points, scan):
+    """Angles between points and the middle of a scan, as its sensor sees them."""
+    middle = (scan / np.linalg.norm(scan, axis=1, keepdims=True)).mean(axis=0)
+    along = points @ (middle / np.linalg.norm(middle)) / np.linalg.norm(points, axis=1)
+    return np.arccos(np.clip(along, -1, 1))
+
+
+def _margin(scan):
+    """Rays that pass an object by are kept within 1 m of its nearest point; radians."""
+    return 1 / max(np.linalg.norm(scan, axis=1).min(), 1)

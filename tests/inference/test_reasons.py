@@ -19,6 +19,7 @@ from wildshape.inference.confidence import (
     warning_of,
 )
 from wildshape.inference.config import ReasonRule
+from wildshape.inference.registration import registered
 from wildshape.method.checkpoint import SHIPPED, load_checkpoint
 from wildshape.records import Box, Completion, Sensor
 
@@ -143,3 +144,14 @@ def test_the_document_names_the_bounds_of_the_shipped_weights():
     assert warned
     assert float(warned[1]) == round(rule.largest * high, 1)
     assert float(warned[2]) == round(rule.smallest * low, 2)
+
+
+def test_a_registration_says_what_is_wrong_with_either_scan_and_reaches_by_the_target():
+    """5 % of the target's 1 m, whatever the source holds beside it."""
+    sure = completion(0.1, 0.9)
+    unsure = dataclasses.replace(sure, confidence=0.2, warning="odd", reasons=("poor_fit",))
+    target, source = line(1.0), np.array([[8.5, 0.1, 0], [18, 0, 0]], np.float32)
+    for done in ((sure, unsure), (unsure, sure)):
+        found = registered(source, target, done)
+        assert (found.confidence, found.warning, found.reasons) == (0.2, "odd", ("poor_fit",))
+        assert found.inlier_ratio == 0

@@ -6,9 +6,10 @@ import json
 
 import numpy as np
 import pytest
+import torch
 from tests.cars import off_surface, poses_of
 from tests.datasets.damaged import passed_over
-from tests.datasets.street import moved, street
+from tests.datasets.street import SIZE, moved, street
 from tests.datasets.write_pandas import Made, Name, pickled, write_frame
 from tests.datasets.write_pandaset import (
     AGO,
@@ -24,7 +25,9 @@ from tests.datasets.write_pandaset import (
 from tests.refusal import refusal_of
 
 from wildshape.datasets.pandaset.reader import PandaSet
+from wildshape.datasets.pandaset.scene import Drive, read_sweep
 from wildshape.datasets.tracks.selection import Selection
+from wildshape.geometry.transforms.se3 import SE3
 
 FRAMES = 3
 MOUNTED_AT = (0.0002, 0.8078, 1.8460)  # on the base: right, forward, up
@@ -51,6 +54,7 @@ def test_points_land_back_on_the_cars(scene):
     for track in found.values():
         assert track.scan_names == ("00", "01", "02")
         assert (track.category, track.sensor.kind) == ("car", "lidar")
+        assert track.label_size_m == pytest.approx(SIZE)
         for i, scan in enumerate(track.scans):
             assert len(scan) > 100
             assert off_surface(poses_of(track)[i].inverse().apply_numpy(scan)).max() < 1e-3
@@ -73,6 +77,18 @@ def test_the_sensor_stands_on_the_roof_when_its_beams_pass(scene, made):
             ahead, up = made.T_world_ego[i][:3, 0], made.T_world_ego[i][:3, 2]
             assert T_world_sensor[:3, 0] @ ahead > np.cos(0.06)
             assert T_world_sensor[:3, 2] @ up > np.cos(0.03)
+
+
+def test_the_first_sweep_goes_as_the_second_and_a_single_one_stands():
+    """At a pose of the base, the sensor is where it is mounted; on the way from one, beside it."""
+    places = torch.tensor(((0.0, 0, 0), (0, 1, 0), (0, 5, 0)), dtype=torch.float64)
+    T_world_base = SE3(torch.eye(3).double().expand(3, 3, 3), places)
+    drive = Drive([0.0, 0.1, 0.2], T_world_base)
+    for frame, time, forward in ((0, -0.05, -0.5), (0, 0.0, 0.0), (1, 0.05, 0.5), (2, 0.15, 3.0)):
+        place = drive.sensor_pose(frame, time).translation.numpy()
+        assert place == pytest.approx(np.add(MOUNTED_AT, (0, forward, 0)))
+    alone = Drive([0.0], T_world_base[1:2]).sensor_pose(0, -0.05).translation.numpy()
+    assert alone == pytest.approx(np.add(MOUNTED_AT, (0, 1, 0)))
 
 
 def test_of_two_labels_the_pandargts_is_left_out(scene):
@@ -106,6 +122,14 @@ def test_what_is_left_out_is_counted(made, tmp_path):
     }
 
 
+def test_points_without_a_place_or_a_time_are_left_out(tmp_path):
+    points = np.arange(12.0).reshape(4, 3)
+    points[1, 2], times = np.nan, np.array([0.0, 0.1, np.inf, 0.3])
+    write_sweep(tmp_path / "00.pkl.gz", points, times, np.zeros(4))
+    found, when = read_sweep(tmp_path / "00.pkl.gz")
+    assert (found.tolist(), when.tolist()) == (points[[0, 3]].tolist(), [0.0, 0.3])
+
+
 refused = refusal_of(tracks)
 
 
@@ -116,7 +140,7 @@ def test_a_wrong_root_says_what_was_expected_and_found(tmp_path):
     refused(tmp_path, r"found velodyne\.$")
 
 
-def test_missing_and_corrupt_files_are_named(scene, made):
+def test_missing_and_corrupt_files_are_named(scene, made, tmp_path):
     sweep = scene / "lidar" / "01.pkl.gz"
     good = sweep.read_bytes()
     sweep.write_bytes(good[: len(good) // 2])
@@ -130,6 +154,19 @@ def test_missing_and_corrupt_files_are_named(scene, made):
     refused(scene, r"poses\.json: expected a JSON list")
     poses.write_text(json.dumps(json.loads(whole)[:2]))
     refused(scene, r"2 poses and 3 timestamps in lidar/ for 3 labelled frames")
+    stamps = scene / "lidar" / "timestamps.json"
+    stamps.write_text(json.dumps(STAMPS[:2]))
+    labels = scene / "annotations" / "cuboids"
+    (labels / "01.pkl.gz").rename(tmp_path / "01.pkl.gz")
+    refused(scene, r"2 poses and 2 timestamps in lidar/ for 3 labelled frames")
+    (tmp_path / "01.pkl.gz").rename(labels / "01.pkl.gz")
+    poses.write_text(whole.replace('"w": ', '"w": 1', 1))
+    stamps.write_text(json.dumps(STAMPS[:3]))
+    refused(scene, r"poses\.json: a heading is no unit quaternion")
+    poses.write_text(whole)
+    for times in (STAMPS[2::-1], [*STAMPS[:2], float("inf")]):
+        stamps.write_text(json.dumps(times))
+        refused(scene, r"timestamps\.json: the times do not rise")
     poses.write_text(whole.replace('"w"', '"v"', 1))
     refused(scene, r"poses\.json: expected poses and timestamps")
     poses.unlink()

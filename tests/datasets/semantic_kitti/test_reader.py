@@ -21,6 +21,7 @@ from tests.datasets.write_semantic_kitti import (
 )
 from tests.refusal import refusal_of
 
+from wildshape.datasets.semantic_kitti.labels import CLASSES
 from wildshape.datasets.semantic_kitti.reader import PAPER, SPLITS, SemanticKitti
 from wildshape.datasets.tracks.selection import Selection
 from wildshape.datasets.tracks.truth import fuse_by_truth, shape_mirrored, shape_partial
@@ -89,6 +90,28 @@ def test_the_chosen_frame_is_that_of_the_car_but_for_front_and_back(sequence, sc
     for shape in (shape_partial(track), shape_mirrored(track), fuse_by_truth(track)):
         assert np.ptp(shape, axis=0) == pytest.approx((4.2, 1.7, 1.35), abs=0.25)
     assert "its points fill 4." in track.source
+
+
+def test_a_label_stays_with_its_point_where_others_have_no_place(sequence, scene):
+    for frame in range(FRAMES):
+        points = moved(np.linalg.inv(velo_poses(scene)[frame]), scene.clouds[frame])
+        labels = labels_of(scene, frame, LABELS)
+        points[np.flatnonzero(labels != ROAD)[::2]] = np.nan
+        write_frame(sequence, frame, points, labels)
+    for i, scan in enumerate(tracks(sequence)[PARKED].scans):
+        T_object_velo = np.linalg.inv(true_poses(scene, "parked")[i])
+        assert off_surface(moved(T_object_velo, scan.astype(float))).max() < 1e-4
+
+
+def test_points_of_no_instance_are_of_no_object(scene, tmp_path):
+    labels = {"parked": 10, "moving": LABELS["moving"]}
+    assert list(tracks(write_sequence(tmp_path / "00", scene, labels))) == [MOVING]
+
+
+def test_classes_are_named_standing_and_then_moving():
+    for standing, *moving in CLASSES.values():
+        assert standing < 100
+        assert all(252 <= number <= 259 for number in moving)
 
 
 def test_what_moved_has_no_truth(sequence, scene):

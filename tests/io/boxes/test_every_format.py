@@ -119,6 +119,23 @@ def test_a_kitti_line_by_hand(tmp_path):
     assert file.read_text().split()[6:10] == ["-1.000000"] * 4
 
 
+@pytest.mark.parametrize("yaw", [0.7, 1.7, -1.2])
+def test_the_image_box_of_a_turned_box_holds_its_corners(yaw, tmp_path):
+    """Through a camera that stands beside the rectified frame's own, as KITTI's P2 does."""
+    box = Box((10.0, 4.0, -1.0), (4.0, 1.8, 1.6), (np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)))
+    one = Detection("car", 0, "0", 0, "car", "lidar", 1.0, box)
+    projection = np.array([[700.0, 0, 600, 45], [0, 700, 180, 0.2], [0, 0, 1, 0.003]])
+    camera = replace(camera_at_the_lidar(), projection=projection)
+    (file,) = write_kitti_labels(tmp_path, [one], camera)
+    alpha, *image = map(float, file.read_text().split()[5:10])
+    rect = camera.T_rect_sensor.apply_numpy(box.corners.astype(np.float64))
+    u, v, depth = projection @ np.column_stack((rect, np.ones(8))).T
+    u, v = u / depth, v / depth
+    assert image == pytest.approx([u.min(), v.min(), u.max(), v.max()], abs=1e-3)
+    seen_from = -yaw - np.pi / 2 - np.arctan2(-4.0, 10.0)
+    assert alpha == pytest.approx(np.remainder(seen_from + np.pi, 2 * np.pi) - np.pi, abs=1e-5)
+
+
 def test_nuscenes_records_are_the_annotations_in_the_sensors_frame(tmp_path):
     car = Thing("car", velocity=(5.0, 3.0, 0.1), yaw_rate=0.3)
     written = write_nuscenes(tmp_path / "nuscenes", (Scene("scene-0061", (car,)),))
@@ -189,6 +206,19 @@ def test_argoverse2_has_the_time_that_a_scan_is_named_by(name, tmp_path):
     write_argoverse2_boxes(path, [of_track, of_drive, replace(of_drive, time_ns=5)])
     stamps = feather.read_table(path).column("timestamp_ns").to_pylist()
     assert stamps == [int(name), int(name), 5]
+
+
+def test_what_is_not_known_of_a_box_is_written_as_that(tmp_path):
+    box = Box((0.0, 0.0, 0.0), (4.0, 2.0, 1.0), (1.0, 0.0, 0.0, 0.0))
+    bare = Detection("car", 0, "7", 7, "", "lidar", 0.5, box)
+    given = [bare, replace(bare, category="car", points=9, velocity=(3.0, -1.0))]
+    write_argoverse2_boxes(tmp_path / "a.feather", given)
+    points = feather.read_table(tmp_path / "a.feather").column("num_interior_pts")
+    assert points.to_pylist() == [-1, 9]
+    write_nuscenes_boxes(tmp_path / "n.json", given)
+    (rows,) = json.loads((tmp_path / "n.json").read_text())["results"].values()
+    names = [(row["detection_name"], row["tracking_name"], row["velocity"]) for row in rows]
+    assert names == [("object", "object", [0, 0]), ("car", "car", [3, -1])]
 
 
 def test_an_argoverse2_table_without_boxes_has_the_types_of_one_with(tmp_path):

@@ -15,7 +15,7 @@ from wildshape.io.store.store import Store, StoreWriter, open_store
 from wildshape.records import Sensor, Track
 
 
-def make_parts(track: Track, out: Path, names=(("a", "b"), ("c",))) -> list[Path]:
+def make_parts(track: Track, out: Path, names=(("a", "b"), ("c", "d"))) -> list[Path]:
     """Stores with and without truth, of one shard and of several."""
     (out / PARTS).mkdir(parents=True)
     (out / WRITING_JSON).write_text("{}")
@@ -30,7 +30,20 @@ def make_parts(track: Track, out: Path, names=(("a", "b"), ("c",))) -> list[Path
 
 def with_gaps(track: Track, name: str) -> Track:
     bare = Track(name, (track.scans[1],), (f"x{name}",), Sensor("lidar", (0.2, 0.4)))
-    return bare if name == "b" else replace(track, name=name, category=name)
+    if name in "bd":
+        return bare
+    return replace(track if name == "a" else _backwards(track), name=name, category=name)
+
+
+def _backwards(track: Track) -> Track:
+    """The same the other way round, so that nothing of it is what a track before it has there."""
+    poses, shape = track.T_sensor_object, track.shape
+    return replace(
+        track,
+        scans=track.scans[::-1],
+        T_sensor_object=None if poses is None else poses[torch.arange(len(poses)).flip(0)],
+        shape=None if shape is None else np.ascontiguousarray(shape[::-1]),
+    )
 
 
 def assert_holds(path: Path, track: Track, names: str) -> None:

@@ -24,7 +24,7 @@ def test_joined_parts_hold_what_went_in(track: Track, tmp_path: Path) -> None:
     parts = make_parts(track, out)
     moved = sorted(file.stat().st_ino for part in parts for file in part.glob("points-*"))
     join_stores(parts, out, {"made": "here"})
-    assert_holds(out, track, "abc")
+    assert_holds(out, track, "abcd")
     assert open_store(out).provenance == {"made": "here"}
     assert sorted(file.stat().st_ino for file in out.glob("points-*")) == moved
     assert {file.name for file in out.iterdir()} == {
@@ -91,7 +91,7 @@ def test_a_join_that_was_killed_is_gone_on_with(track, tmp_path, monkeypatch, mo
         refused(open_store, out, match="half-written")
         finish_join(out)
     assert not is_joining(out)
-    assert_holds(out, track, "abc")
+    assert_holds(out, track, "abcd")
 
 
 def test_a_shard_that_is_lost_is_named(track: Track, tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.inputs import open_tracks
 from wildshape.io.tracks import write_track
 from wildshape.records import Intrinsics, Sensor, Track
+from wildshape.report.statistics import statistics
 from wildshape.report.statistics.statistics import (
     sample_of,
     statistics_of_store,
@@ -49,6 +50,7 @@ def test_sides_ranges_and_counts_come_from_the_index(tmp_path):
     assert (found.tracks, found.scans, found.points, found.read) == (3, 20, 1200, 1)
     assert (found.with_poses, found.with_shape) == (3, 1)
     assert found.categories == {"car": 2, "van": 1}
+    assert found.sensors == {"lidar": 3}
     assert by["points"].tally.most == 60
     assert (by["scans"].tally.least, by["scans"].tally.most) == (4, 8)
     assert (by["range"].tally.least, by["range"].tally.most) == pytest.approx((10.0, 20.0))
@@ -66,7 +68,9 @@ def test_azimuth_is_the_side_that_is_seen(tmp_path):
     assert by["elevation"].tally.mean == pytest.approx(30.0)
 
 
-def test_posed_and_unposed_tracks_between_each_other(tmp_path):
+@pytest.mark.parametrize("block", [1, 4096])
+def test_posed_and_unposed_tracks_between_each_other(tmp_path, monkeypatch, block):
+    monkeypatch.setattr(statistics, "_BLOCK", block)
     bare = replace(around("bare", distance=90.0), T_sensor_object=None)
     found, by = described(
         packed(tmp_path / "store", [around("a"), bare, around("z", distance=30.0)])
