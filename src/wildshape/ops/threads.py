@@ -8,6 +8,7 @@ A sum of torch's depends on how many threads share it. Searches and single scans
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import cache
 from typing import TypeVar
 
 import torch
@@ -44,12 +45,17 @@ def spread(task: Callable[[Item], Result], items: Iterable[Item]) -> list[Result
 
     Args:
         task: spends its time where Python lets other threads run; its result depends on the item
-            alone.
+            alone. It spreads nothing itself.
         items: what it works on.
     """
     listed = list(items)
     count = min(exact_threads(), len(listed))
     if count < 2:
         return [task(item) for item in listed]
-    with alone(count) as threads:
-        return list(threads.map(task, listed))
+    return list(_kept(count).map(task, listed))
+
+
+@cache
+def _kept(count: int) -> ThreadPoolExecutor:
+    """Threads that stay: each keeps memory of its own, which new ones would have to get first."""
+    return alone(count)
