@@ -37,7 +37,13 @@ def exact_on(count: int) -> Iterator[None]:
 
 def alone(count: int) -> ThreadPoolExecutor:
     """So many threads, in each of which torch works alone."""
-    return ThreadPoolExecutor(count, initializer=torch.set_num_threads, initargs=(1,))
+    return ThreadPoolExecutor(count, initializer=_work_alone)
+
+
+def _work_alone() -> None:
+    """A thread takes over torch's number when it first asks for it: later it would ask again."""
+    torch.get_num_threads()
+    torch.set_num_threads(1)
 
 
 def spread(task: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
