@@ -42,6 +42,17 @@ def test_several_at_once_in_order():
     assert torch.get_num_threads() == 2
 
 
+def test_threads_that_stay_work_alone_whatever_is_set_meanwhile():
+    def task(_):
+        return torch.get_num_threads()
+
+    with exact_on(4):
+        found = spread(lambda item: item, range(8))
+        torch.set_num_threads(3)
+        assert set(spread(task, range(8))) == {1}
+    assert found == list(range(8))
+
+
 def test_what_one_raises_is_raised():
     with exact_on(2), pytest.raises(ZeroDivisionError):
         spread(lambda item: 1 / item, [2, 1, 0])

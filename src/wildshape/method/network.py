@@ -122,7 +122,8 @@ class ShapePoseNet(nn.Module):
         Without a gradient the encoder runs as it is, in the type of its weights, and so do others
         than PCN's with one. Rays (`ray_points`) change the codes of networks that see them.
         """
-        return self._beside(rays, self._of_scans(scans, encoding))
+        on_winners = encoding in ("winners", "winners-bf16") and torch.is_grad_enabled()
+        return self._beside(rays, self._of_scans(scans, encoding), by_winners=on_winners)
 
     def _of_scans(
         self, scans: Float[Tensor, "B N 3"], encoding: Encoding | None
@@ -140,12 +141,15 @@ class ShapePoseNet(nn.Module):
         with record_function("wildshape: encoder static"):
             return encode_static(self.encoder, scaled, inner)
 
-    def _beside(self, rays: Tensor | None, code: Float[Tensor, "B z"]) -> Float[Tensor, "B z"]:
+    def _beside(
+        self, rays: Tensor | None, code: Float[Tensor, "B z"], *, by_winners: bool = False
+    ) -> Float[Tensor, "B z"]:
         """The codes with what the rays beside the objects add."""
         if rays is None or self.rays is None or not rays.shape[1]:
             return code
         at = rays[..., :3] / self.config.scale
-        return code + self.rays(torch.cat((at, rays[..., 3:]), dim=-1).to(code.dtype))
+        seen = torch.cat((at, rays[..., 3:]), dim=-1).to(code.dtype)
+        return code + (self.rays.by_winners(seen) if by_winners else self.rays(seen))
 
     def canonical(self, code: Float[Tensor, "B z"]) -> Float[Tensor, "B P 3"]:
         """`Y_can`, metres."""

@@ -10,12 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 from torch.nn.functional import relu
 
 from wildshape.geometry.projection.ray_points import KINDS, ray_points
 from wildshape.geometry.projection.sight_lines import seen_alike
+from wildshape.method.encoders.pcn_winners import at_rows
+from wildshape.ops.column_argmax import column_argmax
+from wildshape.ops.threads import spread
 
 _NEVER = -1e9
 
@@ -68,7 +71,41 @@ class RayEncoder(nn.Module):
             rays: see `ray_points`; positions in units of the network's scale.
         """
         known = rays[..., 3:].any(-1)
-        each = self.layer3(relu(self.layer2(relu(self.layer1(rays)))))
-        most = relu(each).masked_fill(~known[..., None], _NEVER).amax(1)
+        most = self._each(rays).masked_fill(~known[..., None], _NEVER).amax(1)
+        return self._changed(most, known)
+
+    def by_winners(self, rays: Float[Tensor, "B R 6"]) -> Float[Tensor, "B z"]:
+        """The same, trained on a CPU through the rays that the maximum takes (`pcn_winners.py`)."""
+        known = rays[..., 3:].any(-1)
+        first = torch.arange(len(rays), device=rays.device)[:, None] * rays.shape[1]
+        rows = self._winning_rows(rays, known) + first
+        active, at = torch.unique(rows, return_inverse=True)
+        inner = relu(self.layer2(relu(self.layer1(rays.flatten(0, 1)[active]))))
+        return self._changed(at_rows(self.layer3, inner, at), known)
+
+    @torch.no_grad()
+    def _winning_rows(
+        self, rays: Float[Tensor, "B R 6"], known: Bool[Tensor, "B R"]
+    ) -> Int[Tensor, "B c"]:
+        """The known ray of each feature's maximum, scan by scan; the first where none is known."""
+        none = torch.zeros(self.layer3.out_features, dtype=torch.int64)
+
+        @torch.no_grad()  # each thread has a setting of its own
+        def of_one(one: tuple[Tensor, Tensor]) -> Tensor:
+            points, seen = one
+            if not seen.any():
+                return none
+            return column_argmax(self._each(points).masked_fill_(~seen[:, None], _NEVER))
+
+        return torch.stack(spread(of_one, zip(rays, known)))
+
+    def _each(self, rays: Float[Tensor, "*R 6"]) -> Float[Tensor, "*R c"]:
+        """Features of each ray, before the last ReLU: the maximum may be taken first."""
+        return self.layer3(relu(self.layer2(relu(self.layer1(rays)))))
+
+    def _changed(
+        self, most: Float[Tensor, "B c"], known: Bool[Tensor, "B R"]
+    ) -> Float[Tensor, "B z"]:
+        """What the greatest features add; nothing where no ray is known."""
         some = known.any(1, keepdim=True)
-        return self.change(torch.where(some, most, 0.0)) * some
+        return self.change(torch.where(some, relu(most), 0.0)) * some

@@ -11,7 +11,7 @@ scored once. `tests/method/encoders/test_pcn_winners.py` proves it against `PCNE
 import numpy as np
 import torch
 from jaxtyping import Float, Int
-from torch import Tensor
+from torch import Tensor, nn
 from torch.nn.functional import relu
 from torch.profiler import record_function
 
@@ -54,8 +54,15 @@ def _code_of_winners(
     pooled = local.gather(0, pooled_at)
     # Not `[...]`: its gradient is summed by all threads at once, in any order.
     joined = encoder.join_point(local) + encoder.join_pooled(pooled).index_select(0, active // size)
-    code = _GatherDot.apply(relu(joined), encoder.point4.weight, code_at)
-    return code + encoder.point4.bias  # pyright: ignore[reportOperatorIssue, reportReturnType]
+    return at_rows(encoder.point4, relu(joined), code_at)
+
+
+def at_rows(
+    layer: nn.Linear, inputs: Float[Tensor, "n u"], rows: Int[Tensor, "B c"]
+) -> Float[Tensor, "B c"]:
+    """`layer(inputs)[rows[b, c], c]`, with a gradient, of these rows alone."""
+    found = _GatherDot.apply(inputs, layer.weight, rows)
+    return found + layer.bias  # pyright: ignore[reportOperatorIssue, reportReturnType]
 
 
 @torch.no_grad()
