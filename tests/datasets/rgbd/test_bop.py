@@ -6,10 +6,12 @@ import json
 
 import numpy as np
 import pytest
+from PIL import Image
 from tests.cars import poses_of, shape_of
 from tests.datasets.damaged import passed_over
+from tests.datasets.street import rigid
 from tests.datasets.unit_scene import off_boxes
-from tests.datasets.write_rgbd import THINGS, write_bop, write_model
+from tests.datasets.write_rgbd import THINGS, pose_fields, write_bop, write_model, write_png
 from tests.refusal import refusal_of
 
 from wildshape.datasets.rgbd.bop import Bop
@@ -58,6 +60,52 @@ def test_motion_is_known_where_the_cameras_stand_in_a_world(tmp_path):
     write_bop(tmp_path / "b")
     assert len(tracks(tmp_path / "a", selection=Selection(motion="parked"))) == 2
     assert tracks(tmp_path / "b", selection=Selection(motion="parked")) == {}
+
+
+def test_what_stands_far_from_the_worlds_origin_stands(tmp_path):
+    """Near the origin a camera's pose that is not inverted moves the objects too little."""
+    T_camera_world = write_bop(tmp_path)
+    file = tmp_path / "test" / "000001" / "scene_camera.json"
+    cameras = json.loads(file.read_text())
+    for i, T in enumerate(T_camera_world):
+        cameras[str(i)] |= pose_fields(T @ rigid(30.0, 0.0, 0.0, yaw=0.0), "w2c")
+    file.write_text(json.dumps(cameras))
+    assert tuple(tracks(tmp_path, selection=Selection(motion="parked"))) == NAMES
+
+
+def test_of_different_objects_each_has_its_own_mask(tmp_path):
+    """A mask is counted in the image's whole list, not among the same objects."""
+    write_bop(tmp_path, count=1)
+    file = tmp_path / "test" / "000001" / "scene_gt.json"
+    truth = json.loads(file.read_text())
+    truth["0"][0]["obj_id"] = 3
+    file.write_text(json.dumps(truth))
+    found = tracks(tmp_path)
+    assert tuple(found) == ("test_000001_obj000003", "test_000001_obj000007")
+    for track in found.values():
+        on_object = poses_of(track)[0].inverse().apply_numpy(track.scans[0])
+        assert off_boxes(on_object).max() < 1e-3
+
+
+def test_images_are_taken_in_the_order_of_their_numbers(tmp_path):
+    """Of texts "10" is the second, whatever order the file has."""
+    write_bop(tmp_path, count=11)
+    file = tmp_path / "test" / "000001" / "scene_gt.json"
+    file.write_text(json.dumps(json.loads(file.read_text()), sort_keys=True))
+    for track in tracks(tmp_path).values():
+        assert track.scan_names == tuple(f"{i:06d}" for i in range(11))
+
+
+def test_the_largest_number_of_a_depth_image_is_no_depth(tmp_path):
+    write_bop(tmp_path, count=1)
+    scene = tmp_path / "test" / "000001"
+    with Image.open(scene / "depth" / "000000.png") as image:
+        depth = np.array(image).astype(np.uint16)
+    with Image.open(scene / "mask_visib" / "000000_000000.png") as image:
+        rows = np.flatnonzero(np.array(image).any(1))
+    depth[rows[len(rows) // 2] - 4 : rows[len(rows) // 2] + 4] = 0xFFFF
+    write_png(scene / "depth" / "000000.png", depth)
+    assert all(track.scans[0][:, 2].max() < 3.0 for track in tracks(tmp_path).values())
 
 
 def test_selection_and_counts(tmp_path):
@@ -111,7 +159,10 @@ def test_missing_and_damaged_files_are_named(tmp_path):
     truth.write_text("{}")
     refused(tmp_path, r"scene_gt\.json: holds no image")
     truth.write_text(good[1])
-    (scene / "mask_visib" / "000001_000001.png").unlink()
+    mask = scene / "mask_visib" / "000001_000001.png"
+    write_png(mask, np.zeros((24, 32), np.uint8))
+    passed_over(Bop(tmp_path), r"000001_000001\.png: \(24, 32\) pixels, .* has \(120, 160\)")
+    mask.unlink()
     passed_over(Bop(tmp_path), r"000001_000001\.png: no such file; the split's archive")
     (scene / "depth" / "000000.png").write_bytes(b"\x89PNG")
     (track,) = passed_over(Bop(tmp_path), r"depth/000000\.png: ")

@@ -5,12 +5,15 @@
 import warnings
 
 import numpy as np
+import pytest
 import torch
+from tests.refusal import refused
 
 from wildshape.datasets.tracks.gathering import Gathering
 from wildshape.datasets.tracks.labelled_boxes import (
     Crop,
     LabelledObject,
+    check_boxes,
     crop_objects,
     rows_in_box,
 )
@@ -51,3 +54,26 @@ def test_an_object_that_is_labelled_twice_in_a_frame_gives_one_scan() -> None:
     (track,) = gathering.finished()
     assert track.scan_names == ("0", "1")
     assert gathering.rejected == {"scan: a second box of the object in one frame": 1}
+
+
+def box_of(length=4.0, x=1e7):
+    """Sizes and poses of two boxes, the second as told."""
+    poses = SE3(torch.eye(3).double().repeat(2, 1, 1), torch.zeros(2, 3).double())
+    poses.translation[1, 0] = x
+    return np.array([[4.0, 2.0, 1.5], [length, 2.0, 1.5]]), poses
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"length": v} for v in (0.0, -4.0, 1001.0, np.nan)]
+    + [{"x": v} for v in (1e9, np.inf, np.nan)],
+)
+def test_boxes_that_no_object_can_have_are_refused(wrong):
+    check_boxes(*box_of(), "labels.csv", "copy it again")
+    refused(
+        check_boxes,
+        *box_of(**wrong),
+        "labels.csv",
+        "copy it again",
+        match=r"^labels\.csv: box 1 has no size or place .*; copy it again\.$",
+    )

@@ -30,11 +30,11 @@ def completed(poses):
     ]
 
 
-def together(done, scans, settings=SETTINGS, rays=()):
+def together(done, scans, settings=SETTINGS, rays=(), motion=None):
     gathered = whole.Gathered(settings)
     for item, scan in zip(done, scans):
         gathered.add(item, scan)
-    return list(whole.complete_together(gathered, rays=rays))
+    return list(whole.complete_together(gathered, rays=rays, motion=motion))
 
 
 def turned_around(poses, rows):

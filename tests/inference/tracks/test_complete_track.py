@@ -34,6 +34,7 @@ from wildshape.inference.tracks.heading_vote import (
     slow,
     voted_signs,
 )
+from wildshape.inference.tracks.pose_outliers import SensorMotion
 from wildshape.method.network import ShapePoseNet
 
 
@@ -96,6 +97,29 @@ def test_scans_that_agree_on_a_wrong_place_move_to_the_surer_ones():
     alike = joint_icp.refine_checked(scans, start, mirror=True).T_sensor_object
     told = joint_icp.refine_checked(scans, start, odds, mirror=True).T_sensor_object
     assert off(told) < 0.5 * off(alike)
+
+
+def test_a_track_follows_the_scans_whose_odds_are_best():
+    true = poses_of(TRACK)
+    ahead = SE3(torch.eye(3).double(), torch.tensor((0.5, 0.0, 0.0)).double())
+    start = stack([true[i] @ ahead if i in (2, 3, 4) else true[i] for i in range(7)])
+    stated = zip(completed(start), (0.9, 0.9, 0.01, 0.01, 0.01, 0.9, 0.9))
+    done = together([replace(one, confidence=sure) for one, sure in stated], TRACK.scans)
+    off = true.inverse() @ stack([one.pose for one in done])
+    assert float(off.translation.norm(dim=-1).max()) < 0.1
+
+
+def test_where_the_sensors_motion_is_known_no_object_turns_by_a_quarter_at_once():
+    """The last three scans agree on it, and are as sure as the others."""
+    track = each_turned(TRACK, torch.Generator().manual_seed(0))
+    true = poses_of(track)
+    quarter = SE3(rotation_z(torch.tensor(torch.pi / 2).double()), torch.zeros(3).double())
+    start = stack([true[i] @ quarter if i > 3 else true[i] for i in range(7)])
+    R_world_sensor = poses_of(TRACK).rotation @ true.rotation.mT
+    motion = SensorMotion(R_world_sensor, 0.1 * torch.arange(7).double())
+    done = together(completed(start), track.scans, motion=motion)
+    off = true.inverse() @ stack([one.pose for one in done])
+    assert float(torch.rad2deg(off.angle()).max()) < 5.0
 
 
 def test_a_scan_that_turned_and_fits_is_not_put_between_its_neighbours():

@@ -26,8 +26,8 @@ from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.projection.visibility import FacingBins
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.boxes import carried
-from wildshape.inference.confidence import ConfidenceFeatures, Glance
-from wildshape.inference.config import BoxConfig, TrackConfig
+from wildshape.inference.config import BoxConfig, ReasonRule, TrackConfig
+from wildshape.inference.single_scans import Found, Looked
 from wildshape.inference.tracks import complete_track as whole
 from wildshape.inference.tracks.heading_vote import half_turn
 from wildshape.inference.tracks.track_cost import network_inputs
@@ -71,6 +71,33 @@ def test_shapes_of_scans_turned_towards_their_object_become_denser():
     done = completed(poses_of(TRACK))[:2]
     facing = together(done, TRACK.scans, replace(SETTINGS, facing=True))
     assert len(facing[0].points) == 2 * CONFIG.points
+
+
+def test_ground_beside_a_car_goes_unless_the_network_completes_it_too():
+    poses = poses_of(TRACK)
+    high, low = SHAPE.amax(0), SHAPE.amin(0)
+    beside = torch.stack((torch.linspace(-2, 2, 60), torch.full((60,), 1.15), low[2].expand(60)), 1)
+    ground = poses[0].apply(beside.double()).float().numpy()
+    scan, done = np.concatenate((TRACK.scans[0], ground)), completed(poses)[0]
+    for sensor, refined, gone in (
+        ("lidar", True, True),
+        ("lidar", False, False),
+        ("camera", True, False),
+    ):
+        gathered = whole.Gathered(replace(SETTINGS, sensor=sensor))
+        gathered.add(replace(done, refined=refined), scan)
+        left = poses[0].inverse().apply_numpy(gathered.scans[0])
+        assert (left[:, 1].max() < high[1] + 0.1) == gone
+
+
+def test_the_shape_of_a_track_is_drawn_to_what_its_scans_saw():
+    """The network's is 5 cm too wide on either side."""
+    done, wide = completed(poses_of(TRACK)), SHAPE * torch.tensor((1.0, 0.9 / 0.85, 1.0))
+    done = [replace(one, points=one.pose.apply(wide).float().numpy()) for one in done]
+    found = together(done, TRACK.scans)[0]
+    shape = found.pose.inverse().apply_numpy(found.points)
+    wall = (np.abs(shape[:, 0]) < 1.5) & (np.abs(shape[:, 2] + 0.25) < 0.2)
+    assert np.abs(shape[wall, 1]).mean() == pytest.approx(0.85, abs=0.01)
 
 
 def test_what_exact_scans_saw_is_in_the_shape_of_their_track():
@@ -140,12 +167,16 @@ def test_votes_do_not_depend_on_the_size_of_the_objects(sensor):
 def test_the_confidence_is_that_of_scans_that_were_completed():
     """A scan that was only looked at does not count, nor is the mean shape of it."""
     gathered, done = whole.Gathered(SETTINGS), completed(poses_of(TRACK))
-    for item, scan in zip(done, TRACK.scans):
-        gathered.add(item, scan)
-    said = gathered.said[3]
-    features = ConfidenceFeatures(*[0.1] * len(ConfidenceFeatures._fields))
-    gathered.said[3] = Glance(said.pose, 0.99, 2, 0.1, "", (), features)
-    gathered._odds[3] = 0.0
+    for i, (item, scan) in enumerate(zip(done, TRACK.scans)):
+        if i == 3:
+            pose = item.pose.rotation[None], item.pose.translation[None]
+            said = torch.tensor([0.1]), torch.tensor([2]), torch.zeros(1, 7)
+            found = Found(2 * SHAPE[None], *pose, *said)
+            gathered.pass_by(Looked([scan], [scan], found), None, ReasonRule())
+        else:
+            gathered.add(item, scan)
+    assert gathered.said[3].confidence != 0.5
+    torch.testing.assert_close(gathered.shape, SHAPE[: CONFIG.points], atol=1e-5, rtol=0)
     assert gathered.rows.tolist() == [0, 1, 2, 4, 5, 6]
     found = list(whole.complete_together(gathered))
     assert [item.confidence for item in found] == pytest.approx([0.5] * 7)
