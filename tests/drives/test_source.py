@@ -5,6 +5,7 @@
 import os
 import pickle
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.source import Drive
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.poses import write_poses
+from wildshape.parallel.helper import Helper
 from wildshape.records import Turn
 
 NO_POINTS = Turn(np.empty((0, 3), np.float32))
@@ -259,6 +261,20 @@ def test_what_is_kept_does_not_go_along_to_another_process():
     assert 3 in held
     assert 3 not in sent
     assert sent(3).points.tolist() == held(3).points.tolist()
+
+
+def test_another_process_keeps_what_it_read_for_its_next_task_with_that_drive(folder):
+    drive, other, helper = open_drive(folder), open_drive(folder), Helper()
+    try:
+        helper.learn(drive.turn)
+        assert len(helper.work(1).points) == 50
+        (folder / "000001.bin").unlink()
+        helper.learn(replace(drive, motion=None).turn)
+        assert len(helper.work(1).points) == 50
+        helper.learn(other.turn)
+        assert len(helper.work(1).points) == 0
+    finally:
+        helper.close()
 
 
 def test_a_drive_reads_frames_that_are_asked_for_again_once():

@@ -4,7 +4,9 @@
 
 from collections.abc import Callable, Hashable
 from threading import Lock
-from typing import Generic, Protocol, TypeVar, runtime_checkable
+from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
+from uuid import UUID, uuid4
+from weakref import WeakValueDictionary
 
 _ROOM = 256_000_000  # bytes; some 180 scans of an HDL-64E
 
@@ -29,13 +31,14 @@ class FrameCache(Generic[K, T]):
     def __init__(self, give: Callable[[K], T], room: int = _ROOM) -> None:
         """`room`: bytes of all that is kept."""
         self.give, self.room = give, room
+        self._name = uuid4()
         self._held: dict[K, T] = {}
         self._bytes = 0
         self._lock = Lock()
 
-    def __reduce__(self) -> "tuple[type[FrameCache[K, T]], tuple[Callable[[K], T], int]]":
-        """What is kept does not go along to another process."""
-        return FrameCache, (self.give, self.room)
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        """What is kept does not go along to another process, which may have its own already."""
+        return _here, (self.give, self.room, self._name)
 
     def __contains__(self, key: K) -> bool:
         return key in self._held
@@ -55,3 +58,16 @@ class FrameCache(Generic[K, T]):
             while self._bytes > self.room and len(self._held) > 1:
                 self._bytes -= self._held.pop(next(iter(self._held))).nbytes
         return given
+
+
+_CACHES: "WeakValueDictionary[UUID, FrameCache[Any, Any]]" = WeakValueDictionary()
+"""Those that came from another process, by name."""
+
+
+def _here(give: Callable[[K], T], room: int, name: UUID) -> FrameCache[K, T]:
+    """That of the same name: a helper gets its tasks one by one, each with the same drive."""
+    found = _CACHES.get(name)
+    if found is None:
+        _CACHES[name] = found = FrameCache(give, room)
+        found._name = name
+    return found
