@@ -137,6 +137,24 @@ def test_long_scenes_and_gaps_make_several_tracks_of_different_names(tmp_path):
 refused = refusal_of(lambda root: list(all_tracks(Bop(root))))
 
 
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"obj_id": 7.5}, r"obj_id 7\.5 is no whole number"),
+        ({"obj_id": "7"}, r"obj_id '7' is no whole number"),
+        ({"cam_t_m2c": [0.0, -1e30, 1e3]}, r"a pose is 1e\+30 mm away"),
+        ({"cam_t_m2c": [0.0, float("nan"), 1e3]}, r"a pose is nan mm away"),
+    ],
+)
+def test_numbers_that_none_writes_are_refused(tmp_path, wrong, told):
+    write_bop(tmp_path, count=2)
+    file = tmp_path / "test" / "000001" / "scene_gt.json"
+    truth = json.loads(file.read_text())
+    truth["1"][0] |= wrong
+    file.write_text(json.dumps(truth))
+    refused(tmp_path, f"BOP's fields of image 1.*{told}")
+
+
 def test_missing_and_damaged_files_are_named(tmp_path):
     refused(tmp_path, r"expected a BOP data set, split or scene .* found an empty folder")
     write_bop(tmp_path, count=2)

@@ -158,7 +158,9 @@ def _frame(number: int, camera: Any, truth: Any, size: tuple[int, int]) -> Frame
     seen: Counter[int] = Counter()
     things = []
     for place, entry in enumerate(truth):
-        which = int(entry["obj_id"])
+        which = entry["obj_id"]
+        if not isinstance(which, int):
+            raise ValueError(f"obj_id {which!r} is no whole number")
         pose = _pose(entry["cam_R_m2c"], entry["cam_t_m2c"])
         things.append(Thing(which, seen[which], place, pose))
         seen[which] += 1
@@ -168,8 +170,10 @@ def _frame(number: int, camera: Any, truth: Any, size: tuple[int, int]) -> Frame
 
 def _pose(rotation: Any, translation_mm: Any) -> SE3:
     R = np.asarray(rotation, np.float64).reshape(3, 3)
-    t = np.asarray(translation_mm, np.float64).reshape(3, 1) * _MM
-    return SE3.from_matrix(np.concatenate((R, t), axis=1))
+    t = np.asarray(translation_mm, np.float64).reshape(3, 1)
+    if not (np.abs(t) <= _MOST).all():
+        raise ValueError(f"a pose is {float(np.abs(t).max()):.3g} mm away")
+    return SE3.from_matrix(np.concatenate((R, t * _MM), axis=1))
 
 
 def _json(path: Path, expected: str) -> dict[str, Any]:
