@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Detections of keyframes alone, and detections that hold the same points."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -101,3 +102,15 @@ def test_labels_of_kitti_without_a_calibration_say_which_camera_is_assumed(tmp_p
     (said,) = find_detections(DetectionFile(path), drive).warnings
     assert said.startswith("0001.txt is taken to be of a camera at the LiDAR's own place")
     assert find_detections(DetectionFile(path, calibration), drive).warnings == ()
+
+
+def test_boxes_at_times_that_the_drive_does_not_have_are_of_none_of_its_scans(tmp_path: Path):
+    """Those of 2.0 to 2.9 s lay on scan 2 of a drive of one second."""
+    names = [f"{0.1 * frame:.1f}" for frame in range(30)]
+    car = {"boxes_lidar": [[9.0, 0, 0, 4, 2, 1, 0]], "name": ["Car"]}
+    path = tmp_path / "boxes.json"
+    path.write_text(json.dumps([{**car, "frame_id": name} for name in names]))
+    drive = Drive.of("street", names[:10], lambda _: Turn(np.empty((0, 3), np.float32)))
+    found = find_detections(DetectionFile(path), drive)
+    assert [len(row) for row in found.frames] == [1] * 10
+    assert found.warnings == ("20 detections belong to scans that the drive does not have",)
