@@ -35,7 +35,7 @@ def nuscenes(**other):
 
 
 FILES = {
-    "tracking.txt": (f"3 7 {LABEL.format(turn=-math.pi)} 0.5\n", "3", "0007"),
+    "tracking.txt": (f"3 0 {LABEL.format(turn=-math.pi)} 0.5\n", "3", "0000"),
     "without_tracks.txt": (f"3 -1 {LABEL.format(turn=math.pi)}\n", "3", None),
     "000003.txt": (f"{LABEL.format(turn=-math.pi)} 0.5\n\n", "000003", None),
     "nuscenes.json": (nuscenes(), "000003", None),
