@@ -3,19 +3,24 @@
 """Detections of keyframes alone, and detections that hold the same points."""
 
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from tests.drives.cuts import write_cut
 
 import wildshape
 from wildshape.drives.clock import Clock, silent
-from wildshape.drives.config import DriveConfig
+from wildshape.drives.config import DetectionConfig, DriveConfig
 from wildshape.drives.pipeline import Pipeline
 from wildshape.drives.source import Drive
-from wildshape.drives.tracking.box_cutter import cut_boxes
+from wildshape.drives.tracking.box_cutter import BoxCutter, cut_boxes
 from wildshape.drives.tracking.detections import DetectionFile, Detections, find_detections
+from wildshape.drives.tracking.mounting import Mounting
+from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detector import DetectorBox, upright_box
 from wildshape.parallel.team import ALONE
@@ -114,3 +119,23 @@ def test_boxes_at_times_that_the_drive_does_not_have_are_of_none_of_its_scans(tm
     found = find_detections(DetectionFile(path), drive)
     assert [len(row) for row in found.frames] == [1] * 10
     assert found.warnings == ("20 detections belong to scans that the drive does not have",)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 1.0, 2.5])
+def test_boxes_of_a_drive_stand_on_the_ground_of_a_tilted_sensor(yaw, tmp_path: Path):
+    """They leaned with it, and lost a quarter of a vehicle's points."""
+    mounting = Mounting(1.7, 24.0, (0.3, -0.28, math.sqrt(1 - 0.3**2 - 0.28**2)))
+    T_sensor_level = mounting.levelling().inverse()
+    T_level_box = SE3(rotation_z(torch.tensor(yaw).double()), torch.tensor((12.0, 3, -1)).double())
+    T_sensor_box = T_sensor_level @ T_level_box
+    points = T_sensor_box.apply_numpy(points_of(0.0, 400))
+    ahead = T_sensor_box.rotation[:, 0]
+    given = upright_box(
+        T_sensor_box.translation.tolist(), SIZE, float(torch.atan2(ahead[1], ahead[0]))
+    )
+    frames = ((DetectorBox(0, "", "0001", given),),)
+    known = Detections(Path("boxes.csv"), frames, tracked=True, warnings=(), corrected=True)
+    drive = Drive.of("street", ["000000"], lambda _: Turn(points))
+    config = replace(DriveConfig(), detections=DetectionConfig(around_m=1e-3))
+    cutter = BoxCutter(drive, mounting, tmp_path, config, known)
+    assert cutter.cut(0, points, np.ones(400), points).counts.tolist() == [400]
