@@ -147,6 +147,24 @@ def test_a_page_says_that_an_adapted_model_made_it(found, tmp_path):
     assert "are of a model adapted" in note
 
 
+@pytest.mark.parametrize(
+    ("name", "damage"),
+    [
+        ("wildshape.json", {"result": [1]}),
+        ("wildshape.json", {"result": {"seconds": {"tracks": "x"}}}),
+        ("wildshape.json", {"result": {"warnings": "x"}}),
+        ("wildshape.json", {"provenance": [1]}),
+        ("objects/0003/objects.json", {"scans": []}),
+    ],
+)
+def test_a_drive_whose_records_were_changed_is_refused(found, tmp_path, name, damage):
+    """A traceback, or letters for warnings."""
+    out = shutil.copytree(found.out, tmp_path / "found")
+    said = json.loads((out / name).read_text())
+    (out / name).write_text(json.dumps({**said, **damage}))
+    refused(report_from_drive, out, match=name)
+
+
 def test_a_page_says_which_vehicle_s_scans_are_lost(found, tmp_path):
     out = shutil.copytree(found.out, tmp_path / "found")
     lost, whole = CARS
