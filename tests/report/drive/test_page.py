@@ -37,6 +37,7 @@ def test_points_belong_to_the_vehicles_they_were_measured_on(found):
         for number, places in enumerate(CARS.values()):
             own = scan.points[scan.owners == number]
             assert len(own) > 100
+            assert (own[:, 2] > 0.14 - HEIGHT).all()  # not the ground under it
             x, y, _ = places[scan.frame]
             assert np.abs(own[:, :2].mean(0) - (x - scan.frame, y)).max() < 0.4
 
