@@ -155,12 +155,13 @@ def test_scores_that_no_box_has_are_not_asked_for(street, tmp_path):
 def test_a_lower_score_is_counted_and_a_needless_calibration_named(street, tmp_path):
     given = openpcdet(street, tmp_path)
     said = json.loads(given.path.read_text())
-    said[0]["score"][0] = 0.1
+    said[0]["score"][:2] = 0.1, None
     given.path.write_text(json.dumps(said))
     calibration = street.root / "calib" / "0000.txt"
     told = replace(given, least_score=0.3, calibration=calibration)
-    warnings = find_detections(told, street.drive).warnings
-    assert warnings[:2] == (
+    found = find_detections(told, street.drive)
+    assert None in {box.score for box in found.frames[0]}  # that without a score stays
+    assert found.warnings[:2] == (
         "0000.txt is not used: only KITTI's boxes need it",
         "1 detections score less than 0.3 and are left out",
     )

@@ -28,18 +28,18 @@ def written(path, content):
     return path
 
 
-def nuscenes(**other):
+def nuscenes(kind="detection", **other):
     half = math.sqrt(0.5)
     row = {"translation": CENTRE, "size": [1.8, 4.0, 1.6], "rotation": [half, 0, 0, half]}
-    return {"results": {"000003": [{**row, "detection_name": "car", **other}]}}
+    return {"results": {"000003": [{**row, f"{kind}_name": "car", f"{kind}_score": 0.5, **other}]}}
 
 
 FILES = {
-    "tracking.txt": (f"3 7 {LABEL.format(turn=-math.pi)} 0.5\n", "3", "0007"),
+    "tracking.txt": (f"3 0 {LABEL.format(turn=-math.pi)} 0.5\n", "3", "0000"),
     "without_tracks.txt": (f"3 -1 {LABEL.format(turn=math.pi)}\n", "3", None),
     "000003.txt": (f"{LABEL.format(turn=-math.pi)} 0.5\n\n", "000003", None),
     "nuscenes.json": (nuscenes(), "000003", None),
-    "tracks.json": (nuscenes(tracking_id=12), "000003", "12"),
+    "tracks.json": (nuscenes("tracking", tracking_id=12), "000003", "12"),
     "any_length.json": (nuscenes(rotation=[3, 0, 0, 3]), "000003", None),
     "openpcdet.json": (
         [{"frame_id": "000003", "name": ["Car"], "score": [0.5], "boxes_lidar": [LEFT]}],
@@ -70,6 +70,7 @@ def test_every_format_says_the_same_box(name, mark, tmp_path):
     (found,) = read(path)
     assert (found.scan, found.track) == (scan, track)
     assert found.category.lower() in ("car", "")
+    assert found.score == (None if name in ("without_tracks.txt", "by_place.json") else 0.5)
     assert found.box.centre == pytest.approx(CENTRE, abs=1e-6)
     assert found.box.size == pytest.approx(SIZE)
     axes = pose_of(found.box).rotation.numpy()
@@ -119,15 +120,16 @@ def test_a_list_that_holds_a_scan_twice_is_refused(tmp_path):
     refused(read, written(path, [one, one]), match=r"holds scan '000003' 2 times")
 
 
+@pytest.mark.parametrize("degrees", ["90.0", "-90.0"])
 @pytest.mark.parametrize("name", ["tracking.txt", "openpcdet.json", "000004.json", "boxes.csv"])
-def test_turns_in_degrees_are_refused(name, tmp_path):
+def test_turns_in_degrees_are_refused(name, degrees, tmp_path):
     """Their boxes stood across the vehicles, and cut out of each what lay in them."""
     content = FILES[name][0]
     text = content if isinstance(content, str) else json.dumps(content)
     for radians in (-math.pi, LEFT[-1], 1.5707963):
-        text = text.replace(f"{radians}", "90.0")
+        text = text.replace(f"{radians}", degrees)
     path = written(tmp_path / name, text)
-    refused(read, path, match=f"{name}.*a box turned by 90, expected radians")
+    refused(read, path, match=f"{name}.*a box turned by {float(degrees):g}, expected radians")
 
 
 def test_a_fingerprint_tells_names_and_contents(tmp_path):
@@ -148,6 +150,7 @@ def test_a_fingerprint_tells_names_and_contents(tmp_path):
         ("a.txt", LABEL.format(turn="nan"), "not finite"),
         ("a.txt", f"one 2 {LABEL.format(turn=0)}", "labels of KITTI"),
         ("a.txt", LABEL.format(turn=0).replace("1.8 4.0", "-1.8 4.0"), "a box of size"),
+        ("a.txt", LABEL.format(turn=0).replace("1.8 4.0", "0 4.0"), "a box of size"),
         ("a.json", "{", "results of nuScenes"),
         ("a.json", {"boxes": []}, "results"),
         ("a.json", [1], "results of nuScenes"),

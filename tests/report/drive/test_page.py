@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """A drive's page: points where they were measured; played and clicked in a browser."""
 
+import base64
 import json
 import re
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,9 +14,11 @@ from tests.drives.finished_drive import CARS, FRAMES, HEIGHT, finished_drive
 from tests.refusal import refused
 from tests.report.chromium import CHROMIUM, Page, browser, colourful, eventually, moved
 
+from wildshape.io.scans.points import read_points
+from wildshape.io.scans.writers import write_ply
 from wildshape.parallel import processes
 from wildshape.parallel.team import team
-from wildshape.report.drive.page import report_from_drive, write_drive_report
+from wildshape.report.drive.page import drive_report, report_from_drive, write_drive_report
 from wildshape.report.drive.scene import NOBODY, SceneConfig, drawn_scans, scene_data
 
 
@@ -33,6 +37,7 @@ def test_points_belong_to_the_vehicles_they_were_measured_on(found):
         for number, places in enumerate(CARS.values()):
             own = scan.points[scan.owners == number]
             assert len(own) > 100
+            assert (own[:, 2] > 0.14 - HEIGHT).all()  # not the ground under it
             x, y, _ = places[scan.frame]
             assert np.abs(own[:, :2].mean(0) - (x - scan.frame, y)).max() < 0.4
 
@@ -50,18 +55,51 @@ def test_a_long_drive_is_drawn_within_its_limits(found):
     assert (standing["speeds"][1], coming["speeds"][1]) == (0.0, 8.0)
 
 
-def test_each_vehicle_s_scans_are_fused_where_it_is_completed(found):
-    report = report_from_drive(found.out)
+def test_the_scene_s_points_lie_in_the_level_world_where_they_stand(found):
+    """As the page unpacks them: little-endian int16 in steps along each axis, then the pose."""
+    data = scene_data(found, drawn_scans(found, found.open_source()))
+    assert data["ground"] == HEIGHT
+    assert data["way"] == [[frame, 0, 0] for frame in range(FRAMES)]
+    assert [one["moving"] for one in data["vehicles"]] == [False, True]
+    for frame, drawn in enumerate(data["frames"]):
+        assert (drawn["frame"], drawn["time"]) == (frame, pytest.approx(0.1 * frame))
+        packed = np.frombuffer(base64.b64decode(drawn["points"]), "<i2").reshape(-1, 3)
+        points = (packed + 32767.0) * drawn["step"] + drawn["low"]
+        pose = np.array(drawn["pose"])
+        placed = points @ pose[:, :3].T + pose[:, 3]
+        owners = np.array(drawn["owners"])
+        cars = placed[-len(owners) :]
+        for number, places in enumerate(CARS.values()):
+            own = cars[owners == number]
+            x, y, _ = places[frame]
+            assert np.abs(own[:, :2].mean(0) - (x, y)).max() < 0.4
+
+
+def test_each_vehicle_s_scans_are_fused_where_it_is_completed(found, tmp_path):
+    """In the frame of its fullest, here the second of two: what drives was elsewhere before."""
+    out = shutil.copytree(found.out, tmp_path / "found")
+    for name in CARS:
+        first = out / "tracks" / name / "scans" / "000001.ply"
+        write_ply(first, read_points(first)[:150])
+    report = report_from_drive(out)
     assert [shown.name for shown in report.objects] == list(CARS)
     assert all(report.index[0].columns)
     assert [row[1] for row in report.index[0].rows] == ["standing", "moving"]
     assert [row[2:6] for row in report.index[0].rows] == [("0.90", "0.97", "0.94", "0.99")] * 2
+    assert [row[6:] for row in report.index[0].rows] == [
+        ("4.40", "1.80", "1.50", FRAMES, "0.0 to 0.5", nearest, 200) for nearest in ("7.9", "21.1")
+    ]
     assert "That of what is seen driving is raised" in report.index[0].caption
     assert "a strange thing" in report.notes
-    assert dict(report.facts)["vehicles"] == str(len(CARS))
-    assert all(re.match(r"\d", value) for _, value in report.facts)  # nothing that is not known
-    assert ("completion", "2.5 s") in report.cost
+    assert [value for _, value in report.facts] == ["2", "1", "6", "0.5 s", "5 m"]
+    assert report.cost == (
+        ("all of it", "4 s"),
+        ("trajectory", "1.5 s"),
+        ("completion", "2.5 s"),
+    )
     for shown in report.objects:
+        assert shown.subtitle == "scan 000003, 2 scans completed together"
+        assert ("frames", "0 to 5") in shown.details
         assert ("kind right", "0.99") in shown.details
         assert shown.box is not None
         for cloud in shown.clouds:
@@ -89,6 +127,8 @@ def test_without_the_recording_the_vehicles_are_drawn_alone(found, tmp_path):
     said["settings"]["source"] = str(tmp_path / "gone")
     (out / "wildshape.json").write_text(json.dumps(said))
     report = report_from_drive(out)
+    one = drive_report(replace(found, vehicles=found.vehicles[:1]), None)
+    assert [dict(page.facts)["of them moving"] for page in (report, one)] == ["1", "0"]
     assert any("no scans are drawn" in note for note in report.notes)
     assert len(report.objects) == len(CARS)
     assert report_from_drive(out, found.source).notes == report.notes[1:]
@@ -106,6 +146,24 @@ def test_a_page_says_that_an_adapted_model_made_it(found, tmp_path):
     first, second = (report_from_drive(folder).notes for folder in (found.out, out))
     (note,) = set(second) - set(first)
     assert "are of a model adapted" in note
+
+
+@pytest.mark.parametrize(
+    ("name", "damage"),
+    [
+        ("wildshape.json", {"result": [1]}),
+        ("wildshape.json", {"result": {"seconds": {"tracks": "x"}}}),
+        ("wildshape.json", {"result": {"warnings": "x"}}),
+        ("wildshape.json", {"provenance": [1]}),
+        ("objects/0003/objects.json", {"scans": []}),
+    ],
+)
+def test_a_drive_whose_records_were_changed_is_refused(found, tmp_path, name, damage):
+    """A traceback, or letters for warnings."""
+    out = shutil.copytree(found.out, tmp_path / "found")
+    said = json.loads((out / name).read_text())
+    (out / name).write_text(json.dumps({**said, **damage}))
+    refused(report_from_drive, out, match=name)
 
 
 def test_a_page_says_which_vehicle_s_scans_are_lost(found, tmp_path):

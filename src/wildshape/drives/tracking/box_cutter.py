@@ -2,16 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The points in the boxes of somebody else's detector, cut out of the scans of a drive."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+import torch
 from jaxtyping import Bool, Float
 
 from wildshape.drives.config import DetectionConfig, DriveConfig
 from wildshape.drives.tracking.detections import Detections
 from wildshape.drives.tracking.segmentation import CutScan, Cutter
 from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.rotation import quaternion_from_rotation
 from wildshape.io.boxes.detections import pose_of
 from wildshape.io.boxes.detector import DetectorBox
 from wildshape.records import Box, Points
@@ -28,9 +30,22 @@ class BoxCutter(Cutter):
     ) -> CutScan:
         """What is in the boxes of a frame; see `cut_boxes`."""
         given = self.detections
-        seen = scan if given.corrected else as_measured
-        known = given.frames[frame], heights, self.config, seen
-        return cut_boxes(scan, *known, tracked=given.tracked)
+        seen, boxes = as_measured, given.frames[frame]
+        if given.corrected:  # of a drive, whose boxes stand on the ground
+            seen = scan
+            if self.mounting.is_tilted:
+                boxes = tuple(replace(one, box=_stood(one.box, self.mounting.up)) for one in boxes)
+        return cut_boxes(scan, boxes, heights, self.config, seen, tracked=given.tracked)
+
+
+def _stood(box: Box, up: Sequence[float]) -> Box:
+    """A box along the sensor's z, stood along the vertical: its yaw stays as the sensor sees it."""
+    ahead = pose_of(box).rotation[:, 0].numpy().copy()
+    ahead[2] = -(ahead[:2] @ up[:2]) / up[2]
+    ahead /= np.linalg.norm(ahead)
+    axes = torch.from_numpy(np.stack((ahead, np.cross(up, ahead), up), axis=1))
+    qw, qx, qy, qz = quaternion_from_rotation(axes).tolist()
+    return replace(box, quaternion_wxyz=(qw, qx, qy, qz))
 
 
 def cut_boxes(

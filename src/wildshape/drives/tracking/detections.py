@@ -232,14 +232,23 @@ def _frame(scan: str | int, names: dict[str, int], numbers: dict[int, int]) -> i
     for name in (scan, path.name, path.stem):
         if name in names:
             return names[name]
-    return numbers.get(number_of(path.stem, -1))
+    return numbers.get(_counted(scan))
+
+
+def _counted(scan: str | int) -> int:
+    """The number that a scan's name is, in any folder, with or without a file's ending; or -1.
+
+    `12.05` is a time, and not the file of scan 12.
+    """
+    path = PurePosixPath(str(scan))
+    return number_of(path.name if path.suffix[1:].isdigit() else path.stem, -1)
 
 
 def _shift_told(
     boxes: list[DetectorBox], frames: Sequence[Sequence[DetectorBox]], numbers: list[int]
 ) -> str:
     """What else to say where boxes lie one scan off: they begin and end one after the drive."""
-    theirs = [number_of(PurePosixPath(str(one.scan)).stem, -1) for one in boxes]
+    theirs = [_counted(one.scan) for one in boxes]
     late = not frames[0] and max(theirs) == numbers[-1] + 1
     early = not frames[-1] and min(theirs) == numbers[0] - 1 >= 0
     if not (late or early):

@@ -284,6 +284,13 @@ def _read_record(path: Path) -> dict[str, Any]:
         source, topic = (record["settings"].get(name) for name in ("source", "topic"))
         if not isinstance(source, str) or not isinstance(topic, str | None):
             raise ValueError(f"source {source!r}, topic {topic!r}")
+        said = record.get("result") or {}
+        seconds, warned = said.get("seconds") or {}, said.get("warnings") or []
+        timed = all(isinstance(spent, int | float) for spent in seconds.values())
+        if not timed or not isinstance(warned, list):
+            raise ValueError(f"seconds {seconds!r}, warnings {warned!r}")
+        if not isinstance(made := record.get("provenance") or {}, dict):
+            raise ValueError(f"provenance {made!r}")
         file_name(Path(source).name)
         return record
 

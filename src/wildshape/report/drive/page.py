@@ -11,6 +11,7 @@ from wildshape.drives.result import REPORT
 from wildshape.drives.source import Drive
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle, read_finished
 from wildshape.drives.writing.playback.moments import readable_source
+from wildshape.errors import BadInputError
 from wildshape.geometry.sampling import thin
 from wildshape.inference.registration import fuse_scans, to_middle
 from wildshape.io.progress import counted, duration
@@ -22,6 +23,7 @@ from wildshape.report.drive.scene import DrawnScan, drawn_scans, scene_data
 from wildshape.report.page.html import write_report
 from wildshape.report.results import (
     MEANING,
+    OBJECTS,
     PROBABILITIES,
     TrackResult,
     box_of,
@@ -172,6 +174,8 @@ def _chances(found: FinishedDrive, one: FoundVehicle) -> dict[str, str]:
 def _object(found: FinishedDrive, one: FoundVehicle) -> ReportObject:
     """Panels in the sensor frame of its fullest completed scan."""
     result = read_result(found.out / "objects" / one.name)
+    if not result.scans:
+        raise BadInputError(f"{result.folder / OBJECTS}: no scan in it; write it anew.")
     scans = {name: found.scan(one, name) for name in result.scans}
     scan = max(scans, key=lambda name: len(scans[name]))
     entry = result.entry(scan)
