@@ -199,14 +199,6 @@ def test_registration_is_through_the_canonical_frame(predictor):
     torch.testing.assert_close(around.matrix, T_c_a.matrix, atol=1e-4, rtol=0)
 
 
-def test_a_scan_is_registered_to_itself_by_the_identity(predictor):
-    found = predictor.register(scan(), scan())
-    torch.testing.assert_close(
-        found.T_target_source.matrix, torch.eye(4).double(), atol=1e-5, rtol=0
-    )
-    assert found.inlier_ratio == 1
-
-
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_tracks_are_registered_to_and_fused_in_the_middle_scan(predictor, count):
     scans = [scan(seed, count=20 + seed) for seed in range(count)]

@@ -17,6 +17,15 @@ from wildshape.inference.registration import inlier_ratio
 from wildshape.method.network import ShapePoseNet
 
 
+def test_a_scan_is_registered_to_itself_by_the_identity():
+    predictor = Predictor(ShapePoseNet(CONFIG).eval(), SETTINGS)
+    found = predictor.register(scan(), scan())
+    torch.testing.assert_close(
+        found.T_target_source.matrix, torch.eye(4).double(), atol=1e-5, rtol=0
+    )
+    assert found.inlier_ratio == 1
+
+
 def test_inlier_ratio_by_hand():
     """Reach is the lesser of 0.2 m and 5 % of the target's extent (here 10 m and 1 m)."""
     line = np.linspace(0, 1, 11, dtype=np.float32)[:, None]
