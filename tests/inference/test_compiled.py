@@ -10,6 +10,11 @@ import json
 import subprocess
 import sys
 
+from tests.models import CONFIG, SETTINGS
+
+from wildshape.inference import predictor
+from wildshape.method.network import ShapePoseNet
+
 _PROGRAM = """
 import json, warnings
 import torch
@@ -55,3 +60,12 @@ def test_the_same_for_any_batch_and_a_sentence_without_a_compiler():
     assert "runs uncompiled" in sentence
     assert "no C++ compiler anywhere)" in sentence
     assert "\n" not in sentence
+
+
+def test_a_predictor_that_is_compiled_leaves_the_other_as_it_was(monkeypatch):
+    network, made = ShapePoseNet(CONFIG).eval(), ShapePoseNet(CONFIG).eval()
+    monkeypatch.setattr(predictor, "compiled", lambda *_: made)
+    of = predictor.Predictor(network, SETTINGS, level=False)
+    fast = of.compile()
+    assert (fast.network, of.network) == (made, network)
+    assert (fast.up, fast.config, fast.refines) == (of.up, of.config, of.refines)

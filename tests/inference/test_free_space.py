@@ -7,17 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.cars import poses_of, shape_of
+from tests.cars import drive_by, poses_of, shape_of
 from tests.refusal import refused
 
 import wildshape
 from wildshape.geometry.projection.visibility import PolarBins
 from wildshape.geometry.transforms.rotation import rotation_from_vector
 from wildshape.geometry.transforms.se3 import SE3, stack
-from wildshape.inference.config import FreeSpaceConfig
+from wildshape.inference import predictor, single_scans
+from wildshape.inference.config import FreeSpaceConfig, InferenceConfig, TrackConfig
 from wildshape.inference.free_space import SeenScores, Sights, without_free_space
 from wildshape.inference.point_inputs import as_rays
+from wildshape.inference.predictor import Predictor
 from wildshape.inference.single_scans import Looked
+from wildshape.inference.tracks import complete_track
 from wildshape.io.rays import write_rays
 from wildshape.method.hindsight import score_hypotheses
 from wildshape.records import SightLines, Track
@@ -172,6 +175,52 @@ def test_rays_count_in_every_way_to_pose_a_track(track: Track) -> None:
     fused = model.fuse(scans, rays=rays)
     moved = model.register_track(scans, rays=rays)[0].apply_numpy(scans[0])
     np.testing.assert_allclose(fused[: len(scans[0])], moved, atol=1e-5)
+
+
+def test_a_box_leaves_out_what_stands_where_rays_passed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Through the last part of a completed car, of which its scan shows nothing."""
+    model, cars = wildshape.load(), drive_by()
+    T_object_sensor = poses_of(cars)[8].inverse()
+    scan = cars.scans[8][T_object_sensor.apply_numpy(cars.scans[8])[:, 0] > -0.6]
+    alone = model.complete(scan)
+    along = alone.pose.inverse().apply_numpy(alone.points)[:, 0]
+    rays = SightLines.of_returns(3 * alone.points[along < np.quantile(along, 0.15)])
+    length = model.complete(scan, rays=rays).box.size[0]
+    assert length < alone.box.size[0] - 0.2
+    monkeypatch.setattr(single_scans, "without_free_space", lambda shape, *_: shape)
+    assert length < model.complete(scan, rays=rays).box.size[0] - 0.05
+
+
+@pytest.mark.parametrize("key_scans", [32, 3])
+def test_rays_stay_beside_their_scans_in_every_batch(
+    key_scans: int, track: Track, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One scan a batch, in every way to complete a track, short or long, and for its one shape."""
+    scans, rays = [*track.scans] * 2, [track.rays[0], None, None, track.rays[1]]
+    model = wildshape.load(config=InferenceConfig(track=TrackConfig(key_scans=key_scans)))
+    at_once = model.complete_track(scans, rays=rays)
+    look, cut = Predictor.look, complete_track.without_free_space
+    looked, held = [], []
+
+    def looking(self, batch, beside=()):
+        looked.extend(beside)
+        return look(self, batch, beside)
+
+    def cutting(shape, poses, sights):
+        held.extend(sights.rays)
+        return cut(shape, poses, sights)
+
+    monkeypatch.setattr(predictor, "BATCH", 1)
+    monkeypatch.setattr(Predictor, "look", looking)
+    monkeypatch.setattr(complete_track, "without_free_space", cutting)
+    for way in (model.complete_many, model.complete_checked, model.complete_track):
+        looked.clear()
+        done = list(way(scans, rays=rays))
+        assert looked == rays
+    assert held == rays
+    assert done[0].box.size == pytest.approx(at_once[0].box.size, abs=1e-3)
+    assert len(list(model.complete_checked(scans, track=True, rays=rays))) == len(scans)
+    assert held == rays * 2
 
 
 def test_small_objects_are_held_against_rays_as_large_ones_are(track: Track) -> None:

@@ -30,3 +30,13 @@ def test_a_box_is_hardly_wider_with_ground_than_without():
         grounded = np.asarray(model.complete(_with_ground(scan, pose, low, high)).box.size)
         wider.append((grounded / clean)[:2])
     assert np.mean(wider) < 1.08  # 35 cm on each side would be 1.15 along and 1.4 across
+
+
+def test_a_raw_answer_and_a_depth_view_keep_all_points():
+    """The graph of an export sees all of them; what a camera sees low beside an object is of it."""
+    track = drive_by(scans=1)
+    low, high = shape_of(track).min(0), shape_of(track).max(0)
+    scan = _with_ground(track.scans[0], poses_of(track)[0], low, high)
+    assert len(load().look([scan]).seen[0]) < len(scan)
+    for of in (load(raw=True), load("chair")):
+        assert len(of.look([scan]).seen[0]) == len(scan)

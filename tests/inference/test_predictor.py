@@ -11,16 +11,13 @@ import pytest
 import torch
 from tests.models import CONFIG, SETTINGS, scan
 from tests.refusal import refused
-from tests.strategies import rotation_about
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion
-from wildshape.geometry.transforms.se3 import SE3
 from wildshape.inference.confidence import confidence_of, features_of
-from wildshape.inference.config import BoxConfig, InferenceConfig
+from wildshape.inference.config import BoxConfig, InferenceConfig, TrackConfig
 from wildshape.inference.point_inputs import check_sensor
 from wildshape.inference.predictor import Predictor, load
-from wildshape.inference.registration import inlier_ratio
 from wildshape.method.checkpoint import save_checkpoint, weights_file
 from wildshape.method.confidence import ConfidenceFeatures
 from wildshape.method.network import ShapePoseNet
@@ -202,14 +199,6 @@ def test_registration_is_through_the_canonical_frame(predictor):
     torch.testing.assert_close(around.matrix, T_c_a.matrix, atol=1e-4, rtol=0)
 
 
-def test_a_scan_is_registered_to_itself_by_the_identity(predictor):
-    found = predictor.register(scan(), scan())
-    torch.testing.assert_close(
-        found.T_target_source.matrix, torch.eye(4).double(), atol=1e-5, rtol=0
-    )
-    assert found.inlier_ratio == 1
-
-
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_tracks_are_registered_to_and_fused_in_the_middle_scan(predictor, count):
     scans = [scan(seed, count=20 + seed) for seed in range(count)]
@@ -259,6 +248,15 @@ def test_another_kind_of_sensor_is_flagged(predictor):
     assert done.confidence == 0
     assert done.warning.startswith("a camera scan, but the model was trained on lidar")
     assert predictor.complete(scan(), Sensor("lidar")).warning == ""
+    scans = [scan(seed) for seed in range(4)]
+    long = InferenceConfig(track=TrackConfig(key_scans=3))
+    for of in (predictor, Predictor(predictor.network, SETTINGS, config=long)):
+        found = [*of.complete_track(scans, Sensor("camera"))]
+        found += of.complete_checked(scans, Sensor("camera"))
+        found += of.complete_checked(scans, Sensor("camera"), track=True)
+        found += of.complete_many(scans, Sensor("camera"))
+        found.append(of.register(scans[0], scans[1], Sensor("camera")))
+        assert {(one.confidence, one.warning) for one in found} == {(0, done.warning)}
 
 
 def test_confidence_falls_with_the_cost(predictor):
@@ -280,6 +278,8 @@ def test_too_few_points_are_refused_by_name(predictor, count):
         list(predictor.complete_many([scan(), scan(count=40)[:count]]))
     with pytest.raises(BadInputError, match=f"source: {count} finite"):
         predictor.register(scan()[:count], scan())
+    with pytest.raises(BadInputError, match=f"scan 33: {count} finite points"):
+        list(predictor.complete_many([*[scan()] * 33, scan(count=40)[:count]]))
 
 
 def test_a_speck_and_what_is_no_sensor_are_refused(predictor):
@@ -342,20 +342,5 @@ def test_load(predictor, tmp_path):
     path = tmp_path / "model.safetensors"
     save_checkpoint(path, predictor.network, SETTINGS)
     assert_same(load(path).complete(scan()), predictor.complete(scan()), atol=1e-6)
+    assert (load(path).named, load().named) == (path, None)
     refused(load, tmp_path / "gone.safetensors", match="no such checkpoint")
-
-
-def test_inlier_ratio_by_hand():
-    """Reach is the lesser of 0.2 m and 5 % of the target's extent (here 10 m and 1 m)."""
-    line = np.linspace(0, 1, 11, dtype=np.float32)[:, None]
-    target = line * np.array([10, 0, 0], np.float32)
-    source = target + np.array([0, 0.15, 0], np.float32)
-    source[:4, 1] = 0.25
-    one = SE3.identity()
-    assert inlier_ratio(one, source, target) == pytest.approx(7 / 11)
-    small = line * np.array([1, 0, 0], np.float32)
-    near = small + np.array([0, 0.03, 0], np.float32)
-    near[:4, 1] = 0.1
-    assert inlier_ratio(one, near, small) == pytest.approx(7 / 11)
-    T = SE3(rotation_about((0.0, 0.0, 1.0), math.pi), torch.tensor([10.0, 0.0, 0.0]).double())
-    assert inlier_ratio(T, target, target) == 1

@@ -18,7 +18,8 @@ from wildshape.inference.confidence import (
     reasons_of_track,
     warning_of,
 )
-from wildshape.inference.config import ReasonRule
+from wildshape.inference.config import InferenceConfig, ReasonRule, TrackConfig
+from wildshape.inference.predictor import load
 from wildshape.inference.registration import registered
 from wildshape.method.checkpoint import SHIPPED, load_checkpoint
 from wildshape.records import Box, Completion, Sensor
@@ -155,3 +156,14 @@ def test_a_registration_says_what_is_wrong_with_either_scan_and_reaches_by_the_t
         found = registered(source, target, done)
         assert (found.confidence, found.warning, found.reasons) == (0.2, "odd", ("poor_fit",))
         assert found.inlier_ratio == 0
+
+
+def test_a_predictor_flags_by_the_bounds_of_its_configuration():
+    """Single scans, raw or not, and tracks, short or long."""
+    scans = [np.load(Path(__file__).parents[2] / "examples" / "scan.npy").astype(np.float32)] * 3
+    reasons = ReasonRule(few_points=10**6, poor_fit=0.0)
+    for raw, key_scans in ((False, 2), (False, 3), (True, 3)):
+        config = InferenceConfig(reasons=reasons, track=TrackConfig(key_scans=key_scans))
+        model = load(raw=raw, config=config)
+        for done in (*model.complete_many(scans), *model.complete_track(scans)):
+            assert {"few_points", "poor_fit"} <= set(done.reasons)

@@ -172,6 +172,26 @@ def test_graph_is_the_predictor(changes):
     same_as_predictor(graph_of(made), made)
 
 
+def test_confidence_of_odd_scans_is_the_predictors():
+    """Beside the camera, larger than any trained on but not by much, of more points than known."""
+    rng = np.random.default_rng(0)
+    scan = rng.uniform((-0.6, -0.5, 3.0), (0.6, 0.5, 4.0), (60_000, 3)).astype(np.float32)
+    for sensor, high, at, known in (
+        ("lidar", 2.0, (6.0, 0.0, 0.0), True),
+        ("lidar", 1.5, (6.0, 0.0, 0.0), True),
+        ("lidar", 1.0, (6.0, 0.0, 0.0), False),
+        ("camera", 2.0, (0.0, 0.0, 0.0), True),
+        ("camera", 2.0, (4.0, 0.0, -2.0), False),
+    ):
+        made = predictor(sensor=sensor, extent_m=(0.5, high), calibration=CALIBRATION)
+        given = scan + np.array(at, np.float32)
+        with torch.inference_mode():
+            found = graph_of(made)(*map(torch.from_numpy, prepared(given, 96)))
+        confidence = made.complete(given).confidence
+        assert float(found.confidence) == pytest.approx(confidence, abs=1e-3)
+        assert (confidence > 0) == known
+
+
 def same_as_predictor(graph, made):
     for scan in rehearsal_scans(made.settings, 6):
         with torch.inference_mode():
@@ -253,8 +273,10 @@ def export_with(tmp_path, monkeypatch):
     return export
 
 
-@pytest.mark.parametrize("output", OUTPUTS[:-1])
-@pytest.mark.parametrize(("value", "scans"), [(np.nan, 1), (np.inf, 1), (0.01, 2)])
+ODD = [(output, *how) for output in OUTPUTS[:-1] for how in ((np.nan, 1), (np.inf, 1), (0.01, 2))]
+
+
+@pytest.mark.parametrize(("output", "value", "scans"), [*ODD, ("branch", 1, 2)])
 def test_a_file_that_gives_something_else_is_not_written(
     output, value, scans, export_with, tmp_path
 ):
@@ -314,10 +336,12 @@ def test_the_rule_of_a_predictor_is_that_of_its_graph():
     points = torch.from_numpy(np.load(ROOT / "examples" / "scan.npy")).float()[None]
     upside_down = points * torch.tensor((1.0, -1.0, -1.0))
     drawn = torch.arange(upside_down.shape[1])[None]
-    cost = {}
+    cost, own = {}, {}
     for bound in (HypothesisRule().upright_rad, 4.0):  # 4 radians: nothing is rolled as far
         rule = HypothesisRule(upright_rad=bound)
         made = load(raw=True, config=InferenceConfig(hypothesis=rule))
         with torch.no_grad():
             cost[bound] = float(graph_of(made)(upside_down, drawn).cost)
+        own[bound] = made.complete(upside_down[0]).cost
+    assert own[4.0] > own[HypothesisRule().upright_rad]
     assert cost[HypothesisRule().upright_rad] < cost[4.0], "only the first takes a second look"

@@ -22,7 +22,7 @@ from tests.models import CONFIG, SETTINGS
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.config import InferenceConfig, TrackConfig
-from wildshape.inference.predictor import Predictor
+from wildshape.inference.predictor import Predictor, load
 from wildshape.inference.refine import drawn_to, padded
 from wildshape.inference.tracks import joint_icp
 from wildshape.inference.tracks.heading_vote import (
@@ -172,6 +172,9 @@ def test_a_better_refinement_is_kept():
 def test_one_scan_is_completed_as_ever():
     predictor, done = Predictor(ShapePoseNet(CONFIG), SETTINGS), completed(poses_of(TRACK)[:1])
     assert list(predictor.put_together(done, TRACK.scans[:1])) == done
+    scan, shipped = TRACK.scans[3].astype(np.float32), load()
+    (together,) = shipped.complete_track([scan])
+    np.testing.assert_array_equal(together.points, shipped.complete(scan).points)
 
 
 def test_of_a_long_track_key_scans_are_fitted_to_each_other_and_the_others_to_them():
@@ -301,7 +304,10 @@ def test_the_predictor_uses_tracks():
     middle = done[len(done) // 2].pose
     T_middle_scan = predictor.register_track(scans, track=True)
     torch.testing.assert_close(T_middle_scan[0].matrix, (middle @ done[0].pose.inverse()).matrix)
-    assert len(predictor.fuse(scans, track=True)) == sum(map(len, scans))
+    fused = predictor.fuse(scans, track=True)
+    assert len(fused) == sum(map(len, scans))
+    moved = T_middle_scan[0].apply_numpy(scans[0])
+    np.testing.assert_allclose(fused[: len(moved)], moved, atol=1e-5)
 
 
 @pytest.mark.parametrize("key_scans", [3, 40])
