@@ -174,8 +174,8 @@ class TrackConfig:
     Attributes:
         coarse: first fit of the poses to each other.
         fine: the fit that goes on from it.
-        key_scans: of a longer track so many, evenly spread, are fitted to each other; with the
-            points of more the fits are worse.
+        key_scans: of a longer track so many, evenly spread, two at least, are fitted to each
+            other; with the points of more the fits are worse.
         onto: fit of each other scan to the key scans.
         believed: scans whose odds are this share of the best are among the surest.
         within_m: fits that move a pose farther are not believed.
