@@ -79,5 +79,11 @@ class Tracks:
 
 
 _WITH_RAYS = Tracks(occlusion=0.5, rays=512)
-DATA = {1: Tracks(), 2: Tracks(), 3: Tracks(count=4800), 4: _WITH_RAYS, 5: _WITH_RAYS}
+DATA = {
+    1: Tracks(),
+    2: Tracks(),
+    3: Tracks(count=4800),
+    4: replace(_WITH_RAYS, count=4800),
+    5: _WITH_RAYS,
+}
 """By their seeds. What is learned carries over to unseen objects the better the more there were."""
