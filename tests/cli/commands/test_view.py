@@ -15,6 +15,7 @@ from wildshape.cli.commands.view import Settings, source_of
 from wildshape.cli.main import main
 from wildshape.cli.options import FileOptions, NetworkOptions
 from wildshape.errors import BadInputError
+from wildshape.report.page.folder import report_from_folder
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +68,24 @@ def test_options_that_change_nothing_are_refused(completed, store):
             source_of(asked)
     with pytest.raises(BadInputError, match="--inputs: "):
         source_of(Settings(Path(store), inputs=Path(store)))
+
+
+def test_scans_that_changed_are_not_shown_beside_earlier_results(wildshape, dataset, tmp_path):
+    data = shutil.copytree(dataset / "000000", tmp_path / "data")
+    out = tmp_path / "out"
+    assert wildshape("complete", data, "--out", out).code == 0
+
+    def shown(inputs=None):
+        scans = source_of(Settings(out, inputs=inputs)).track(0).scans
+        (drawn,) = report_from_folder(out, inputs).objects
+        return all(map(len, scans)), "changed since" not in drawn.subtitle
+
+    assert shown() == (True, True)
+    copy = shutil.copytree(data, tmp_path / "copy" / "data")
+    first, *_, last = sorted((data / "scans").iterdir())
+    shutil.copy(last, first)
+    assert shown() == (False, False)
+    assert shown(copy) == (True, True)
 
 
 def test_the_drive_is_named_where_its_figures_are_given(refused, tmp_path):
