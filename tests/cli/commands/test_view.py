@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 from urllib.request import urlopen
 
+import numpy as np
 import pytest
 
 from wildshape.cli.commands.view import Settings, source_of
@@ -54,6 +55,20 @@ def test_objects_are_in_the_order_of_the_report(evaluated, tmp_path):
     said["methods"]["cars, track"] = said["methods"]["cars"]
     (folder / "metrics.json").write_text(json.dumps(said))
     assert "by cars in this evaluation" in source_of(Settings(folder)).note
+
+
+@pytest.mark.parametrize("named", ["000000", "renamed"])
+def test_an_evaluation_s_scans_have_its_origin(evaluated, dataset, tmp_path, named):
+    """Those that it ranks, and those of which it knows nothing."""
+    folder = shutil.copytree(evaluated, tmp_path / "evaluation")
+    said = json.loads((folder / "metrics.json").read_text())
+    said["provenance"]["settings"]["origin"] = [1, 2, 3]
+    (folder / "metrics.json").write_text(json.dumps(said))
+    data = tmp_path / "data"
+    shutil.copytree(dataset / "000000", data / named)
+    first = source_of(Settings(data)).track(0).scans[0]
+    shown = source_of(Settings(folder, inputs=data)).track(0).scans[0]
+    np.testing.assert_allclose(shown, first - (1, 2, 3), atol=1e-5)
 
 
 def test_what_cannot_be_shown_is_refused(refused, tmp_path):
