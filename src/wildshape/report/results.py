@@ -107,17 +107,26 @@ class Inputs:
         except (BadInputError, KeyError, ValueError):
             return None
 
-    def check(self, folder: Path) -> None:
-        """Open the place that was named for the results of a folder.
+    def check(self, folders: Sequence[Path]) -> None:
+        """Open the place that was named for the results of folders.
 
         Raises:
-            BadInputError: there are no scans, or how they were read is damaged.
+            BadInputError: there are no scans of these results, or how they were read is damaged.
         """
-        if self.place is not None:
-            marker = folder.parent / MARKER
-            with reading(marker, "how the scans of results were read"):
-                coordinates = coordinates_of(_settings(marker))
-            self._open(self.place, coordinates)
+        if self.place is None:
+            return
+        if not folders:
+            raise BadInputError(f"--inputs {self.place}: no results of scans here; leave it out.")
+        marker = folders[0].parent / MARKER
+        with reading(marker, "how the scans of results were read"):
+            coordinates = coordinates_of(_settings(marker))
+        names = {folder.name for folder in folders}
+        names.add(str(read_json(folders[0] / OBJECTS, _SAID, dict).get("track")))
+        if names.isdisjoint(self._open(self.place, coordinates).names):
+            raise BadInputError(
+                f"--inputs {self.place}: holds no track '{folders[0].name}'; name the scans under"
+                " the names that they had."
+            )
 
     def _differ(self, path: Path, files: str | None) -> bool:
         """Whether others lie there by now than those of this fingerprint."""

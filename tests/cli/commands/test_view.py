@@ -103,6 +103,15 @@ def test_scans_that_changed_are_not_shown_beside_earlier_results(wildshape, data
     assert shown(copy) == (True, True)
 
 
+def test_inputs_that_are_of_no_result_are_refused(refused, completed, evaluated, dataset, tmp_path):
+    shutil.copytree(dataset / "000000", tmp_path / "data" / "renamed")
+    said = "holds no track '000000'"
+    assert said in refused("report", completed, "--inputs", tmp_path / "data")
+    with pytest.raises(BadInputError, match=said):
+        source_of(Settings(completed, inputs=tmp_path / "data"))
+    assert "leave it out" in refused("report", evaluated, "--inputs", tmp_path / "data")
+
+
 def test_the_drive_is_named_where_its_figures_are_given(refused, tmp_path):
     said = {"methods": {"wildshape": {}}, "provenance": {"settings": {"folder": "found"}}}
     (tmp_path / "metrics.json").write_text(json.dumps(said))

@@ -99,8 +99,7 @@ def report_from_folder(folder: Path, inputs: Path | None = None) -> Report:
             "evaluate or train with --out first."
         )
     where = Inputs(inputs)
-    for track in tracks[:1]:
-        where.check(track)
+    where.check(tracks)
     ranked = worst_first(_judged(track, where) for track in tracks[:MAX_JUDGED])
     drawn = ranked[:MAX_OBJECTS]
     return Report(

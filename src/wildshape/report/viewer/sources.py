@@ -87,7 +87,7 @@ def from_results(folder: Path, inputs: Path | None = None) -> Source:
     names = [place.relative_to(folder).as_posix() for place in folders]
     labels = [as_text(folder.resolve().name if name == "." else name) for name in names]
     where, kept = Inputs(inputs), {}
-    where.check(folders[0])
+    where.check(folders)
 
     def result(number: int) -> TrackResult:
         if number not in kept:
