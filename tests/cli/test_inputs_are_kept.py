@@ -49,8 +49,17 @@ def test_a_fused_cloud_is_not_written_among_the_scans(wildshape, refused, tmp_pa
     assert found.code == 0, found
     track = next((tmp_path / "data").glob("*/scans")).parent
     source = track / "scans" if plain else track
-    assert "among the scans" in refused("fuse", source, "--out", track / "scans" / "fused.ply")
-    assert len(list((track / "scans").iterdir())) == 2
+    first, last = sorted((track / "scans").iterdir())
+    alone = shutil.copy(first, tmp_path / "alone.ply")
+    for read, out in (
+        (source, track / "scans" / "fused.ply"),
+        (first, track / "scans" / "fused.ply"),
+        (alone, alone),
+        (track, track / "shape.ply"),
+        (first, track / "poses.txt"),
+    ):
+        assert "among the scans" in refused("fuse", read, "--out", out, "--overwrite")
+    assert sorted((track / "scans").iterdir()) == [first, last]
     assert wildshape("fuse", source, "--out", tmp_path / "fused.ply").code == 0
 
 

@@ -12,6 +12,7 @@ from typing import Any
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detections import read_box
+from wildshape.io.fingerprint import fingerprint_of
 from wildshape.io.guard import read_json, reading
 from wildshape.io.inputs import TrackSource, open_tracks
 from wildshape.io.poses import read_poses
@@ -84,11 +85,13 @@ class Inputs:
     """The scans that results are about, each place opened once.
 
     Attributes:
-        place: where the scans are now; None goes by what objects.json says.
+        place: where the scans are now; None goes by what objects.json says, as long as the files
+            there are those that were completed.
     """
 
     place: Path | None = None
     opened: dict[tuple[Path, Coordinates], TrackSource] = field(default_factory=dict)
+    seen: dict[Path, str] = field(default_factory=dict)
 
     def track(self, folder: Path, record: dict[str, Any]) -> Track | None:
         """The track that `folder` is about; None if the scans have moved, changed or lost it."""
@@ -96,22 +99,40 @@ class Inputs:
         if named is None:
             return None
         try:
-            source = self._open(named, coordinates_of(_settings(folder.parent / MARKER)))
+            settings = _settings(folder.parent / MARKER)
+            source = self._open(named, coordinates_of(settings))
+            if self.place is None and self._differ(named, settings.get("files")):
+                return None
             return source[source.numbers[str(record.get("track") or folder.name)]]
         except (BadInputError, KeyError, ValueError):
             return None
 
-    def check(self, folder: Path) -> None:
-        """Open the place that was named for the results of a folder.
+    def check(self, folders: Sequence[Path]) -> None:
+        """Open the place that was named for the results of folders.
 
         Raises:
-            BadInputError: there are no scans, or how they were read is damaged.
+            BadInputError: there are no scans of these results, or how they were read is damaged.
         """
-        if self.place is not None:
-            marker = folder.parent / MARKER
-            with reading(marker, "how the scans of results were read"):
-                coordinates = coordinates_of(_settings(marker))
-            self._open(self.place, coordinates)
+        if self.place is None:
+            return
+        if not folders:
+            raise BadInputError(f"--inputs {self.place}: no results of scans here; leave it out.")
+        marker = folders[0].parent / MARKER
+        with reading(marker, "how the scans of results were read"):
+            coordinates = coordinates_of(_settings(marker))
+        names = {folder.name for folder in folders}
+        names.add(str(read_json(folders[0] / OBJECTS, _SAID, dict).get("track")))
+        if names.isdisjoint(self._open(self.place, coordinates).names):
+            raise BadInputError(
+                f"--inputs {self.place}: holds no track '{folders[0].name}'; name the scans under"
+                " the names that they had."
+            )
+
+    def _differ(self, path: Path, files: str | None) -> bool:
+        """Whether others lie there by now than those of this fingerprint."""
+        if files is not None and path not in self.seen:
+            self.seen[path] = fingerprint_of(path)
+        return files is not None and self.seen[path] != files
 
     def _open(self, path: Path, coordinates: Coordinates) -> TrackSource:
         if (path, coordinates) not in self.opened:

@@ -99,6 +99,11 @@ def test_points_that_are_not_finite_are_dropped_and_said_once(wildshape, scan, t
     found = wildshape("complete", tmp_path / "nan.npy", "--out", tmp_path / "c", "--model", trained)
     assert found.code == 0
     assert found.err.count("dropped 7 points") == 1
+    np.save(tmp_path / "whole.npy", scan[7:])
+    pair = wildshape("register", tmp_path / "whole.npy", tmp_path / "nan.npy", "--model", trained)
+    assert pair.code == 0
+    assert pair.err.startswith(f"{tmp_path / 'nan.npy'}: dropped 7 points")
+    assert pair.err.count("dropped") == 1
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,14 @@ import time
 from pathlib import Path
 from urllib.request import urlopen
 
+import numpy as np
 import pytest
 
 from wildshape.cli.commands.view import Settings, source_of
 from wildshape.cli.main import main
 from wildshape.cli.options import FileOptions, NetworkOptions
 from wildshape.errors import BadInputError
+from wildshape.report.page.folder import report_from_folder
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +57,20 @@ def test_objects_are_in_the_order_of_the_report(evaluated, tmp_path):
     assert "by cars in this evaluation" in source_of(Settings(folder)).note
 
 
+@pytest.mark.parametrize("named", ["000000", "renamed"])
+def test_an_evaluation_s_scans_have_its_origin(evaluated, dataset, tmp_path, named):
+    """Those that it ranks, and those of which it knows nothing."""
+    folder = shutil.copytree(evaluated, tmp_path / "evaluation")
+    said = json.loads((folder / "metrics.json").read_text())
+    said["provenance"]["settings"]["origin"] = [1, 2, 3]
+    (folder / "metrics.json").write_text(json.dumps(said))
+    data = tmp_path / "data"
+    shutil.copytree(dataset / "000000", data / named)
+    first = source_of(Settings(data)).track(0).scans[0]
+    shown = source_of(Settings(folder, inputs=data)).track(0).scans[0]
+    np.testing.assert_allclose(shown, first - (1, 2, 3), atol=1e-5)
+
+
 def test_what_cannot_be_shown_is_refused(refused, tmp_path):
     assert "no such file" in refused("view", tmp_path / "absent")
     assert "no scans" in refused("view", tmp_path)
@@ -67,6 +83,33 @@ def test_options_that_change_nothing_are_refused(completed, store):
             source_of(asked)
     with pytest.raises(BadInputError, match="--inputs: "):
         source_of(Settings(Path(store), inputs=Path(store)))
+
+
+def test_scans_that_changed_are_not_shown_beside_earlier_results(wildshape, dataset, tmp_path):
+    data = shutil.copytree(dataset / "000000", tmp_path / "data")
+    out = tmp_path / "out"
+    assert wildshape("complete", data, "--out", out).code == 0
+
+    def shown(inputs=None):
+        scans = source_of(Settings(out, inputs=inputs)).track(0).scans
+        (drawn,) = report_from_folder(out, inputs).objects
+        return all(map(len, scans)), "changed since" not in drawn.subtitle
+
+    assert shown() == (True, True)
+    copy = shutil.copytree(data, tmp_path / "copy" / "data")
+    first, *_, last = sorted((data / "scans").iterdir())
+    shutil.copy(last, first)
+    assert shown() == (False, False)
+    assert shown(copy) == (True, True)
+
+
+def test_inputs_that_are_of_no_result_are_refused(refused, completed, evaluated, dataset, tmp_path):
+    shutil.copytree(dataset / "000000", tmp_path / "data" / "renamed")
+    said = "holds no track '000000'"
+    assert said in refused("report", completed, "--inputs", tmp_path / "data")
+    with pytest.raises(BadInputError, match=said):
+        source_of(Settings(completed, inputs=tmp_path / "data"))
+    assert "leave it out" in refused("report", evaluated, "--inputs", tmp_path / "data")
 
 
 def test_the_drive_is_named_where_its_figures_are_given(refused, tmp_path):

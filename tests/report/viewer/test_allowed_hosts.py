@@ -83,10 +83,13 @@ def test_port_80_goes_without_saying():
 
 
 def test_allowed_names():
-    allowed = checked_hosts(["Tunnel.example", "127.0.0.1:9000"])
+    allowed = checked_hosts(["Tunnel.example", "127.0.0.1:9000", "tls.example:443"])
     assert is_welcome(["tunnel.example"], ["https://tunnel.example"], AT, allowed)
     assert is_welcome(["tunnel.example:7"], [], AT, allowed)
     assert is_welcome(["127.0.0.1:9000"], ["http://127.0.0.1:9000"], AT, allowed)
+    assert is_welcome(["tls.example"], ["https://tls.example"], AT, allowed)
+    assert not is_welcome(["tls.example"], ["http://tls.example"], AT, allowed)
+    assert not is_welcome(["tls.example:8443"], [], AT, allowed)
     assert not is_welcome(["127.0.0.1:9001"], [], AT, allowed)
     assert not is_welcome(["not-tunnel.example"], [], AT, allowed)
     for wrong in ("*", "*.example", "http://a", "a/b", "a@b", "", "a:b"):

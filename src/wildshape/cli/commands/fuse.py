@@ -78,14 +78,18 @@ def run(settings: Settings) -> None:
 
 
 def _keep_out(track: Path, out: Path) -> None:
-    """Refuse a cloud among the scans: it would be one of them the next time.
+    """Refuse a cloud in place of what was read, or where it would be read the next time.
 
     Raises:
         BadInputError: it would lie there.
     """
-    scans = track / "scans" if (track / "scans").is_dir() else track
-    if out.resolve().parent == scans.resolve():
+    folder = track if track.is_dir() else track.parent
+    scans = (folder / "scans" if (folder / "scans").is_dir() else folder).resolve()
+    in_track, place = scans.name == "scans", out.resolve()
+    among = place.parent == scans and (in_track or track.is_dir())
+    truth = in_track and place in (scans.parent / "shape.ply", scans.parent / "poses.txt")
+    if among or truth or place == track.resolve():
         raise BadInputError(
-            f"{out}: lies among the scans of {track}, and would be taken for one the next time;"
-            " choose another place to write."
+            f"{out}: lies among the scans of {track} or is its truth, and would be taken for that"
+            " the next time; choose another place to write."
         )

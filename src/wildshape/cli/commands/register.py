@@ -117,14 +117,18 @@ def _pair(settings: Settings, target: Path) -> None:
 
 def _scan(path: Path, settings: Settings) -> "Track":
     from wildshape.cli.pipe import as_file
+    from wildshape.cli.terminal import say
     from wildshape.io.inputs import open_tracks
 
     kind = settings.format if is_pipe(path) else "auto"
     with as_file(path, kind) as file:
-        track = open_tracks(file, settings.scans.files.coordinates).single("a pair")
+        source = open_tracks(file, settings.scans.files.coordinates)
+        track = source.single("a pair")
     if len(track.scans) != 1:
         raise BadInputError(
             f"{path}: holds {len(track.scans)} scans, but a pair takes two files of one scan each;"
             " for a whole track name it alone with --out DIR."
         )
+    for told in source.doubts:
+        say(f"{path}: {told}")
     return track

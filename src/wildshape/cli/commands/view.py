@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
     from wildshape.inference.predictor import Predictor
+    from wildshape.io.scans.points import Coordinates
     from wildshape.report.viewer.drive_page import DrivePage
     from wildshape.report.viewer.page import Page
     from wildshape.report.viewer.sources import Source
@@ -141,7 +142,7 @@ def source_of(settings: Settings) -> "Source":
         return _evaluated(settings)
     if settings.inputs is not None:
         raise BadInputError(f"--inputs: {folder} holds scans themselves, no results; leave it out.")
-    return _scans(settings, folder)
+    return _scans(settings, folder, settings.files.coordinates)
 
 
 def _refuse_for_results(settings: Settings) -> None:
@@ -157,12 +158,12 @@ def _refuse_for_results(settings: Settings) -> None:
         )
 
 
-def _scans(settings: Settings, path: Path) -> "Source":
+def _scans(settings: Settings, path: Path, coordinates: "Coordinates") -> "Source":
     from wildshape.io.inputs import open_tracks
     from wildshape.records import as_text
     from wildshape.report.viewer.live_completion import from_model
 
-    source = open_tracks(path, settings.files.coordinates)
+    source = open_tracks(path, coordinates)
     title = as_text(path.resolve().name)
     return from_model(title, source.names, source.__getitem__, lambda: _model(settings))
 
@@ -192,7 +193,8 @@ def _evaluated(settings: Settings) -> "Source":
     if data is None:
         raise BadInputError(f"{settings.input}: does not say which data it is of; add --inputs.")
     here = settings.files.coordinates
-    source = open_tracks(data, coordinates_of(asked) if here == SENSOR_METRES else here)
+    coordinates = coordinates_of(asked) if here == SENSOR_METRES else here
+    source = open_tracks(data, coordinates)
     numbers = source.numbers
     ranked = [
         (numbers[name], f"{name}  (CD {cd:.3f} m)")
@@ -200,7 +202,7 @@ def _evaluated(settings: Settings) -> "Source":
         if name in numbers
     ]
     if not ranked:
-        return _scans(settings, data)
+        return _scans(settings, data, coordinates)
     return from_model(
         as_text(settings.input.resolve().name),
         [label for _, label in ranked],

@@ -99,8 +99,7 @@ def report_from_folder(folder: Path, inputs: Path | None = None) -> Report:
             "evaluate or train with --out first."
         )
     where = Inputs(inputs)
-    for track in tracks[:1]:
-        where.check(track)
+    where.check(tracks)
     ranked = worst_first(_judged(track, where) for track in tracks[:MAX_JUDGED])
     drawn = ranked[:MAX_OBJECTS]
     return Report(
@@ -234,7 +233,8 @@ def _object(judged: Judged, result: TrackResult) -> ReportObject:
 
 
 def _completed_only(result: TrackResult) -> ReportObject:
-    completed, missing = result.completed_scans(), "the input scans cannot be read"
+    completed = result.completed_scans()
+    missing = "the input scans cannot be read, or changed since; --inputs names them"
     if not completed:
         return ReportObject(result.folder.name, missing, scans=scans_of(result))
     scan = completed[len(completed) // 2]

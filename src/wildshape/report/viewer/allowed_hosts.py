@@ -49,7 +49,9 @@ def is_welcome(
     """
     if len(hosts) != 1 or len(origins) > 1:
         return False
-    return all(_is_own(u, port, allowed) for u in (f"http://{hosts[0]}", *origins))
+    # A host without a port is at that of its scheme, which it does not say.
+    host = any(_is_own(f"{scheme}://{hosts[0]}", port, allowed) for scheme in _PORTS)
+    return host and all(_is_own(origin, port, allowed) for origin in origins)
 
 
 def _is_own(url: str, port: int, allowed: Sequence[str]) -> bool:

@@ -87,7 +87,7 @@ def from_results(folder: Path, inputs: Path | None = None) -> Source:
     names = [place.relative_to(folder).as_posix() for place in folders]
     labels = [as_text(folder.resolve().name if name == "." else name) for name in names]
     where, kept = Inputs(inputs), {}
-    where.check(folders[0])
+    where.check(folders)
 
     def result(number: int) -> TrackResult:
         if number not in kept:
@@ -142,6 +142,7 @@ def _track(result: TrackResult) -> Track:
         empty: tuple[Points, ...] = tuple(np.zeros((0, 3), np.float32) for _ in names)
         if not names:
             raise BadInputError(f"{result.folder}: neither its scans nor shapes can be read.")
-        return Track(result.folder.name, empty, names, source="its scans cannot be read")
+        said = "its scans cannot be read, or changed since; --inputs names them"
+        return Track(result.folder.name, empty, names, source=said)
     kept = [i for i, name in enumerate(result.track.scan_names) if name in set(names)]
     return result.track.part(kept or list(range(len(result.track.scans))))
