@@ -11,6 +11,7 @@ from tests.refusal import refused
 from tests.stopping import stopped_at
 
 from wildshape.errors import BadInputError, LostWorkersError
+from wildshape.io import output
 from wildshape.io.earlier import EARLIER
 from wildshape.io.output import MARKER, Output, begin, finished, provenance
 
@@ -22,6 +23,26 @@ def test_says_what_is_needed_to_do_it_again() -> None:
     assert data["time_utc"].endswith("+00:00")
     assert {"wildshape", "code", "python", "torch", "numpy"} <= data.keys()
     assert json.loads(json.dumps(data)) == data
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="no git")
+def test_changed_code_is_said_and_figures_that_benchmarks_write_are_no_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code, figures = tmp_path / "src/package/io/output.py", tmp_path / "benchmarks/results/a.csv"
+    for file in (code, figures):
+        file.parent.mkdir(parents=True)
+        file.write_text("1")
+    git = ("git", "-C", str(tmp_path), "-c", "user.name=a", "-c", "user.email=a@b.c")
+    for does in (("init", "-q"), ("add", "."), ("commit", "-qm", "first")):
+        subprocess.run([*git, *does], check=True)
+    monkeypatch.setattr(output, "__file__", str(code))
+    commit = provenance("x")["code"]
+    assert len(commit) == 40
+    figures.write_text("2")
+    assert provenance("x")["code"] == commit
+    code.write_text("2")
+    assert provenance("x")["code"] == f"{commit} with changes"
 
 
 def test_does_not_import_torch() -> None:

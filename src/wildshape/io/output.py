@@ -28,6 +28,7 @@ from wildshape.io.guard import reading
 from wildshape.io.progress import SILENT, Progress
 
 _LONGEST_BYTES, _SHOWN = 251, 60  # of a name before `.ply`; file systems end at 255
+_RESULTS = "benchmarks/results"
 _LEFTOVER = ".*.part"  # as `io/atomic.py` names what it has not finished
 
 
@@ -298,13 +299,17 @@ def provenance(command: str) -> dict[str, Any]:
 
 
 def code_version() -> str:
-    """The commit of the checkout that this package runs from, or else the package's version."""
+    """The commit of the checkout that this package runs from, or else the package's version.
+
+    Figures that benchmarks write there are no changes of the code.
+    """
     root = Path(__file__).resolve().parents[3]
     if not (root / ".git").exists():
         return _version("wildshape")
     try:
         commit = _git(root, "rev-parse", "HEAD")
-        return commit + (" with changes" if _git(root, "status", "--porcelain", "-uno") else "")
+        changed = _git(root, "status", "--porcelain", "-uno", "--", f":!{_RESULTS}")
+        return commit + (" with changes" if changed else "")
     except (OSError, subprocess.SubprocessError):
         return _version("wildshape")
 
