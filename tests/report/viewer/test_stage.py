@@ -15,6 +15,7 @@ from tests.report.viewer.shown import perfect, track
 
 from wildshape.evaluation.metrics import completion_error
 from wildshape.geometry.box import box_axes
+from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.report.viewer.colours import (
     COLOURINGS,
@@ -29,6 +30,8 @@ from wildshape.report.viewer.colours import (
 from wildshape.report.viewer.details import details
 from wildshape.report.viewer.registrations import AFTER, BEFORE, TRUTH
 from wildshape.report.viewer.stage import POINTS_A_CLOUD, Stage, Wish
+
+_VALUE = "<span style='text-align:right'>"
 
 
 class _Scene:
@@ -91,6 +94,12 @@ def test_clouds_are_sent_once_and_one_scan_is_seen() -> None:
     assert sum(cloud.visible for cloud in scene.clouds.values()) == 1
 
 
+def _off(by: float) -> SE3:
+    """A turn about z, radians, and as many metres along it."""
+    turn = rotation_z(torch.tensor(by, dtype=torch.float64))
+    return SE3(turn, by * torch.eye(3, dtype=torch.float64)[2])
+
+
 def _drawn(handle: Any, points: np.ndarray) -> np.ndarray:
     """Points of a node's own frame where they are seen."""
     return points @ box_axes(handle.wxyz).T + np.array(handle.position)
@@ -108,8 +117,9 @@ def test_everything_is_drawn_where_it_is_about_the_scan_shown() -> None:
     for scan in range(5):
         done = perfect(stage.track, scan)
         assert done.box is not None
-        stage.add(scan, replace(done, box=replace(done.box, size=(4.0 + scan, 2.0, 1.5))))
-    corner = np.eye(3)
+        box = replace(done.box, size=(4.0 + scan, 2.0, 1.5))
+        stage.add(scan, replace(done, box=box, pose=poses[scan] @ _off(0.2)))
+    own = {"box": np.eye(3), "axes": _off(0.2).apply_numpy(np.eye(3))}
     wish = Wish(shown=frozenset({"scan", "completed", "box", "axes", "truth", "fused"}), way=TRUTH)
     for scan, hold in ((4, "sensor"), (1, "sensor"), (4, "object"), (1, "object")):
         stage.show(replace(wish, scan=scan, hold=cast(Any, hold)))
@@ -132,9 +142,9 @@ def test_everything_is_drawn_where_it_is_about_the_scan_shown() -> None:
             np.testing.assert_allclose(_cloud(stage, kind, key), seen(points), atol=1e-4)
         fused = _cloud(stage, "fused", TRUTH)[300 * scan : 300 * scan + 300]
         np.testing.assert_allclose(fused, seen(measured), atol=1e-4)
-        for line in stage.lines.values():
-            own = seen(poses[scan].apply_numpy(corner))
-            np.testing.assert_allclose(_drawn(line, corner), own, atol=1e-4)
+        for kind, corners in own.items():
+            place = seen(poses[scan].apply_numpy(corners))
+            np.testing.assert_allclose(_drawn(stage.lines[kind], np.eye(3)), place, atol=1e-4)
         assert stage.lines["box"].scale == done.box.size
 
 
@@ -144,10 +154,8 @@ def test_colours_and_errors_are_those_of_the_scan_shown() -> None:
     blue = completed_colours(CONFIDENCE, np.zeros((1, 3), np.float32), 1.0, shape, None)
     for scan in range(5):
         done = perfect(stage.track, scan)
-        assert done.pose is not None
-        T = SE3(done.pose.rotation, done.pose.translation + 0.1 * scan * torch.eye(3)[2])
         points = stage.track.scans[scan] + np.float32((0, 0, 0.1 * scan))
-        stage.add(scan, replace(done, pose=T, points=points))
+        stage.add(scan, replace(done, pose=poses[scan] @ _off(0.1 * scan), points=points))
     for scan in (4, 1):
         told = details(stage, Wish(scan, way=AFTER))
         points = stage.completions[scan].points
@@ -155,7 +163,8 @@ def test_colours_and_errors_are_those_of_the_scan_shown() -> None:
         cd = completion_error(points, poses[scan].apply_numpy(shape)).cd
         assert f">{cd:.3f} m<" in told
         off = 0.1 * abs(scan - stage.track.middle)
-        assert f", {off:.2f} m<" in told.partition("pose error")[2].partition("</div>")[0]
+        assert f"to the middle scan</span>{_VALUE}{np.rad2deg(off):.1f}°, {off:.2f} m<" in told
+        assert f">{np.linalg.norm(poses[scan].translation):.1f} m<" in told
         assert stage.track.scan_names[scan] in told
     for colouring in (GUESSED, WRONG):
         stage, _ = _stage()
@@ -169,13 +178,15 @@ def test_colours_and_errors_are_those_of_the_scan_shown() -> None:
 
 def test_every_colouring_and_every_fact_can_be_shown() -> None:
     stage, scene = _stage()
-    stage.add(2, perfect(stage.track, 2))
+    stage.add(2, replace(perfect(stage.track, 2), warning="<odd>"))
     painted = scene.clouds["/completed/1"]
     seen = []
     for colouring in COLOURINGS:
         stage.show(Wish(2, colouring=colouring))
         seen.append(painted.colors.copy())
-        assert "car &lt;b&gt;" in details(stage, Wish(2, colouring=colouring))
+        told = details(stage, Wish(2, colouring=colouring))
+        assert "car &lt;b&gt;" in told
+        assert "&lt;odd&gt;" in told
     assert all((a != b).any() for a, b in pairwise(seen))
     assert "not yet" in details(stage, Wish(0))
 
