@@ -87,7 +87,7 @@ class _Model:
 
 def test_a_model_is_loaded_when_first_needed_and_begins_with_the_scan_shown() -> None:
     ahead = np.array([[1, 0, 0]], np.float32)
-    rays = tuple(SightLines(ahead, np.float32([5 + i])) for i in range(5))
+    rays = tuple(SightLines(ahead, np.array([5 + i], np.float32)) for i in range(5))
     shown, loaded = replace(track(), sensor=Sensor(resolution_deg=(0.2, 0.4)), rays=rays), []
     source = from_model("t", ["a"], lambda _: shown, lambda: loaded.append(_Model()) or loaded[0])
     assert source.track(0) is shown

@@ -154,7 +154,7 @@ def test_colours_and_errors_are_those_of_the_scan_shown() -> None:
     blue = completed_colours(CONFIDENCE, np.zeros((1, 3), np.float32), 1.0, shape, None)
     for scan in range(5):
         done = perfect(stage.track, scan)
-        points = stage.track.scans[scan] + np.float32((0, 0, 0.1 * scan))
+        points = stage.track.scans[scan] + np.array((0, 0, 0.1 * scan), np.float32)
         stage.add(scan, replace(done, pose=poses[scan] @ _off(0.1 * scan), points=points))
     for scan in (4, 1):
         told = details(stage, Wish(scan, way=AFTER))
