@@ -147,6 +147,16 @@ def test_scores_leave_out_what_the_detector_doubts(street, write, tmp_path):
     )
 
 
+def test_two_names_of_one_scan_are_told(street, tmp_path):
+    given = openpcdet(street, tmp_path)
+    assert not any("all taken" in told for told in find_detections(given, street.drive).warnings)
+    said = json.loads(given.path.read_text())
+    given.path.write_text(json.dumps([*said, {**said[0], "frame_id": "0"}]))
+    (told,) = (one for one in find_detections(given, street.drive).warnings if "all taken" in one)
+    assert told.startswith("boxes of '0' and of 'samples/LIDAR_TOP/")
+    assert told.endswith(f"of scan {street.drive.scan_names[0]}")
+
+
 def test_scores_that_no_box_has_are_not_asked_for(street, tmp_path):
     given = replace(kitti_tracking(street, tmp_path), least_score=0.3)
     refused(find_detections, given, street.drive, match="no box has a score")

@@ -4,6 +4,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from urllib.request import urlopen
 
 import numpy as np
@@ -13,6 +14,7 @@ from tests.drives.finished_drive import CARS, HEIGHT, SIZE, finished_drive
 pytest.importorskip("viser", reason="did not run: viser is not installed (extra view)")
 from wildshape.cli.main import main
 from wildshape.drives.writing.finished import read_finished
+from wildshape.drives.writing.playback.moments import colour_of
 from wildshape.report.viewer import page as pages
 from wildshape.report.viewer.drive_page import NOTHING, measured, serving_drive
 
@@ -55,6 +57,39 @@ def test_vehicles_stand_at_their_places_and_the_chosen_one_shows_its_shape(found
         page.picker.value = NOTHING
         page.choose()
         assert page.extra == []
+
+
+def test_a_scan_is_coloured_by_height_and_by_the_vehicle_that_it_is_on(found):
+    with serving_drive(found) as page:
+        start, *_, end = page.ways[0].points.reshape(-1, 3)  # below the sensor
+        np.testing.assert_allclose((start, end), ((0, 0, -HEIGHT), (5, 0, -HEIGHT)), atol=1e-6)
+        page.time.value = 4
+        page.refresh()
+        points, colours = page.scan.points, page.scan.colors.astype(int)
+        high = points[:, 2] > 0.3 - HEIGHT
+        for number, places in enumerate(CARS.values()):
+            x, y, _ = places[4]
+            on = high & (np.linalg.norm(points[:, :2] - [x - 4, y], axis=1) < max(SIZE))
+            assert on.sum() > 50
+            bright = 0.45 * np.array(colour_of(number)) + 140
+            assert np.abs(colours[on] - bright).max() <= 1
+        page.boxes = {}
+        page.time.value = 3
+        page.refresh()
+        grey = 70 + 130 * (page.scan.points[:, 2:] + HEIGHT) / 4  # by the height above the ground
+        assert np.abs(page.scan.colors - grey).max() <= 1.01
+
+
+def test_a_vehicle_is_seen_in_its_own_frames_alone(found):
+    late, always = found.vehicles
+    late = replace(late, frames=late.frames[3:], boxes=late.boxes[3:], points=late.points[3:])
+    with serving_drive(replace(found, vehicles=(late, always))) as page:
+        for frame in (0, 5, 2, 3):
+            page.time.value = frame
+            page.refresh()
+            seen = [node["place"].visible for node in page.nodes]
+            assert seen == [frame >= 3, True]
+            assert f"{sum(seen)} here, 2 in all" in page.text.content
 
 
 def test_scans_of_a_vehicle_are_laid_over_each_other_in_its_box(found):

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from operator import is_
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from tests.refusal import refused
 from tests.report.viewer.shown import perfect, track
 
+from wildshape.geometry.projection.sight_lines import SightLines
 from wildshape.geometry.transforms.se3 import stack
 from wildshape.io.poses import write_poses
 from wildshape.io.scans.writers import write_ply
@@ -65,12 +67,15 @@ def test_results_come_back_scan_by_scan(tmp_path: Path, moved: bool) -> None:
 
 
 class _Model:
-    """Completes with the scan itself."""
+    """Completes with the scan itself; keeps what it was given with each."""
+
+    def __init__(self) -> None:
+        self.given: list[tuple[object, ...]] = []
 
     def complete_many(
         self, scans: Sequence[object], sensor: Sensor | None, *, rays: Sequence[object] = ()
     ) -> Iterator[Completion]:
-        assert len(rays) in (0, len(scans))
+        self.given += [(scan, sensor, beside) for scan, beside in zip(scans, rays, strict=True)]
         shown = track()
         done = perfect(shown, 0)
         for scan in scans:
@@ -81,16 +86,20 @@ class _Model:
 
 
 def test_a_model_is_loaded_when_first_needed_and_begins_with_the_scan_shown() -> None:
-    shown, loaded = track(), []
-    source = from_model("t", ["a"], lambda _: shown, lambda: loaded.append(1) or _Model())
+    ahead = np.array([[1, 0, 0]], np.float32)
+    rays = tuple(SightLines(ahead, np.array([5 + i], np.float32)) for i in range(5))
+    shown, loaded = replace(track(), sensor=Sensor(resolution_deg=(0.2, 0.4)), rays=rays), []
+    source = from_model("t", ["a"], lambda _: shown, lambda: loaded.append(_Model()) or loaded[0])
     assert source.track(0) is shown
     assert loaded == []
     made = list(source.make(0, shown, 3))
     list(source.make(0, shown, 0))
-    assert loaded == [1]
+    assert len(loaded) == 1
     assert [number for number, _ in made] == [3, 0, 1, 2, 4]
     for number, one in made:
         np.testing.assert_array_equal(one.points, shown.scans[number])
+    expected = [(shown.scans[i], shown.sensor, rays[i]) for i, _ in made]
+    assert [all(map(is_, *pair)) for pair in zip(loaded[0].given, expected)] == [True] * 5
 
 
 def test_worst_objects_come_first(tmp_path: Path) -> None:

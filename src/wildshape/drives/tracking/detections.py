@@ -177,7 +177,7 @@ def find_detections(file: DetectionFile, drive: Drive) -> Detections:
             f"{file.path}: its scans, for example '{vehicles[0].scan}', are none of {drive.name}'s,"
             f" for example '{drive.scan_names[0]}'; name them alike."
         )
-    warnings = _calibration_told(file)
+    warnings = [*_calibration_told(file), *_named_twice_told(frames, drive.scan_names)]
     if len(boxes) < len(given):
         left = len(given) - len(boxes)
         warnings.append(f"{left} detections score less than {file.least_score:g} and are left out")
@@ -206,6 +206,16 @@ def _calibration_told(file: DetectionFile) -> list[str]:
         f"{file.path.name} is taken to be of a camera at the LiDAR's own place that looks along x;"
         " pass the calibration of the real one"
     ]
+
+
+def _named_twice_told(frames: Sequence[Sequence[DetectorBox]], scans: Sequence[str]) -> list[str]:
+    """A sentence if boxes of two names, as `0` and `000000`, lie on one scan."""
+    named = [sorted({str(box.scan) for box in row}) for row in frames]
+    twice = next((place for place, names in enumerate(named) if len(names) > 1), None)
+    if twice is None:
+        return []
+    one, other, *_ = named[twice]
+    return [f"boxes of '{one}' and of '{other}' are all taken to be of scan {scans[twice]}"]
 
 
 def _is_vehicle(category: str) -> bool:
