@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""Units that die leave nothing in the optimiser that slows a CPU down."""
+"""Units that die leave nothing in the optimiser that slows a CPU down; states are saved in time."""
 
 import copy
 
 import torch
 from torch import nn
 
+from wildshape.training import loop as loops
 from wildshape.training.loop import Loop, run_to_end
 from wildshape.training.objectives import Objective
 from wildshape.training.runtime.log import RunLog
@@ -55,3 +56,23 @@ def test_moments_of_dead_units_end_at_zero_and_weights_are_the_same(tmp_path, mo
     assert denormal(found) == 0
     for one, other in zip(found.network.parameters(), plain.network.parameters()):
         assert torch.equal(one, other)
+
+
+def test_a_killed_run_loses_some_minutes_however_rarely_it_is_validated(tmp_path, monkeypatch):
+    network = nn.Linear(1, 1)
+    state = TrainState(network, network, torch.optim.Adam(network.parameters()))
+    meter, saved = Meter(1, 0, torch.device("cpu")), []
+
+    def take():
+        meter.write(torch.tensor(state.step), Objective(torch.zeros(()), {}, torch.zeros(1).long()))
+        state.step += 1
+
+    def keep():
+        saved.append(state.step)
+        return {}
+
+    # A step takes a minute: the state is saved every five of them, at the next line of the log.
+    monkeypatch.setattr(loops, "monotonic", lambda: 60.0 * state.step)
+    with RunLog(tmp_path, 0) as log:
+        run_to_end(Loop(state, lambda: (24, 12), 2, take, keep, keep), meter, log, None, bool)
+    assert saved == [6, 12, 18, 24]

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 from torch.profiler import record_function
@@ -23,6 +24,7 @@ from wildshape.training.validate import Validation, truth_figures, usual_up, val
 __all__ = ["MODEL", "Progress", "Run", "StopRequested", "fit", "setup", "split_tracks"]
 
 _LOG_EVERY = 25
+_SAVED_S = 300  # between two checkpoints the state is saved as often: a killed run loses so much
 _RARER_ON_A_GPU = 10  # reading figures waits for it, a validation takes as long as 1,000 steps
 Progress = Callable[[int, dict[str, Any]], None]
 
@@ -109,7 +111,7 @@ def run_to_end(
     stopped: Callable[[], bool],
 ) -> None:
     """Step to the end, logging and saving on the way; arguments and errors as of `fit`."""
-    state = loop.state
+    state, saved = loop.state, monotonic()
     while state.step < loop.plan()[0]:
         loop.take()
         state.drop_faded()
@@ -121,11 +123,15 @@ def run_to_end(
             values = meter.read(now)
             log.write(now, values)
             _report(loop, progress, values)
+            if not (due or stop or now == steps) and monotonic() - saved >= _SAVED_S:
+                _halt(loop)
+                saved = monotonic()
         if stop:
             _halt(loop)
             raise StopRequested
         if due:
             _save(loop, log)
+            saved = monotonic()
     _save(loop, log)
 
 
