@@ -98,6 +98,12 @@ def kitti(points):
     return np.column_stack((points, np.zeros(len(points)))).astype("<f4").tobytes()
 
 
+@pytest.mark.parametrize("given", [("--workers", 3), ("--ray", "local"), ("--overwrite",)])
+def test_options_of_a_folder_are_refused_where_none_is_written(refused, scan_file, given):
+    for order in (("complete", scan_file, "--out", "-"), ("register", scan_file, scan_file)):
+        assert "writes no folder" in refused(*order, *given)
+
+
 @pytest.mark.parametrize("kind", ["ply", "glb"])
 def test_a_coloured_mesh_goes_through_a_pipe(kind, pipe, scan_file, tmp_path):
     order = ("--mesh", "--mesh-format", kind, "--mesh-colours", "confidence")

@@ -29,11 +29,13 @@ def test_times_of_points_that_are_no_turn_s_are_not_used_and_told_of():
         turn = Turn(np.zeros((200, 3), np.float32), np.linspace(0.0, turn_s, 200))
         return Drive.of("street", ["a0", "a1", "a2"], lambda _: turn, times)
 
-    good, degrees = (drive_of(turn_s, (5.0, 5.1, 5.2)) for turn_s in (0.11, 0.36))
+    good, degrees, still = (drive_of(s, (5.0, 5.1, 5.2)) for s in (0.11, 0.36, 0.0012))
     assert good.turn(1).seconds is not None
     assert clock_told(good) == []
     assert degrees.turn(1).seconds is None
     assert "cannot be used: a turn would last much longer" in clock_told(degrees)[0]
+    (told,) = clock_told(still)
+    assert told.startswith("times of a scan's points lie within 1.2 ms, as of a sensor whose clock")
     assert "without a times.txt they are not corrected" in clock_told(drive_of(0.1, None))[0]
 
 

@@ -187,6 +187,21 @@ class WorkOptions:
 Network = Annotated[NetworkOptions, OmitArgPrefixes, arg(name="model", prefix_name=False)]
 Work = Annotated[WorkOptions, OmitArgPrefixes, arg(name="worker", prefix_name=False)]
 DEFAULT_WORK = WorkOptions()
+
+
+def refuse_folder_options(work: WorkOptions, *, overwrite: bool, prints: str) -> None:
+    """Refuse options that change nothing where no folder is written; `prints`: what does not.
+
+    Raises:
+        BadInputError: one is given.
+    """
+    if work != DEFAULT_WORK or overwrite:
+        raise BadInputError(
+            f"{prints} writes no folder, of which --workers, --ray and --overwrite are; leave them"
+            " out."
+        )
+
+
 Files = Annotated[FileOptions, OmitArgPrefixes, arg(name="file", prefix_name=False)]
 
 

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
+
 from wildshape.drives.config import LinkConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.trajectory import FIRST_SCANS
@@ -14,6 +16,7 @@ from wildshape.errors import BadInputError
 from wildshape.io.progress import counted
 from wildshape.records import Turn
 
+_INSTANT_S = 0.005  # a turn of the fastest sensors lasts ten times as long
 _SLOW_S = 0.21  # 5 Hz is well enough
 _FEWEST_SCANS = 5
 _FEWEST_TURNED = 3  # vehicles; of 134 that moved on streets and real drives 3 were, one a drive
@@ -82,12 +85,19 @@ def rate_told(scan_s: float | None, step_m: float, config: LinkConfig) -> list[s
 
 
 def clock_told(drive: Drive) -> list[str]:
-    """A sentence if points have times that the drive cannot use in any of the first scans."""
+    """A sentence if points have times that are of no use in any of the first scans."""
     turns = {frame: _read(drive, frame) for frame in range(min(FIRST_SCANS, len(drive)))}
     timed = [
         frame for frame, turn in turns.items() if turn is not None and turn.seconds is not None
     ]
-    if not timed or any(drive.turn(frame).seconds is not None for frame in timed):
+    used = [seconds for frame in timed if (seconds := drive.turn(frame).seconds) is not None]
+    spans = [float(np.ptp(seconds)) for seconds in used if len(seconds)]
+    if spans and max(spans) < _INSTANT_S:
+        return [
+            f"times of a scan's points lie within {1000 * max(spans):.2g} ms, as of a sensor whose"
+            " clock stands still: if it turns, scans are not corrected for its motion"
+        ]
+    if not timed or used:
         return []
     if drive.times is None:
         return [

@@ -4,7 +4,7 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,16 +12,22 @@ from typing import Any
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detections import read_box
-from wildshape.io.fingerprint import fingerprint_of
 from wildshape.io.guard import read_json, reading
 from wildshape.io.inputs import TrackSource, open_tracks
 from wildshape.io.poses import read_poses
-from wildshape.io.scans.points import METRES, SENSOR_METRES, Coordinates, read_points
+from wildshape.io.scans.points import (
+    METRES,
+    SENSOR_METRES,
+    Coordinates,
+    checksum_of,
+    read_points,
+)
 from wildshape.io.scans.writers import CLOUD_FORMATS
 from wildshape.records import Box, Points, Track
 
 MARKER, OBJECTS, METRICS, SCORES = "wildshape.json", "objects.json", "metrics.json", "scores.json"
 _SAID = "what complete or register writes"
+_OTHERS = "not the points that were completed: --inputs names others"
 PROBABILITIES = {"p_pose": "heading right", "p_box": "box right", "p_kind": "kind right"}
 MEANING = (
     "The chances that the heading is within 10° of the truth, that the box shares 0.7 of the joint "
@@ -85,27 +91,28 @@ class Inputs:
     """The scans that results are about, each place opened once.
 
     Attributes:
-        place: where the scans are now; None goes by what objects.json says, as long as the files
+        place: where the scans are now; None goes by what objects.json says, as long as the scans
             there are those that were completed.
     """
 
     place: Path | None = None
     opened: dict[tuple[Path, Coordinates], TrackSource] = field(default_factory=dict)
-    seen: dict[Path, str] = field(default_factory=dict)
 
     def track(self, folder: Path, record: dict[str, Any]) -> Track | None:
-        """The track that `folder` is about; None if the scans have moved, changed or lost it."""
+        """The completed scans of the track that `folder` is about.
+
+        None if they have moved, changed or lost it. Changed ones that were named are told in
+        `source`.
+        """
         named = self.place or (Path(record["input"]) if record.get("input") else None)
         if named is None:
             return None
         try:
-            settings = _settings(folder.parent / MARKER)
-            source = self._open(named, coordinates_of(settings))
-            if self.place is None and self._differ(named, settings.get("files")):
-                return None
-            return source[source.numbers[str(record.get("track") or folder.name)]]
+            source = self._open(named, coordinates_of(_settings(folder.parent / MARKER)))
+            track = source[source.numbers[str(record.get("track") or folder.name)]]
         except (BadInputError, KeyError, ValueError):
             return None
+        return self._completed(track, record.get("scans") or ())
 
     def check(self, folders: Sequence[Path]) -> None:
         """Open the place that was named for the results of folders.
@@ -128,11 +135,17 @@ class Inputs:
                 " the names that they had."
             )
 
-    def _differ(self, path: Path, files: str | None) -> bool:
-        """Whether others lie there by now than those of this fingerprint."""
-        if files is not None and path not in self.seen:
-            self.seen[path] = fingerprint_of(path)
-        return files is not None and self.seen[path] != files
+    def _completed(self, track: Track, entries: Sequence[dict[str, Any]]) -> Track | None:
+        """The scans of a track that these entries of objects.json are of."""
+        sums = {str(entry["scan"]): entry.get("points_crc32") for entry in entries}
+        kept = [i for i, name in enumerate(track.scan_names) if name in sums or not sums]
+        if not kept:
+            return None
+        track = track.part(kept)
+        found = zip(track.scan_names, map(checksum_of, track.scans))
+        if all(sums.get(name) in (None, points_crc32) for name, points_crc32 in found):
+            return track
+        return None if self.place is None else replace(track, source=_OTHERS)
 
     def _open(self, path: Path, coordinates: Coordinates) -> TrackSource:
         if (path, coordinates) not in self.opened:

@@ -85,22 +85,43 @@ def test_options_that_change_nothing_are_refused(completed, store):
         source_of(Settings(Path(store), inputs=Path(store)))
 
 
-def test_scans_that_changed_are_not_shown_beside_earlier_results(wildshape, dataset, tmp_path):
-    data = shutil.copytree(dataset / "000000", tmp_path / "data")
-    out = tmp_path / "out"
-    assert wildshape("complete", data, "--out", out).code == 0
-
-    def shown(inputs=None):
-        scans = source_of(Settings(out, inputs=inputs)).track(0).scans
-        (drawn,) = report_from_folder(out, inputs).objects
-        return all(map(len, scans)), "changed since" not in drawn.subtitle
-
-    assert shown() == (True, True)
-    copy = shutil.copytree(data, tmp_path / "copy" / "data")
+@pytest.mark.parametrize("single", [False, True])
+def test_scans_that_changed_are_not_shown_beside_earlier_results(
+    wildshape, dataset, store, tmp_path, single
+):
+    data = shutil.copytree(dataset / "000000", tmp_path / "data" / "000000")
     first, *_, last = sorted((data / "scans").iterdir())
+    out = tmp_path / "out"
+    assert wildshape("complete", first if single else data.parent, "--out", out).code == 0
+    assert _shown(out) == (True, True, "")
+    copy = shutil.copytree(data, tmp_path / "copy" / "000000")
+    shutil.copytree(data, data.parent / "added")
+    assert _shown(out) == (True, True, "")
     shutil.copy(last, first)
-    assert shown() == (False, False)
-    assert shown(copy) == (True, True)
+    assert _shown(out) == (False, True, "changed since")
+    assert _shown(out, first if single else data.parent) == (True, True, "names others")
+    assert _shown(out, copy / "scans" / first.name if single else copy) == (True, True, "")
+    if not single:
+        assert _shown(out, store) == (True, True, "")  # the same, packed
+        first.rename(first.with_stem("renamed"))
+        assert _shown(out, data) == (True, True, "")  # those that are left
+        for scan in list((copy / "scans").iterdir()):
+            scan.rename(scan.with_stem(f"other{scan.stem}"))
+        assert _shown(out, copy) == (False, True, "changed since")
+
+
+def _shown(out, inputs=None):
+    """Whether scans are drawn, and their shapes; which of the sentences on scans is said."""
+    source = source_of(Settings(out, inputs=inputs))
+    track = source.track(0)
+    drawn = report_from_folder(out, inputs).objects[0]
+    panels = {cloud.label for cloud in drawn.clouds}
+    scans, made = all(map(len, track.scans)), dict(source.make(0, track, 0)).values()
+    shapes = all(one.points is not None for one in made)
+    assert ("input scan" in panels, "completed" in panels) == (scans, shapes)
+    said = "changed since", "names others"
+    assert [one in track.source for one in said] == [one in drawn.subtitle for one in said]
+    return scans, shapes, next((one for one in said if one in track.source), "")
 
 
 def test_inputs_that_are_of_no_result_are_refused(refused, completed, evaluated, dataset, tmp_path):

@@ -19,6 +19,7 @@ from wildshape.cli.options import (
     check_mesh_format,
     is_pipe,
     option,
+    refuse_folder_options,
 )
 from wildshape.errors import BadInputError
 
@@ -146,6 +147,9 @@ def _to_stdout(settings: Settings) -> None:
     """One scan completed to stdout: a PLY, a mesh, or one JSON object with the points."""
     if settings.boxes or settings.calibration:
         raise BadInputError("--boxes: stdout holds one shape; name a folder with --out DIR.")
+    refuse_folder_options(
+        settings.work, overwrite=settings.scans.overwrite, prints="complete to stdout"
+    )
     with uncollected():
         from wildshape.cli.pipe import refuse_terminal, write_stdout
         from wildshape.cli.terminal import answer, say

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, arg
 
 from wildshape.cli.commands import uncollected
-from wildshape.cli.options import DEFAULT_SCANS, DEFAULT_WORK, Format, Scans, Work, is_pipe, option
+from wildshape.cli.options import (
+    DEFAULT_SCANS,
+    DEFAULT_WORK,
+    Format,
+    Scans,
+    Work,
+    is_pipe,
+    option,
+    refuse_folder_options,
+)
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -94,6 +103,9 @@ def _pair(settings: Settings, target: Path) -> None:
 
     if is_pipe(settings.source) and is_pipe(target):
         raise BadInputError("register - -: stdin holds one scan; name a file for the other.")
+    refuse_folder_options(
+        settings.work, overwrite=settings.scans.overwrite, prints="register SOURCE TARGET"
+    )
     source, target_track = (_scan(path, settings) for path in (settings.source, target))
     predictor = load(settings.scans.network.model, settings.scans.network.device)
     rays = [one for track in (source, target_track) for one in track.rays or (None,)]

@@ -25,7 +25,7 @@ from wildshape.io.inputs import Part, TrackSource, open_tracks, with_rays
 from wildshape.io.output import Output, begin, file_name, keep_apart, remove_leftovers
 from wildshape.io.poses import times_of, write_poses, write_trajectory, write_tum
 from wildshape.io.progress import SILENT, Bar, Progress
-from wildshape.io.scans.points import SENSOR_METRES, Coordinates
+from wildshape.io.scans.points import SENSOR_METRES, Coordinates, checksum_of
 from wildshape.io.scans.writers import (
     CLOUD_FORMATS,
     MESH_FORMATS,
@@ -38,8 +38,7 @@ from wildshape.method.checkpoint import fingerprint, weights_file
 from wildshape.parallel.team import team
 from wildshape.records import Completion, Track
 
-COMPLETED, MESH = "completed", "mesh"
-OBJECTS, POSES = "objects.json", "poses.txt"
+COMPLETED, MESH, OBJECTS, POSES = "completed", "mesh", "objects.json", "poses.txt"
 MIDDLE, TUM, TRAJECTORY = "T_middle_scan.txt", "trajectory.tum", "trajectory.json"
 FILES = (
     *(f"*/{COMPLETED}/*.{kind}" for kind in CLOUD_FORMATS),
@@ -47,7 +46,6 @@ FILES = (
     *(f"*/{name}" for name in (POSES, MIDDLE, TUM, TRAJECTORY, OBJECTS)),
     *BOX_FILES,
 )
-
 _MODEL = ("command", "code", "time_utc", "steps", "seed")  # said of a model
 
 
@@ -192,6 +190,7 @@ def write_results(
         BadInputError: nothing can be used, or a name cannot be that of a file.
     """
     earlier: list[tuple[str, str]] = []
+    sums: list[int] = []  # of the scans that are under way, in order
     summary = FolderSummary(output.path, "registered" if registers else "completed")
 
     def done(name: str) -> bool:
@@ -202,6 +201,10 @@ def write_results(
         summary.finished_before += 1
         return True
 
+    def summed(part: Part) -> Part:
+        sums.extend(map(checksum_of, part.track.scans))
+        return part
+
     task = _PartCompleter(
         predictor,
         output.path.absolute(),
@@ -209,7 +212,7 @@ def write_results(
         clouds=options.clouds,
         mesh=options.mesh,
     )
-    parts = source.parts(None if options.track else BATCH, done)
+    parts = map(summed, source.parts(None if options.track else BATCH, done))
     with (
         team(options.workers, options.ray) as helpers,
         progress.bar("completing", len(source)) as bar,
@@ -220,13 +223,10 @@ def write_results(
             skipped = source.skipped_in(track.name)
             _write_poses(folder, track, poses, skipped, registers=registers)
             described = objects_of(
-                track,
-                scans,
-                predictor,
-                source.path,
-                together=options.track,
-                skipped=skipped,
+                track, scans, predictor, source.path, together=options.track, skipped=skipped
             )
+            for entry in described["scans"]:
+                entry["points_crc32"] = sums.pop(0)
             remove_leftovers(folder)  # of a worker that was killed, whose part another did
             write_json(folder / OBJECTS, described)
             summary.tracks, summary.scans = summary.tracks + 1, summary.scans + len(scans)

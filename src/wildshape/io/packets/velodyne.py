@@ -19,6 +19,7 @@ import numpy as np
 from wildshape.errors import BadInputError, load_library
 from wildshape.io.guard import first_line, reading
 from wildshape.io.packets.clock import gone_on, set_told
+from wildshape.io.packets.records import Place, records_of
 from wildshape.records import Turn
 
 _INSTALL = "pip install 'wildshape[pcap]'"
@@ -48,7 +49,7 @@ class _Packet(NamedTuple):
         data: as the sensor sent it.
     """
 
-    begin: int
+    begin: Place
     source: _Source
     stamp: float
     data: bytes
@@ -65,7 +66,7 @@ class _Turn:
         turned: how far from behind the beam has come, hundredths of a degree.
     """
 
-    begin: int
+    begin: Place
     packets: int = 0
     began: float = 0.0
     stamp: float = 0.0
@@ -204,30 +205,29 @@ def _named(source: _Source) -> str:
     return f"{inet_to_str(source[0])}:{source[1]}"
 
 
-def _packets(file: IO[bytes], begin: int | None = None) -> Iterator[_Packet]:
+def _packets(file: IO[bytes], begin: Place | None = None) -> Iterator[_Packet]:
     """The packets of points, from a record on; others are passed over.
 
     Raises:
         Exception: no recording, or it is cut off here.
     """
-    from dpkt import pcap
-
-    records = pcap.UniversalReader(file)
-    link, size = _link(records.datalink()), _decoder().PACKET_SIZE
-    if begin is not None:
-        file.seek(begin)
-    begin = file.tell()
+    links, size = _links(), _decoder().PACKET_SIZE
     before: dict[_Source, bytes] = {}
-    for stamp, record in records:
-        found, sender = _datagram(link(record))
+    unread = None
+    for place, link, stamp, record in records_of(file, begin):
+        if link not in links:
+            unread = link
+            continue
+        found, sender = _datagram(links[link](record))
         if found is not None and found.ulen == size + _UDP_HEADER:
             if len(found.data) < size:
                 raise EOFError(_cut_told(file))
             source = sender, found.dport
             if found.data != before.get(source):  # a switch's mirror sends packets twice
-                yield _Packet(begin, source, float(stamp), found.data)
+                yield _Packet(place, source, stamp, found.data)
             before[source] = found.data
-        begin = file.tell()
+    if unread is not None and not before:
+        raise ValueError(f"its link layer {unread} is not read; record from a network card")
 
 
 def _cut_told(file: IO[bytes]) -> str:
@@ -237,19 +237,15 @@ def _cut_told(file: IO[bytes]) -> str:
     return "its packets are cut short; record whole ones, with tcpdump's -s 0"
 
 
-def _link(kind: int) -> Any:
-    """How a record begins, by the number of its link layer.
-
-    Raises:
-        ValueError: none that a sensor sends through.
-    """
+def _links() -> dict[int, Any]:
+    """How a record begins, by the number of its link layer."""
     from dpkt import ethernet, ip, ip6, loopback, sll, sll2
 
     def raw(record: bytes) -> Any:
         return ip6.IP6(record) if record[:1] >= b"\x60" else ip.IP(record)  # by its version
 
     # https://www.tcpdump.org/linktypes.html; 113 and 276 are of `tcpdump -i any`
-    links = {
+    return {
         0: loopback.Loopback,
         1: ethernet.Ethernet,
         101: raw,
@@ -258,13 +254,10 @@ def _link(kind: int) -> Any:
         229: raw,
         276: sll2.SLL2,
     }
-    if kind not in links:
-        raise ValueError(f"its link layer {kind} is not read; record from a network card")
-    return links[kind]
 
 
 def _packets_of(
-    file: IO[bytes], source: _Source | None, begin: int, count: int
+    file: IO[bytes], source: _Source | None, begin: Place, count: int
 ) -> Iterator[_Packet]:
     """So many packets of a sensor, from a record on."""
     return islice((one for one in _packets(file, begin) if one.source == source), count)

@@ -3,6 +3,7 @@
 """The door to scan files: points by suffix, in metres and the sensor's frame, and checked."""
 
 import math
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -207,6 +208,11 @@ def without_repeats(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "k 3"
     placed = points[order]
     again = np.append(False, (placed[1:] == placed[:-1]).all(axis=1))
     return points[np.sort(order[~again])] if again.any() else points
+
+
+def checksum_of(points: Float32[np.ndarray, "n 3"]) -> int:
+    """CRC-32 of points, x y z after x y z in float32, little endian."""
+    return zlib.crc32(np.ascontiguousarray(points, "<f4").data)
 
 
 def check_scan(points: Float[np.ndarray, "n 3"], name: str) -> None:

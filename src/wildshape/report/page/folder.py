@@ -234,7 +234,7 @@ def _object(judged: Judged, result: TrackResult) -> ReportObject:
 
 def _completed_only(result: TrackResult) -> ReportObject:
     completed = result.completed_scans()
-    missing = "the input scans cannot be read, or changed since; --inputs names them"
+    missing = "the input scans cannot be read by their names, or changed since; --inputs names them"
     if not completed:
         return ReportObject(result.folder.name, missing, scans=scans_of(result))
     scan = completed[len(completed) // 2]

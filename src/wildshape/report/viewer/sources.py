@@ -142,7 +142,6 @@ def _track(result: TrackResult) -> Track:
         empty: tuple[Points, ...] = tuple(np.zeros((0, 3), np.float32) for _ in names)
         if not names:
             raise BadInputError(f"{result.folder}: neither its scans nor shapes can be read.")
-        said = "its scans cannot be read, or changed since; --inputs names them"
+        said = "its scans cannot be read by their names, or changed since; --inputs names them"
         return Track(result.folder.name, empty, names, source=said)
-    kept = [i for i, name in enumerate(result.track.scan_names) if name in set(names)]
-    return result.track.part(kept or list(range(len(result.track.scans))))
+    return result.track
