@@ -4,11 +4,18 @@
 
 import numpy as np
 import pytest
+import torch
 
 from wildshape.drives.config import LinkConfig
-from wildshape.drives.recording_checks import backwards_told, clock_told, rate_told
+from wildshape.drives.recording_checks import (
+    backwards_told,
+    clock_told,
+    rate_told,
+    sideways_told,
+)
 from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.source import Drive
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Turn
 
 
@@ -79,3 +86,34 @@ def test_scans_in_reverse_order_are_said():
     assert told.startswith("5 of 6 moving vehicles drive backwards by their shapes: the scans are")
     for turned in ([], [True, True], [True] * 3 + [False] * 3):
         assert backwards_told(turned) == []
+
+
+@pytest.mark.parametrize(
+    ("mounted_deg", "frames", "step_m", "told"),
+    [
+        (0, 12, 1.0, ""),
+        (30, 12, 1.0, ""),
+        (90, 12, 1.0, "goes to its right"),
+        (-90, 12, 1.0, "goes to its left"),
+        (180, 12, 1.0, "goes backwards"),
+        (90, 12, 0.4, ""),
+        (90, 600, 0.01, ""),
+    ],
+)
+def test_a_sensor_that_does_not_go_where_its_x_looks_is_told_of(mounted_deg, frames, step_m, told):
+    """It follows a bend; `mounted_deg`: of its x against the vehicle's, counterclockwise."""
+    bend = np.radians(20.0) * np.arange(frames)
+    places = np.cumsum(step_m * np.stack([np.cos(bend), np.sin(bend), 0 * bend], 1), axis=0)
+    yaw = bend + np.radians(mounted_deg)
+    zero, one = np.zeros(frames), np.ones(frames)
+    rows = [np.cos(yaw), -np.sin(yaw), zero, np.sin(yaw), np.cos(yaw), zero, zero, zero, one]
+    way = SE3(torch.from_numpy(np.stack(rows, 1).reshape(frames, 3, 3)), torch.from_numpy(places))
+    names = [f"{frame:03}" for frame in range(frames)]
+    points = np.ones((200, 3), np.float32)
+    untimed = Drive.of("street", names, lambda _: Turn(points))
+    assert told in "".join(sideways_told(untimed, way))
+    assert bool(sideways_told(untimed, way)) == bool(told)
+    timed = Turn(points, np.linspace(0.0, 0.1, 200))
+    times = [0.1 * frame for frame in range(1, frames + 1)]
+    assert sideways_told(Drive.of("street", names, lambda _: timed, times), way) == []
+    assert sideways_told(Drive.of("street", names, lambda _: Turn(points), None, way), way) == []

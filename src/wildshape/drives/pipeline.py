@@ -30,7 +30,14 @@ from wildshape.drives.completing.vehicles import (
     write_judged,
 )
 from wildshape.drives.config import DriveConfig
-from wildshape.drives.recording_checks import backwards_told, clock_told, count_told, rate_told
+from wildshape.drives.recording_checks import (
+    backwards_told,
+    clock_told,
+    count_told,
+    has_times,
+    rate_told,
+    sideways_told,
+)
 from wildshape.drives.result import DriveResult
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.box_cutter import BoxCutter, check_cut
@@ -41,7 +48,6 @@ from wildshape.drives.tracking.sightings import Sightings, read_sightings, write
 from wildshape.drives.tracking.static_tracks import joined_where_they_stand
 from wildshape.drives.tracking.tracks import linked_clusters
 from wildshape.drives.tracking.trajectory import (
-    FIRST_SCANS,
     Breaks,
     find_trajectory,
     jumps,
@@ -254,8 +260,7 @@ class Pipeline:
     def turns(self, objects: list[Sightings], T_level_sensor: SE3) -> Turns:
         """The sensor's turns, in their sense where points have no times."""
         found = Turns(self.drive.moments, T_level_sensor, breaks=self.breaks.frames)
-        first = range(min(FIRST_SCANS, len(self.drive)))  # one alone may be empty
-        if all(self.drive.turn(frame).seconds is None for frame in first):
+        if not has_times(self.drive):
             shown = ((one.frames, one.boxes) for one in self.completed(objects, found))
             found = with_sense(found, shown, self.config.turns)
         write_json(self.stages / TURNS, {"sense": found.sense, "ticks": found.ticks})
@@ -325,6 +330,7 @@ class Pipeline:
         if empty := points.count(0):
             found.append(f"{empty} of {len(points)} scans are empty or cannot be read")
         found += self.breaks.told() + clock_told(self.drive)
+        found += sideways_told(self.drive, T_world_sensor)
         found += count_told(len(points) - points.count(0))
         if not self.tracked:
             found += rate_told(self.seen_s, self.step_m(T_world_sensor), self.config.tracks)

@@ -13,6 +13,7 @@ from wildshape.drives.config import LinkConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.trajectory import FIRST_SCANS
 from wildshape.errors import BadInputError
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.progress import counted
 from wildshape.records import Turn
 
@@ -20,6 +21,7 @@ _INSTANT_S = 0.005  # a turn of the fastest sensors lasts ten times as long
 _SLOW_S = 0.21  # 5 Hz is well enough
 _FEWEST_SCANS = 5
 _FEWEST_TURNED = 3  # vehicles; of 134 that moved on streets and real drives 3 were, one a drive
+_LEAST_WAY_M, _LEAST_STEP_M = 5.0, 0.05  # less tells no direction: odometry's noise is 15 mm
 _LEAST_BYTES = 2000  # of a file; smaller ones hold hardly any points, and may be alike
 
 
@@ -65,6 +67,33 @@ def backwards_told(turned: Sequence[bool]) -> list[str]:
         " are in reverse order of time, the sensor's way is wrong, or the model takes rears for"
         " fronts"
     ]
+
+
+def sideways_told(drive: Drive, T_world_sensor: SE3) -> list[str]:
+    """A sentence if the sensor does not go where its x looks, to 45 degrees.
+
+    Where points have no times, they are taken for seen in a turn whose middle looks along x.
+    Recordings with poses of their own have axes of their own, too.
+    """
+    if drive.T_world_sensor is not None or has_times(drive):
+        return []
+    R, places = T_world_sensor.rotation.numpy(), T_world_sensor.translation.numpy()
+    steps = np.diff(places, axis=0)
+    steps[np.linalg.norm(steps, axis=1) < _LEAST_STEP_M] = 0.0
+    ahead, left, _ = np.einsum("kji,kj->i", R[:-1], steps)
+    if np.hypot(ahead, left) < _LEAST_WAY_M or ahead > abs(left):
+        return []
+    to = "backwards" if -ahead > abs(left) else "to its left" if left > 0 else "to its right"
+    return [
+        f"the sensor goes {to}: points without times need x forward and scans in order of time,"
+        " else vehicles are misplaced and things that stand may seem to move"
+    ]
+
+
+def has_times(drive: Drive) -> bool:
+    """Whether points of the first scans have times; one scan alone may be empty."""
+    first = range(min(FIRST_SCANS, len(drive)))
+    return any(drive.turn(frame).seconds is not None for frame in first)
 
 
 def rate_told(scan_s: float | None, step_m: float, config: LinkConfig) -> list[str]:
