@@ -1,10 +1,99 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""A drive from above."""
+"""A drive from above, measured in its pixels."""
 
-from tests.drives.finished_drive import FRAMES, finished_drive
+import io
+from dataclasses import replace
 
-from wildshape.report.drive.picture import picture_from_above
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+from tests.drives.finished_drive import CARS, FRAMES, HEIGHT, finished_drive
+
+from wildshape.drives.writing.playback.moments import PALETTE
+from wildshape.geometry.transforms.rotation import rotation_z
+from wildshape.geometry.transforms.se3 import SE3
+from wildshape.report.drive.picture import picture_from_above, write_drive_picture
+from wildshape.report.drive.scene import NOBODY, DrawnScan
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    return finished_drive(tmp_path_factory.mktemp("drive"))
+
+
+def pixels(picture):
+    with Image.open(picture if not isinstance(picture, bytes) else io.BytesIO(picture)) as image:
+        return np.asarray(image.convert("RGB")).astype(int)
+
+
+def places(picture, colour, near=60):
+    """`(n, 2)` of the pixels of a colour: to the right, and up."""
+    wanted = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)])
+    rows, columns = np.nonzero((abs(picture - wanted) < near).all(-1))
+    return np.column_stack((columns, -rows))
+
+
+def way_of(picture):
+    """Where the sensor's way, 5 m, begins and ends, pixels: its end is thicker than a line."""
+    white = places(picture, "#ffffff", 30)
+    rows, counts = np.unique(white[:, 1], return_counts=True)
+    row = rows[counts.argmax()]
+    along = white[white[:, 1] == row, 0]
+    return np.array((along.min(), row)), np.array((along.max() - 4, row))
+
+
+def in_metres(picture, at):
+    """From the sensor's last place: ahead, and to the left."""
+    start, end = way_of(picture)
+    return (at - end) * (FRAMES - 1) / (end - start)[0]
+
+
+def test_vehicles_lie_where_they_are_and_the_sensor_drives_to_the_right(found):
+    drawn = pixels(picture_from_above(found, ()))
+    for number, cars in enumerate(CARS.values()):
+        x, y, _ = cars[0]  # of equally full scans the first
+        outline = places(drawn, PALETTE[number])
+        middle = in_metres(drawn, (outline.min(0) + outline.max(0)) / 2)
+        assert middle == pytest.approx((x - (FRAMES - 1), y), abs=1.5), number
+
+
+def test_the_picture_is_the_same_wherever_the_world_s_axes_look(found):
+    ten_m = SE3(found.T_level_sensor.rotation, 2 * found.T_level_sensor.translation)
+    turn = SE3(rotation_z(torch.tensor(2.0).double()), torch.zeros(3).double())
+    points = np.random.default_rng(0).uniform((5, -8, 0), (9, -3, 0.1), (9000, 3))
+    scans = [DrawnScan(2, points.astype(np.float32), np.full(len(points), NOBODY))]
+    one, other = (
+        pixels(picture_from_above(replace(found, T_level_sensor=T), scans))
+        for T in (ten_m, turn @ ten_m)
+    )
+    assert one.shape == other.shape
+    assert (abs(one - other).max(-1) > 60).mean() < 0.01
+
+
+def test_what_stands_higher_is_brighter_and_lies_where_it_was_seen(found):
+    """Two squares seen in the third frame, at the ground and 3 m above it."""
+    x, y, z = np.mgrid[-1:1:60j, -1:1:60j, 0:1].reshape(3, -1)
+    spots = [np.column_stack((x + 4, y + at, z + up)) for at, up in ((4, 0), (-4, 3))]
+    points = (np.concatenate(spots) - (0, 0, HEIGHT)).astype(np.float32)
+    scan = DrawnScan(2, points, np.full(len(points), NOBODY))
+    drawn = pixels(picture_from_above(found, [scan]))
+    for colour, left in (("#303b47", 4.0), ("#d3dce3", -4.0)):
+        spot = in_metres(drawn, np.median(places(drawn, colour, 16), axis=0))
+        assert spot == pytest.approx((2 + 4 - 5, left), abs=0.4)
+
+
+def test_below_are_each_vehicle_s_scan_and_its_shape(found, tmp_path):
+    path = tmp_path / "drive.png"
+    write_drive_picture(found, found.open_source(), path, found.vehicles[::-1])
+    drawn = pixels(path)
+    drawn = drawn[int(0.72 * len(drawn)) : int(0.95 * len(drawn))]
+    quarters = np.array_split(drawn, 4, axis=1)
+    for quarter, colour in zip(quarters, ("#ffffff", PALETTE[1], "#ffffff", PALETTE[0])):
+        spots = places(quarter, colour)
+        assert len(spots) > 80
+        assert np.ptp(spots, axis=0)[0] > 0.4 * quarter.shape[1]
 
 
 def test_names_are_drawn_as_they_are(tmp_path):
