@@ -3,19 +3,22 @@
 """A drive from above, measured in its pixels."""
 
 import io
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 from PIL import Image
-from tests.drives.finished_drive import CARS, FRAMES, HEIGHT, finished_drive
+from tests.drives.finished_drive import CARS, FRAMES, HEIGHT, SIZE, finished_drive
 
 from wildshape.drives.writing.playback.moments import PALETTE
 from wildshape.geometry.transforms.rotation import rotation_z
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.report.drive.picture import picture_from_above, write_drive_picture
 from wildshape.report.drive.scene import NOBODY, DrawnScan
+
+WAY_M = 2.0 * (FRAMES - 1)
 
 
 @pytest.fixture(scope="module")
@@ -35,53 +38,55 @@ def places(picture, colour, near=60):
     return np.column_stack((columns, -rows))
 
 
-def way_of(picture):
-    """Where the sensor's way, 5 m, begins and ends, pixels: its end is thicker than a line."""
+def in_metres(picture, at):
+    """From the sensor's last place: ahead, and to the left; by its way, whose end is a dot."""
     white = places(picture, "#ffffff", 30)
     rows, counts = np.unique(white[:, 1], return_counts=True)
     row = rows[counts.argmax()]
     along = white[white[:, 1] == row, 0]
-    return np.array((along.min(), row)), np.array((along.max() - 4, row))
+    end = along.max() - 4
+    return (at - (end, row)) * WAY_M / (end - along.min())
 
 
-def in_metres(picture, at):
-    """From the sensor's last place: ahead, and to the left."""
-    start, end = way_of(picture)
-    return (at - end) * (FRAMES - 1) / (end - start)[0]
+def driving(found, heading):
+    """Twice as fast, in a world whose axes are turned."""
+    turn = SE3(rotation_z(torch.tensor(heading).double()), torch.zeros(3).double())
+    T = SE3(found.T_level_sensor.rotation, 2 * found.T_level_sensor.translation)
+    return replace(found, T_level_sensor=turn @ T)
 
 
-def test_vehicles_lie_where_they_are_and_the_sensor_drives_to_the_right(found):
-    drawn = pixels(picture_from_above(found, ()))
+@pytest.mark.parametrize("heading", [0.0, 2.0])
+def test_vehicles_lie_and_look_where_they_do_and_the_sensor_drives_to_the_right(found, heading):
+    drawn = pixels(picture_from_above(driving(found, heading), ()))
     for number, cars in enumerate(CARS.values()):
-        x, y, _ = cars[0]  # of equally full scans the first
-        outline = places(drawn, PALETTE[number])
-        middle = in_metres(drawn, (outline.min(0) + outline.max(0)) / 2)
-        assert middle == pytest.approx((x - (FRAMES - 1), y), abs=1.5), number
+        x, y, yaw = cars[0]  # of equally full scans the first
+        outline = in_metres(drawn, places(drawn, PALETTE[number])) - (x - WAY_M, y)
+        inside = outline[np.linalg.norm(outline, axis=1) < 3.2]  # not its way
+        assert len(inside) > 300
+        front = inside[np.linalg.norm(inside, axis=1).argmax()]
+        ahead = 1.3 * SIZE[0] / 2
+        expected = (ahead * math.cos(yaw), ahead * math.sin(yaw))
+        assert front == pytest.approx(expected, abs=0.2), number
 
 
-def test_the_picture_is_the_same_wherever_the_world_s_axes_look(found):
-    ten_m = SE3(found.T_level_sensor.rotation, 2 * found.T_level_sensor.translation)
-    turn = SE3(rotation_z(torch.tensor(2.0).double()), torch.zeros(3).double())
-    points = np.random.default_rng(0).uniform((5, -8, 0), (9, -3, 0.1), (9000, 3))
-    scans = [DrawnScan(2, points.astype(np.float32), np.full(len(points), NOBODY))]
-    one, other = (
-        pixels(picture_from_above(replace(found, T_level_sensor=T), scans))
-        for T in (ten_m, turn @ ten_m)
-    )
-    assert one.shape == other.shape
-    assert (abs(one - other).max(-1) > 60).mean() < 0.01
-
-
-def test_what_stands_higher_is_brighter_and_lies_where_it_was_seen(found):
+@pytest.mark.parametrize("heading", [0.0, 2.0])
+def test_what_stands_higher_is_brighter_and_lies_where_it_was_seen(found, heading):
     """Two squares seen in the third frame, at the ground and 3 m above it."""
     x, y, z = np.mgrid[-1:1:60j, -1:1:60j, 0:1].reshape(3, -1)
     spots = [np.column_stack((x + 4, y + at, z + up)) for at, up in ((4, 0), (-4, 3))]
     points = (np.concatenate(spots) - (0, 0, HEIGHT)).astype(np.float32)
     scan = DrawnScan(2, points, np.full(len(points), NOBODY))
-    drawn = pixels(picture_from_above(found, [scan]))
+    drawn = pixels(picture_from_above(driving(found, heading), [scan]))
     for colour, left in (("#303b47", 4.0), ("#d3dce3", -4.0)):
         spot = in_metres(drawn, np.median(places(drawn, colour, 16), axis=0))
-        assert spot == pytest.approx((2 + 4 - 5, left), abs=0.4)
+        assert spot == pytest.approx((4 + 4 - WAY_M, left), abs=0.4)
+
+
+def test_the_bar_is_as_long_as_it_says(found):
+    drawn = pixels(picture_from_above(driving(found, 0.0), ()))
+    bar = places(drawn, "#a0a8b3", 12)
+    length = np.ptp(in_metres(drawn, bar[bar[:, 1] == bar[:, 1].min()]), axis=0)[0]
+    assert length == pytest.approx(10.0, abs=0.2)
 
 
 def test_below_are_each_vehicle_s_scan_and_its_shape(found, tmp_path):
