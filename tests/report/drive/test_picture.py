@@ -38,14 +38,14 @@ def places(picture, colour, near=60):
     return np.column_stack((columns, -rows))
 
 
-def in_metres(picture, at):
+def in_metres(picture, at, way_m=WAY_M):
     """From the sensor's last place: ahead, and to the left; by its way, whose end is a dot."""
     white = places(picture, "#ffffff", 30)
     rows, counts = np.unique(white[:, 1], return_counts=True)
     row = rows[counts.argmax()]
     along = white[white[:, 1] == row, 0]
     end = along.max() - 4
-    return (at - (end, row)) * WAY_M / (end - along.min())
+    return (at - (end, row)) * way_m / (end - along.min())
 
 
 def driving(found, heading):
@@ -67,6 +67,13 @@ def test_vehicles_lie_and_look_where_they_do_and_the_sensor_drives_to_the_right(
         ahead = 1.3 * SIZE[0] / 2
         expected = (ahead * math.cos(yaw), ahead * math.sin(yaw))
         assert front == pytest.approx(expected, abs=0.2), number
+
+
+def test_the_way_of_what_drives_is_drawn(found):
+    drawn, way_m = pixels(picture_from_above(found, ())), FRAMES - 1
+    x, y, _ = CARS["<7>"][-1]
+    far = in_metres(drawn, places(drawn, PALETTE[1]), way_m)
+    assert far[far[:, 0].argmin()] == pytest.approx((x - way_m, y), abs=0.2)
 
 
 @pytest.mark.parametrize("heading", [0.0, 2.0])
