@@ -40,10 +40,11 @@ def places(picture, colour, near=60):
 
 def in_metres(picture, at, way_m=WAY_M):
     """From the sensor's last place: ahead, and to the left; by its way, whose end is a dot."""
-    white = places(picture, "#ffffff", 30)
+    white = places(picture, "#ffffff", 12)
     rows, counts = np.unique(white[:, 1], return_counts=True)
     row = rows[counts.argmax()]
     along = white[white[:, 1] == row, 0]
+    assert white[abs(white[:, 1] - row) > 2, 0].min() > along.mean(), "the dot is where it ends"
     end = along.max() - 4
     return (at - (end, row)) * way_m / (end - along.min())
 
