@@ -8,14 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tests.drives.street import HEIGHT, scan, street, things
+from tests.drives.street import HEIGHT, scan, street
 from tests.refusal import refused
 
 import wildshape
 from wildshape.drives.config import DriveConfig, LinkConfig, MountingConfig
 from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.source import Drive
-from wildshape.drives.tracking.given_poses import held_back
 from wildshape.drives.tracking.mounting import Mounting, find_mounting
 from wildshape.drives.tracking.trajectory import Breaks, find_trajectory
 from wildshape.drives.writing.files import DriveFiles
@@ -95,18 +94,6 @@ def test_a_sensor_that_may_drive_though_it_seems_to_stand_is_said(scans):
     assert find_trajectory(drive_of([scans[0]] * 8), LEVEL, DriveConfig()).breaks.told() == []
 
 
-def test_an_odometry_that_was_held_back_is_said():
-    seen = street(frames=8)
-    for scans, told in (
-        (seen.scans, "first scans do not lie on the last"),
-        ([seen.scans[0]] * 8, ""),
-    ):
-        found = held_back(drive_of(scans), SE3.identity(8), LEVEL, DriveConfig())
-        assert told in found
-        assert bool(found) == bool(told)
-    assert held_back(drive_of(seen.scans), path_of(seen.places), LEVEL, DriveConfig()) == ""
-
-
 def test_a_flat_ceiling_does_not_hold_the_sensor_back():
     """Its rings lie around the sensor wherever it is: in a car park it stood still."""
     up = np.deg2rad(np.arange(2.0, 22.5, 0.35))
@@ -120,118 +107,6 @@ def test_a_flat_ceiling_does_not_hold_the_sensor_back():
     way = find_trajectory(drive_of(under), LEVEL, DriveConfig())
     found = way.T_world_sensor.translation[-1].numpy()
     assert found == pytest.approx((4 * 0.7, 4 * 0.02, 0.0), abs=0.1)
-
-
-def test_poses_that_do_not_fit_the_scans_are_said():
-    """Right ones, inverse ones, scans in the world, a camera's axes, other scales, none at all."""
-    seen = street(frames=8)
-    path = path_of(seen.places)
-    turn = torch.tensor(((0, -1, 0, 5e5), (1, 0, 0, 5e6), (0, 0, 1, 90), (0, 0, 0, 1.0)))
-    T_map_sensor = SE3.from_matrix(turn.double()) @ path
-    placed = [path[frame].apply_numpy(scan) for frame, scan in enumerate(seen.scans)]
-    camera = SE3.from_matrix(torch.eye(4).double()[[1, 2, 0, 3]])
-    late = torch.tensor([0.0] * 5 + [1.5] * 3).double()[:, None] * torch.eye(3).double()[0]
-    for scans, poses, told in (
-        (seen.scans, T_map_sensor, None),
-        (seen.scans, T_map_sensor.inverse(), "inverse of the poses fits the scans better"),
-        (placed, path, "lie better on each other without them"),
-        (seen.scans, camera @ path @ camera.inverse(), "without them"),
-        (seen.scans, SE3(path.rotation, 100 * path.translation), "without them: give T_world_"),
-        (seen.scans, SE3(path.rotation, path.translation / 2), "a wrong scale, order or frame"),
-        (seen.scans, path[torch.arange(7, -1, -1)], "in the order of the scans"),
-        (seen.scans, SE3(path.rotation, path.translation + late), "jump at frame 5"),
-        (seen.scans, SE3(path.rotation, 1.1 * path.translation), "with all ways 0.9 times as long"),
-        (seen.scans, SE3.identity(8), "the sensor hardly moves, but its scans do not"),
-        ([seen.scans[0]] * 8, SE3.identity(8), None),
-    ):
-        drive = replace(drive_of(scans), T_world_sensor=poses)
-        found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
-        assert len(found) == bool(told)
-        assert (told or "") in "".join(found)
-
-
-def test_a_jump_of_poses_is_said_where_steps_are_uneven():
-    """By whole scans the steps themselves change more than where the poses jump."""
-    at = np.cumsum([0, *(3, 2) * 5, 3])
-    places = np.column_stack((1.4 * at, 0 * at))
-    seen = [scan(things(), place, frame) for frame, place in enumerate(places)]
-    jumped = places + np.outer(at >= 10, (1.6, 0.0))
-    for given, told in ((places, []), (jumped, ["jump at frame 4"])):
-        poses, times = path_of(given), (0.04 * at).tolist()
-        drive = Drive.of("street", ["a"] * 12, lambda frame: Turn(seen[frame]), times, poses)
-        found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
-        assert len(found) == len(told)
-        assert all(word in said for word, said in zip(told, found))
-
-
-def test_right_poses_amid_traffic_are_not_doubted():
-    """Half of what is seen drives elsewhere; half a metre beside less fits."""
-    seen = street(frames=8)
-    path = path_of(seen.places)
-    low, high = (-28.0, -28.0, -1.0), (28.0, 28.0, 8.0)
-    driving = np.random.default_rng(0).uniform(low, high, size=(20_000, 3)).astype(np.float32)
-    ahead = np.array((1.3, 0.0, 0.0), np.float32)
-    scans = [np.concatenate((scan, driving + i * ahead)) for i, scan in enumerate(seen.scans)]
-    half = SE3(path.rotation, path.translation / 2)
-    for poses, told in ((path, []), (half, ["a wrong scale, order or frame"])):
-        drive = replace(drive_of(scans), T_world_sensor=poses)
-        found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
-        assert len(found) == len(told)
-        assert all(word in said for word, said in zip(told, found))
-
-
-def test_poses_whose_z_looks_down_or_whose_frame_is_turned_are_said():
-    """On a nearly straight way what the near scans show hardly differs."""
-    seen = street(frames=10)
-    angle = torch.tensor(math.radians(1.5), dtype=torch.float64)
-    T_sensor_car = SE3(rotation_z(angle), torch.zeros(3, dtype=torch.float64))
-    scans = [T_sensor_car.apply_numpy(scan) for scan in seen.scans]
-    path = path_of(seen.places) @ T_sensor_car.inverse()
-    turn = torch.diag(torch.tensor((1.0, -1.0, -1.0), dtype=torch.float64))
-    axes = SE3(turn, torch.zeros(3, dtype=torch.float64))
-    turned = SE3(rotation_z(torch.tensor(math.radians(4.0)).double()), torch.zeros(3).double())
-    for poses, told in (
-        (path, []),
-        (axes @ path @ axes, ["y and z reversed"]),
-        (path @ turned, ["turned by 4 degrees about"]),
-        (drifting(path, 0.4), ["turned by 0.4 degrees more each scan"]),
-        (drifting(path, -0.2), ["turned by 0.2 degrees more each scan"]),
-    ):
-        drive = replace(drive_of(scans), T_world_sensor=poses)
-        found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
-        assert len(found) == len(told)
-        assert all(word in said for word, said in zip(told, found))
-
-
-def test_poses_of_the_scan_before_or_after_are_said():
-    """Between scans where the sensor turns by more and by less."""
-    frames = torch.arange(-1, 15).double()
-    turns = SE3(rotation_z(0.02 * torch.sin(0.8 * frames)), torch.zeros(16, 3).double())
-    places = np.column_stack((frames, 0 * frames))
-    seen = [scan(things(), place, frame) for frame, place in enumerate(places[1:-1])]
-    scans = [turn.inverse().apply_numpy(points) for turn, points in zip(turns[1:], seen)]
-    path = path_of(places) @ turns
-    for first, told in ((0, ["for the scan before it"]), (1, []), (2, ["for the scan after it"])):
-        drive = replace(drive_of(scans), T_world_sensor=path[torch.arange(first, first + 14)])
-        found = find_trajectory(drive, LEVEL, DriveConfig()).breaks.told()
-        assert len(found) == len(told)
-        assert all(word in said for word, said in zip(told, found))
-
-
-def drifting(path, degrees):
-    """Each step turned so much too far."""
-    turn = rotation_z(torch.tensor(math.radians(degrees)).double())
-    poses = [path[0]]
-    for frame in range(1, len(path)):
-        step = path[frame - 1].inverse() @ path[frame]
-        poses.append(poses[-1] @ step @ SE3(turn, torch.zeros(3).double()))
-    return SE3.from_matrix(torch.stack([pose.matrix for pose in poses]))
-
-
-def path_of(places):
-    """`T_world_sensor` of a sensor that looks along x."""
-    moved = np.column_stack((places, np.zeros(len(places))))
-    return SE3(torch.eye(3).double().repeat(len(places), 1, 1), torch.from_numpy(moved))
 
 
 def test_scans_of_objects_are_refused(scans):

@@ -23,6 +23,7 @@ from wildshape.drives.tracking.detections import DetectionFile, find_detections
 from wildshape.drives.writing.files import DriveFiles, detections_of
 from wildshape.drives.writing.finished import read_finished
 from wildshape.drives.writing.playback.mcap import write_mcap
+from wildshape.drives.writing.playback.rerun import write_rerun
 from wildshape.errors import MissingExtraError
 from wildshape.geometry.transforms.rotation import rotation_from_vector
 from wildshape.geometry.transforms.se3 import SE3
@@ -159,6 +160,26 @@ def test_rerun_holds_boxes_shapes_scans_and_the_way(found):
         assert rows[f"/world/vehicles/{escaped}/box", "Boxes3D:half_sizes"] == 1
         assert rows[f"/world/vehicles/{escaped}/shape", "Points3D:positions"] == 1
     assert rows[r"/world/vehicles/\<7\>", "Clear:is_recursive"] == 1
+
+
+def test_rerun_s_grey_is_by_height_where_the_sensor_is_tilted(found, tmp_path):
+    """What lies 20 m ahead of one that looks 10 degrees up is 3.5 m higher than it measures."""
+    read = pytest.importorskip("rerun.chunk", reason="did not run: rerun-sdk is not installed")
+    up = rotation_from_vector(torch.deg2rad(torch.tensor((0.0, -10.0, 0.0)).double()))
+    T_level_sensor = found.T_level_sensor @ SE3(up, torch.zeros(3).double())
+    tilted = replace(found, T_level_sensor=T_level_sensor, vehicles=())
+    write_rerun(tilted, tmp_path / "drive.rrd")
+    for chunk in read.RrdReader(str(tmp_path / "drive.rrd")).stream():
+        batch = chunk.to_record_batch()
+        if "Points3D:colors" in batch.schema.names:
+            points = np.array(batch.column("Points3D:positions")[0].as_py())
+            colours = np.array(batch.column("Points3D:colors")[0].as_py())
+            height = (points @ up.numpy()[2] + HEIGHT).clip(0, 4)
+            assert np.ptp(height) > 3
+            assert (colours >> 24) == pytest.approx(70 + 150 * height / 4, abs=1.01)
+            break
+    else:
+        pytest.fail("no scan in it")
 
 
 @pytest.mark.parametrize(

@@ -137,6 +137,16 @@ def test_examples_and_figures(tmp_path):
     assert titles == ["one scan", "truth", "ICP", "scan", "ours, completed", "ours, fused"]
 
 
+def test_names_are_drawn_as_they_are(tmp_path):
+    """A track's `a$^$` ended evaluate in a traceback; a model's `_mine` stood in no legend."""
+    tracks = [replace(drive_by(scans=3, points=100), name="a$^$ 車")]
+    results = run({name: Method() for name in ("_mine", "$^$")}, tracks)
+    drawn = write_figures(tmp_path, results, gather(tracks, results, "$^$", Method()))
+    assert [path.name for path in drawn] == ["errors.png", "examples.png"]
+    for axes in draw_errors(results).axes:
+        assert set(axes.get_legend_handles_labels()[1]) >= {" _mine", r"\$^\$"}
+
+
 def test_drawing_keeps_aspect_and_survives_gaps():
     tracks = [drive_by(scans=2, points=60)]
     results = run({"scan": OneScan()}, tracks)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +19,7 @@ from wildshape.evaluation.results import MethodScores, Results
 from wildshape.evaluation.risk_coverage import risk_coverage
 from wildshape.evaluation.summary import stated
 from wildshape.io.atomic import atomic_write
+from wildshape.io.progress import literal
 from wildshape.records import Points
 
 if TYPE_CHECKING:
@@ -53,7 +55,7 @@ def draw_examples(examples: Sequence[Example]) -> Figure:
     for row, example in zip(axes, examples, strict=True):
         _draw_example(row, example)
     for ax, title in zip(axes[0], panels, strict=True):
-        ax.set_title(title)
+        ax.set_title(literal(title))
     return figure
 
 
@@ -63,7 +65,8 @@ def _draw_example(row: Sequence[Axes], example: Example) -> None:
     for ax, cloud in zip(row, clouds, strict=True):
         draw_panel(ax, cloud, example.truth)
     row[0].set_ylabel(f"{example.label}\nCD {example.cd:.3f} m", fontsize=9)
-    row[1].text(0.02, 0.97, example.track, va="top", fontsize=6, transform=row[1].transAxes)
+    name = literal(example.track)
+    row[1].text(0.02, 0.97, name, va="top", fontsize=6, transform=row[1].transAxes)
 
 
 def draw_panel(ax: Axes, cloud: Points | None, truth: Points) -> None:
@@ -122,7 +125,12 @@ def _draw_shares(ax: Axes, errors: list[float], scores: MethodScores, colour: in
         return
     shares = 100 * np.arange(len(errors) + 1) / len(errors)
     x = np.concatenate(([0.0], np.sort(errors)))
-    ax.step(x, shares, where="post", label=scores.name, color=f"C{colour}")
+    ax.step(x, shares, where="post", label=_listed(scores.name), color=f"C{colour}")
+
+
+def _listed(name: str) -> str:
+    """As a legend has it: matplotlib's leaves out what begins with an underscore."""
+    return literal(f" {name}" if name.startswith("_") else name)
 
 
 def _finish(ax: Axes) -> None:
@@ -149,7 +157,7 @@ def draw_confidence(results: Results) -> Figure | None:
             curve = risk_coverage(order, cd)
             assert curve is not None
             shares = 100 * np.asarray(curve.coverage)
-            ax.plot(shares, curve.risk, color=f"C{i}", linestyle=style, label=label)
+            ax.plot(shares, curve.risk, color=f"C{i}", linestyle=style, label=_listed(label))
     ax.set_xlabel("scans kept, the surest first, %")
     ax.set_ylabel("their mean Chamfer distance, m")
     ax.set_ylim(bottom=0)
@@ -167,6 +175,7 @@ def write_figures(folder: Path, results: Results, examples: Sequence[Example]) -
     if examples:
         drawn["examples.png"] = draw_examples(examples)
     for name, figure in drawn.items():
-        with atomic_write(folder / name) as file:
+        with atomic_write(folder / name) as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # names in scripts that matplotlib's font lacks
             figure.savefig(file, format="png", dpi=130)
     return [folder / name for name in drawn]

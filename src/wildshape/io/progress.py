@@ -78,3 +78,9 @@ def duration(seconds: float) -> str:
 def printable(text: str) -> str:
     """Text without control characters, which a damaged file could send to the terminal."""
     return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)
+
+
+def literal(text: str) -> str:
+    """Text that matplotlib draws as it is: no formulas, no control characters."""
+    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+    return shown.replace("$", r"\$")

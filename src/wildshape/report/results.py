@@ -23,7 +23,7 @@ from wildshape.io.scans.points import (
     read_points,
 )
 from wildshape.io.scans.writers import CLOUD_FORMATS
-from wildshape.records import Box, Points, Track
+from wildshape.records import Box, Points, SensorKind, Track
 
 MARKER, OBJECTS, METRICS, SCORES = "wildshape.json", "objects.json", "metrics.json", "scores.json"
 _SAID = "what complete or register writes"
@@ -58,6 +58,11 @@ class TrackResult:
     def scans(self) -> tuple[str, ...]:
         """Names of the scans that have a result, in their order in time."""
         return tuple(str(entry["scan"]) for entry in self.entries)
+
+    @property
+    def sensor(self) -> SensorKind:
+        """What took the scans: which way is up in the completed shapes."""
+        return "camera" if self.record.get("sensor") == "camera" else "lidar"
 
     def entry(self, scan: str) -> dict[str, Any]:
         """What objects.json says of a scan."""

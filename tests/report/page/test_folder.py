@@ -178,6 +178,14 @@ def test_without_the_scans_only_the_completed_shape_is_shown(tmp_path: Path) -> 
     assert ("time", "20 ms") in shown.details
 
 
+def test_a_camera_s_shape_stands_upright_without_its_scans(tmp_path: Path) -> None:
+    """It was drawn in a LiDAR's axes, from below."""
+    said = {"input": str(tmp_path / "gone"), "sensor": "camera", "scans": [_entry("000001")]}
+    _completed(tmp_path / "chair", _track(), said)
+    assert report_from_folder(tmp_path).objects[0].sensor == "camera"
+    assert from_results(tmp_path).track(0).sensor.kind == "camera"
+
+
 def test_registered_only_and_in_millimetres(tmp_path: Path) -> None:
     track = _track()
     scans = tmp_path / "data" / "0007" / "scans"

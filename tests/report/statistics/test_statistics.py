@@ -68,6 +68,14 @@ def test_azimuth_is_the_side_that_is_seen(tmp_path):
     assert by["elevation"].tally.mean == pytest.approx(30.0)
 
 
+def test_a_scan_alone_is_seen_from_one_side(tmp_path):
+    """By its rounding the picture drew a median change of 8.54e-07 degrees."""
+    for number in range(8):
+        alone = around(distance=12.0, height=2.0).part([number])
+        _, by = described(packed(tmp_path / f"{number}", [alone]))
+        assert by["turn"].tally.most == 0
+
+
 @pytest.mark.parametrize("block", [1, 4096])
 def test_posed_and_unposed_tracks_between_each_other(tmp_path, monkeypatch, block):
     monkeypatch.setattr(statistics, "_BLOCK", block)

@@ -3,18 +3,21 @@
 """The viewer of a drive: the scene at a time, and the vehicle that is chosen."""
 
 import json
+import math
 import shutil
 from dataclasses import replace
 from urllib.request import urlopen
 
 import numpy as np
 import pytest
+import torch
 from tests.drives.finished_drive import CARS, HEIGHT, SIZE, finished_drive
 
 pytest.importorskip("viser", reason="did not run: viser is not installed (extra view)")
 from wildshape.cli.main import main
 from wildshape.drives.writing.finished import read_finished
 from wildshape.drives.writing.playback.moments import colour_of
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.report.viewer import page as pages
 from wildshape.report.viewer.drive_page import NOTHING, measured, serving_drive
 
@@ -78,6 +81,18 @@ def test_a_scan_is_coloured_by_height_and_by_the_vehicle_that_it_is_on(found):
         page.refresh()
         grey = 70 + 130 * (page.scan.points[:, 2:] + HEIGHT) / 4  # by the height above the ground
         assert np.abs(page.scan.colors - grey).max() <= 1.01
+
+
+def test_grey_is_by_height_where_the_sensor_is_tilted(found):
+    """What lies 20 m ahead of one that looks 10 degrees up is 3.5 m higher than it measures."""
+    c, s = math.cos(math.radians(10)), math.sin(math.radians(10))
+    up = torch.tensor(((c, 0, -s), (0, 1, 0), (s, 0, c))).double()
+    T_level_sensor = found.T_level_sensor @ SE3(up, torch.zeros(3).double())
+    with serving_drive(replace(found, T_level_sensor=T_level_sensor, vehicles=())) as page:
+        x, _, z = page.scan.points.T
+        height = (s * x + c * z + HEIGHT).clip(0, 4)
+        assert np.ptp(height) > 3
+        assert np.abs(page.scan.colors - (70 + 130 * height[:, None] / 4)).max() <= 1.01
 
 
 def test_a_vehicle_is_seen_in_its_own_frames_alone(found):

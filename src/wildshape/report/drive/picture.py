@@ -7,6 +7,8 @@ Drawn on a slate card of its own, it reads the same on light and dark pages.
 
 import io
 import math
+import re
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,7 @@ from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
 from wildshape.drives.writing.playback.moments import PALETTE
 from wildshape.geometry.sampling import thin
 from wildshape.io.atomic import atomic_write
+from wildshape.io.progress import literal
 from wildshape.report.drive.scene import (
     NOBODY,
     DrawnScan,
@@ -106,7 +109,9 @@ def _image(figure: Any, suffix: str) -> bytes:
     from PIL import Image
 
     figure.set_dpi(_DPI)
-    figure.canvas.draw()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # names in scripts that matplotlib's font lacks
+        figure.canvas.draw()
     image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
     buffer = io.BytesIO()
     image.save(buffer, format=suffix[1:].upper(), quality=80, method=4)
@@ -173,8 +178,8 @@ def _from_above(axes: Any, found: FinishedDrive, one: FoundVehicle, colour: str)
 
 
 def _short(one: FoundVehicle) -> str:
-    """Of a name that several tracks gave, the first."""
-    return one.name.partition("+")[0]
+    """Of a name that several tracks gave, as `0007+2`, the first."""
+    return literal(re.sub(r"\+\d+$", "", one.name))
 
 
 def _scale_bar(axes: Any, bounds: tuple[np.ndarray, np.ndarray]) -> None:

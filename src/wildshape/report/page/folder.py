@@ -245,6 +245,7 @@ def _completed_only(result: TrackResult) -> ReportObject:
         clouds=() if shape is None else (Cloud("completed", shape),),
         box=box_of(entry),
         details=_details(entry),
+        sensor=result.sensor,
         scans=scans_of(result),
     )
 

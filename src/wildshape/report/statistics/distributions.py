@@ -48,8 +48,8 @@ class RunningDistribution:
         towards /= np.maximum(distance, 1e-9)[:, None]
         starts = np.concatenate(([0], np.cumsum(sizes)[:-1]))
         middle = np.repeat(starts + sizes // 2, sizes)
-        cosine = np.einsum("si,si->s", towards, towards[middle])
-        turn = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+        half = np.linalg.norm(towards - towards[middle], axis=1) / 2
+        turn = np.degrees(2 * np.arcsin(np.minimum(half, 1.0)))  # by the cosine 0 was 8.5e-07
         ranges, azimuth, elevation, turns = self.seen
         _add_direction((ranges, azimuth, elevation), towards, distance)
         turns.add(np.maximum.reduceat(turn, starts))

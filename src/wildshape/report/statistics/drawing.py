@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from wildshape.io.progress import literal
 from wildshape.report.content import BLUE, GREY, ORANGE
 from wildshape.report.statistics.statistics import Quantity, Statistics
 
@@ -26,12 +27,6 @@ def number(value: float) -> str:
     if abs(value) >= 100:
         return f"{value:,.0f}"
     return f"{float(f'{value:.3g}'):zg}"
-
-
-def literal(text: str) -> str:
-    """Text that matplotlib draws as it is: no formulas, no control characters."""
-    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
-    return shown.replace("$", r"\$")
 
 
 def draw_bars(axes: "Axes", quantity: Quantity) -> None:

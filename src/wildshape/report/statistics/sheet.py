@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from wildshape.inference.registration import to_middle
 from wildshape.io.atomic import atomic_write
-from wildshape.io.progress import counted
+from wildshape.io.progress import counted, literal
 from wildshape.records import Track
 from wildshape.report.content import Cell, Figure, Report, ReportObject, Table, track_object
 from wildshape.report.page.html import write_report
@@ -20,7 +20,6 @@ from wildshape.report.statistics.drawing import (
     SOFT,
     draw_panel,
     is_rose,
-    literal,
     number,
     panels_of,
 )

@@ -12,11 +12,10 @@ from jaxtyping import Float
 from wildshape.datasets.tracks.truth import fuse_by_truth
 from wildshape.evaluation.pictures import project
 from wildshape.geometry.sampling import thin
-from wildshape.io.progress import counted
+from wildshape.io.progress import counted, literal
 from wildshape.records import Points, Track
 from wildshape.report.content import GREEN, GREY, ORANGE
 from wildshape.report.scene import upright
-from wildshape.report.statistics.drawing import literal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -201,7 +201,8 @@ class DrivePage:
         assert self.drive is not None
         scan, boxes = self.drive.scan(frame), self.boxes.get(frame, {})
         drawn = thinned(frame, scan, boxes, _CONFIG.points_a_scan)
-        height = drawn.points[:, 2] + self.found.ground_m
+        height = drawn.points @ self.found.T_level_sensor[frame].rotation.numpy()[2]
+        height += self.found.ground_m
         grey = (70 + 130 * np.clip(height / 4, 0, 1))[:, None]
         bright = [0.45 * np.array(colour_of(number)) + 140 for number in range(len(self.names))]
         own = np.array([*bright, np.zeros(3)])[drawn.owners]

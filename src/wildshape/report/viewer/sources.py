@@ -11,7 +11,7 @@ import numpy as np
 from wildshape.datasets.tracks.truth import shape_partial, whole_shape
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
-from wildshape.records import Box, Points, Track, as_text
+from wildshape.records import Box, Points, Sensor, Track, as_text
 from wildshape.report.results import (
     OBJECTS,
     Inputs,
@@ -143,5 +143,6 @@ def _track(result: TrackResult) -> Track:
         if not names:
             raise BadInputError(f"{result.folder}: neither its scans nor shapes can be read.")
         said = "its scans cannot be read by their names, or changed since; --inputs names them"
-        return Track(result.folder.name, empty, names, source=said)
+        sensor = Sensor(result.sensor)
+        return Track(result.folder.name, empty, names, sensor=sensor, source=said)
     return result.track

@@ -106,6 +106,7 @@ def _transform(rr: Any, T: SE3) -> Any:
 
 def _scan(rr: Any, moment: Moment, ground_m: float) -> Any:
     """Grey, brighter the higher above the ground."""
-    share = np.clip((moment.scan[:, 2:] + ground_m) / 4.0, 0.0, 1.0)
-    grey = (70 + 150 * share).astype(np.uint8)
-    return rr.Points3D(moment.scan, colors=np.repeat(grey, 3, axis=1), radii=_SCAN_DOT_M)
+    height = moment.scan @ moment.T_level_sensor.rotation.numpy()[2] + ground_m
+    grey = (70 + 150 * np.clip(height / 4.0, 0.0, 1.0)).astype(np.uint8)
+    colours = np.repeat(grey[:, None], 3, axis=1)
+    return rr.Points3D(moment.scan, colors=colours, radii=_SCAN_DOT_M)
