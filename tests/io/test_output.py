@@ -33,6 +33,7 @@ def test_says_what_is_needed_to_do_it_again() -> None:
         ("wildshape.cli.__main__", "/x/__main__.py", "wildshape OUT --seed 1"),
         ("experiments.tables.__main__", "/x/a.py", "python -m experiments.tables OUT --seed 1"),
         (None, "examples/a.py", "python examples/a.py OUT --seed 1"),
+        (None, "", "python OUT --seed 1"),  # typed into Python itself
     ],
 )
 def test_what_another_program_made_is_not_said_to_be_a_command_of_ours(
