@@ -5,8 +5,8 @@
     python benchmarks/bench_encoder.py [--small]
 
 `winners` is what training on a CPU uses, `dense` is autograd through the same module, `literal` is
-Conv1d with the pooled feature copied to each point. Clouds are drawn with replacement from scans of
-half as many more points, as training draws them. All have the allocator's setting of training;
+Conv1d with the pooled feature copied to each point. Clouds are drawn with replacement, as training
+draws them, from scans of 1.14 times as many points. All have the allocator's setting of training;
 bench_step.py has one row without. Gradients are compared in float64.
 """
 

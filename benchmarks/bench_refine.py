@@ -72,8 +72,8 @@ def measure_clusters(outcome: Outcome, seconds: float) -> None:
 
 def main() -> None:
     arguments = begin(options(__doc__))
-    print(header("bench_refine.py"))
     torch.set_num_threads(1)
+    print(header("bench_refine.py"))
     outcome = Outcome("refine")
     seconds = 1.5 if arguments.small else 10.0
     measure_refinement(outcome, 4 if arguments.smoke else 32, seconds)

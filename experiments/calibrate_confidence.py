@@ -18,12 +18,11 @@ from pathlib import Path
 
 import numpy as np
 import torch
-import tyro
 from experiments.confidence import rewrite
+from experiments.tables.command import begin
 from experiments.trust_data import Both, Known
 from experiments.trust_parts import STREETS, Parts
 
-from wildshape.cli.main import in_a_sentence
 from wildshape.errors import BadInputError
 from wildshape.evaluation.calibration import auroc, calibration
 from wildshape.io.atomic import write_json
@@ -72,8 +71,8 @@ class Settings:
     workers: int = 1
 
 
-def main(settings: Settings) -> None:
-    """Complete, fit, hold, write."""
+def main(settings: Settings, command: str) -> None:
+    """Complete, fit, hold, write; the command line says how it came about."""
     settings.out.mkdir(parents=True, exist_ok=True)
     model = weights_file(settings.model)
     parts = Parts(settings.out, model, settings.streets, settings.share)
@@ -94,8 +93,7 @@ def main(settings: Settings) -> None:
         "scan": held(trust.scan, scans, _scans(others), OF_SCAN),
         "track": held(trust.track, tracks, _tracks(others), OF_TRACK),
     }
-    line = "python -m experiments.calibrate_confidence --out OUT"
-    report = {"trust": asdict(trust), "held": said, "provenance": provenance(line)}
+    report = {"trust": asdict(trust), "held": said, "provenance": provenance(command)}
     write_json(settings.out / "trust.json", report)
     if settings.write is not None:
         rewrite(model, settings.write, trust=trust)
@@ -180,5 +178,4 @@ def _figures(name: str, parts: list[tuple[Known, np.ndarray]]) -> dict[str, dict
 
 if __name__ == "__main__":
     torch.set_num_threads(1)
-    with in_a_sentence():
-        main(tyro.cli(Settings))
+    begin(main, Settings, "experiments.calibrate_confidence")

@@ -22,6 +22,7 @@ from typing import Any, Literal
 import numpy as np
 import tyro
 from experiments.meshes import unseen_vehicles
+from experiments.tables.command import commit
 
 from wildshape.cli.main import in_a_sentence
 from wildshape.io.atomic import write_text
@@ -126,7 +127,7 @@ def _table(out: Path, seeds: list[str], everything: str, scans: int) -> str:
     said = ", ".join(
         f"{name} {seconds / (scans * _PERIOD_S):.2f}" for name, seconds in stages.items()
     )
-    made = ", ".join(sorted({record["provenance"]["code"][:7] for record in records}))
+    made = ", ".join(sorted({commit(record["provenance"]["code"]) for record in records}))
     return "\n".join(lines) + (
         f"\n\nSeconds a second of drive, mean, by stage: {said}.\n\nFound at commit {made}.\n"
     )

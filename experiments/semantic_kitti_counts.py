@@ -10,24 +10,32 @@ Reads labels alone (data_odometry_labels.zip, 179 MB); minutes. What `convert` w
 "car bus truck other-vehicle, scans of >= 100 points", less what it counts as left out.
 """
 
-import sys
 from pathlib import Path
+
+import tyro
 
 from wildshape.cli.main import in_a_sentence
 from wildshape.datasets.semantic_kitti.labels import (
+    LABELS_CURE,
     VEHICLES,
     categories_of,
     count_points,
-    label_files,
 )
 from wildshape.datasets.semantic_kitti.reader import SPLITS, SemanticKitti
 from wildshape.datasets.semantic_kitti.sequence import find_sequences
+from wildshape.datasets.tracks.parts import numbered
 
 PAPER = {"train": (659, 51186), "test": (229, 16299)}
 MEAN = 512
 
 
-def main(root: Path) -> None:
+def main(root: tyro.conf.Positional[Path]) -> None:
+    """Print the counts of each split under each reading.
+
+    Args:
+        root: SemanticKITTI's folder.
+    """
+    SemanticKitti(root).parts()  # refuses what has no labels
     found = find_sequences(root)
     for split in ("train", "test"):
         names = [name for name in SPLITS[split] if name in found]
@@ -36,7 +44,7 @@ def main(root: Path) -> None:
         objects = [
             (chosen[label & 0xFFFF].category, list(points.values()))
             for name in names
-            for label, points in count_points(label_files(found[name] / "labels"), chosen).items()
+            for label, points in count_points(_label_files(found[name]), chosen).items()
         ]
         instances, scans = PAPER[split]
         print(f"{split}: the paper has {instances} instances, {scans} scans", end="")
@@ -47,6 +55,10 @@ def main(root: Path) -> None:
                 print(f"  {' '.join(categories)}, scans of >= {least} points: {row}")
 
 
+def _label_files(sequence: Path) -> dict[int, Path]:
+    return numbered(sequence / "labels", ".label", f"no .label files; {LABELS_CURE}")
+
+
 def count(objects: list[list[int]], least: int) -> str:
     kept = [[n for n in points if n >= least] for points in objects]
     kept = [points for points in kept if points and sum(points) >= MEAN * len(points)]
@@ -55,5 +67,4 @@ def count(objects: list[list[int]], least: int) -> str:
 
 if __name__ == "__main__":
     with in_a_sentence():
-        SemanticKitti(Path(sys.argv[1])).parts()
-        main(Path(sys.argv[1]))
+        tyro.cli(main)

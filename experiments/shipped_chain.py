@@ -293,7 +293,8 @@ def _trusted(model: Path, settings: Settings) -> Path:
             write=written,
             streets=calibrate_confidence.STREETS[: settings.part(8, least=2)],
             share=settings.share,
-        )
+        ),
+        settings.command,
     )
     return written
 

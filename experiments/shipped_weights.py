@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.mesh_credits import rows_of
-from experiments.tables.command import begin
+from experiments.tables.command import begin, commit
 
 from experiments import by_kind
 from wildshape.cli.main import main
@@ -165,7 +165,7 @@ def page(out: Path, done: list[Drives], command: str) -> str:
     """The tables of what is finished."""
     found = [_metrics(out / data.name, way)["provenance"] for data in done for way in data.measured]
     made = {
-        f"commit {one['code'][:7]}, {one['time_utc'][:10]}, {one['hardware']['cpu']}"
+        f"commit {commit(one['code'])}, {one['time_utc'][:10]}, {one['hardware']['cpu']}"
         for one in found
     }
     head = (

@@ -120,6 +120,8 @@ def ship(model: Path, settings: Settings) -> None:
     """The same checkpoint in half precision, as the package carries it."""
     network, found = load_checkpoint(model)
     stages = f"--steps {settings.steps} --taught-steps {settings.taught_steps}"
+    same = settings.taught_lr == Settings.taught_lr
+    stages += "" if same else f" --taught-lr {settings.taught_lr:g}"
     stages += " --headings DEFAULT" if settings.headings else ""
     stages += "" if settings.device == "cpu" else f" --device {settings.device}"
     what = f"--category {settings.category} --cad CAD --out RUN {stages} --seed {settings.seed}"

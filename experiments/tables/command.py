@@ -14,6 +14,11 @@ from wildshape.cli.main import in_a_sentence
 SettingsT = TypeVar("SettingsT")
 
 
+def commit(code: str) -> str:
+    """A `code` of provenance as pages say it: seven digits, and whether there were changes."""
+    return f"{code[:7]}{' with changes' if code.endswith('changes') else ''}"
+
+
 def begin(run: Callable[[SettingsT, str], None], settings: type[SettingsT], module: str) -> None:
     """Run a script with the settings of its command line, and tell it that line.
 

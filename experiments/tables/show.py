@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from experiments.tables.command import commit
 from experiments.tables.data import as_values
 from experiments.tables.measure import Measured
 from experiments.tables.table import Block, Row, Table, Trained
@@ -59,12 +60,20 @@ def markdown(table: Table, parts: Sequence[Part], command: str, made: dict[str, 
     where = f"{made['hardware']['cpu']}, {made['hardware']['gpu'] or 'no GPU'}"
     head = [
         f"# {table.title}",
-        f"`{command}`, commit {made['code'][:12]}, {made['time_utc']}, {where}.",
+        f"`{command}`, commit {_commits(parts)}, {made['time_utc']}, {where}.",
         "Mean ± standard deviation over training seeds (over turns for rows that are not trained)."
         " † printed by the paper, on other data: a ratio may be looked at, no common benchmark.",
     ]
     foot = "\n".join(f"- {note}" for note in table.notes)
     return "\n\n".join([*head, *(_part(part) for part in parts), *([foot] if foot else [])]) + "\n"
+
+
+def _commits(parts: Sequence[Part]) -> str:
+    """All that trained or measured a row: what is finished is found again by later ones."""
+    rows = [one for part in parts for _, measured in part.rows for one in measured]
+    codes = {one.made["code"] for one in rows}
+    codes |= {one.model.made["provenance"]["code"] for one in rows if one.model}
+    return ", ".join(sorted(map(commit, codes)))
 
 
 def _part(part: Part) -> str:

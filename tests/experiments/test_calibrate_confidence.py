@@ -2,16 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """What probabilities are fitted to: truth of objects, fronts that most agree on, parts left out."""
 
+import json
 import math
 
 import numpy as np
 import pytest
 import torch
 from experiments.calibrate_confidence import Settings, fit, held, main
-from experiments.trust_data import Known
+from experiments.trust_data import Both, Known
 from experiments.trust_parts import Parts
 from tests.models import CONFIG, SETTINGS
 
+from experiments import calibrate_confidence
 from wildshape.errors import BadInputError
 from wildshape.io.write_tracks import write_tracks
 from wildshape.method.checkpoint import save_checkpoint
@@ -72,4 +74,17 @@ def test_what_other_weights_completed_is_not_taken_for_these(cars, tmp_path):
 def test_data_of_one_name_are_not_taken_for_each_other(tmp_path, places):
     check = tuple(tmp_path / place for place in places)
     with pytest.raises(BadInputError, match="other data are called"):
-        main(Settings(tmp_path / "out", check=check))
+        main(Settings(tmp_path / "out", check=check), "the command")
+
+
+def test_figures_say_by_which_command_they_are(tmp_path, monkeypatch):
+    """Also which data they are of: other calls' are of others."""
+    parts = {f"street{seed}": Both(*[known(seed, 90)] * 3) for seed in range(3)}
+    monkeypatch.setattr(Parts, "simulated", lambda *_: parts)
+    for name in ("OF_SCAN", "OF_TRACK"):
+        monkeypatch.setattr(calibrate_confidence, name, OF_SCAN)
+    monkeypatch.setattr(calibrate_confidence, "TrackFeatures", ScanFeatures)
+    main(Settings(tmp_path), "the command --unseen 45")
+    made = json.loads((tmp_path / "trust.json").read_text("utf-8"))
+    assert made["provenance"]["command"] == "the command --unseen 45"
+    assert made["held"]["scan"]["streets"]["pose"]["n"] == 3 * 60

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Experiments end as commands do: with one sentence where the input is bad, never a traceback."""
 
+import importlib
 import subprocess
 import sys
 from pathlib import Path
@@ -25,7 +26,8 @@ def test_a_missing_file_is_one_sentence(tmp_path, command):
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
-def test_every_script_ends_so(script):
+def test_every_script_finds_what_it_imports_and_ends_so(script):
+    importlib.import_module(f"experiments.{script.stem}")
     text = script.read_text("utf-8")
     if '__name__ == "__main__"' not in text:
         return

@@ -6,7 +6,7 @@ import json
 from dataclasses import replace
 
 import pytest
-from experiments.shipped_weights import PAGE, Settings, drives, run  # pyright: ignore
+from experiments.shipped_weights import PAGE, Drives, Settings, drives, page, run  # pyright: ignore
 
 from experiments import shipped_weights  # pyright: ignore
 
@@ -38,14 +38,14 @@ def test_the_page_has_every_row_and_is_made_once(two_sets, tmp_path, cad, half_w
     half_written(tmp_path / "share-0.01" / "cad")
     settings = Settings(tmp_path, cad, share=0.01)
     run(settings, "the command")
-    page = (tmp_path / "share-0.01" / PAGE).read_text("utf-8")
-    first, second = page.split("\n## ")[1:]
+    text = (tmp_path / "share-0.01" / PAGE).read_text("utf-8")
+    first, second = text.split("\n## ")[1:]
     for name in ("identity", "one-scan", "local-icp", "wildshape", "wildshape, track"):
         assert f"\n| {name} | " in first
         assert f"\n| {name} | " in second
     assert "\n| wildshape, not refined | " in first
     assert "\n| car | 4 | " in second, "by kind"
-    assert "the command" in page
+    assert "the command" in text
     made = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("metrics.json")}
     assert len(made) == 4
     run(settings, "the command")
@@ -57,3 +57,12 @@ def test_the_page_has_every_row_and_is_made_once(two_sets, tmp_path, cad, half_w
     run(settings, "the command")
     new = {path.parent for path in made if path.stat().st_mtime_ns != made[path]}
     assert new == {other}
+
+
+def test_the_page_says_where_the_code_that_measured_had_changes(tmp_path):
+    (tmp_path / "some-none").mkdir()
+    made = {"code": f"{'0f' * 20} with changes", "time_utc": "2026-11-30", "hardware": {"cpu": "x"}}
+    found = json.dumps({"methods": {}, "provenance": made})
+    (tmp_path / "some-none" / "metrics.json").write_text(found, "utf-8")
+    some = Drives("some", "Some", (), {"none": ()})
+    assert "Measured at commit 0f0f0f0 with changes, 2026-11-30, x. " in page(tmp_path, [some], "")

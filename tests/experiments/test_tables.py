@@ -14,10 +14,11 @@ from experiments.tables import data, ladder, make, train  # pyright: ignore
 from experiments.tables.__main__ import TABLES, Settings, main  # pyright: ignore
 from experiments.tables.data import Simulated, as_values, store_of  # pyright: ignore
 from experiments.tables.measure import Measured, as_results  # pyright: ignore
-from experiments.tables.show import Part, record  # pyright: ignore
+from experiments.tables.show import Part, markdown, record  # pyright: ignore
 from experiments.tables.size import SIZES, sized  # pyright: ignore
 from experiments.tables.sources import Sources  # pyright: ignore
-from experiments.tables.table import Trained  # pyright: ignore
+from experiments.tables.table import Baseline, Block, Table, Trained  # pyright: ignore
+from experiments.tables.train import Model  # pyright: ignore
 from experiments.tables.tsne import tsne  # pyright: ignore
 from PIL import Image
 from tests.cars import drive_by
@@ -243,6 +244,18 @@ def test_rows_of_equal_names_in_other_blocks_are_all_recorded():
     ]
     trained = [as_values(r.data) for b in table.blocks for r in b.rows if isinstance(r, Trained)]
     assert [one for one in found if one] == trained
+
+
+def test_a_page_names_every_commit_that_trained_or_measured_a_row():
+    """Rows are found again, so that the commit that prints them need not be one of these."""
+    clean, changed, printing = ("a" * 40, f"{'b' * 40} with changes", "c" * 40)
+    found = run({"m": OneScan()}, [drive_by(scans=2, points=60)])
+    model = Model(Path("m"), {"provenance": {"code": changed}})
+    block = Block("b", Sources(SIZES["test"]).drives("test"), (row := Baseline("m"),))
+    part = Part(block, "none", ((row, (Measured(found, {"code": clean}, model),)),), {})
+    made = {"code": printing, "time_utc": "today", "hardware": {"cpu": "x", "gpu": None}}
+    page = markdown(Table("t", (block,), 1), [part], "the command", made)
+    assert "\n`the command`, commit aaaaaaa, bbbbbbb with changes, today, x, no GPU.\n" in page
 
 
 def test_scores_are_read_as_they_were_written():

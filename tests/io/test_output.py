@@ -4,6 +4,7 @@ import json
 import shutil
 import subprocess
 import sys
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from tests.stopping import stopped_at
 from wildshape.errors import BadInputError, LostWorkersError
 from wildshape.io import output
 from wildshape.io.earlier import EARLIER
-from wildshape.io.output import MARKER, Output, begin, finished, provenance
+from wildshape.io.output import MARKER, Output, begin, command_line, finished, provenance
 
 
 def test_says_what_is_needed_to_do_it_again() -> None:
@@ -23,6 +24,25 @@ def test_says_what_is_needed_to_do_it_again() -> None:
     assert data["time_utc"].endswith("+00:00")
     assert {"wildshape", "code", "python", "torch", "numpy"} <= data.keys()
     assert json.loads(json.dumps(data)) == data
+
+
+@pytest.mark.parametrize(
+    ("module", "program", "said"),
+    [
+        (None, "/usr/bin/wildshape", "wildshape OUT --seed 1"),
+        ("wildshape.cli.__main__", "/x/__main__.py", "wildshape OUT --seed 1"),
+        ("experiments.tables.__main__", "/x/a.py", "python -m experiments.tables OUT --seed 1"),
+        (None, "examples/a.py", "python examples/a.py OUT --seed 1"),
+        (None, "", "python OUT --seed 1"),  # typed into Python itself
+    ],
+)
+def test_what_another_program_made_is_not_said_to_be_a_command_of_ours(
+    module: str | None, program: str, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = module and ModuleSpec(module, None)
+    monkeypatch.setattr(sys.modules["__main__"], "__spec__", spec)
+    monkeypatch.setattr(sys, "argv", [program, "OUT", "--seed", "1"])
+    assert command_line() == said
 
 
 @pytest.mark.skipif(shutil.which("git") is None, reason="no git")

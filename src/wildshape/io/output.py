@@ -198,8 +198,12 @@ def unfinished(path: Path, command: str) -> bool:
 
 
 def command_line() -> str:
-    """As a user would type it again."""
-    return shlex.join(["wildshape", *sys.argv[1:]])
+    """As a user would type it again, of the program that runs: Wildshape's, or what imports it."""
+    spec = getattr(sys.modules["__main__"], "__spec__", None)
+    module = spec.name.removesuffix(".__main__") if spec else ""
+    ours = "wildshape" in (module.partition(".")[0], Path(*sys.argv[:1]).stem)
+    other = ("python", "-m", module) if module else ("python", *filter(None, sys.argv[:1]))
+    return shlex.join([*(("wildshape",) if ours else other), *sys.argv[1:]])
 
 
 def file_name(name: str) -> str:
