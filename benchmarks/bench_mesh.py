@@ -28,7 +28,7 @@ from wildshape.records import Points
 from wildshape.simulate.generate import SimulationConfig, simulate_tracks
 
 WATERTIGHT_BAR, HAUSDORFF_BAR_M = 0.99, 0.05
-SAMPLES, NEIGHBOURS, DEPTH = 30_000, 24, 6
+SAMPLES, NEIGHBOURS, DEPTH = 300_000, 24, 6  # of 30,000 the mesh seemed 2 mm farther
 Mesher = Callable[[Points], trimesh.Trimesh]
 Case = tuple[Points, Points]
 
