@@ -96,6 +96,15 @@ def test_units_apply_to_everything(said_by: str, track: Track, tmp_path: Path) -
     torch.testing.assert_close(poses_of(found).matrix, poses.matrix)
 
 
+def test_a_unit_that_track_json_alone_names_is_named_as_what_to_drop(
+    track: Track, tmp_path: Path
+) -> None:
+    write_track(tmp_path / "t", track)
+    info = tmp_path / "t" / "track.json"
+    info.write_text(info.read_text().replace('"unit": "m"', '"unit": "mm"'))
+    refused(read_track, tmp_path / "t", match='drop --unit, or the "unit" of its track.json')
+
+
 def _camera(key: str, value: str) -> str:
     """track.json of a camera with one value replaced."""
     values = dict.fromkeys(("fx", "fy", "cx", "cy", "width", "height"), "7") | {key: value}

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Data that cannot teach are told before the training, and others are not."""
 
+import sys
 from dataclasses import replace
 
 import pytest
@@ -111,3 +112,13 @@ def test_true_poses_the_wrong_way_round_are_told(cars, tmp_path, teacher):
         train(tmp_path / name, tmp_path / f"{name}.run", options, Heard())
     (said,) = (text for text in heard if "true poses" in text)
     assert said.startswith(f"{tmp_path / 'turned'}: ")
+
+
+def test_training_needs_none_of_the_libraries_of_other_commands(tmp_path, car_store, monkeypatch):
+    for name in ("scipy", "trimesh", "small_gicp", "skimage", "laspy", "matplotlib", "PIL"):
+        for loaded in [one for one in sys.modules if one.split(".")[0] == name]:
+            monkeypatch.delitem(sys.modules, loaded)
+        monkeypatch.setitem(sys.modules, name, None)  # importing it is an ImportError
+    run = tmp_path / "run"
+    train(car_store.path, run, TrainingOptions("tiny", steps=1), Silent())
+    assert (run / "model.safetensors").is_file()

@@ -5,6 +5,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Literal
 
 import numpy as np
@@ -60,7 +61,8 @@ def truth_figures(
 ) -> dict[str, float]:
     """Registration and completion of held-out tracks against their truth, where they have it.
 
-    A view on the run for those who look; nothing is chosen by it.
+    A view on the run for those who look; nothing is chosen by it. None without scipy, which
+    evaluation needs, but training does not.
 
     Args:
         network: in evaluation.
@@ -72,7 +74,7 @@ def truth_figures(
     """
     known = [int(t) for t in tracks if store.poses_of(int(t)) is not None]
     known = known[: config.truth_tracks]
-    if not known:
+    if not known or not find_spec("scipy"):
         return {}
     method = {"held out": Learned(Predictor(network, settings))}
     found = protocol.run(

@@ -9,10 +9,13 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+import torch
+from jaxtyping import Float
 
 from wildshape.errors import BadInputError
 from wildshape.geometry.box import extent
 from wildshape.geometry.sampling import radius_inliers, statistical_inliers, voxel_thin
+from wildshape.ops.nearest import nearest
 from wildshape.records import Points, Track
 
 _VOXEL_M, _SMALL_M = 0.04, 2.4
@@ -92,8 +95,6 @@ def misplaced(track: Track) -> str:
     Raises:
         BadInputError: the track has no poses.
     """
-    from scipy.spatial import KDTree
-
     finite = [scan[np.isfinite(scan).all(axis=1)] for scan in track.scans]
     track = replace(track, scans=tuple(finite))
     points = fuse_by_truth(track)
@@ -108,10 +109,16 @@ def misplaced(track: Track) -> str:
             return "its true poses do not bring its scans together"
         return ""
     some = points[:: -(-len(points) // _LOOKED_AT)]
-    off = float(np.median(KDTree(track.shape).query(some)[0]))
+    off = float(np.median(_distances(some, track.shape)))
     if off <= _OFF * min(extent(points), extent(track.shape)):
         return ""
     return f"by its true poses its scans lie {off:.3g} m off its true shape"
+
+
+def _distances(points: Points, shape: Points) -> Float[np.ndarray, "n"]:
+    """From each point to the nearest of a shape, metres; training looks, too, and has no scipy."""
+    found = nearest(torch.as_tensor(points)[None].float(), torch.as_tensor(shape)[None].float())
+    return found.distance_squared[0].sqrt().numpy()
 
 
 def _spanned_if_inverted(track: Track) -> float:

@@ -271,8 +271,8 @@ def check_one_object(points: Float[np.ndarray, "n 3"], name: str) -> None:
         raise BadInputError(
             f"{name}: {extent:.4g} m across, but a scan of one object is at least "
             f"{_SMALLEST_EXTENT:g} m: "
-            "normalised coordinates (write them in metres), or a unit that does not fit "
-            "(drop --unit mm if the file is in metres)."
+            "normalised coordinates (write them in metres), or a unit that does not fit (if the "
+            'file is in metres, drop --unit, or the "unit" of its track.json or header).'
         )
     if extent > LARGEST_EXTENT_M:
         raise BadInputError(
