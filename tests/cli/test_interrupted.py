@@ -14,6 +14,7 @@ import torch
 from safetensors.torch import load_file
 from tests.cli.processes import running, wait_for
 
+from wildshape import __version__
 from wildshape.io.scans.points import read_points
 from wildshape.io.store.layout import JOINING_JSON
 from wildshape.io.store.store import Store
@@ -31,6 +32,14 @@ class Finder:
 signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.meta_path.insert(0, Finder)
 runpy.run_module(sys.argv[1], run_name="__main__")
+"""
+_STOPPED_EXIT = """
+import atexit, runpy, signal, sys
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+atexit.register(signal.raise_signal, signal.SIGINT)
+sys.argv = ["wildshape", "--version"]
+runpy.run_module("wildshape", run_name="__main__")
 """
 
 
@@ -211,4 +220,13 @@ def test_ctrl_c_amid_the_first_imports_leaves_no_traceback(module):
     command = [sys.executable, "-c", _STOPPED_IMPORT, module]
     found = subprocess.run(command, capture_output=True, text=True)
     assert found.returncode == 130
+    assert not found.stderr
+
+
+def test_ctrl_c_on_the_way_out_leaves_no_traceback():
+    """The work is done, and said; Python's own end is what the signal meets."""
+    command = [sys.executable, "-c", _STOPPED_EXIT]
+    found = subprocess.run(command, capture_output=True, text=True)
+    assert found.returncode == -signal.SIGINT
+    assert found.stdout.strip() == __version__
     assert not found.stderr

@@ -51,6 +51,9 @@ def test_times_of_points_that_are_no_turn_s_are_not_used_and_told_of():
     [
         ("t", (1.7e9, 1.7e9), "cannot be used: from 1700000000 to 1700000000 is no turn"),
         ("ts", (-0.05, 0.05), "the field ts is not read as times of points"),
+        ("scalar_Time", (-0.05, 0.05), "the field scalar_Time is not read as times of points"),
+        ("GPSTime", (-0.05, 0.05), "the field GPSTime is not read as times of points"),
+        ("timestamp_ns", (0.0, 1e8), "the field timestamp_ns is not read as times of points"),
         ("t", (-0.05, 0.05), ""),
         ("intensity", (0.0, 1.0), ""),
     ],

@@ -13,7 +13,12 @@ from jaxtyping import Float, Num
 TIME_FIELDS = ("t", "time", "timestamp", "offset_time", "time_offset", "time_stamp", "gps_time")
 """Names of the fields that hold it, the likeliest first."""
 
-LIKE_TIMES = ("ts", "stamp", "dt", "delta_t", "Time", "Timestamp", "GpsTime", "time_ns", "time_us")
+LIKE_TIMES = (
+    *("ts", "stamp", "dt", "delta_t", "Time", "Timestamp", "GpsTime", "GPSTime"),
+    *("time_ns", "time_us", "timestamp_ns", "timestamp_us", "t_ns", "t_us"),
+    # CloudCompare puts this before the name of every field of a PLY.
+    *(f"scalar_{name}" for name in (*TIME_FIELDS, "Time", "Timestamp", "GpsTime", "GPSTime")),
+)
 """Names under which times may stand, too, but which are not read."""
 
 _UNITS = (1.0, 1e-3, 1e-6, 1e-9)
