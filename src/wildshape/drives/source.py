@@ -243,7 +243,7 @@ def _beside(frame: int, times: Sequence[float], last: int) -> tuple[int, int]:
 
 
 def _ticks(
-    names: tuple[str, ...], times: Sequence[float] | None, told: str
+    names: tuple[str, ...], times: Sequence[float] | None, where: str
 ) -> tuple[tuple[int, ...], tuple[float, ...], tuple[str, ...]]:
     """When each scan was taken, in scans since the first, and a sentence if some are missing.
 
@@ -252,7 +252,7 @@ def _ticks(
     if times is not None:
         steps = _in_scans(np.diff(times))
     elif numbers := _numbers(names):
-        steps = _numbered(names, numbers, told)
+        steps = _numbered(names, numbers, where)
     else:
         steps = np.ones(len(names) - 1)
     ticks = _since_first(np.clip(np.rint(steps), 1, _LONGEST_PAUSE).astype(int))
@@ -270,7 +270,7 @@ def _numbers(names: tuple[str, ...]) -> Sequence[int | float]:
 
 
 def _numbered(
-    names: tuple[str, ...], numbers: Sequence[int | float], told: str
+    names: tuple[str, ...], numbers: Sequence[int | float], where: str
 ) -> Float[np.ndarray, "m"]:
     """Steps of names that count scans one by one, or by tens, or are stamps of a clock.
 
@@ -280,7 +280,7 @@ def _numbered(
     steps = np.array([after - before for before, after in pairwise(numbers)], np.float64)
     if (steps <= 0).any():
         raise BadInputError(
-            f"{told}: of {names[0]} to {names[-1]} some share a number; rename them."
+            f"{where}: of {names[0]} to {names[-1]} some share a number; rename them."
         )
     one_by_one = (steps == 1).any() and all(float(number).is_integer() for number in numbers)
     return steps if one_by_one else _in_scans(steps)
