@@ -49,6 +49,21 @@ def test_json_that_holds_half_a_character_is_spelt_out():
     assert Track("a", (), (), category="\ud83d").category == "\\ud83d"
 
 
+@pytest.mark.parametrize("name", ["wildshape.json", "n" * 252])
+def test_a_track_that_cannot_become_a_folder_is_refused_before_any_work(
+    refused, wildshape, dataset, trained, tmp_path, name
+):
+    """The tracks before it were done, and then: not a directory."""
+    data = renamed(dataset, tmp_path / "data", "z", "0.ply")
+    (data / "wildshape.json").unlink()
+    (data / "z").rename(data / name)
+    out = tmp_path / "out"
+    assert name[:60] in refused("complete", data, "--out", out, "--model", trained)
+    assert not out.exists()
+    done = wildshape("convert", "folder", data, out, "--layout", "folders")
+    assert (done.code, name[:60] in done.err, "become a file" in done.err) == (2, True, True)
+
+
 @pytest.mark.parametrize("layout", ["packed", "folders"])
 def test_converted_and_reported(wildshape, data, trained, tmp_path, layout):
     out = tmp_path / os.fsdecode(b"\xfcut")

@@ -149,3 +149,16 @@ def test_boxes_are_held_against_the_label_where_there_is_one():
     assert score.iou == pytest.approx(score.bev)
     off = (score.length_off_m, score.width_off_m, score.height_off_m)
     assert off == pytest.approx((0.4, -0.1, 0.0))
+
+
+def test_a_box_beside_the_true_one_is_turned_as_it_lies():
+    """Along the diagonal of a square, out of its corner; across it little would be shared."""
+    square = FittedBox(
+        torch.zeros(3).double(), torch.tensor((2.0, 2.0, 1.0)).double(), torch.eye(3).double()
+    )
+    half = math.radians(45) / 2
+    along = Box((1.0, 1.0, 0.0), (4.0, 0.4, 1.0), (math.cos(half), 0.0, 0.0, math.sin(half)))
+    score = box_score(along, square, SE3.identity())
+    shared = 2 * 0.4 - 0.4**2 / 4
+    assert score.bev == pytest.approx(shared / (4 + 4 * 0.4 - shared))
+    assert score.iou == pytest.approx(score.bev)

@@ -51,6 +51,7 @@ class Drive:
         cut_by: how its objects are cut out, for their files.
         motion: of the sensor at each frame, once known: scans are corrected by it.
         contents: of the files that scans are read from: their sizes, and a hash of some bytes.
+        path: as it was given, if it lies anywhere.
     """
 
     name: str
@@ -64,6 +65,7 @@ class Drive:
     cut_by: str = "without labels"
     motion: tuple[Twist, ...] | None = None
     contents: tuple[int | str, ...] = ()
+    path: Path | None = None
 
     @classmethod
     def of(
@@ -75,6 +77,7 @@ class Drive:
         T_world_sensor: SE3 | None = None,
         warnings: Sequence[str] = (),
         files: Iterable[Path] = (),
+        path: Path | None = None,
     ) -> "Drive":
         """A drive whose ticks come from the scans' times, or from their names if these count.
 
@@ -92,8 +95,8 @@ class Drive:
                     else "is not after the one before it; sort the scans in the order in which"
                     " they were taken"
                 )
-                raise BadInputError(f"{name}: time {row} ({after:.10g}) {wrong}.")
-        ticks, moments, missing = _ticks(names, times)
+                raise BadInputError(f"{path or name}: time {row} ({after:.10g}) {wrong}.")
+        ticks, moments, missing = _ticks(names, times, str(path or name))
         return cls(
             name=name,
             scan_names=names,
@@ -104,10 +107,16 @@ class Drive:
             T_world_sensor=T_world_sensor,
             warnings=(*warnings, *missing),
             contents=_contents(tuple(files)),
+            path=path,
         )
 
     def __len__(self) -> int:
         return len(self.scan_names)
+
+    @property
+    def told(self) -> str:
+        """What errors call it: its path, so that it is found."""
+        return str(self.path or self.name)
 
     @cached_property
     def scan_s(self) -> float | None:
@@ -234,7 +243,7 @@ def _beside(frame: int, times: Sequence[float], last: int) -> tuple[int, int]:
 
 
 def _ticks(
-    names: tuple[str, ...], times: Sequence[float] | None
+    names: tuple[str, ...], times: Sequence[float] | None, where: str
 ) -> tuple[tuple[int, ...], tuple[float, ...], tuple[str, ...]]:
     """When each scan was taken, in scans since the first, and a sentence if some are missing.
 
@@ -243,7 +252,7 @@ def _ticks(
     if times is not None:
         steps = _in_scans(np.diff(times))
     elif numbers := _numbers(names):
-        steps = _numbered(names, numbers)
+        steps = _numbered(names, numbers, where)
     else:
         steps = np.ones(len(names) - 1)
     ticks = _since_first(np.clip(np.rint(steps), 1, _LONGEST_PAUSE).astype(int))
@@ -260,7 +269,9 @@ def _numbers(names: tuple[str, ...]) -> Sequence[int | float]:
     return [] if any(_DATED.match(name) for name in names) else numbers_of(names)
 
 
-def _numbered(names: tuple[str, ...], numbers: Sequence[int | float]) -> Float[np.ndarray, "m"]:
+def _numbered(
+    names: tuple[str, ...], numbers: Sequence[int | float], where: str
+) -> Float[np.ndarray, "m"]:
     """Steps of names that count scans one by one, or by tens, or are stamps of a clock.
 
     Raises:
@@ -268,7 +279,9 @@ def _numbered(names: tuple[str, ...], numbers: Sequence[int | float]) -> Float[n
     """
     steps = np.array([after - before for before, after in pairwise(numbers)], np.float64)
     if (steps <= 0).any():
-        raise BadInputError(f"{names[0]} to {names[-1]}: scans share a number; rename them.")
+        raise BadInputError(
+            f"{where}: of {names[0]} to {names[-1]} some share a number; rename them."
+        )
     one_by_one = (steps == 1).any() and all(float(number).is_integer() for number in numbers)
     return steps if one_by_one else _in_scans(steps)
 

@@ -210,10 +210,10 @@ def file_name(name: str) -> str:
     """The name itself.
 
     Raises:
-        BadInputError: it is no plain file name, or leaves no room for a suffix.
+        BadInputError: it is no plain file name, or ours, or leaves no room for a suffix.
     """
     long = len(name.encode(errors="replace")) > _LONGEST_BYTES
-    if not name or Path(name).name != name or name.startswith(".") or "\0" in name or long:
+    if name[:1] in ("", ".") or name in MARKERS or Path(name).name != name or "\0" in name or long:
         said = f"{name[:_SHOWN]}..." if long else name
         raise BadInputError(f"'{said}': a track or scan of this name cannot become a file; rename.")
     return name

@@ -55,6 +55,21 @@ def test_a_long_drive_is_drawn_within_its_limits(found):
     assert (standing["speeds"][1], coming["speeds"][1]) == (0.0, 8.0)
 
 
+def test_a_vehicle_between_the_frames_drawn_is_drawn_where_it_is_fullest(found):
+    """Its row led to a scene without it."""
+    standing, coming = found.vehicles
+    short = replace(coming, frames=(3, 4), boxes=coming.boxes[3:5], points=(200, 100))
+    at_once = replace(short, frames=(3,), boxes=short.boxes[:1], points=(90,))
+    brief = replace(found, vehicles=(standing, short, at_once))
+    config = SceneConfig(frames=1)
+    scans = drawn_scans(brief, found.open_source(), config)
+    assert [scan.frame for scan in scans] == [0, 3]
+    assert [(scan.owners > 0).sum() > 100 for scan in scans] == [False, True]
+    vehicles = scene_data(brief, scans, config)["vehicles"]
+    assert [one["points"] for one in vehicles] == [[200, 200], [0, 200], [0, 90]]
+    assert all(any(one["places"]) for one in vehicles)
+
+
 def test_the_scene_s_points_lie_in_the_level_world_where_they_stand(found):
     """As the page unpacks them: little-endian int16 in steps along each axis, then the pose."""
     data = scene_data(found, drawn_scans(found, found.open_source()))

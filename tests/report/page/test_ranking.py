@@ -60,6 +60,30 @@ def test_an_object_that_was_registered_alone_counts_its_scans(tmp_path):
     assert dict(zip(table.columns, table.rows[0], strict=True))["measured"] == 2
 
 
+def test_objects_registered_alone_are_sorted_by_the_median_rotation(tmp_path):
+    found = [("a", 1, 0.1), ("a", 2, 0.2), ("a", 90, 0.9), ("b", 30, 0.5), ("c", 5, 0.4)]
+    rows = [{"track": t, "rotation_deg": turn, "translation_m": m} for t, turn, m in found]
+    method = {"name": "m", "completions": [], "registrations": rows}
+    (tmp_path / "scores.json").write_text(json.dumps({"runs": [{"methods": [method]}]}))
+    table = objects_of_scores(tmp_path / "scores.json", "m")
+    assert table is not None
+    assert table.rows == (
+        ("b", 1, "30.0", "0.50"),
+        ("c", 1, "5.0", "0.40"),
+        ("a", 3, "2.0", "0.20"),
+    )
+
+
+def test_the_worst_cd_of_an_object_is_beside_its_mean(tmp_path):
+    errors = [{"precision": 0.1, "coverage": one} for one in (0.1, 0.3)]
+    method = {"name": "m", "registrations": []}
+    method |= {"completions": [{"track": "a", "error": error} for error in errors]}
+    (tmp_path / "scores.json").write_text(json.dumps({"runs": [{"methods": [method]}]}))
+    table = objects_of_scores(tmp_path / "scores.json", "m")
+    assert table is not None
+    assert table.rows == (("a", 2, "0.300", "0.400"),)
+
+
 def test_a_probability_of_zero_counts_and_one_that_is_not_stated_does_not():
     entries = [{"p_pose": 0.0}, {"p_pose": 1.0}, {"p_pose": None}, {}]
     assert chances_of(entries) == {"heading right": 0.5}

@@ -68,6 +68,11 @@ def test_azimuth_is_the_side_that_is_seen(tmp_path):
     assert by["elevation"].tally.mean == pytest.approx(30.0)
 
 
+def test_the_viewpoint_changes_from_the_middle_scan_s(tmp_path):
+    _, by = described(packed(tmp_path / "store", [around(scans=8).part([0, 1, 2])]))
+    assert by["turn"].tally.most == pytest.approx(45.0)
+
+
 def test_a_scan_alone_is_seen_from_one_side(tmp_path):
     """By its rounding the picture drew a median change of 8.54e-07 degrees."""
     for number in range(8):
@@ -105,6 +110,17 @@ def test_a_sample_without_truth_is_said_once(tmp_path):
     assert by["range"].basis == "sensor's frame, middle of each scan; a sample of 1 of 3 tracks"
 
 
+def test_without_truth_the_longest_scan_is_measured(tmp_path):
+    whole = around(scans=1).scans[0]
+    half = whole[whole[:, 0] < whole[:, 0].mean()]
+    for scans in ((half, whole), (whole, half)):
+        found = statistics_of_store(
+            packed(tmp_path / str(len(scans[0])), [Track("t", scans, ("0", "1"))]), [0], print
+        )
+        by = {q.name: q.tally for q in found.quantities}
+        assert by["length"].mean == pytest.approx(4.0, abs=0.3)
+
+
 def test_a_cameras_axes_are_turned_to_forward_left_up(tmp_path):
     ahead = np.random.default_rng(0).normal((1.0, 2.0, 10.0), 0.05, (50, 3)).astype(np.float32)
     camera = Sensor("camera", intrinsics=Intrinsics(240.0, 240.0, 64.0, 64.0, 128, 128))
@@ -135,7 +151,8 @@ def test_what_scans_were_put_together_to_is_no_true_shape(tmp_path, kind):
 def test_where_only_some_have_their_truth_that_is_said(tmp_path):
     bare = [replace(around(name), T_sensor_object=None) for name in "bcd"]
     shaped = replace(around("a"), shape=np.eye(3, dtype=np.float32))
-    _, by = described(packed(tmp_path / "store", [shaped, *bare]))
+    found, by = described(packed(tmp_path / "store", [shaped, *bare]))
+    assert (found.with_poses, found.with_shape) == (1, 1)
     assert by["range"].basis == "object's frame, by truth; all tracks, 8 of 32 scans"
     assert by["length"].basis == "truth shapes; all tracks, 1 of 4 of these"
 
@@ -150,6 +167,8 @@ def test_folders_say_the_same_as_the_store(tmp_path):
     source = open_tracks(tmp_path / "folders")
     read = statistics_of_tracks(source, sample_of(len(source), 0), lambda _: None)
     assert (read.tracks, read.read, read.scans) == (4, 3, 8)
+    shaped = sum(track.shape is not None for track in tracks)
+    assert (read.with_poses, read.with_shape) == (3, shaped)
     assert set(read.unusable) == {"b/000001.ply", "d", "d/0.npy"}
     _, by = described(packed(tmp_path / "store", [tracks[0], tracks[2]]))
     few = statistics_of_tracks(source, [0, 2], lambda _: None)

@@ -66,6 +66,7 @@ def open_log(path: Path) -> Drive:
     told = f"{_POSES} lacks {lacking} of {len(stamps)} sweeps; none of its poses are taken"
     return Drive.of(
         name=path.resolve().name,
+        path=path,
         scan_names=[file.stem for file in files],
         read=_Sweeps(
             tuple(files),

@@ -139,6 +139,7 @@ def _drive(
             )
     return Drive.of(
         name=path.name or path.resolve().name,
+        path=path,
         scan_names=[file.stem for file in files],
         read=_Files(tuple(files), None if times is None else tuple(times)),
         times=times,

@@ -31,6 +31,7 @@ def open_recording(path: Path, topic: str | None = None) -> Drive:
     bag = open_bag(path, topic)
     return Drive.of(
         name=path.resolve().stem if path.is_file() else path.resolve().name,
+        path=path,
         scan_names=[f"{frame:06d}" for frame in range(len(bag.times))],
         read=bag,
         times=bag.times,
@@ -56,6 +57,7 @@ def open_packet_file(path: Path) -> Drive:
     described = path.with_suffix(".json")
     return Drive.of(
         name=path.stem,
+        path=path,
         scan_names=[f"{frame:06d}" for frame in range(len(times))],
         read=file,
         times=times,

@@ -65,6 +65,7 @@ def open_scene(path: Path) -> Drive:
     times = tuple(frame.microseconds / 1e6 for frame, _ in there)
     return Drive.of(
         name=path.name,
+        path=path,
         scan_names=[frame.name for frame, _ in there],
         read=_Sweeps(tuple(file for _, file in there), infos, times),
         times=times,

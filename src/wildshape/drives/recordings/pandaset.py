@@ -65,6 +65,7 @@ def open_pandaset(path: Path) -> Drive:
     T = stack([drive.sensor_pose(frame, time) for frame, time in zip(files, stamps)])
     return Drive.of(
         name=path.resolve().name,
+        path=path,
         scan_names=[f"{frame:02d}" for frame in files],
         read=_Sweeps(files, drive),
         times=stamps,

@@ -77,6 +77,7 @@ def open_segment(path: Path) -> Drive:
         raise BadInputError(f"{tables['vehicle_pose']}: holds no poses; copy it again.")
     return Drive.of(
         name=path.name,
+        path=path,
         scan_names=[str(time) for time in times],
         read=_Frames(path.parent, path.name, times),
         times=[time / 1e6 for time in times],

@@ -174,7 +174,7 @@ def find_detections(file: DetectionFile, drive: Drive) -> Detections:
     placed = sum(map(len, frames))
     if not placed:
         raise BadInputError(
-            f"{file.path}: its scans, for example '{vehicles[0].scan}', are none of {drive.name}'s,"
+            f"{file.path}: its scans, for example '{vehicles[0].scan}', are none of {drive.told}'s,"
             f" for example '{drive.scan_names[0]}'; name them alike."
         )
     warnings = [*_calibration_told(file), *_named_twice_told(frames, drive.scan_names)]

@@ -143,11 +143,11 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
     if not scans:
         drive.read(0)  # says why if it cannot be read
         raise BadInputError(
-            f"{drive.name}: its scans hold no points, or all of them are NaN; write them again."
+            f"{drive.told}: its scans hold no points, or all of them are NaN; write them again."
         )
     if all(_is_an_object(scan, config) for scan in scans):
         raise BadInputError(
-            f"{drive.name}: its scans are of single objects, cut out; drive needs the whole scans."
+            f"{drive.told}: its scans are of single objects, cut out; drive needs the whole scans."
             " For objects there is `wildshape complete --track`."
         )
     planes = [ground_plane(scan, config) for scan in scans]
@@ -158,13 +158,13 @@ def find_mounting(drive: Drive, config: MountingConfig) -> Mounting:
         share = _on_ground(scans, planes, config)
         if share <= _HANGING:
             raise BadInputError(
-                f"{drive.name}: the ground lies above the sensor, as if it hung upside down; turn"
+                f"{drive.told}: the ground lies above the sensor, as if it hung upside down; turn"
                 " the scans by 180 degrees about x, so that z points up."
             )
     found = np.array([plane for plane in planes if plane is not None])
     if not len(found):
         raise BadInputError(
-            f"{drive.name}: no ground is seen below the sensor; the scans must be full ones in the"
+            f"{drive.told}: no ground is seen below the sensor; the scans must be full ones in the"
             " sensor's frame, metres, z up."
         )
     height = float(np.median(found[:, 3]))

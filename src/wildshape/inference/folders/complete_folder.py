@@ -192,6 +192,8 @@ def write_results(
     earlier: list[tuple[str, str]] = []
     sums: list[int] = []  # of the scans that are under way, in order
     summary = FolderSummary(output.path, "registered" if registers else "completed")
+    for name in source.names:
+        file_name(name)  # before any work
 
     def done(name: str) -> bool:
         before = _written_before(output.path / file_name(name) / OBJECTS)

@@ -34,7 +34,7 @@ class SceneConfig:
     """How much of a drive is drawn: a page of it stays below 25 MB.
 
     Attributes:
-        frames: at most so many, evenly spread.
+        frames: at most so many, evenly spread, and one for each vehicle that is in none of them.
         points: of all frames drawn.
         points_a_scan: at most.
         points_a_vehicle: at most, of those in a scan.
@@ -78,12 +78,20 @@ def drawn_scans(
     helpers: Team = ALONE,
 ) -> list[DrawnScan]:
     """The scans that are drawn, read one by one; without the recording they have no points."""
-    step = -(-len(found) // config.frames) or 1
-    frames = range(0, len(found), step)
+    frames = _drawn_frames(found, config)
     most = min(config.points_a_scan, config.points // max(1, len(frames)))
     if drive is None:
         return [thinned(frame, _NO_POINTS, {}, most, config) for frame in frames]
     return list(helpers.in_order(_Drawing(drive, boxes_by_frame(found), most, config), frames))
+
+
+def _drawn_frames(found: FinishedDrive, config: SceneConfig) -> list[int]:
+    step = -(-len(found) // config.frames) or 1
+    frames = set(range(0, len(found), step))
+    for one in found.vehicles:
+        if frames.isdisjoint(one.frames):
+            frames.add(one.fullest)
+    return sorted(frames)
 
 
 @dataclass(frozen=True)

@@ -138,7 +138,8 @@ def objects_of_scores(scores: Path, method: str) -> Table | None:
     if not {**cds, **turns}:
         return None
     order = sorted(
-        {**cds, **turns}, key=lambda name: (-_mean(cds.get(name)), -_mean(turns.get(name)))
+        {**cds, **turns},
+        key=lambda name: (-_mean(cds.get(name)), -float(np.median(turns.get(name) or 0.0))),
     )
     columns, rows = _without_empty(
         (
