@@ -112,7 +112,7 @@ def test_an_output_stays_where_nothing_can_replace_it(wildshape, refused, datase
         command = (verb, "folder", dataset, out, "--layout", "folders")
     assert wildshape(*command).code == 0
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
-    assert "--unit mm" in refused(*command, "--overwrite", "--unit", "mm")
+    assert "drop --unit" in refused(*command, "--overwrite", "--unit", "mm")
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
 
