@@ -75,14 +75,14 @@ def sideways_told(drive: Drive, T_world_sensor: SE3) -> list[str]:
     Where points have no times, they are taken for seen in a turn whose middle looks along x.
     Recordings with poses of their own have axes of their own, too.
     """
-    if drive.T_world_sensor is not None or has_times(drive):
+    if drive.T_world_sensor is not None:
         return []
     R, places = T_world_sensor.rotation.numpy(), T_world_sensor.translation.numpy()
     steps = np.diff(places, axis=0)
     steps[np.linalg.norm(steps, axis=1) < _LEAST_STEP_M] = 0.0
     ahead, left, _ = np.einsum("kji,kj->i", R[:-1], steps)
-    if np.hypot(ahead, left) < _LEAST_WAY_M or ahead > abs(left):
-        return []
+    if np.hypot(ahead, left) < _LEAST_WAY_M or ahead > abs(left) or has_times(drive):
+        return []  # scans are read last: hardly any drive comes so far
     to = "backwards" if -ahead > abs(left) else "to its left" if left > 0 else "to its right"
     return [
         f"the sensor goes {to}: points without times need x forward and scans in order of time,"
