@@ -27,9 +27,12 @@ pytest.importorskip("pypatchworkpp")
 
 def test_an_odometry_that_was_held_back_is_said():
     seen = street(frames=8)
+    whole = seen.scans[0]
+    left = whole[np.arctan2(whole[:, 1], whole[:, 0]) > 1.5]
     for scans, told in (
         (seen.scans, "first scans do not lie on the last"),
-        ([seen.scans[0]] * 8, ""),
+        ([whole] * 8, ""),
+        ([*[whole] * 7, left], ""),  # recordings end amid a turn
     ):
         found = held_back(drive_of(scans), SE3.identity(8), LEVEL, DriveConfig())
         assert told in found

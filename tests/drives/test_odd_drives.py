@@ -53,6 +53,18 @@ def test_the_way_breaks_off_where_a_scan_was_taken_elsewhere(scans):
     assert Breaks((2,)).ticks((0, 1, 2, 3), LinkConfig(longest_gap=4)) == [0, 1, 7, 8]
 
 
+@pytest.mark.parametrize("frame", [0, 2])
+def test_the_way_goes_on_after_a_scan_that_lost_most_packets(scans, frame):
+    """On it lies little of the next one, which was taken for one from elsewhere."""
+    left = scans[frame][np.arctan2(scans[frame][:, 1], scans[frame][:, 0]) > 1.5]
+    way = find_trajectory(
+        drive_of([*scans[:frame], left, *scans[frame + 1 :]]), LEVEL, DriveConfig()
+    )
+    assert way.breaks.frames == ()
+    steps = np.diff(way.T_world_sensor.translation.numpy(), axis=0)
+    assert steps == pytest.approx(np.tile((0.7, 0.02, 0.0), (3, 1)), abs=0.1)
+
+
 def test_a_sensor_that_stands_stays_where_it_is(scans):
     way = find_trajectory(drive_of([scans[0]] * 3), LEVEL, DriveConfig())
     assert (way.breaks.frames, way.breaks.told()) == ((), [])

@@ -236,7 +236,8 @@ def _reach_m(T_world_sensor: SE3) -> float:
 
 
 def _first_and_last(frames: int) -> list[tuple[int, int]]:
-    return [(start, frames - 1) for start in range(min(_PAIRS, frames - 1))]
+    """Of the first and the last frames, each in one pair: the very last may be half a scan."""
+    return [(start, frames - 1 - start) for start in range(min(_PAIRS, frames // 2))]
 
 
 def _pairs(T_world_sensor: SE3, most_m: float) -> Iterator[tuple[int, int]]:

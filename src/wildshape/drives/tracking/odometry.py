@@ -76,7 +76,7 @@ class Odometry:
         if fit < self.config.good_fit and (found := self._from_afar(scan, pose)) is not None:
             self.kiss, there = found
             _hold(self.kiss, self.ground)
-        elif fit < self.config.least_fit:
+        elif fit < self.config.least_fit and self._fit(there, back=True) < self.config.least_fit:
             self.lost.append(frame)
             self.ground = GroundMap(self.config, self.up)
             self.ground.see(ground)
@@ -100,10 +100,13 @@ class Odometry:
         best = max(found, key=lambda one: self._fit(one[1]))
         return best if self._fit(best[1]) >= self.config.good_fit else None
 
-    def _fit(self, there: Float[np.ndarray, "n 3"]) -> float:
-        """The share of a scan that lies on the one before."""
-        clouds = (torch.from_numpy(points).float()[None] for points in (there, self._before))
-        away = nearest(*clouds).distance_squared
+    def _fit(self, there: Float[np.ndarray, "n 3"], *, back: bool = False) -> float:
+        """The share of a scan that lies on the one before.
+
+        `back`: of the one before that lies on it; on half a scan no more than half of it lies.
+        """
+        both = [torch.from_numpy(points).float()[None] for points in (there, self._before)]
+        away = nearest(*(both[::-1] if back else both)).distance_squared
         return float((away < self.config.fits_m**2).float().mean())
 
 
