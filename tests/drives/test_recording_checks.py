@@ -54,6 +54,7 @@ def test_times_of_points_that_are_no_turn_s_are_not_used_and_told_of():
         ("scalar_Time", (-0.05, 0.05), "the field scalar_Time is not read as times of points"),
         ("GPSTime", (-0.05, 0.05), "the field GPSTime is not read as times of points"),
         ("timestamp_ns", (0.0, 1e8), "the field timestamp_ns is not read as times of points"),
+        ("scalar_GpsTime", (0.0, 0.0), ""),
         ("t", (-0.05, 0.05), ""),
         ("intensity", (0.0, 1.0), ""),
     ],

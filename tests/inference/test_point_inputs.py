@@ -47,10 +47,13 @@ def test_arrays_lists_and_tensors(given):
     ("given", "said"),
     [
         (np.zeros((0, 3)), "0 finite points; at least 16"),
-        (np.eye(15)[:, :3], "15 finite points"),
+        (1 + np.eye(15)[:, :3], "15 finite points"),
         (np.full((40, 3), np.nan), "0 finite points"),
         (np.ones((40, 3)), "all 40 points are equal"),
-        (np.vstack((np.eye(20)[:, :3], np.full((1, 3), 3e38))), "across, but a scan of one object"),
+        (
+            np.vstack((1 + np.eye(20)[:, :3], np.full((1, 3), 3e38))),
+            "across, but a scan of one object",
+        ),
         (np.zeros((40, 4)), r"shape \(n, 3\), found \(40, 4\)"),
         (np.zeros(40), r"found \(40,\)"),
         ([[1.0, 2.0, 3.0], [1.0]], "no array of numbers"),

@@ -19,6 +19,7 @@ from wildshape.io.scans.points import (
     check_repeats,
     drop_nonfinite,
     read_scan,
+    without_origin,
 )
 from wildshape.records import Points, Sensor, SightLines
 
@@ -29,7 +30,7 @@ _PLACES = ("xyz", "vertices", _OPEN3D_TENSOR, "points")
 
 
 def as_points(scan: object, name: str = "scan") -> Points:
-    """A scan handed in from Python as `(n, 3)` float32, finite and each place once.
+    """A scan handed in from Python as `(n, 3)` float32, finite, each place once, none the sensor's.
 
     Args:
         scan: an array or tensor, records with x, y, z, a path of a scan file, or an object that
@@ -56,7 +57,7 @@ def as_points(scan: object, name: str = "scan") -> Points:
             " pass x, y, z columns in metres."
         )
     check_near(points, name)
-    points = drop_nonfinite(points).points
+    points = drop_nonfinite(without_origin(points)).points
     if len(points) < LEAST_POINTS:
         raise BadInputError(
             f"{name}: {len(points)} finite points; at least {LEAST_POINTS} are needed."

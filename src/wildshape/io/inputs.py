@@ -109,12 +109,12 @@ class TrackSource:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """A sentence each on points that were not finite, and on names that are odd, by kind."""
+        """A sentence each on points that were dropped, and on names that are odd, by kind."""
         told = []
         if self._dropped:
             points = counted(sum(self._dropped.values()), "point")
             scans = counted(len(self._dropped), "scan")
-            told.append(f"dropped {points} with NaN or infinity in {scans}")
+            told.append(f"dropped {points} of NaN, infinity or zeros alone in {scans}")
         for tracks in self._odd.values():
             name, odd = next(iter(tracks.items()))
             more = len(tracks) - 1
@@ -124,7 +124,7 @@ class TrackSource:
 
     @property
     def dropped_nonfinite(self) -> tuple[tuple[str, int], ...]:
-        """`track/scan file` and number of NaN or infinite points dropped until now."""
+        """`track/scan file` and number of points that `read_scan` dropped until now."""
         return tuple(self._dropped.items())
 
     def __len__(self) -> int:

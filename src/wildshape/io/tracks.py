@@ -46,7 +46,7 @@ class TrackFile:
     Attributes:
         track: the usable scans, with their truth if there is any.
         skipped: file name and reason of each scan that could not be used.
-        dropped_nonfinite: file name and number of the points that were NaN or infinite.
+        dropped_nonfinite: file name and number of the points that `read_scan` dropped.
         doubts: what is odd about the names of scans and rays, a sentence by kind.
     """
 

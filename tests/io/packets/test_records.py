@@ -93,6 +93,19 @@ def test_each_section_has_interfaces_of_its_own(recorded, tmp_path):
     np.testing.assert_array_equal(drive.turn(6).points, expected.turn(2).points)
 
 
+def test_a_section_in_the_other_order_of_bytes_is_told(recorded, tmp_path):
+    """All that comes after it was lost without a word."""
+    one = _write(recorded, tmp_path / "one.pcapng", [(_ETHERNET, _MICRO, 0)], lambda _: 0)
+    header = "0a0d0d0a 0000001c 1a2b3c4d 0001 0000 ffffffffffffffff 0000001c"
+    one.write_bytes(one.read_bytes() + bytes.fromhex(header))
+    drive = open_drive(one)
+    assert len(drive) == 4
+    assert drive.warnings == (
+        "one.pcapng is cut off or damaged (a block of 469762048 bytes at its end, or of the other"
+        " order of bytes)",
+    )
+
+
 def test_a_record_of_an_interface_that_is_not_described(recorded, tmp_path):
     whole = _write(recorded, tmp_path / "one.pcapng", [(_ETHERNET, _MICRO, 0)], lambda _: 0)
     block = b"".join(number.to_bytes(4, "little") for number in (6, 588))  # type and bytes

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from tests.refusal import refused
 
+from wildshape.inference.point_inputs import as_points
 from wildshape.io.scans.arrays import read_rows
 from wildshape.io.scans.points import SUFFIXES, Coordinates, read_points, read_scan
 from wildshape.io.scans.writers import write_ply
@@ -102,6 +103,17 @@ def test_nonfinite_points_are_dropped_and_counted(tmp_path: Path, cloud: np.ndar
         scan = read_scan(path)
         assert scan.dropped_nonfinite == 3
         np.testing.assert_array_equal(scan.points, np.delete(cloud, [3, 10, 11], axis=0))
+
+
+def test_what_did_not_return_is_dropped_and_counted(tmp_path: Path, cloud: np.ndarray) -> None:
+    """Drivers and depth images write the sensor's own place; it is told from a scan beside it."""
+    np.save(tmp_path / "a.npy", np.insert(cloud, [0, 5, 5], 0.0, axis=0))
+    scan = read_scan(tmp_path / "a.npy")
+    assert scan.dropped_nonfinite == 3
+    np.testing.assert_array_equal(scan.points, cloud)
+    np.testing.assert_array_equal(as_points(np.insert(cloud, [0, 5, 5], 0.0, axis=0)), cloud)
+    np.save(tmp_path / "none.npy", np.zeros((20, 3)))
+    refused(read_scan, tmp_path / "none.npy", match="all 20 points are equal")
 
 
 def test_ply_round_trip_keeps_every_bit(tmp_path: Path, cloud: np.ndarray) -> None:

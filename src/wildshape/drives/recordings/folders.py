@@ -166,9 +166,12 @@ def _unread_times_told(files: list[Path], times: list[float] | None) -> list[str
 
 
 def _unusable(field: Callable[[tuple[str, ...]], np.ndarray | None]) -> str:
-    """Why a scan's points have no times, if they have a field of them."""
-    values = field(TIME_FIELDS)
-    if values is not None or field(LIKE_TIMES) is None:
+    """Why a scan's points have no times, if they have a field of them.
+
+    One value in a field of another name is no times, whatever it is called: zeros, or a stamp.
+    """
+    values, like = field(TIME_FIELDS), field(LIKE_TIMES)
+    if values is not None or like is None or not np.ptp(like):
         return unusable_told(values)
     return unusable_told(None, next(name for name in LIKE_TIMES if field((name,)) is not None))
 

@@ -86,6 +86,8 @@ def _of_interfaces(file: IO[bytes], reader: Any, begin: Place | None) -> Iterato
         if size < _LEAST_BYTES:
             raise ValueError(f"a block of {size} bytes")
         block, known = head + file.read(size - 8), place.interfaces
+        if len(block) < size:
+            raise EOFError(f"a block of {size} bytes at its end, or of the other order of bytes")
         if kind == _SECTION:
             known = ()
         elif kind == pcapng.PCAPNG_BT_IDB:

@@ -127,7 +127,7 @@ class ScanFile:
 
     Attributes:
         points: `(n, 3)` float32, metres, sensor frame, all finite.
-        dropped_nonfinite: how many points of the file were NaN or infinite.
+        dropped_nonfinite: how many points of the file were NaN, infinite or zeros alone.
     """
 
     points: Float32[np.ndarray, "n 3"]
@@ -161,15 +161,25 @@ def read_points(
 def read_scan(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> ScanFile:
     """A scan that has passed `check_scan`, each place once.
 
-    NaN and infinite points are dropped and counted.
+    NaN and infinite points are dropped and counted, and those at the sensor (`without_origin`).
 
     Raises:
         BadInputError: the file cannot be read, or is no scan of an object in metres.
     """
     points = read_all(Path(path), coordinates)
-    check_scan(points, str(path))
-    found = drop_nonfinite(points)
-    return ScanFile(without_repeats(found.points), found.dropped_nonfinite)
+    returned = without_origin(points)
+    check_scan(returned, str(path))
+    kept = drop_nonfinite(returned).points
+    return ScanFile(without_repeats(kept), len(points) - len(kept))
+
+
+def without_origin(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "k 3"]:
+    """Those not at the sensor itself, which drivers and depth images write for no return.
+
+    The same array comes back where none is there, or all are.
+    """
+    away = (points != 0).any(axis=1)
+    return points if away.all() or not away.any() else points[away]
 
 
 def drop_nonfinite(points: Float[np.ndarray, "n 3"]) -> ScanFile:
