@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The folder of a finished drive as `wildshape drive` leaves it, made without finding anything."""
 
+import gc
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -82,6 +83,12 @@ def finished_drive(
     said = {"command": "drive", "status": "finished", "settings": {"source": str(recording)}}
     (out / "wildshape.json").write_text(json.dumps({**said, "result": result}))
     return read_finished(out)
+
+
+def poses_alive() -> int:
+    """Poses that are held now: one for each box of a long drive would take gigabytes."""
+    gc.collect()
+    return sum(type(one) is SE3 for one in gc.get_objects())
 
 
 def _write_object(out: Path, name: str, names: list[str], scans: list, shape: np.ndarray) -> None:

@@ -14,7 +14,7 @@ import pytest
 import torch
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
-from tests.drives.finished_drive import CARS, FRAMES, HEIGHT, SIZE, finished_drive
+from tests.drives.finished_drive import CARS, FRAMES, HEIGHT, SIZE, finished_drive, poses_alive
 from tests.refusal import refused
 
 from wildshape.drives.completing.level_frame import boxes_in_scans
@@ -23,6 +23,7 @@ from wildshape.drives.tracking.detections import DetectionFile, find_detections
 from wildshape.drives.writing.files import DriveFiles, detections_of
 from wildshape.drives.writing.finished import read_finished
 from wildshape.drives.writing.playback.mcap import write_mcap
+from wildshape.drives.writing.playback.moments import moments
 from wildshape.drives.writing.playback.rerun import write_rerun
 from wildshape.errors import MissingExtraError
 from wildshape.geometry.transforms.rotation import rotation_from_vector
@@ -42,6 +43,13 @@ def found(tmp_path_factory):
     drive = read_finished(drive.out)
     DriveFiles(mcap=True, rerun=find_spec("rerun") is not None).write(drive.out)
     return drive
+
+
+def test_a_long_drive_s_poses_are_not_held_one_by_one(found):
+    before = poses_alive()
+    playing = moments(found)
+    assert len(next(playing).present) == len(CARS)
+    assert poses_alive() - before < FRAMES  # of two vehicles in each of them
 
 
 @pytest.fixture(scope="module")

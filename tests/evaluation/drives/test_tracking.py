@@ -6,6 +6,8 @@ Random cases were compared with TrackEval 1.3.0, too: HOTA, DetA and AssA to 1e-
 switches; it needs OpenCV, so that it is no dependency.
 """
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -67,6 +69,17 @@ def test_nothing_found_and_nothing_there() -> None:
     assert (empty.hota, empty.detection, empty.association) == (0, 0, 0)
     assert hota([_frame([0], [])]) is None
     assert identity_switches([_frame([0], []), _frame([], [0])]) == 0
+
+
+def test_memory_does_not_grow_with_all_the_pairs_that_there_could_be() -> None:
+    numbers = (np.arange(first, first + 3) for first in range(0, 1800, 3))
+    frames = [Pairs(some, some, np.eye(3)) for some in numbers]
+    tracemalloc.start()
+    found = hota(frames)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert found == pytest.approx(hota(frames[:1]))
+    assert most < 8 * 1800**2  # a number for each pair
 
 
 def test_an_identity_goes_on_even_where_another_box_fits_better() -> None:

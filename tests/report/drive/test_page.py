@@ -43,11 +43,14 @@ def test_points_belong_to_the_vehicles_they_were_measured_on(found):
 
 
 def test_a_long_drive_is_drawn_within_its_limits(found):
-    config = SceneConfig(frames=3, points=600, points_a_vehicle=20, points_a_shape=30)
+    config = SceneConfig(frames=3, points=600, points_a_vehicle=20, shape_points=60)
     scans = drawn_scans(found, found.open_source(), config)
     assert [scan.frame for scan in scans] == [0, 2, 4]
     assert all((scan.owners == NOBODY).sum() == 200 for scan in scans)
     assert all((scan.owners != NOBODY).sum() == 40 for scan in scans)
+    crowded = replace(config, vehicle_points=90)  # of 3 frames of 2 vehicles
+    thinner = drawn_scans(found, found.open_source(), crowded)
+    assert all((scan.owners != NOBODY).sum() == 30 for scan in thinner)
     data = scene_data(found, scans, config)
     assert [one["shape"]["count"] for one in data["vehicles"]] == [30, 30]
     standing, coming = data["vehicles"]
@@ -66,7 +69,8 @@ def test_a_vehicle_between_the_frames_drawn_is_drawn_where_it_is_fullest(found):
     assert [scan.frame for scan in scans] == [0, 3]
     assert [(scan.owners > 0).sum() > 100 for scan in scans] == [False, True]
     vehicles = scene_data(brief, scans, config)["vehicles"]
-    assert [one["points"] for one in vehicles] == [[200, 200], [0, 200], [0, 90]]
+    assert [one["points"] for one in vehicles] == [[200, 200], [200], [90]]
+    assert [one["first"] for one in vehicles] == [0, 1, 1]
     assert all(any(one["places"]) for one in vehicles)
 
 

@@ -11,13 +11,15 @@ from urllib.request import urlopen
 import numpy as np
 import pytest
 import torch
-from tests.drives.finished_drive import CARS, HEIGHT, SIZE, finished_drive
+from tests.drives.finished_drive import CARS, HEIGHT, SIZE, finished_drive, poses_alive
 
 pytest.importorskip("viser", reason="did not run: viser is not installed (extra view)")
 from wildshape.cli.main import main
 from wildshape.drives.writing.finished import read_finished
 from wildshape.drives.writing.playback.moments import colour_of
 from wildshape.geometry.transforms.se3 import SE3
+from wildshape.report.drive.scene import SceneConfig
+from wildshape.report.viewer import drive_page
 from wildshape.report.viewer import page as pages
 from wildshape.report.viewer.drive_page import NOTHING, measured, serving_drive
 
@@ -27,6 +29,14 @@ pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")  # viser's
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     return finished_drive(tmp_path_factory.mktemp("drive"))
+
+
+def test_what_is_held_and_sent_of_many_vehicles_is_bounded(found, monkeypatch):
+    monkeypatch.setattr(drive_page, "_CONFIG", SceneConfig(shape_points=60))
+    before = poses_alive()
+    with serving_drive(found) as page:
+        assert [len(node["shapes"].points) for node in page.nodes] == [30, 30]
+        assert poses_alive() - before < len(page.found)  # of two vehicles in each of the frames
 
 
 def test_vehicles_stand_at_their_places_and_the_chosen_one_shows_its_shape(found):

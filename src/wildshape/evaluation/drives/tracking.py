@@ -8,7 +8,7 @@ The CLEAR MOT Metrics", 2008. Both are computed as TrackEval does, which has the
 """
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,19 +56,14 @@ def hota(frames: Sequence[Pairs]) -> Hota | None:
     founds = _most(frame.found for frame in frames)
     if trues == 0:
         return None
-    alike, true_count, found_count = _alignment(frames, founds, trues)
-    matches = np.zeros((len(ALPHAS), founds, trues))
-    for frame in frames:
-        rows, columns = _assigned(alike[np.ix_(frame.found, frame.true)] * frame.overlap)
-        overlap = frame.overlap[rows, columns]
-        for k, alpha in enumerate(ALPHAS):
-            kept = overlap >= alpha - _TIE
-            matches[k, frame.found[rows[kept]], frame.true[columns[kept]]] += 1
-    hits = matches.sum((1, 2))
+    true_count = _counts((frame.true for frame in frames), trues)
+    found_count = _counts((frame.found for frame in frames), founds)
+    pairs, matches = _matches(frames, found_count, true_count)
+    hits = matches.sum(1)
     all_true, all_found = true_count.sum(), found_count.sum()
     detection = hits / np.maximum(all_true + all_found - hits, 1)
-    shared = found_count[:, None] + true_count[None] - matches
-    association = (matches * matches / np.maximum(shared, 1)).sum((1, 2)) / np.maximum(hits, 1)
+    shared = found_count[pairs // trues] + true_count[pairs % trues] - matches
+    association = (matches * matches / np.maximum(shared, 1)).sum(1) / np.maximum(hits, 1)
     return Hota(
         float(np.sqrt(detection * association).mean()),
         float(detection.mean()),
@@ -80,21 +75,62 @@ def _most(numbers: object) -> int:
     return max((int(n.max()) + 1 for n in numbers if len(n)), default=0)  # type: ignore[attr-defined]
 
 
+def _counts(numbers: Iterable[np.ndarray], most: int) -> np.ndarray:
+    """In how many frames each track is."""
+    return np.bincount(np.concatenate(list(numbers)), minlength=most).astype(float)
+
+
+def _numbered(parts: Iterable[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of tracks that meet at all, and which of them each is: few of all that there could be.
+
+    A pair is `found * trues + true`.
+    """
+    return np.unique(np.concatenate(list(parts)), return_inverse=True)
+
+
+def _matches(
+    frames: Sequence[Pairs], found_count: np.ndarray, true_count: np.ndarray
+) -> tuple[np.ndarray, Float[np.ndarray, "alphas pairs"]]:
+    """Pairs of tracks, and in how many frames each is matched at each overlap."""
+    assigned = [
+        _assigned(alike * frame.overlap)
+        for frame, alike in zip(frames, _alignment(frames, found_count, true_count))
+    ]
+    pairs, which = _numbered(
+        frame.found[rows] * len(true_count) + frame.true[columns]
+        for frame, (rows, columns) in zip(frames, assigned)
+    )
+    overlap = np.concatenate([frame.overlap[at] for frame, at in zip(frames, assigned)])
+    kept = overlap >= ALPHAS[:, None] - _TIE
+    matches = np.array([np.bincount(which[one], minlength=len(pairs)) for one in kept], float)
+    return pairs, matches
+
+
 def _alignment(
-    frames: Sequence[Pairs], founds: int, trues: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """How much each pair of tracks goes together over all frames, and the frames of each track."""
-    together = np.zeros((founds, trues))
-    true_count, found_count = np.zeros(trues), np.zeros(founds)
-    for frame in frames:
-        overlap = frame.overlap
-        either = overlap.sum(0)[None] + overlap.sum(1)[:, None] - overlap
-        share = np.divide(overlap, either, out=np.zeros_like(overlap), where=either > _TIE)
-        together[np.ix_(frame.found, frame.true)] += share
-        true_count[frame.true] += 1
-        found_count[frame.found] += 1
-    alike = together / np.maximum(found_count[:, None] + true_count[None] - together, _TIE)
-    return alike, true_count, found_count
+    frames: Sequence[Pairs], found_count: np.ndarray, true_count: np.ndarray
+) -> Iterator[np.ndarray]:
+    """`(f, t)` of each frame: how much its tracks go together over all frames."""
+    trues = len(true_count)
+    cells = [np.nonzero(frame.overlap > _TIE) for frame in frames]
+    pairs, which = _numbered(
+        frame.found[rows] * trues + frame.true[columns]
+        for frame, (rows, columns) in zip(frames, cells)
+    )
+    share = np.concatenate([_shares(frame.overlap)[at] for frame, at in zip(frames, cells)])
+    together = np.bincount(which, share, len(pairs))
+    either = found_count[pairs // trues] + true_count[pairs % trues] - together
+    alike = (together / np.maximum(either, _TIE))[which]
+    ends = np.cumsum([len(rows) for rows, _ in cells])
+    for frame, at, part in zip(frames, cells, np.split(alike, ends[:-1])):
+        found = np.zeros_like(frame.overlap)
+        found[at] = part
+        yield found
+
+
+def _shares(overlap: np.ndarray) -> np.ndarray:
+    """Of each overlap, of all that its two have in the frame."""
+    either = overlap.sum(0)[None] + overlap.sum(1)[:, None] - overlap
+    return np.divide(overlap, either, out=np.zeros_like(overlap), where=either > _TIE)
 
 
 def _assigned(worth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

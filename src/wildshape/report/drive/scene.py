@@ -6,7 +6,7 @@ The drawing frame is the level world (`drives/completing/level_frame.py`): z up,
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -38,7 +38,9 @@ class SceneConfig:
         points: of all frames drawn.
         points_a_scan: at most.
         points_a_vehicle: at most, of those in a scan.
+        vehicle_points: on all vehicles in all frames drawn.
         points_a_shape: at most, of a complete one.
+        shape_points: of all complete ones together.
         range_m: farther points are left out.
         cell_m: of the rest one point in each cell of this size is drawn.
     """
@@ -47,7 +49,9 @@ class SceneConfig:
     points: int = 1_200_000
     points_a_scan: int = 14_000
     points_a_vehicle: int = 400
+    vehicle_points: int = 900_000
     points_a_shape: int = 1500
+    shape_points: int = 750_000
     range_m: float = 80.0
     cell_m: float = 0.2
 
@@ -82,7 +86,10 @@ def drawn_scans(
     most = min(config.points_a_scan, config.points // max(1, len(frames)))
     if drive is None:
         return [thinned(frame, _NO_POINTS, {}, most, config) for frame in frames]
-    return list(helpers.in_order(_Drawing(drive, boxes_by_frame(found), most, config), frames))
+    boxes = boxes_by_frame(found)
+    each = config.vehicle_points // max(1, sum(len(boxes.get(frame, ())) for frame in frames))
+    config = replace(config, points_a_vehicle=max(1, min(config.points_a_vehicle, each)))
+    return list(helpers.in_order(_Drawing(drive, boxes, most, config), frames))
 
 
 def _drawn_frames(found: FinishedDrive, config: SceneConfig) -> list[int]:
@@ -158,17 +165,23 @@ def placed(found: FinishedDrive, one: FoundVehicle) -> Float[np.ndarray, "f 4"]:
     return upright_places(found.placed(one))
 
 
+def points_a_shape(found: FinishedDrive, config: SceneConfig = _DEFAULT) -> int:
+    """How many of each complete shape are drawn."""
+    return min(config.points_a_shape, config.shape_points // max(1, len(found.vehicles)))
+
+
 def scene_data(
     found: FinishedDrive, scans: Sequence[DrawnScan], config: SceneConfig = _DEFAULT
 ) -> dict[str, Any]:
     """The scene as JSON values, for the script of the page."""
     frames = [scan.frame for scan in scans]
+    most = points_a_shape(found, config)
     return {
         "name": found.name,
         "ground": found.ground_m,
         "palette": PALETTE,
         "frames": [_frame(found, scan) for scan in scans],
-        "vehicles": [_vehicle(found, one, frames, config) for one in found.vehicles],
+        "vehicles": [_vehicle(found, one, frames, most) for one in found.vehicles],
         "way": found.T_level_sensor.translation.numpy().round(3).tolist(),
     }
 
@@ -186,8 +199,12 @@ def _frame(found: FinishedDrive, scan: DrawnScan) -> dict[str, Any]:
 
 
 def _vehicle(
-    found: FinishedDrive, one: FoundVehicle, frames: Sequence[int], config: SceneConfig
+    found: FinishedDrive, one: FoundVehicle, frames: Sequence[int], most: int
 ) -> dict[str, Any]:
+    """From the `first` to the last of the frames drawn that it is in, null where it is not seen."""
+    there = set(one.frames)
+    drawn = [number for number, frame in enumerate(frames) if frame in there]
+    during = frames[drawn[0] : drawn[-1] + 1]
     places = dict(zip(one.frames, placed(found, one).round(3).tolist()))
     points = dict(zip(one.frames, one.points))
     speeds = np.linalg.norm(found.velocities(one), axis=1)
@@ -198,10 +215,11 @@ def _vehicle(
         "moving": one.moving,
         "confidence": round(one.confidence, 3),
         "chances": chances_in(found.out / "objects" / one.name),
-        "places": [places.get(frame) for frame in frames],
-        "points": [points.get(frame, 0) for frame in frames],
-        "speeds": [speed.get(frame, 0.0) for frame in frames],
-        "shape": _packed(thin(found.shape(one), config.points_a_shape)),
+        "first": drawn[0],
+        "places": [places.get(frame) for frame in during],
+        "points": [points.get(frame, 0) for frame in during],
+        "speeds": [speed.get(frame, 0.0) for frame in during],
+        "shape": _packed(thin(found.shape(one), most)),
     }
 
 

@@ -3,6 +3,7 @@
 """The page of a drive: its scene over time, and every vehicle with its shape when it is clicked."""
 
 import threading
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
 from html import escape
@@ -16,9 +17,16 @@ from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle
 from wildshape.drives.writing.playback.moments import colour_of, readable_source
 from wildshape.errors import BadInputError
 from wildshape.geometry.sampling import thin
+from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detections import pose_of
 from wildshape.records import Box, Points
-from wildshape.report.drive.scene import NOBODY, SceneConfig, boxes_by_frame, thinned
+from wildshape.report.drive.scene import (
+    NOBODY,
+    SceneConfig,
+    boxes_by_frame,
+    points_a_shape,
+    thinned,
+)
 from wildshape.report.results import box_of, chances_in, read_result
 from wildshape.report.scene import box_segments
 from wildshape.report.viewer.details import framed, row
@@ -67,7 +75,7 @@ class DrivePage:
         self.lock = threading.RLock()
         self.boxes = boxes_by_frame(found)
         self.names = tuple(one.name for one in found.vehicles)
-        self.places = [dict(zip(one.frames, found.placed(one))) for one in found.vehicles]
+        self.places = [found.placed(one) for one in found.vehicles]
         self.chances = [chances_in(found.out / "objects" / name) for name in self.names]
         self.shown: int | None = None
         self.extra: list[Any] = []
@@ -169,10 +177,10 @@ class DrivePage:
     def _vehicle(self, number: int, one: FoundVehicle) -> dict[str, Any]:
         scene, at, colour = self.server.scene, f"/vehicles/{number}", colour_of(number)
         if one.moving:
-            places = np.array([T.translation.tolist() for T in self.places[number].values()])
+            places = self.places[number].translation.numpy()
             self.ways.append(self._line(f"/ways/{number}", places, colour))
         parts: dict[str, Any] = {"place": scene.add_frame(at, show_axes=False)}
-        shape = thin(self.found.shape(one), _CONFIG.points_a_shape)
+        shape = thin(self.found.shape(one), points_a_shape(self.found, _CONFIG))
         parts["shapes"] = self._dots(f"{at}/shape", shape, colour, _SHAPE_DOT_M)
         parts["boxes"] = scene.add_line_segments(
             f"{at}/edges",
@@ -210,7 +218,7 @@ class DrivePage:
 
     def _show_vehicles(self) -> None:
         for number, node in enumerate(self.nodes):
-            T = self.places[number].get(self.frame)
+            T = self._place(number)
             node["place"].visible = T is not None
             if T is not None:
                 node["place"].wxyz, node["place"].position = as_node(T)
@@ -219,6 +227,12 @@ class DrivePage:
                 node[name].visible = self.layers[name].value and not closely
         for name, handle in zip(("shapes", "scan"), self.extra):
             handle.visible = self.layers[name].value
+
+    def _place(self, number: int) -> SE3 | None:
+        """`T_level_box` of a vehicle in the frame shown, if it is there."""
+        frames = self.found.vehicles[number].frames
+        row = bisect_left(frames, self.frame)
+        return self.places[number][row] if self.frame in frames[row : row + 1] else None
 
     def _show_closely(self, number: int) -> None:
         """All of the vehicle's shape, and what its completed scans measured, at its place."""
@@ -232,7 +246,8 @@ class DrivePage:
             self._dots(f"{at}/whole", shape, colour_of(number), _CHOSEN_DOT_M),
             self._dots(f"{at}/measured", measured(self.found, one), _WHITE, _MEASURED_DOT_M),
         ]
-        T = self.places[number][self.frame]
+        T = self._place(number)
+        assert T is not None
         middle, size = T.translation.numpy(), max(one.size)
         towards = self.found.T_level_sensor[self.frame].translation.numpy() - middle
         towards[2] = 0.6 * np.linalg.norm(towards)

@@ -70,12 +70,17 @@ class Moment:
 def moments(found: FinishedDrive) -> Iterator[Moment]:
     """All frames, their scans read one by one."""
     drive = readable_source(found)
-    there: dict[int, list[Present]] = {}
+    there: dict[int, list[tuple[int, int]]] = {}  # number of the vehicle, and which of its frames
     for number, one in enumerate(found.vehicles):
-        speeds = np.linalg.norm(found.velocities(one), axis=1).tolist()
-        rows = zip(one.frames, found.placed(one), one.points, speeds)
-        for frame, T, points, speed in rows:
-            there.setdefault(frame, []).append(Present(one, colour_of(number), T, points, speed))
+        for row, frame in enumerate(one.frames):
+            there.setdefault(frame, []).append((number, row))
+    places = [found.placed(one) for one in found.vehicles]
+    speeds = [np.linalg.norm(found.velocities(one), axis=1) for one in found.vehicles]
+
+    def present(number: int, row: int) -> Present:
+        one, speed = found.vehicles[number], float(speeds[number][row])
+        return Present(one, colour_of(number), places[number][row], one.points[row], speed)
+
     none = np.empty((0, 3), np.float32)
     for frame, seconds in enumerate(found.seconds):
         yield Moment(
@@ -83,7 +88,7 @@ def moments(found: FinishedDrive) -> Iterator[Moment]:
             seconds,
             found.T_level_sensor[frame],
             none if drive is None else thin(drive.scan(frame), SCAN_POINTS),
-            tuple(there.get(frame, ())),
+            tuple(present(*at) for at in there.get(frame, ())),
         )
 
 

@@ -60,7 +60,7 @@
   }
 
   const here = (i) => through(rigid(frames[i].pose), [0, 0, 0]).slice(0, 3); // the sensor's place
-  const seen = (number) => vehicles[number].places[now];
+  const seen = (number) => vehicles[number].places[now - vehicles[number].first];
   const signs = [0, 1].flatMap((x) => [0, 1].flatMap((y) => [0, 1].map((z) => [x - 0.5, y - 0.5, z - 0.5])));
   const edges = signs.flatMap((a, i) => signs.slice(0, i).flatMap((b, j) => (Math.abs(dot(minus(a, b), minus(a, b)) - 1) < 1e-9 ? [[i, j]] : [])));
 
@@ -178,12 +178,12 @@
     const box = $("card"), one = vehicles[chosen];
     box.hidden = !one;
     if (!one) return;
-    const place = seen(chosen), make = (tag, text) => Object.assign(document.createElement(tag), { textContent: text });
+    const place = seen(chosen), at = now - one.first, make = (tag, text) => Object.assign(document.createElement(tag), { textContent: text });
     const away = place && Math.hypot(...minus(place.slice(0, 3), here(now)));
     const list = [["size", one.size.map((v) => v.toFixed(2)).join(" × ") + " m"], ["confidence", one.confidence.toFixed(2)],
       ...Object.entries(one.chances).map(([label, chance]) => [label, chance.toFixed(2)]),
-      ["motion", one.moving ? "moving" : "standing"], ...(place ? [["distance", away.toFixed(1) + " m"], ["points in scan", one.points[now].toLocaleString("en")]] : [["", "not in this frame"]]),
-      ...(one.moving && place ? [["speed", one.speeds[now].toFixed(1) + " m/s"]] : [])];
+      ["motion", one.moving ? "moving" : "standing"], ...(place ? [["distance", away.toFixed(1) + " m"], ["points in scan", one.points[at].toLocaleString("en")]] : [["", "not in this frame"]]),
+      ...(one.moving && place ? [["speed", one.speeds[at].toFixed(1) + " m/s"]] : [])];
     const table = document.createElement("dl");
     for (const [label, value] of list) table.append(make("dt", label), make("dd", value));
     const open = make("button", "its shape and scans ↓");
@@ -202,8 +202,8 @@
   function choose(number, told = true) {
     chosen = number;
     if (number >= 0 && !seen(number)) { // to when it is best seen
-      const { points } = vehicles[number];
-      now = points.indexOf(Math.max(...points));
+      const { first, points } = vehicles[number];
+      now = first + points.indexOf(Math.max(...points));
       clock();
     }
     if (number >= 0 && told) document.dispatchEvent(new CustomEvent("vehicle", { detail: number }));
