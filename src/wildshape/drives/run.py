@@ -16,6 +16,7 @@ from wildshape.drives.result import FILES, DriveResult, earlier_result, line_of,
 from wildshape.drives.tracking.detections import DetectionFile, find_detections
 from wildshape.drives.writing.files import DriveFiles
 from wildshape.drives.writing.folder import BOXES, FRAMES
+from wildshape.errors import BadInputError
 from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import released_after
 from wildshape.io.output import begin, finished, keep_apart, remove_leftovers
@@ -48,23 +49,23 @@ def drive(
     An interrupted run is gone on with; of a finished one only the files asked for are written.
 
     Args:
-        source: a folder of full scans, a drive of a published data set or a recording of ROS
-            (`recordings`).
+        source: a folder of full scans, a drive of a published data set, or a recording of ROS or
+            of packets (`recordings`).
         out: folder to write (docs/drive.md); by default `found` where Python runs.
         config: the numbers of every stage.
         topic: of point clouds, for a recording of ROS that holds several.
-        predictor: by default the shipped weights.
+        predictor: for scans of LiDARs; by default the shipped weights.
         workers: processes that cut scans and complete objects; None: one a core; or those of a
             `parallel.team.team` that are there already.
         files: what else to write into the folder.
-        detections: what somebody else's detector found, in place of the clusters.
-        adapt: train the model on what was found, and complete the drive again if it is better; or
-            what came of that already (`adapting.adapt`), for several drives.
+        detections: the file of what somebody else's detector found, in place of the clusters.
+        adapt: an `AdaptConfig`: train the model on what was found, and complete the drive again if
+            it is better; or what came of that already (`adapting.adapt`), for several drives.
         overwrite: remove an earlier output first.
         watch: told of progress.
 
     Raises:
-        BadInputError: source, detections or output cannot be used.
+        BadInputError: source, weights, detections or output cannot be used.
         MissingExtraError: a library is not installed.
     """
     source, out = Path(source), Path(out)
@@ -76,6 +77,7 @@ def drive(
         recording = given.noted(recording)
         keep_apart(out, detections.path)
     predictor = load(config=INFERENCE) if predictor is None else predictor
+    _check_lidar(predictor)
     keep_apart(out, source, predictor.named and weights_file(predictor.named))
     settings = settings_of(source, recording, topic, config, predictor, detections)
     line = line_of(source, out, topic, config, detections, predictor.named)
@@ -102,3 +104,13 @@ def drive(
                 found = replace(run, helpers=helpers).again(adapt.model, found)
         files.write(out)
         return found
+
+
+def _check_lidar(predictor: Predictor) -> None:
+    """Refuse weights of depth cameras: `car` is a name of such, and would find nothing."""
+    sensor = predictor.settings.sensor
+    if sensor != "lidar":
+        raise BadInputError(
+            f"{predictor.named or predictor}: was trained on {sensor} scans, but drives are of"
+            " lidar scans; choose other weights by --model, or none for the shipped ones."
+        )

@@ -44,6 +44,13 @@ def test_detections_are_those_of_one_drive(recording, tmp_path, refused):
     assert "give one drive" in refused(*given)
 
 
+def test_weights_of_depth_cameras_are_refused(recording, tmp_path, refused):
+    """They are named `car`, and would find no vehicle without a word."""
+    said = refused("drive", recording, "--out", tmp_path / "out", "--model", "car")
+    assert "car: was trained on camera scans, but drives are of lidar scans" in said
+    assert not (tmp_path / "out").exists()
+
+
 def test_detections_in_the_output_are_refused(recording, tmp_path, refused):
     (tmp_path / "out").mkdir()
     labels = tmp_path / "out" / "labels.txt"

@@ -111,6 +111,22 @@ def test_labels_that_are_odd_are_told(wildshape, street, found, tmp_path, change
     assert bool(told) == (str(other) in said.err)
 
 
+def test_labels_of_another_frame_are_not_taken_for_those_of_another_scan(
+    wildshape, street, found, tmp_path
+):
+    """Moved aside by 6 m hardly any is met; by chance more of those of the next scan are."""
+    other = tmp_path / "other"
+    shutil.copytree(street, other)
+    path = other / "label_02" / "0000.txt"
+    lines = [line.split() for line in path.read_text().splitlines()]
+    moved = ([*words[:13], str(float(words[13]) + 6), *words[14:]] for words in lines)
+    path.write_text("".join(f"{' '.join(words)}\n" for words in moved))
+    said = wildshape("evaluate-drive", found, "--labels", other, "--json")
+    assert said.code == 0, said
+    assert "KITTI's frame and order" in said.err
+    assert "numbered alike" not in said.err
+
+
 def test_a_place_that_cannot_be_written_is_refused_before_anything_is_measured(
     refused, street, found, tmp_path
 ):

@@ -14,6 +14,7 @@ from wildshape.evaluation.drives.protocol import DriveScores
 
 _FEW = 0.1  # of the average precision from above, in space: heights do not meet
 _FRAMES, _BETTER = 20, 1.15  # are looked at for labels of a neighbouring scan that fit better
+_FITS = 0.1  # mean IoU; less is chance
 _CURE = (
     "check that they are of these scans and in KITTI's frame and order: height, width, length, the"
     " middle of the floor, the turn"
@@ -49,7 +50,7 @@ def _shifted(found: FoundDrive, labelled: LabelledDrive) -> Iterator[str]:
     if len(found.frames) < 3:
         return
     now, before, after = (_fit(found, labelled, by) for by in (0, -1, 1))
-    if max(before, after) > _BETTER * now:
+    if max(before, after) > max(_BETTER * now, _FITS):
         other = "before" if before > after else "after"
         yield (
             f"{labelled.path}: what is found in a scan fits the labels of the one {other} it better"
