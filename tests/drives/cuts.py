@@ -12,6 +12,7 @@ def write_cut(folder, frame, clusters, scanned, grounds=None):
     points = np.concatenate((np.empty((0, 3)), *clusters)).astype(np.float32)
     known = {"points": points, "rows": np.arange(len(points), dtype=np.int32), "scanned": scanned}
     known["grounds"] = np.zeros((len(clusters), 3)) if grounds is None else np.array(grounds)
+    known["seconds"] = np.empty(0)
     counts = np.array([len(cluster) for cluster in clusters], int)
     folder.mkdir(parents=True, exist_ok=True)
     np.savez(cut_file(folder, frame), **known, counts=counts, tracks=np.array([], str))

@@ -10,6 +10,8 @@ import pytest
 from wildshape.drives.config import DriveConfig
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.mounting import find_mounting
+from wildshape.drives.tracking.segmentation import Cutter, read_cut
+from wildshape.drives.tracking.sightings import Sightings
 from wildshape.drives.tracking.trajectory import find_trajectory
 from wildshape.records import Turn
 from wildshape.simulate.street.whole_drive import StreetConfig, WholeDrive
@@ -62,6 +64,20 @@ def test_points_are_where_one_place_sees_them_and_the_way_is_truer(simulated):
         assert np.linalg.norm(corrected.scan(frame) - true, axis=1).mean() < 0.03
         assert np.linalg.norm(as_it_is.scan(frame) - true, axis=1).mean() > 0.2
     assert off < 0.9 * off_without
+
+
+def test_objects_know_when_their_points_were_met(simulated, tmp_path):
+    measured, _ = simulated
+    for timed in (True, False):
+        drive = drive_of(measured, timed=timed)
+        cuts = tmp_path / str(timed)
+        cuts.mkdir()
+        Cutter(drive, find_mounting(drive, CONFIG.mounting), cuts, CONFIG)(2)
+        cut = read_cut(cuts, 2)
+        seen = Sightings("a", (2,), ((1,),), (int(cut.counts[1]),))
+        (seconds,) = seen.seconds(cuts)
+        true = measured[2].times[cut.rows_of([1])] if timed else np.empty(0)
+        np.testing.assert_allclose(seconds, true, atol=1e-7)
 
 
 @pytest.mark.parametrize("stamped_s", [-0.05, 0.0, 0.05])

@@ -209,6 +209,19 @@ class SurroundingsConfig:
 
 
 @dataclass(frozen=True)
+class DeskewConfig:
+    """How scans of what drives are carried to one time (`deskewing.py`).
+
+    Attributes:
+        least_m_per_s: what is slower stands: the middle of what is seen of it moves, too.
+        smooth_s: over which its speed is taken, standard deviation.
+    """
+
+    least_m_per_s: float = 2.5
+    smooth_s: float = 0.5
+
+
+@dataclass(frozen=True)
 class TurnConfig:
     """Which way the beam turns (`rolling_shutter.py`).
 

@@ -17,8 +17,10 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from jaxtyping import Float
 
 from wildshape.drives.completing.batched_inference import box_of, completed, looks_at
+from wildshape.drives.completing.deskewing import deskewed
 from wildshape.drives.completing.driving import drives
 from wildshape.drives.completing.vehicles import shape_nats, vehicle_sized
 from wildshape.drives.config import DriveConfig
@@ -179,10 +181,14 @@ class Completer:
         scans = [look.scans[0] for look in one.in_time]
         rays = [one.rays.get(i) for i in one.places] if self.config.completion.rays else ()
         frames = list(one.looked_at.frames)
-        at = self.drive.times or _USUAL_S * np.array(self.drive.ticks)
-        seconds = torch.tensor([at[frame] - at[frames[0]] for frame in frames])
+        seconds = torch.tensor(self._since_first(frames), dtype=torch.float32)
         motion = SensorMotion(self.T_world_level.rotation[frames].double(), seconds)
         return list(self.predictor.put_together(done, scans, rays, motion))
+
+    def _since_first(self, frames: list[int]) -> Float[np.ndarray, "k"]:
+        """The scans' times since the first of them, seconds."""
+        at = np.array(self.drive.times or _USUAL_S * np.array(self.drive.ticks))
+        return at[frames] - at[frames[0]]
 
     def _look(self, every: list[_Candidate], count: int | None) -> None:
         """Look at the first so many scans of each."""
@@ -251,10 +257,12 @@ class Completer:
         write_json(folder / OBJECTS, said)  # last: it says that the object is done
 
     def _clouds(self, seen: Sightings) -> list[Points]:
-        clouds = seen.clouds(self.cuts)
-        if self.T_level_sensor is None:
-            return clouds
-        return [self.T_level_sensor.apply_numpy(cloud) for cloud in clouds]
+        clouds, frames = seen.clouds(self.cuts), list(seen.frames)
+        if self.T_level_sensor is not None:
+            clouds = [self.T_level_sensor.apply_numpy(cloud) for cloud in clouds]
+        met = [at + own for at, own in zip(self._since_first(frames), seen.seconds(self.cuts))]
+        T_world_level = self.T_world_level[torch.tensor(frames)]
+        return deskewed(clouds, met, T_world_level, self.config.deskewing)
 
 
 def order_of_looks(seen: Sightings, parts: int) -> list[int]:

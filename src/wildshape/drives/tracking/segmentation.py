@@ -21,7 +21,7 @@ from wildshape.drives.tracking.mounting import Mounting
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import atomic_write
 from wildshape.io.guard import reading
-from wildshape.records import Points
+from wildshape.records import Points, Turn
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,7 @@ class CutScan:
         tracks: the object that each cluster is, if known (`detections.py`).
         grounds: `(k, 3)` a point of the ground under each cluster, sensor frame, metres; none
             before it is written.
+        seconds: when each of the points was met, since the scan's time; empty if not known.
     """
 
     points: Points
@@ -44,11 +45,12 @@ class CutScan:
     scanned: int
     tracks: tuple[str, ...] = ()
     grounds: Float[np.ndarray, "_ 3"] = field(default_factory=lambda: np.empty((0, 3)))
+    seconds: Float[np.ndarray, "_"] = field(default_factory=lambda: np.empty(0))
 
     @property
     def nbytes(self) -> int:
         """Memory that it takes."""
-        return self.points.nbytes + self.rows.nbytes + self.grounds.nbytes
+        return sum(a.nbytes for a in (self.points, self.rows, self.grounds, self.seconds))
 
     @cached_property
     def ends(self) -> list[int]:
@@ -63,6 +65,10 @@ class CutScan:
     def cluster(self, row: int) -> Points:
         """The points of one."""
         return self.points[self._of(row)]
+
+    def seconds_of(self, row: int) -> Float[np.ndarray, "_"]:
+        """When the points of one were met; empty if not known."""
+        return self.seconds[self._of(row)]
 
     def rows_of(self, clusters: Sequence[int]) -> Int[np.ndarray, "k"]:
         """The rows of the points of some in the whole scan."""
@@ -94,7 +100,7 @@ class Cutter:
         """Cut one scan and write its file."""
         turn = self.drive.turn(frame)
         scan = self.drive.corrected(frame, turn)
-        self._write(frame, scan, self._heights(scan), turn.points)
+        self._write(frame, scan, self._heights(scan), turn)
 
     def landmarks(self, frame: int) -> Landmarks:
         """What odometry sees of a frame, which is cut on the way.
@@ -104,7 +110,7 @@ class Cutter:
         turn = self.drive.turn(frame)
         heights = self._heights(turn.points)
         if turn.seconds is None:
-            self._write(frame, turn.points, heights, turn.points)
+            self._write(frame, turn.points, heights, turn)
         return landmarks(turn, heights, self.mounting, self.config)
 
     def cut(
@@ -135,9 +141,10 @@ class Cutter:
         frame: int,
         scan: Points,
         heights: Float[np.ndarray, "n"],
-        as_measured: Points,
+        turn: Turn,
     ) -> None:
-        found = self.cut(frame, scan, heights, as_measured)
+        found = self.cut(frame, scan, heights, turn.points)
+        seconds = np.empty(0) if turn.seconds is None else turn.seconds[found.rows]
         arrays = {
             "points": found.points,
             "rows": found.rows,
@@ -145,6 +152,7 @@ class Cutter:
             "scanned": np.array(found.scanned),
             "tracks": np.array(found.tracks, np.str_),
             "grounds": self._grounds(found, heights),
+            "seconds": seconds.astype(np.float32),
         }
         with atomic_write(cut_file(self.folder, frame)) as file:
             np.savez(file, **arrays)
@@ -180,7 +188,7 @@ def _read_cut(written: tuple[Path, int]) -> CutScan:
     with np.load(written[0], allow_pickle=False) as found:
         arrays = found["points"], found["rows"], found["counts"]
         tracks = tuple(found["tracks"].tolist())
-        return CutScan(*arrays, int(found["scanned"]), tracks, found["grounds"])
+        return CutScan(*arrays, int(found["scanned"]), tracks, found["grounds"], found["seconds"])
 
 
 _cuts = FrameCache(_read_cut)

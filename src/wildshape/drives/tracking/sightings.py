@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.segmentation import read_cut
@@ -57,6 +57,14 @@ class Sightings:
         for frame, rows in zip(self.frames, self.rows):
             cut = read_cut(cuts, frame)
             found.append(np.concatenate([cut.cluster(row) for row in rows]))
+        return found
+
+    def seconds(self, cuts: Path) -> list[Float[np.ndarray, "_"]]:
+        """When its points were met in each frame, since the scan's time; empty if not known."""
+        found = []
+        for frame, rows in zip(self.frames, self.rows):
+            cut = read_cut(cuts, frame)
+            found.append(np.concatenate([cut.seconds_of(row) for row in rows]))
         return found
 
     def track(self, cuts: Path, drive: Drive, category: str) -> Track:
