@@ -2,13 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calibration error, Brier score and AUROC, by hand and in the figures of an evaluation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.cars import drive_by
+from tests.evaluation.scores import completion
 
 from wildshape.evaluation.calibration import auroc, calibration
 from wildshape.evaluation.metrics import BoxScore
 from wildshape.evaluation.protocol import Spoken, run
+from wildshape.evaluation.results import MethodScores
 from wildshape.evaluation.summary import figures_of, headings_right
 from wildshape.records import Box
 
@@ -50,6 +54,19 @@ def test_auroc_counts_pairs():
 def test_the_front_is_one_end_for_all():
     turns = (2.0, 175.0, 178.0, 90.0)
     assert headings_right([BoxScore(0.5, turn) for turn in turns]) == [False, True, True, False]
+
+
+def test_right_is_within_10_degrees_and_0_7_of_the_area_and_bins_are_five():
+    """Of ten stated from 0.05 to 0.95 every other one comes true: bins of two, half of each."""
+    rows = []
+    for number in range(10):
+        box = BoxScore(0.5, *((9.9, 0.71) if number % 2 else (10.1, 0.69)))
+        stated = number / 10 + 0.05
+        rows.append(replace(completion("a", 0.1, 0.1), box=box, p_pose=stated, p_box=stated))
+    found = figures_of(MethodScores("m", tuple(rows), (), ()))
+    for kind in ("pose", "box"):
+        assert found[f"p_{kind}_error"] == pytest.approx((0.4 + 0.2 + 0.0 + 0.2 + 0.4) / 5)
+        assert found[f"p_{kind}_brier_constant"] == pytest.approx(0.25)
 
 
 class Stating:

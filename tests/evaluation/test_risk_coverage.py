@@ -40,6 +40,7 @@ def test_the_order_of_errors_is_all_that_counts():
     assert rank_correlation([9.0, 3.0, 5.0, 1.0], error) == pytest.approx(1)
     assert rank_correlation([0.9, 0.93, 0.91, 0.99], error) == pytest.approx(-1)
     assert rank_correlation([1.0, 1.0, 1.0, 1.0], error) is None
+    assert rank_correlation([3.0, 2.0, 1.0], [0.1, 0.2, 0.4]) == pytest.approx(1)
     assert rank_correlation([1.0, 2.0], error[:2]) is None
     assert rank_correlation([], []) is None
 

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What evaluation asks of a method. Methods offer any of these and do not import this file.
 
-None of them is handed anything but points and the kind of sensor (METHOD 8).
+None of them is handed anything but points, how they were taken, and, where it can take them, the
+rays of the frame that missed the object (METHOD 8).
 """
 
 from collections.abc import Iterable, Sequence

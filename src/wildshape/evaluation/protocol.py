@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The Wildshape developers
 # SPDX-License-Identifier: Apache-2.0
-"""The evaluation protocol of METHOD 8: methods see points and the sensor, never the truth."""
+"""The evaluation protocol of METHOD 8: methods see points, rays and the sensor, never the truth."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields

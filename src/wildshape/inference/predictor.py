@@ -111,20 +111,29 @@ class Predictor:
         """The complete shape of the object of one scan.
 
         Args:
-            points: `(n, 3)` array or tensor, sensor frame, metres.
+            points: `(n, 3)` array or tensor, sensor frame, metres; or a file or an object of
+                another library (`point_inputs.as_points`).
             sensor: how it was taken; by default as the scans trained on.
             rays: of the same frame that passed the object by, if known: `SightLines`, a file of
                 them, or `directions`, `ranges` and perhaps `origins` as a dict or a tuple.
 
         Raises:
-            BadInputError: not `(n, 3)`, fewer than 16 finite points, over 100 m across, or no rays.
+            BadInputError: not `(n, 3)`, fewer than 16 finite, different points, over 100 m or under
+                1 cm across, over 1 km away; no `Sensor`; no rays, or of another scan.
         """
         return next(self.complete_many([points], sensor, rays=[rays]))
 
     def complete_many(
         self, scans: Each, sensor: Sensor | None = None, *, rays: object = None
     ) -> Iterator[Completion]:
-        """`complete` for many scans, in batches; each is completed on its own."""
+        """`complete` for many scans, in batches; each is completed on its own.
+
+        Nothing is done, or refused, before the first completion is taken. `rays`: None, or one set
+        a scan, which may be None.
+
+        Raises:
+            BadInputError: as `complete`; the batches before have been given by then.
+        """
         point_inputs.check_sensor(sensor)
         scans = point_inputs.each_of(scans)
         known = point_inputs.rays_of_each(rays, scans)
@@ -143,7 +152,7 @@ class Predictor:
         is drawn to what the scans saw (`complete_track.py`).
 
         Raises:
-            BadInputError: a scan is not `(n, 3)`, or has fewer than 16 finite points.
+            BadInputError: as `complete`.
         """
         clouds, known = point_inputs.together(scans, rays, sensor)
         return list(self._together(clouds, sensor, known))
@@ -221,7 +230,11 @@ class Predictor:
     def register(
         self, source: object, target: object, sensor: Sensor | None = None, *, rays: object = None
     ) -> Registration:
-        """`T_target_source` of two scans `(n, 3)`, sensor frames, metres; `rays`: of both."""
+        """`T_target_source` of two scans `(n, 3)`, sensor frames, metres; `rays`: of both.
+
+        Raises:
+            BadInputError: as `complete`.
+        """
         point_inputs.check_sensor(sensor)
         pair = point_inputs.as_points(source, "source"), point_inputs.as_points(target, "target")
         known = point_inputs.rays_of_each(rays, pair)
@@ -239,6 +252,9 @@ class Predictor:
             sensor: how they were taken.
             track: pose the scans together (`complete_track`) and not each on its own.
             rays: of each, as in `complete`; None: of none.
+
+        Raises:
+            BadInputError: as `complete`, or there is no scan.
         """
         return to_middle(self.poses(scans, sensor, track=track, rays=rays))
 

@@ -122,7 +122,7 @@ def voted_signs(
     *,
     leaps: bool = False,
 ) -> Float[Tensor, "V"]:
-    """The same where the scans do not follow each other.
+    """+1 or -1 for each scan of a track whose scans do not follow each other: turn those of -1.
 
     Args:
         gain: by how much the track's shape costs more in a scan when turned around, metres.

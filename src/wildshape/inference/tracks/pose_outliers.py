@@ -80,7 +80,7 @@ def without_leaps(
     motion: SensorMotion,
     config: PoseOutlierConfig = _DEFAULT.outliers,
 ) -> SE3:
-    """The same of a sensor whose motion is known: no object turns faster than vehicles do.
+    """`without_outliers` where the sensor's motion is known: nothing turns faster than vehicles.
 
     Of all scans those are right that together are surest and do not contradict each other so.
     """
