@@ -83,16 +83,18 @@ class Turn:
         seconds: `(n,)` when each was taken, since the scan's own time; None if that is unknown.
         origins: `(n, 3)` where the ray of each began, where a data set has already moved the
             points to where they would be seen from the sensor's place at the scan's time.
+        met: `(n,)` in place of `seconds`, where points have been moved so.
     """
 
     points: Points
     seconds: Float[np.ndarray, "_"] | None = None
     origins: Points | None = None
+    met: Float[np.ndarray, "_"] | None = None
 
     @property
     def nbytes(self) -> int:
         """Memory that it takes."""
-        known = (self.points, self.seconds, self.origins)
+        known = (self.points, self.seconds, self.origins, self.met)
         return sum(one.nbytes for one in known if one is not None)
 
     def carried(self, motion: Twist) -> Points:

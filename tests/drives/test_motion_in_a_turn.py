@@ -68,8 +68,10 @@ def test_points_are_where_one_place_sees_them_and_the_way_is_truer(simulated):
 
 def test_objects_know_when_their_points_were_met(simulated, tmp_path):
     measured, _ = simulated
-    for timed in (True, False):
-        drive = drive_of(measured, timed=timed)
+    for timed in (True, False, "moved"):
+        drive = drive_of(measured, timed=bool(timed))
+        if timed == "moved":  # by the data set
+            drive = replace(drive, read=lambda i: Turn(measured[i].points, met=measured[i].times))
         cuts = tmp_path / str(timed)
         cuts.mkdir()
         Cutter(drive, find_mounting(drive, CONFIG.mounting), cuts, CONFIG)(2)

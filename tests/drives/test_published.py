@@ -4,6 +4,7 @@
 
 import pickle
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -101,6 +102,23 @@ def test_rays_begin_where_the_sensor_was_when_it_took_them(tmp_path):
         assert full.origins.shape == full.points.shape
         found = np.unique(np.linalg.norm(full.origins[:, :2], axis=1).round(1))
         assert found == pytest.approx(np.sort(places), abs=0.051)
+
+
+def test_points_that_were_moved_say_when_they_were_met(tmp_path):
+    """Vehicles drive on while they are met. The sensor goes at 20 m/s."""
+    for path in (write_log(tmp_path / "log", SCENE), write_scene(tmp_path / "001", SCENE)):
+        drive = open_drive(path)
+        turn = drive.turn(1)
+        assert turn.seconds is None  # no correction for the sensor's motion
+        assert turn.origins is not None
+        assert turn.met is not None
+        away = np.linalg.norm(turn.origins[:, :2], axis=1)
+        assert np.abs(turn.met).max() > 0.04
+        assert away == pytest.approx(20.0 * np.abs(turn.met), abs=0.11)  # origins are of steps
+        wrong = replace(turn, met=1000 * turn.met)
+        found = replace(drive, read=lambda _, wrong=wrong: wrong).turn(1)
+        assert found.met is None
+        assert found.origins is turn.origins
 
 
 def test_a_release_that_names_no_scene_is_refused(tmp_path):

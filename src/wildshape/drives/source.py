@@ -143,14 +143,15 @@ class Drive:
         except BadInputError:
             return _NOTHING
         if self.times is None or self._is_too_long(turn):
-            return Turn(turn.points)
+            return Turn(turn.points, origins=turn.origins)
         return self._timed(turn, self.times, frame)
 
     def _is_too_long(self, turn: Turn) -> bool:
         """Whether its points' times are of more than what lies between two scans."""
-        if turn.seconds is None or not len(turn.seconds) or self.scan_s is None:
+        seconds = turn.met if turn.seconds is None else turn.seconds
+        if seconds is None or not len(seconds) or self.scan_s is None:
             return False
-        return bool(np.ptp(turn.seconds) > _LONGEST_TURN * self.scan_s)
+        return bool(np.ptp(seconds) > _LONGEST_TURN * self.scan_s)
 
     def _timed(self, turn: Turn, times: tuple[float, ...], frame: int) -> Turn:
         """A turn that begins as long before or after its scan's time as the others do.

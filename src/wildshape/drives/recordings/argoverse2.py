@@ -32,10 +32,11 @@ class _Sweeps:
     def __call__(self, frame: int) -> Turn:
         sweep = read_sweep(self.files[frame])
         points = self.T_sensor_ego.apply_numpy(sweep.points)
+        met = sweep.offsets_ns / 1e9
         if self.city is None:
-            return Turn(points)
+            return Turn(points, met=met)
         starts = self.city.ray_starts(int(self.files[frame].stem), sweep, self.T_ego_lidars)
-        return Turn(points, origins=self.T_sensor_ego.apply_numpy(starts))
+        return Turn(points, origins=self.T_sensor_ego.apply_numpy(starts), met=met)
 
 
 def find_logs(root: Path) -> list[Path]:

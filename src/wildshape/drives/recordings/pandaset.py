@@ -40,7 +40,7 @@ class _Sweeps:
             T_world_then = self.poses.sensor_pose(number, stamp + float(step) * _STEP_S)
             places[steps == step] = T_world_then.translation.numpy()
         seen, origins = (T_sensor_world.apply_numpy(one) for one in (points, places))
-        return Turn(seen.astype(np.float32), origins=origins.astype(np.float32))
+        return Turn(seen.astype(np.float32), None, origins.astype(np.float32), times - stamp)
 
 
 def find_pandaset(root: Path) -> list[Path]:

@@ -144,7 +144,8 @@ class Cutter:
         turn: Turn,
     ) -> None:
         found = self.cut(frame, scan, heights, turn.points)
-        seconds = np.empty(0) if turn.seconds is None else turn.seconds[found.rows]
+        met = turn.met if turn.seconds is None else turn.seconds
+        seconds = np.empty(0) if met is None else met[found.rows]
         arrays = {
             "points": found.points,
             "rows": found.rows,
