@@ -9,16 +9,23 @@ from wildshape.datasets.nuscenes.json_rows import json_rows
 from wildshape.datasets.nuscenes.reader import file_of, find_tables, info_of, read_sweep
 from wildshape.datasets.nuscenes.scene import read_scene
 from wildshape.datasets.nuscenes.table_index import cache_folder, index_of, lidar_of
+from wildshape.drives.recordings.beam_order import met_in_order
 from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import stack
 from wildshape.io.scans.turns import read_turn
 from wildshape.records import Turn
 
+_TURN_S = 0.05  # of LIDAR_TOP
+
 
 @dataclass(frozen=True)
 class _Sweeps:
-    """Reads a frame's sweep; TruckScenes' points have times."""
+    """Reads a frame's sweep.
+
+    nuScenes has corrected it for the motion of the vehicle. TruckScenes has not: its points have
+    times.
+    """
 
     files: tuple[Path, ...]
     infos: tuple[Path | None, ...]
@@ -28,7 +35,8 @@ class _Sweeps:
         file = self.files[frame]
         if file.suffix == ".pcd":
             return read_turn(file, self.times[frame])
-        return Turn(read_sweep(file, self.infos[frame]))
+        points = read_sweep(file, self.infos[frame])
+        return Turn(points, met=met_in_order(points, _TURN_S))
 
 
 def find_scenes(root: Path) -> list[Path]:
