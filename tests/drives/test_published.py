@@ -8,13 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.datasets import write_waymo as waymo
 from tests.datasets.street import street
 from tests.datasets.write_argoverse2 import STAMPS, write_log
 from tests.datasets.write_kitti_raw import write_drive
 from tests.datasets.write_nuscenes import Scene, Thing, write_nuscenes, write_relative
 from tests.datasets.write_nuscenes import off_surface as off_box
 from tests.datasets.write_pandaset import AGO, write_scene
-from tests.datasets.write_waymo import PERIOD, SEGMENT, START, write_waymo
+from tests.datasets.write_waymo import PERIOD, SEGMENT, START, mount, write_waymo
 from tests.datasets.write_waymo import Thing as WaymoThing
 from tests.refusal import refused
 
@@ -119,6 +120,24 @@ def test_points_that_were_moved_say_when_they_were_met(tmp_path):
         found = replace(drive, read=lambda _, wrong=wrong: wrong).turn(1)
         assert found.met is None
         assert found.origins is turn.origins
+
+
+def test_waymo_s_pixels_say_when_they_were_met_by_where_the_sensor_was(tmp_path, monkeypatch):
+    left = WaymoThing("left", start=(854.4, 1508.3, -50.2))  # met a quarter of a turn before
+    segment = write_waymo(tmp_path / "training", [left], frames=3) / SEGMENT
+    drive = open_drive(segment)
+    turn = drive.turn(1)
+    assert turn.seconds is None
+    assert turn.met is not None
+    assert len(turn.met) == len(turn.points)
+    ahead, aside, _ = mount()[:3, :3] @ turn.points.T  # in the vehicle's axes
+    share = -np.arctan2(aside, ahead) / (2 * np.pi)
+    assert turn.met == pytest.approx(share * PERIOD / 1e6, abs=0.002)
+    assert turn.met.mean() < -0.02
+    goes = waymo.vehicle_pose
+    monkeypatch.setattr(waymo, "vehicle_pose", lambda time: goes(0 * time))
+    stays = write_waymo(tmp_path / "standing", [left], frames=3) / SEGMENT
+    assert open_drive(stays).turn(1).met is None
 
 
 def test_a_release_that_names_no_scene_is_refused(tmp_path):

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 
 from wildshape.datasets.tracks.gathering import Gathering
 from wildshape.datasets.tracks.labelled_boxes import (
@@ -38,6 +39,7 @@ from wildshape.geometry.projection.full_scan import FullScan
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Points, Sensor, Track, Turn
 
+_SLOW_M_PER_S = 1.0  # a place in float32 is off by some millimetres
 _PLACE_M = 0.1  # rays that begin so near each other have one place: they are looked at together
 TOP = Sensor(kind="lidar", resolution_deg=(0.136, 0.31))
 _LAYOUT = f"<root>/<split>/{{{','.join(COMPONENTS)}}}/<segment>.parquet"
@@ -136,10 +138,18 @@ class Frame:
         ends, starts = self._rays(np.where(seen, 0.0, 1.0))
         return FullScan(points, _places(np.concatenate((origins, starts))), lost=ends - starts)
 
-    def turn(self) -> Turn:
-        """All points in the sensor's frame at the frame's time, and where their rays began."""
+    def turn(self, velocity: Float[np.ndarray, "3"]) -> Turn:
+        """All points in the sensor's frame at the frame's time, and where their rays began.
+
+        Pixels have poses and no times: how far the sensor had come tells when they were met.
+
+        Args:
+            velocity: of the sensor, in its frame, metres a second.
+        """
         points, origins = self._rays(self.image[..., 0])
-        return Turn(points, origins=_places(origins))
+        speed = float(np.linalg.norm(velocity))
+        met = origins @ (velocity / speed**2) if speed > _SLOW_M_PER_S else None
+        return Turn(points, origins=_places(origins), met=met)
 
     def points(self) -> Points:
         """All points `(n, 3)` in the sensor's frame at the frame's time, metres."""

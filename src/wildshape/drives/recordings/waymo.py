@@ -8,12 +8,13 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 
 from wildshape.datasets.waymo.reader import Frame, frames, tables_of
 from wildshape.datasets.waymo.tables import WITHOUT_LABELS, read_calibration, read_vehicle_poses
 from wildshape.drives.source import Drive
 from wildshape.errors import BadInputError
-from wildshape.geometry.transforms.se3 import stack
+from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.records import Turn
 
 
@@ -50,10 +51,21 @@ class _Frames:
     root: Path
     segment: str
     times: tuple[int, ...]
+    T_world_sensor: SE3
 
     def __call__(self, frame: int) -> Turn:
         found = _reader(self.root, self.segment).at(self.times[frame])
-        return Turn(np.empty((0, 3), np.float32)) if found is None else found.turn()
+        if found is None:
+            return Turn(np.empty((0, 3), np.float32))
+        return found.turn(self._velocity(frame))
+
+    def _velocity(self, frame: int) -> Float[np.ndarray, "3"]:
+        """Of the sensor, in its frame, metres a second."""
+        before, after = max(frame - 1, 0), min(frame + 1, len(self.times) - 1)
+        places = self.T_world_sensor.translation.numpy()
+        since = (self.times[after] - self.times[before]) / 1e6
+        moved = self.T_world_sensor.rotation[frame].numpy().T @ (places[after] - places[before])
+        return moved / since if since else np.zeros(3)
 
 
 def find_segments(root: Path) -> list[Path]:
@@ -75,12 +87,13 @@ def open_segment(path: Path) -> Drive:
     times = tuple(T_world_vehicle)
     if not times:
         raise BadInputError(f"{tables['vehicle_pose']}: holds no poses; copy it again.")
+    T_world_sensor = stack(list(T_world_vehicle.values())) @ T_vehicle_sensor
     return Drive.of(
         name=path.name,
         path=path,
         scan_names=[str(time) for time in times],
-        read=_Frames(path.parent, path.name, times),
+        read=_Frames(path.parent, path.name, times, T_world_sensor),
         times=[time / 1e6 for time in times],
-        T_world_sensor=stack(list(T_world_vehicle.values())) @ T_vehicle_sensor,
+        T_world_sensor=T_world_sensor,
         files=tables.values(),
     )
