@@ -18,8 +18,9 @@ STEP_S = 0.4  # between scans
 def follower(speed, scans=6):
     """The front of a car behind the sensor: its left half ends a turn, its right half begins it.
 
-    Returns the clouds, the times of their points, `T_level_cloud`, and each cloud as the front
-    stands at the mean of its times. The level world is turned and moved against the sensor.
+    Returns the clouds, the times of their points, those of the scans, `T_level_cloud`, and each
+    cloud as the front stands at the mean of its times. The level world is turned and moved against
+    the sensor.
     """
     rng = np.random.default_rng(0)
     front = rng.uniform((-10.2, -0.9, 0), (-10.0, 0.9, 1.4), (300, 3))
@@ -35,15 +36,14 @@ def follower(speed, scans=6):
     R = rotation_z(torch.tensor(0.7, dtype=torch.float64))
     T_level_world = SE3(R, torch.tensor((3.0, -2.0, 1.0), dtype=torch.float64))
     T_world_cloud = SE3(torch.eye(3).double().expand(scans, 3, 3), torch.tensor(np.array(places)))
-    seconds = [STEP_S * scan + met for scan in range(scans)]
-    return clouds, seconds, T_level_world @ T_world_cloud, whole
+    return clouds, [met] * scans, STEP_S * np.arange(scans), T_level_world @ T_world_cloud, whole
 
 
 def test_the_halves_of_a_vehicle_that_follows_are_put_together():
-    clouds, seconds, T_level_cloud, whole = follower(8.0)
+    clouds, seconds, times, T_level_cloud, whole = follower(8.0)
     apart = [np.abs(one - two).max() for one, two in zip(clouds, whole)]
     assert min(apart) > 0.35
-    found = deskewed(clouds, seconds, T_level_cloud, CONFIG)
+    found = deskewed(clouds, seconds, times, T_level_cloud, CONFIG)
     for one, two in zip(found, whole, strict=True):
         np.testing.assert_allclose(one, two, atol=1e-4)
         assert one.dtype == np.float32
@@ -52,13 +52,21 @@ def test_the_halves_of_a_vehicle_that_follows_are_put_together():
 @pytest.mark.parametrize("slow", [0.0, 2.0])
 def test_what_stands_stays(slow):
     """The middle of what is seen of a parked car moves, as more of it comes into sight."""
-    clouds, seconds, T_level_cloud, _ = follower(slow)
-    found = deskewed(clouds, seconds, T_level_cloud, CONFIG)
+    clouds, seconds, times, T_level_cloud, _ = follower(slow)
+    found = deskewed(clouds, seconds, times, T_level_cloud, CONFIG)
     assert all(one is two for one, two in zip(found, clouds, strict=True))
 
 
 def test_without_times_or_with_one_scan_all_stays():
-    clouds, seconds, T_level_cloud, _ = follower(8.0)
+    clouds, seconds, times, T_level_cloud, _ = follower(8.0)
     unknown = [np.empty(0) for _ in clouds]
-    assert deskewed(clouds, unknown, T_level_cloud, CONFIG) == clouds
-    assert deskewed(clouds[:1], seconds[:1], T_level_cloud[:1], CONFIG) == clouds[:1]
+    assert deskewed(clouds, unknown, times, T_level_cloud, CONFIG) == clouds
+    assert deskewed(clouds[:1], seconds[:1], times[:1], T_level_cloud[:1], CONFIG) == clouds[:1]
+
+
+def test_a_scan_without_times_stays_and_the_others_do_not():
+    clouds, seconds, times, T_level_cloud, whole = follower(8.0)
+    seconds[2] = np.empty(0)
+    found = deskewed(clouds, seconds, times, T_level_cloud, CONFIG)
+    assert found[2] is clouds[2]
+    np.testing.assert_allclose(found[4], whole[4], atol=0.01)  # of 0.4

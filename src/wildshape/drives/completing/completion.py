@@ -260,9 +260,9 @@ class Completer:
         clouds, frames = seen.clouds(self.cuts), list(seen.frames)
         if self.T_level_sensor is not None:
             clouds = [self.T_level_sensor.apply_numpy(cloud) for cloud in clouds]
-        met = [at + own for at, own in zip(self._since_first(frames), seen.seconds(self.cuts))]
         T_world_level = self.T_world_level[torch.tensor(frames)]
-        return deskewed(clouds, met, T_world_level, self.config.deskewing)
+        known = seen.seconds(self.cuts), self._since_first(frames), T_world_level
+        return deskewed(clouds, *known, self.config.deskewing)
 
 
 def order_of_looks(seen: Sightings, parts: int) -> list[int]:

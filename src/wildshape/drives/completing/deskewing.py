@@ -20,31 +20,34 @@ from wildshape.records import Points
 def deskewed(
     clouds: Sequence[Points],
     seconds: Sequence[Float[np.ndarray, "_"]],
+    times: Float[np.ndarray, "k"],
     T_level_cloud: SE3,
     config: DeskewConfig,
 ) -> list[Points]:
     """The clouds of an object, each carried to the mean time of its points by its own motion.
 
-    Those of what stands, or without times, stay as they are.
+    Those of what stands, and a scan without times, stay as they are.
 
     Args:
         clouds: `(n, 3)` in some scans, in time order, metres.
-        seconds: when each point was met, from one beginning for all scans; empty if not known.
+        seconds: when each point was met, since the scan's time; empty if not known.
+        times: of the scans, seconds.
         T_level_cloud: of each, to the level world.
         config: see there.
     """
-    if len(clouds) < 2 or not all(map(len, seconds)):
+    if len(clouds) < 2 or not any(map(len, seconds)):
         return list(clouds)
     middles = np.array([_middle(T_level_cloud[i], cloud) for i, cloud in enumerate(clouds)])
-    met = np.array([float(one.mean()) for one in seconds])
+    since = np.array([float(one.mean()) if len(one) else 0.0 for one in seconds])
+    met = times + since
     found = []
     for i, (cloud, at) in enumerate(zip(clouds, seconds)):
         velocity = _velocity(middles, met - met[i], config)
-        if np.hypot(*velocity) < config.least_m_per_s:
+        if not len(at) or np.hypot(*velocity) < config.least_m_per_s:
             found.append(cloud)
             continue
         R = T_level_cloud[i].rotation.numpy()
-        back = (met[i] - at)[:, None] * (R.T @ (*velocity, 0.0))
+        back = (since[i] - at)[:, None] * (R.T @ (*velocity, 0.0))
         found.append((cloud + back).astype(np.float32))
     return found
 
