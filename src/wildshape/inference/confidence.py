@@ -7,7 +7,8 @@ are short names for machines (docs/formats.md). Asked of the scan: `other_sensor
 for weights of LiDARs, or the reverse), `too_large_for_model` (the bounding box's diagonal is above
 the largest trained on), `too_small_for_model` (below half of the smallest trained on: a scan may
 show a part of an object), `few_points`, `sensor_inside` (the points lie on all sides of the
-origin). Asked of a track: `scans_disagree` (on its height: perhaps they are of several objects).
+origin); three more are asked of it and its shape (`single_object.py`). Asked of a track:
+`scans_disagree` (on its height: perhaps they are of several objects).
 Asked of the result: `poor_fit` (the label-free cost is far above that of scans held out in
 training), `low_confidence`, and which of the probabilities is low: `unsure_heading`, `unsure_box`,
 `other_kind`. `ReasonRule` holds the bounds.
@@ -43,6 +44,11 @@ DENSEST = 40_000  # points: no calibration has seen more, and what it saw falls 
 VIEW_PX = 240.0  # focal length of the camera that calibrations saw; finer ones say no more
 VIEWED_M = (1.6, 2.05)  # how far from it what it saw was; from elsewhere as if from there
 OFF_AXIS = 0.5  # cosine: no depth camera sees what is farther off its axis
+_CURES = {
+    "points_off_shape": "cut out the object alone, without ground or what stands beside it",
+    "not_one_scan": "hand in the points of one frame, seen from where its sensor stood",
+    "roof_not_seen": "cut out one vehicle, without another or its trailer",
+}
 _OF_RESULT = ("poor_fit", "low_confidence", "unsure_heading", "unsure_box", "other_kind")
 
 
@@ -289,7 +295,7 @@ def reasons_sentence(done: Completion | Registration) -> str:
     if not done.reasons:
         return ""
     why = ", ".join(map(_words, done.reasons))
-    detail = f" ({done.warning})" if done.warning else ""
+    detail = f" ({advice})" if (advice := _advice(done)) else ""
     return f"this result is not to be trusted: {why}{detail}"
 
 
@@ -299,13 +305,16 @@ class ReasonCounts:
 
     Attributes:
         seen: results looked at.
-        flagged: of them not to be trusted; `example` is the first, with its warning if any.
+        flagged: of them not to be trusted.
+        example: the first of these, or the first with a warning or a cure, and that.
+        advised: whether it has one.
         reasons: how often each speaks.
     """
 
     seen: int = 0
     flagged: int = 0
     example: str = ""
+    advised: bool = False
     reasons: Counter[str] = field(default_factory=Counter)
 
     def add(self, name: str, done: Completion) -> None:
@@ -313,8 +322,9 @@ class ReasonCounts:
         self.seen += 1
         self.flagged += bool(done.reasons)
         self.reasons.update(done.reasons)
-        if done.reasons and not self.example:
-            self.example = f"{name}: {done.warning}" if done.warning else name
+        advice = _advice(done)
+        if done.reasons and (not self.example or (advice and not self.advised)):
+            self.example, self.advised = f"{name}: {advice}" if advice else name, bool(advice)
 
     def of(self, names: Iterable[str], done: Iterable[Completion]) -> "ReasonCounts":
         """The same with more results looked at."""
@@ -338,6 +348,11 @@ class ReasonCounts:
     def data(self) -> dict[str, Any]:
         """The same for machines, the commonest reason first."""
         return {"flagged": self.flagged, "reasons": dict(self.reasons.most_common())}
+
+
+def _advice(done: Completion | Registration) -> str:
+    """The warning, or else what is to be done about the first reason that has a cure."""
+    return done.warning or next((_CURES[one] for one in done.reasons if one in _CURES), "")
 
 
 def _words(reason: str) -> str:

@@ -287,6 +287,12 @@ class ReasonRule:
             most on 35 tracks of one object, and 0.27 on 74 half-hidden ones, 4 % of which lie above
             this. Of mixtures of two vehicles 0.3 m apart in height all 10 do, and 24 of 25
             half-hidden ones.
+        apart_m: what lies so far from a shape is no part of it; of a vehicle, smaller objects as
+            much less.
+        off_share: share of a scan that may lie off its shape. Of 1,148 clean scans none had more.
+        alike_deg: two points so near each other in direction were not met by one turn of a sensor.
+        twice_share: share of a scan that may have another range in its direction. Of the same
+            scans none had more.
     """
 
     few_points: int = 32
@@ -296,6 +302,10 @@ class ReasonRule:
     low_confidence: float = 0.1
     least: float = 0.5
     disagree: float = 0.2
+    apart_m: float = 0.5
+    off_share: float = 0.015
+    alike_deg: float = 0.06
+    twice_share: float = 0.01
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from wildshape.inference.confidence import glance_of, judged, look_features
 from wildshape.inference.config import HypothesisRule, InferenceConfig, RefineConfig
 from wildshape.inference.free_space import Rays, SeenScores, Sights, without_free_space
 from wildshape.inference.refine import Refined, refine, with_its_scan
+from wildshape.inference.single_object import reasons_of_object
 from wildshape.io.scans.points import LEAST_POINTS
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.choose_hypothesis import (
@@ -284,16 +285,19 @@ def completed(
         alone = sights.part([i])
         solid = without_free_space(shape, stack([T_sensor_can]), alone)
         standing = alone.of(whole, 0)
+    box, odd = box_seen(solid, T_sensor_can, seen, settings, config.box), ()
+    if settings.sensor == "lidar":
+        odd = reasons_of_object(scan, seen, shows, box, settings.unit, config.reasons)
     done = Completion(
         points=shows,
         pose=T_sensor_can.to(torch.float64).owned(),
-        box=box_seen(solid, T_sensor_can, seen, settings, config.box),
+        box=box,
         confidence=said.confidence,
         branch=said.branch,
         cost=said.cost,
         refined=posed.refined,
         warning=said.warning,
-        reasons=said.reasons,
+        reasons=(*said.reasons, *odd),
         features=said.features,
     )
     if not posed.surfaces:
