@@ -198,29 +198,34 @@ def test_rays_stay_beside_their_scans_in_every_batch(
     """One scan a batch, in every way to complete a track, short or long, and for its one shape."""
     scans, rays = [*track.scans] * 2, [track.rays[0], None, None, track.rays[1]]
     model = wildshape.load(config=InferenceConfig(track=TrackConfig(key_scans=key_scans)))
-    at_once = model.complete_track(scans, rays=rays)
     look, cut = Predictor.look, complete_track.without_free_space
-    looked, held = [], []
+    looked, costs, held = [], [], []
 
     def looking(self, batch, beside=()):
+        found = look(self, batch, beside)
         looked.extend(beside)
-        return look(self, batch, beside)
+        costs.append(found.found.cost)
+        return found
 
     def cutting(shape, poses, sights):
         held.extend(sights.rays)
         return cut(shape, poses, sights)
 
-    monkeypatch.setattr(predictor, "BATCH", 1)
     monkeypatch.setattr(Predictor, "look", looking)
     monkeypatch.setattr(complete_track, "without_free_space", cutting)
+    model.complete_track(scans, rays=rays)
+    (at_once,) = costs
+    assert held == rays
+    monkeypatch.setattr(predictor, "BATCH", 1)
     for way in (model.complete_many, model.complete_checked, model.complete_track):
         looked.clear()
-        done = list(way(scans, rays=rays))
+        costs.clear()
+        assert len(list(way(scans, rays=rays))) == len(scans)
         assert looked == rays
-    assert held == rays
-    assert done[0].box.size == pytest.approx(at_once[0].box.size, abs=1e-3)
-    assert len(list(model.complete_checked(scans, track=True, rays=rays))) == len(scans)
+        assert torch.cat(costs).tolist() == pytest.approx(at_once.tolist(), rel=1e-4)
     assert held == rays * 2
+    assert len(list(model.complete_checked(scans, track=True, rays=rays))) == len(scans)
+    assert held == rays * 3
 
 
 def test_small_objects_are_held_against_rays_as_large_ones_are(track: Track) -> None:
