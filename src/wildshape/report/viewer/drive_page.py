@@ -281,7 +281,8 @@ class DrivePage:
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         found, frame, number = self.found, self.frame, self.chosen
-        yield "time", f"{found.seconds[frame]:.1f} s"
+        if found.times:
+            yield "time", f"{found.seconds[frame]:.1f} s"
         yield "scan", found.scan_names[frame]
         yield "vehicles", f"{len(self.boxes.get(frame, {}))} here, {len(self.names)} in all"
         if self.drive is None:
