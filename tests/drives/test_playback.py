@@ -112,6 +112,21 @@ def test_mcap_boxes_and_shapes_stand_where_the_cars_are(messages):
         assert scan["z"].min() == np.float32(-HEIGHT)
 
 
+def test_mcap_says_speeds_only_where_times_are_known(found, messages, tmp_path):
+    """A drive without times had those of ten scans a second."""
+
+    def said(updates):
+        return {pair.key for one in updates for pair in one.entities[-1].metadata}
+
+    assert "speed" in said(update for _, update in messages["/boxes"])
+    write_mcap(replace(found, times=None), tmp_path / "untimed.mcap")
+    with (tmp_path / "untimed.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        boxes = [message for *_, message in reader.iter_decoded_messages(["/boxes"])]
+    assert len(boxes) == FRAMES
+    assert "speed" not in said(boxes)
+
+
 def test_mcap_rises_from_0_where_times_begin_before_it(found, tmp_path):
     early = replace(found, times=tuple(time - 3.05 for time in found.times))
     write_mcap(early, tmp_path / "early.mcap")

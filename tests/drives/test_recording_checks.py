@@ -12,9 +12,11 @@ from wildshape.drives.recording_checks import (
     clock_told,
     rate_told,
     sideways_told,
+    tipped_told,
 )
 from wildshape.drives.recordings.recording_kinds import open_drive
 from wildshape.drives.source import Drive
+from wildshape.geometry.transforms.rotation import rotation_from_vector
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.records import Turn
 
@@ -90,6 +92,26 @@ def test_scans_in_reverse_order_are_said():
     assert told.startswith("5 of 6 moving vehicles drive backwards by their shapes: the scans are")
     for turned in ([], [True, True], [True] * 3 + [False] * 3):
         assert backwards_told(turned) == []
+
+
+@pytest.mark.parametrize("rolled_deg", [0.0, 50.0])
+def test_a_sensor_that_tips_on_its_way_is_told_of_and_not_one_that_turns(rolled_deg):
+    """Of scans cut down to their vehicles odometry rolled over by 55 degrees, unsaid."""
+
+    def about(axis, degrees):
+        return rotation_from_vector(torch.tensor(axis, dtype=torch.float64) * np.radians(degrees))
+
+    mounted = about([1.0, 0.0, 0.0], rolled_deg)
+    up = mounted.T[:, 2].tolist()
+
+    def way(axis, degrees):
+        turned = [mounted.T @ about(axis, degrees * part) @ mounted for part in (0.0, 0.5, 1.0)]
+        return SE3(torch.stack(turned), torch.zeros(3, 3, dtype=torch.float64))
+
+    assert tipped_told(way([0.0, 0.0, 1.0], 170.0), up) == []
+    assert tipped_told(way([0.0, 1.0, 0.0], 20.0), up) == []
+    (told,) = tipped_told(way([0.0, 1.0, 0.0], 55.0), up)
+    assert told.startswith("the sensor tips by 55 degrees, more than on any road")
 
 
 @pytest.mark.parametrize(

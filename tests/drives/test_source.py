@@ -170,7 +170,7 @@ def test_what_cannot_be_a_drive_is_refused_in_a_sentence(folder, tmp_path):
     (tmp_path / "a.bin").touch()
     refused(open_drive, tmp_path / "a.bin", match="a file of another kind; a drive is a folder")
     (folder / "times.txt").write_text("1\n2\n3\n")
-    refused(open_drive, folder, match="3 times for 4 scans")
+    refused(open_drive, folder, match="times.txt: 3 times for 4 scans")
     (folder / "times.txt").write_text("1\n2\n1.5\n3\n")
     refused(open_drive, folder, match=rf"^{folder}: time 3 \(1.5\) is not after")
     (folder / "times.txt").write_text("1\n2\n2\n3\n")
@@ -178,7 +178,9 @@ def test_what_cannot_be_a_drive_is_refused_in_a_sentence(folder, tmp_path):
     (folder / "times.txt").write_text("1\n2\nnan\n3\n")
     refused(open_drive, folder, match="not finite")
     (folder / "times.txt").write_text("100\n200\n300\n500\n")
-    refused(open_drive, folder, match="100 s from one scan to the next; write its times in seconds")
+    refused(
+        open_drive, folder, match="times.txt: 100 s from one scan to the next; write its times in"
+    )
     (folder / "times.txt").write_text("".join(f"{at / 600}\n" for at in range(4)))  # minutes
     refused(open_drive, folder, match="0.00166667 s from one scan .*; write its times in seconds")
     (folder / "times.txt").unlink()

@@ -37,6 +37,7 @@ from wildshape.drives.recording_checks import (
     has_times,
     rate_told,
     sideways_told,
+    tipped_told,
 )
 from wildshape.drives.result import DriveResult
 from wildshape.drives.source import Drive
@@ -331,6 +332,7 @@ class Pipeline:
             found.append(f"{empty} of {len(points)} scans are empty or cannot be read")
         found += self.breaks.told() + clock_told(self.drive)
         found += sideways_told(self.drive, T_world_sensor)
+        found += tipped_told(T_world_sensor, mounting.up)
         found += count_told(len(points) - points.count(0))
         if not self.tracked:
             found += rate_told(self.seen_s, self.step_m(T_world_sensor), self.config.tracks)

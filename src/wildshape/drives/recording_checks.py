@@ -22,6 +22,9 @@ _SLOW_S = 0.21  # 5 Hz is well enough
 _FEWEST_SCANS = 5
 _FEWEST_TURNED = 3  # vehicles; of 134 that moved on streets and real drives 3 were, one a drive
 _LEAST_WAY_M, _LEAST_STEP_M = 5.0, 0.05  # less tells no direction: odometry's noise is 15 mm
+_STEEPEST_DEG = (
+    30.0  # against the first scan; the steepest streets rise by 19, real drives tip by 1
+)
 _LEAST_BYTES = 2000  # of a file; smaller ones hold hardly any points, and may be alike
 
 
@@ -87,6 +90,21 @@ def sideways_told(drive: Drive, T_world_sensor: SE3) -> list[str]:
     return [
         f"the sensor goes {to}: points without times need x forward and scans in order of time,"
         " else vehicles are misplaced and things that stand may seem to move"
+    ]
+
+
+def tipped_told(T_world_sensor: SE3, up: Sequence[float]) -> list[str]:
+    """A sentence if the sensor tips on its way as no vehicle does.
+
+    `up`: the vertical in the sensor frame, unit length.
+    """
+    upright = T_world_sensor.rotation.numpy() @ np.asarray(up)
+    tipped = float(np.rad2deg(np.arccos(np.clip(upright @ upright[0], -1.0, 1.0))).max())
+    if tipped < _STEEPEST_DEG:
+        return []
+    return [
+        f"the sensor tips by {tipped:.0f} degrees, more than on any road: its way is wrong, and"
+        " with it boxes and speeds; give whole scans, or a poses.txt"
     ]
 
 

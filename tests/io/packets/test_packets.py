@@ -80,7 +80,7 @@ def test_turns_amid_which_packets_are_missing(turns, tmp_path, begin, count, who
 
     drive = open_drive(rewrite(path, lose))
     assert len(drive) == whole
-    assert "1 turns with missing packets are left out" in drive.warnings
+    assert "1 turn with missing packets left out" in drive.warnings
 
 
 def test_a_sensor_that_looks_back_alone_has_whole_turns(turns, tmp_path):

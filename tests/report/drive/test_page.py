@@ -94,6 +94,18 @@ def test_the_scene_s_points_lie_in_the_level_world_where_they_stand(found):
             assert np.abs(own[:, :2].mean(0) - (x, y)).max() < 0.4
 
 
+def test_without_times_no_seconds_and_no_speeds_are_shown(found):
+    """Those of ten scans a second were, as if they had been measured."""
+    untimed = replace(found, times=None)
+    report = drive_report(untimed, None)
+    assert [name for name, _ in report.facts if name == "time"] == []
+    assert "seen, frames" in report.index[0].columns
+    assert [row[10] for row in report.index[0].rows] == ["0 to 5"] * 2
+    scene = scene_data(untimed, drawn_scans(untimed, None))
+    assert not scene["timed"]
+    assert [one["speeds"] for one in scene["vehicles"]] == [None, None]
+
+
 def test_each_vehicle_s_scans_are_fused_where_it_is_completed(found, tmp_path):
     """In the frame of its fullest, here the second of two: what drives was elsewhere before."""
     out = shutil.copytree(found.out, tmp_path / "found")

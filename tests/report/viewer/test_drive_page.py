@@ -39,6 +39,13 @@ def test_what_is_held_and_sent_of_many_vehicles_is_bounded(found, monkeypatch):
         assert poses_alive() - before < len(page.found)  # of two vehicles in each of the frames
 
 
+def test_the_time_is_shown_where_it_is_known(found):
+    for drive, said in ((found, True), (replace(found, times=None), False)):
+        with serving_drive(drive) as page:
+            page.refresh()
+            assert (">time<" in page.text.content) == said
+
+
 def test_vehicles_stand_at_their_places_and_the_chosen_one_shows_its_shape(found):
     with serving_drive(found) as page:
         page.time.value = 4

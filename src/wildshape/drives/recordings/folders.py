@@ -82,7 +82,7 @@ def open_folder(path: Path) -> Drive:
         )
     files = _files(path)
     poses = path / "poses.txt"
-    return _drive(path, files, _seconds(path / "times.txt"), poses if poses.is_file() else None)
+    return _drive(path, files, path / "times.txt", poses if poses.is_file() else None)
 
 
 def find_kitti_raw(root: Path) -> list[Path]:
@@ -96,7 +96,7 @@ def find_kitti_raw(root: Path) -> list[Path]:
 
 def open_kitti_raw(path: Path) -> Drive:
     """A drive of KITTI raw; see `open_folder`."""
-    return _drive(path, _files(path / _RAW), _timestamps(path / _RAW.parent / "timestamps.txt"))
+    return _drive(path, _files(path / _RAW), path / _RAW.parent / "timestamps.txt")
 
 
 def find_kitti_tracking(root: Path) -> list[Path]:
@@ -120,22 +120,22 @@ def find_sequences(root: Path) -> list[Path]:
 
 def open_sequence(path: Path) -> Drive:
     """A sequence; its own poses are those of a camera and are not used. See `open_folder`."""
-    return _drive(path, _files(path / _ODOMETRY), _seconds(path / "times.txt"))
+    return _drive(path, _files(path / _ODOMETRY), path / "times.txt")
 
 
-def _drive(
-    path: Path, files: list[Path], times: list[float] | None, poses: Path | None = None
-) -> Drive:
+def _drive(path: Path, files: list[Path], clock: Path, poses: Path | None = None) -> Drive:
+    """A drive of some files; `clock`: their times, seconds or KITTI raw's, if it is there."""
+    times = _timestamps(clock) if clock.name == "timestamps.txt" else _seconds(clock)
     if times is not None:
         times = _times_of(files, times)
         if len(times) != len(files):
             raise BadInputError(
-                f"{path}: {len(times)} times for {len(files)} scans; give a line a scan."
+                f"{clock}: {len(times)} times for {len(files)} scans; give a line a scan."
             )
         step = float(np.median(np.diff(times))) if len(times) > 1 else _LONGEST_STEP_S
         if step > _LONGEST_STEP_S or 0 < step < _SHORTEST_STEP_S:
             raise BadInputError(
-                f"{path}: {step:.6g} s from one scan to the next; write its times in seconds."
+                f"{clock}: {step:.6g} s from one scan to the next; write its times in seconds."
             )
     return Drive.of(
         name=path.name or path.resolve().name,

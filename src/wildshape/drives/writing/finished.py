@@ -175,6 +175,12 @@ class FinishedDrive:
         except BadInputError:
             return np.empty((0, 3), np.float32)
 
+    def speeds(self, vehicle: FoundVehicle) -> list[float] | None:
+        """Over the ground, of each of its frames, m/s; None where no times are known."""
+        if self.times is None:
+            return None
+        return np.linalg.norm(self.velocities(vehicle), axis=1).tolist()
+
     def velocities(self, vehicle: FoundVehicle) -> Float[np.ndarray, "f 3"]:
         """Over the ground, in each frame's sensor axes, m/s; 0 for what stands.
 

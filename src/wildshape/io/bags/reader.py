@@ -16,6 +16,7 @@ from wildshape.errors import BadInputError, MissingExtraError
 from wildshape.io.bags.clouds import Cloud, cloud_of, frame_name, message_types, stamp
 from wildshape.io.bags.storages import CLOUD, STORAGES, Key, Message, storage_of
 from wildshape.io.guard import first_line, reading
+from wildshape.io.progress import counted
 from wildshape.io.scans.point_times import seconds_since, unusable_told
 from wildshape.io.scans.points import check_near
 from wildshape.records import Turn
@@ -221,9 +222,9 @@ def _in_order(topic: str, scans: list[_Scan], told: tuple[str, ...]) -> Bag:
     kept = tuple(taken[instant] for instant in instants)
     repeated, dropped = len(scans) - len(kept), sum(scan.dropped for scan in kept)
     if repeated:
-        told += (f"{repeated} scans bear the time of another and were left out",)
+        told += (f"{counted(repeated, 'scan')} with the time of another left out",)
     if dropped:
-        told += (f"{dropped} points without a return were left out",)
+        told += (f"{counted(dropped, 'point')} without a return left out",)
     return Bag(topic, tuple(instant / 1e9 for instant in instants), told, kept)
 
 

@@ -13,6 +13,7 @@ from jaxtyping import Bool, Int
 from wildshape.errors import load_library
 from wildshape.io.guard import reading
 from wildshape.io.packets.clock import gone_on, set_told
+from wildshape.io.progress import counted
 from wildshape.records import Turn
 
 _INSTALL = "pip install 'wildshape[ouster]'"
@@ -70,7 +71,7 @@ def open_ouster(path: Path, described: Path) -> OusterTurns:
                 numbers.append(number)
                 recorded.append(int(frame.packet_timestamp.max()) // 1000)
         left = len(source) - len(numbers)
-    told = [f"{left} turns lack packets and were left out"] if left else []
+    told = [f"{counted(left, 'turn')} with missing packets left out"] if left else []
     gone, by_s = gone_on(times, recorded)
     told += set_told(f"the sensor's clock in {path.name}", by_s)
     return OusterTurns(path, described, gone, tuple(told), tuple(numbers))

@@ -20,6 +20,7 @@ from wildshape.errors import BadInputError, load_library
 from wildshape.io.guard import first_line, reading
 from wildshape.io.packets.clock import gone_on, set_told
 from wildshape.io.packets.records import Place, records_of
+from wildshape.io.progress import counted
 from wildshape.records import Turn
 
 _INSTALL = "pip install 'wildshape[pcap]'"
@@ -139,12 +140,13 @@ def open_velodyne(path: Path) -> VelodyneTurns:
     whole = tuple(compress(found, sound))
     # A recording begins and ends amid a turn, which is no loss.
     if lacking := sound[1:-1].count(False):
-        warnings.append(f"{lacking} turns with missing packets are left out")
+        warnings.append(f"{counted(lacking, 'turn')} with missing packets left out")
     described = _described(path, source, found) if source is not None and whole else None
     if source is not None and described is None:
         damaged = models[source].total() - max(models[source].values())
         if damaged:
-            warnings.append(f"{damaged} packets end in another model than most and are left out")
+            packets = counted(damaged, "packet")
+            warnings.append(f"{packets} of another model than most left out")
     times, by_s = gone_on([turn.stamp for turn in found], [turn.micros for turn in found])
     warnings += set_told(f"the clock of {path.name}", by_s)
     whole_times = tuple(compress(times, sound))

@@ -54,6 +54,7 @@ _COLUMNS = (
     "nearest, m",
     "most points",
 )
+_UNTIMED = tuple("seen, frames" if name == "seen, s" else name for name in _COLUMNS)
 
 
 def report_from_drive(out: Path, moved: Path | None = None, helpers: Team = ALONE) -> Report:
@@ -122,7 +123,7 @@ def _facts(found: FinishedDrive) -> list[tuple[str, str]]:
         ("vehicles", str(len(found.vehicles))),
         ("of them moving", str(moving)),
         ("scans", str(len(found))),
-        ("time", f"{found.seconds[-1]:.1f} s" if len(found) else "0 s"),
+        *([("time", f"{found.seconds[-1]:.1f} s")] if found.times else []),
         ("way of the sensor", f"{found.travelled_m:.0f} m"),
     ]
 
@@ -140,17 +141,17 @@ def _index(found: FinishedDrive) -> Table:
     count = range(len(rows))
     return Table(
         title=counted(len(rows), "vehicle"),
-        columns=_COLUMNS,
+        columns=_COLUMNS if found.times else _UNTIMED,
         rows=rows,
         caption="Click a row for its complete shape and its scans."
-        f" {MEANING} That of what is seen driving is raised.",
+        f" {MEANING} That of what is seen driving is raised. What was seen too briefly to tell is"
+        " called standing, too.",
         sortable=True,
         objects=tuple(i if i < MOST_OBJECTS else None for i in count),
     )
 
 
 def _row(found: FinishedDrive, one: FoundVehicle) -> tuple[Cell, ...]:
-    first, last = (found.seconds[one.frames[i]] for i in (0, -1))
     chances = _chances(found, one)
     return (
         one.name,
@@ -159,10 +160,17 @@ def _row(found: FinishedDrive, one: FoundVehicle) -> tuple[Cell, ...]:
         *(chances.get(words) for words in PROBABILITIES.values()),
         *(f"{side:.2f}" for side in one.size),
         len(one.frames),
-        f"{first:.1f} to {last:.1f}",
+        _seen(found, one),
         f"{one.nearest_m:.1f}",
         max(one.points),
     )
+
+
+def _seen(found: FinishedDrive, one: FoundVehicle) -> str:
+    first, last = one.frames[0], one.frames[-1]
+    if not found.times:
+        return f"{first} to {last}"
+    return f"{found.seconds[first]:.1f} to {found.seconds[last]:.1f}"
 
 
 def _chances(found: FinishedDrive, one: FoundVehicle) -> dict[str, str]:

@@ -179,6 +179,7 @@ def scene_data(
     return {
         "name": found.name,
         "ground": found.ground_m,
+        "timed": found.times is not None,
         "palette": PALETTE,
         "frames": [_frame(found, scan) for scan in scans],
         "vehicles": [_vehicle(found, one, frames, most) for one in found.vehicles],
@@ -207,8 +208,8 @@ def _vehicle(
     during = frames[drawn[0] : drawn[-1] + 1]
     places = dict(zip(one.frames, placed(found, one).round(3).tolist()))
     points = dict(zip(one.frames, one.points))
-    speeds = np.linalg.norm(found.velocities(one), axis=1)
-    speed = dict(zip(one.frames, speeds.round(1).tolist()))
+    speeds = found.speeds(one)
+    speed = dict(zip(one.frames, speeds or ()))
     return {
         "name": one.name,
         "size": [round(side, 3) for side in one.size],
@@ -218,7 +219,7 @@ def _vehicle(
         "first": drawn[0],
         "places": [places.get(frame) for frame in during],
         "points": [points.get(frame, 0) for frame in during],
-        "speeds": [speed.get(frame, 0.0) for frame in during],
+        "speeds": speeds and [round(speed.get(frame, 0.0), 1) for frame in during],
         "shape": _packed(thin(found.shape(one), most)),
     }
 

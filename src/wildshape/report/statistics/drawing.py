@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.ticker import Locator
 
 INK, SOFT, GRID = "#16191d", "#59616c", "#e3e7ec"
+_FEW_DECADES = 200
 _BINS, _ROSE_BINS, _NAMED, _LONGEST = 28, 24, 8, 34
 
 
@@ -37,7 +38,11 @@ def draw_bars(axes: "Axes", quantity: Quantity) -> None:
         edges[:-1], 100 * heights, np.diff(edges) * 0.92, align="edge", color=BLUE, linewidth=0
     )
     if tally.spans_decades():
+        from matplotlib.ticker import LogLocator
+
         axes.set_xscale("log")
+        if edges[-1] < _FEW_DECADES * edges[0]:  # powers of ten alone may be a single one
+            axes.xaxis.set_major_locator(LogLocator(10, subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(lambda value, _: number(value))
     axes.minorticks_off()
     median = tally.quantile(0.5)

@@ -19,6 +19,7 @@ from wildshape.errors import BadInputError
 from wildshape.geometry.sampling import thin
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.boxes.detections import pose_of
+from wildshape.io.progress import counted
 from wildshape.records import Box, Points
 from wildshape.report.drive.scene import (
     NOBODY,
@@ -281,7 +282,8 @@ class DrivePage:
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         found, frame, number = self.found, self.frame, self.chosen
-        yield "time", f"{found.seconds[frame]:.1f} s"
+        if found.times:
+            yield "time", f"{found.seconds[frame]:.1f} s"
         yield "scan", found.scan_names[frame]
         yield "vehicles", f"{len(self.boxes.get(frame, {}))} here, {len(self.names)} in all"
         if self.drive is None:
@@ -297,7 +299,10 @@ class DrivePage:
         yield "confidence", f"{one.confidence:.2f}"
         for words, chance in self.chances[number].items():
             yield words, f"{chance:.2f}"
-        yield "seen", f"{'moving' if one.moving else 'standing'}, {len(one.frames)} frames"
+        yield (
+            "seen",
+            f"{'moving' if one.moving else 'standing'}, {counted(len(one.frames), 'frame')}",
+        )
 
 
 def measured(found: FinishedDrive, one: FoundVehicle) -> Points:

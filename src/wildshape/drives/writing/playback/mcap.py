@@ -205,7 +205,7 @@ def _about(one: Present) -> list[tuple[str, str]]:
         ("size", " x ".join(f"{side:.2f}" for side in known.size) + " m"),
         ("confidence", f"{known.confidence:.2f}"),
         ("moving", str(known.moving).lower()),
-        ("speed", f"{one.speed:.1f} m/s"),
+        *([] if one.speed is None else [("speed", f"{one.speed:.1f} m/s")]),
         ("points", str(one.points)),
     ]
 

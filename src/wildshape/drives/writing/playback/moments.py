@@ -38,14 +38,14 @@ class Present:
         colour: red, green, blue, 0 to 255.
         T_level_box: where its box is.
         points: of the scan that belong to it.
-        speed: over the ground, m/s.
+        speed: over the ground, m/s; None where no times are known.
     """
 
     vehicle: FoundVehicle
     colour: tuple[int, int, int]
     T_level_box: SE3
     points: int
-    speed: float
+    speed: float | None
 
 
 @dataclass(frozen=True)
@@ -75,10 +75,11 @@ def moments(found: FinishedDrive) -> Iterator[Moment]:
         for row, frame in enumerate(one.frames):
             there.setdefault(frame, []).append((number, row))
     places = [found.placed(one) for one in found.vehicles]
-    speeds = [np.linalg.norm(found.velocities(one), axis=1) for one in found.vehicles]
+    speeds = [found.speeds(one) for one in found.vehicles]
 
     def present(number: int, row: int) -> Present:
-        one, speed = found.vehicles[number], float(speeds[number][row])
+        one, known = found.vehicles[number], speeds[number]
+        speed = None if known is None else known[row]
         return Present(one, colour_of(number), places[number][row], one.points[row], speed)
 
     none = np.empty((0, 3), np.float32)

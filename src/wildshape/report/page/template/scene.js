@@ -170,7 +170,8 @@
   function write() {
     const frame = frames[now];
     $("time").value = now;
-    $("now").textContent = `frame ${frame.frame}, ${frame.time.toFixed(1)} of ${frames.at(-1).time.toFixed(1)} s`;
+    const last = frames.at(-1);
+    $("now").textContent = data.timed ? `frame ${frame.frame}, ${frame.time.toFixed(1)} of ${last.time.toFixed(1)} s` : `frame ${frame.frame} of ${last.frame}`;
     card();
   }
 
@@ -183,7 +184,7 @@
     const list = [["size", one.size.map((v) => v.toFixed(2)).join(" × ") + " m"], ["confidence", one.confidence.toFixed(2)],
       ...Object.entries(one.chances).map(([label, chance]) => [label, chance.toFixed(2)]),
       ["motion", one.moving ? "moving" : "standing"], ...(place ? [["distance", away.toFixed(1) + " m"], ["points in scan", one.points[at].toLocaleString("en")]] : [["", "not in this frame"]]),
-      ...(one.moving && place ? [["speed", one.speeds[at].toFixed(1) + " m/s"]] : [])];
+      ...(one.moving && place && one.speeds ? [["speed", one.speeds[at].toFixed(1) + " m/s"]] : [])];
     const table = document.createElement("dl");
     for (const [label, value] of list) table.append(make("dt", label), make("dd", value));
     const open = make("button", "its shape and scans ↓");
