@@ -22,9 +22,7 @@ _SLOW_S = 0.21  # 5 Hz is well enough
 _FEWEST_SCANS = 5
 _FEWEST_TURNED = 3  # vehicles; of 134 that moved on streets and real drives 3 were, one a drive
 _LEAST_WAY_M, _LEAST_STEP_M = 5.0, 0.05  # less tells no direction: odometry's noise is 15 mm
-_STEEPEST_DEG = (
-    30.0  # against the first scan; the steepest streets rise by 19, real drives tip by 1
-)
+_STEEPEST_DEG = 30.0  # against the first scan; the steepest streets have 19, real drives 1
 _LEAST_BYTES = 2000  # of a file; smaller ones hold hardly any points, and may be alike
 
 
