@@ -45,13 +45,13 @@ def run(settings: Settings) -> None:
         from wildshape.inference.predictor import load
         from wildshape.inference.registration import fuse_scans, to_middle
         from wildshape.io.inputs import open_tracks
-        from wildshape.io.output import refuse_file
+        from wildshape.io.output import begin_file
         from wildshape.io.progress import counted
         from wildshape.io.scans.writers import check_suffix, write_cloud
 
     asked = settings.scans
     check_suffix(settings.out)
-    refuse_file(settings.out, overwrite=asked.overwrite)
+    begin_file(settings.out, overwrite=asked.overwrite)
     _keep_out(settings.track, settings.out)
     source = open_tracks(settings.track, asked.files.coordinates)
     track = source.single("fuse")
