@@ -54,6 +54,20 @@ def test_in_space_as_boxes_of_any_rotation(a: UprightBox, b: UprightBox) -> None
     )
 
 
+@given(st.lists(_BOX, max_size=6), st.lists(_BOX, max_size=6))
+def test_many_boxes_as_each_pair_alone(found: list[UprightBox], labelled: list[UprightBox]) -> None:
+    every = np.array(overlaps(found, labelled))
+    for i, j in np.ndindex(len(found), len(labelled)):
+        alone = np.array(overlaps([found[i]], [labelled[j]]))
+        assert every[:, i, j] == pytest.approx(alone[:, 0, 0], abs=1e-12)
+
+
+def test_boxes_without_an_extent_share_nothing() -> None:
+    flat = CAR._replace(height=0.0)
+    assert overlaps([flat], [flat]).space == 0
+    assert overlaps([CAR._replace(width=0.0)], [CAR]).bev == 0
+
+
 def test_no_boxes() -> None:
     assert overlaps([], [CAR]).bev.shape == (0, 1)
     assert overlaps([CAR], []).space.shape == (1, 0)

@@ -22,11 +22,11 @@ from wildshape.evaluation.drives.found import (
     Clusters,
     Found,
     FoundDrive,
+    kept_clusters,
     points_inside,
-    read_clusters,
 )
 from wildshape.evaluation.drives.labels import LabelledDrive, LabelledFrame, View
-from wildshape.evaluation.drives.motion import Correction, like_found
+from wildshape.evaluation.drives.motion import Correction, like_found, sampled_frames
 from wildshape.evaluation.drives.overlap import Overlaps, UprightBox, overlaps
 from wildshape.evaluation.drives.rectangles import l_shape, smallest_rectangle
 from wildshape.evaluation.drives.same_scans import check_same_scans
@@ -49,6 +49,7 @@ BASELINES: dict[str, Callable[[Points], UprightBox]] = {
     "clusters, smallest rectangles": smallest_rectangle,
     "clusters, L-shape fits": l_shape,
 }
+_Boxes = dict[tuple[int, str], tuple[UprightBox, ...]]  # of each baseline, by frame and track
 
 
 @dataclass(frozen=True)
@@ -171,32 +172,44 @@ def evaluate_drives(
             f"{labelled[0].path}: no label counts: none is of a vehicle with"
             f" {labelled[0].counting.points} points; give labels with their scans."
         )
-    kept = [read_clusters(drive.path) for drive in found]
-    labelled, corrections = zip(*map(like_found, labelled, kept))
+    others, samples = zip(*(_around_clusters(*one) for one in zip(found, labelled)))
+    labelled, corrections = zip(*map(like_found, labelled, samples))
     rows = [_row(OURS, found, labelled)]
     at(1)
-    clusters = [
-        own or points_inside(drive, labels.scans)
-        for own, drive, labels in zip(kept, found, labelled, strict=True)
-    ]
-    for number, (name, fit) in enumerate(BASELINES.items(), 2):
-        refitted = [_refitted(drive, own, fit) for drive, own in zip(found, clusters)]
+    for number, name in enumerate(BASELINES):
+        refitted = [_refitted(drive, own, number) for drive, own in zip(found, others)]
         rows.append(_row(name, refitted, labelled))
-        at(number)
+        at(number + 2)
     errors = tuple(_trajectory(one, other) for one, other in zip(found, labelled, strict=True))
     cameras = sum(one.view is not None for one in labelled)
     return DriveScores(tuple(rows), errors, corrections, cameras)
 
 
-def _refitted(
-    drive: FoundDrive, clusters: Clusters, fit: Callable[[Points], UprightBox]
-) -> FoundDrive:
+def _around_clusters(drive: FoundDrive, labels: LabelledDrive) -> tuple[_Boxes, Clusters]:
+    """Each baseline's box around each cluster, and the clusters kept of `sampled_frames`."""
+    sampled = sampled_frames(drive)
+    boxes, sample = _Boxes(), {}
+    for frame, track, points in kept_clusters(drive.path):
+        boxes[frame, track] = _fitted(points)
+        if frame in sampled:
+            sample[frame, track] = points
+    if not boxes:
+        inside = points_inside(drive, labels.scans)
+        boxes = {(frame, track): _fitted(points) for frame, track, points in inside}
+    return boxes, sample
+
+
+def _fitted(points: Points) -> tuple[UprightBox, ...]:
+    return tuple(fit(points) for fit in BASELINES.values())
+
+
+def _refitted(drive: FoundDrive, boxes: _Boxes, baseline: int) -> FoundDrive:
     """The same vehicles, as sure, with other boxes; where no point was seen there is none."""
     frames = tuple(
         tuple(
-            replace(one, box=fit(clusters[number, one.track]))
+            replace(one, box=boxes[number, one.track][baseline])
             for one in frame
-            if (number, one.track) in clusters
+            if (number, one.track) in boxes
         )
         for number, frame in enumerate(drive.frames)
     )
