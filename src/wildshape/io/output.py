@@ -21,6 +21,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from wildshape.arguments import expect
 from wildshape.errors import BadInputError, LostWorkersError, MissingExtraError
 from wildshape.io.atomic import lock_folder, remove_leftovers_of, write_json
 from wildshape.io.earlier import EARLIER, MARKER, MARKERS, MOVED, forget, put_back, set_aside
@@ -103,6 +104,7 @@ def begin(
             another process is writing there.
     """
     settings = json.loads(json.dumps(settings, default=str))
+    expect(overwrite, bool, "overwrite", "True removes what is there")
     resumed = False
     if path.exists() and not path.is_dir():
         raise BadInputError(f"{path}: is a file; --out names a folder to write.")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wildshape.arguments import as_path
 from wildshape.datasets.kitti.raw import read_velodyne
 from wildshape.errors import BadInputError
 from wildshape.evaluation.drives.overlap import UprightBox
@@ -79,12 +80,13 @@ def _labels_of(name: str, labels: Path) -> Path:
     raise BadInputError(f"{labels}: no labels of the drive {name}; name them as it is named.")
 
 
-def read_found(path: Path, scans: int) -> FoundDrive:
+def read_found(path: Path | str, scans: int) -> FoundDrive:
     """The boxes and the trajectory of a drive of so many scans.
 
     Raises:
         BadInputError: boxes are missing or damaged, or are of another number of scans.
     """
+    path = as_path(path, "path")
     frames: dict[int, list[Found]] = defaultdict(list)
     seen: set[tuple[int, str]] = set()
     for row in read_box_table(path / BOXES):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
+from wildshape.arguments import expect
 from wildshape.errors import BadInputError
 from wildshape.evaluation.drives.average_precision import (
     HIT,
@@ -165,6 +166,7 @@ def evaluate_drives(
         BadInputError: nothing that counts is labelled, a drive was found in other scans than the
             labelled ones, or kept points or scans are damaged.
     """
+    _check(found, labelled)
     for drive, labels in zip(found, labelled, strict=True):
         check_same_scans(drive.path, labels.scans)
     if not any(one.counted for drive in labelled for frame in drive.frames for one in frame.labels):
@@ -183,6 +185,21 @@ def evaluate_drives(
     errors = tuple(_trajectory(one, other) for one, other in zip(found, labelled, strict=True))
     cameras = sum(one.view is not None for one in labelled)
     return DriveScores(tuple(rows), errors, corrections, cameras)
+
+
+def _check(found: Sequence[FoundDrive], labelled: Sequence[LabelledDrive]) -> None:
+    """Refuse what Python hands in that is no list of drives and one of their labels."""
+    for name, given, kind, reader in (
+        ("found", found, FoundDrive, "read_found"),
+        ("labelled", labelled, LabelledDrive, "read_labels"),
+    ):
+        several = expect(given, Sequence, name, f"pass a list of what {reader} gives")
+        for one in several:
+            expect(one, kind, name, f"{reader} makes one of a path")
+    if len(found) != len(labelled) or not len(found):
+        raise BadInputError(
+            f"{len(found)} drives found, {len(labelled)} labelled; pass the labels of each drive."
+        )
 
 
 def _around_clusters(drive: FoundDrive, labels: LabelledDrive) -> tuple[_Boxes, Clusters]:
@@ -314,12 +331,13 @@ def _size_bias(frames: Sequence[_Frame]) -> tuple[float, float, float] | None:
 def _vehicles(frames: Sequence[_Frame]) -> tuple[VehicleScore, ...]:
     scores: dict[tuple[int, int], VehicleScore] = {}
     for frame in frames:
-        mine = {j: i for i, j in belonging(frame.overlaps.bev * frame.counted)}
+        bev = frame.overlaps.bev
+        mine = {j: i for i, j in belonging(bev * frame.counted)}
         for j in np.flatnonzero(frame.counted).tolist():
             key = (frame.drive, frame.labels.labels[j].track)
             before = scores.get(key, VehicleScore(*key, 0, 0, ()))
             track = (frame.found[mine[j]].track,) if j in mine else ()
-            hit = j in mine and bool(frame.overlaps.bev[mine[j], j] >= LEAST_IOU[0])
+            hit = j in mine and bool(bev[mine[j], j] >= LEAST_IOU[0])
             tracks = tuple(sorted({*before.tracks, *track}))
             scores[key] = VehicleScore(*key, before.scans + 1, before.found + hit, tracks)
     return tuple(scores[key] for key in sorted(scores))
