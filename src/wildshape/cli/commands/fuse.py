@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`wildshape fuse`: all scans of a track as one cloud."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -56,9 +56,10 @@ def run(settings: Settings) -> None:
     source = open_tracks(settings.track, asked.files.coordinates)
     track = source.single("fuse")
     predictor = load(asked.network.model, asked.network.device)
-    done = list(
-        predictor.complete_checked(track.scans, track.sensor, track=asked.together, rays=track.rays)
+    found = predictor.complete_checked(
+        track.scans, track.sensor, track=asked.together, rays=track.rays
     )
+    done = [replace(one, points=one.points[:0].copy()) for one in found]  # poses alone are needed
     fused = fuse_scans(track.scans, to_middle(stack([scan.pose for scan in done])))
     write_cloud(settings.out, fused)
     for told in source.doubts:
