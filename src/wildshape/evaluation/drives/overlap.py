@@ -36,23 +36,42 @@ class UprightBox(NamedTuple):
 
 
 class Overlaps(NamedTuple):
-    """Of each found box with each labelled one, `(f, l)`.
+    """Of each found box with each labelled one; few of the pairs meet, and these alone are held.
 
     Attributes:
-        bev: intersection over union in bird's eye view.
-        space: intersection over union in 3D.
-        on: the part of the found box's footprint that lies on the label's.
+        shape: how many are found, how many labelled.
+        pairs: rows and columns of the pairs that are near each other.
+        parts: `(3, k)` of each of them: `bev`, `space` and `on`.
     """
 
-    bev: Float[np.ndarray, "f l"]
-    space: Float[np.ndarray, "f l"]
-    on: Float[np.ndarray, "f l"]
+    shape: tuple[int, int]
+    pairs: tuple[np.ndarray, np.ndarray]
+    parts: Float[np.ndarray, "3 k"]
+
+    @property
+    def bev(self) -> Float[np.ndarray, "f l"]:
+        """Intersection over union in bird's eye view; made anew each time."""
+        return self._table(0)
+
+    @property
+    def space(self) -> Float[np.ndarray, "f l"]:
+        """Intersection over union in 3D."""
+        return self._table(1)
+
+    @property
+    def on(self) -> Float[np.ndarray, "f l"]:
+        """The part of the found box's footprint that lies on the label's."""
+        return self._table(2)
+
+    def _table(self, which: int) -> Float[np.ndarray, "f l"]:
+        table = np.zeros(self.shape)
+        table[self.pairs] = self.parts[which]
+        return table
 
 
 def overlaps(found: Sequence[UprightBox], labelled: Sequence[UprightBox]) -> Overlaps:
     """All pairs."""
     a, b = (np.array(boxes, float).reshape(-1, 7) for boxes in (found, labelled))
-    bev, space, on = np.zeros((3, len(a), len(b)))
     i, j = _near(a, b)
     one, other = a[i], b[j]
     shared = shared_grounds(one[:, _PLACE], one[:, _SIDES], other[:, _PLACE], other[:, _SIDES])
@@ -62,10 +81,9 @@ def overlaps(found: Sequence[UprightBox], labelled: Sequence[UprightBox]) -> Ove
     )
     volume = shared * np.maximum(np.minimum(*tops) - np.maximum(*floors), 0.0)
     volumes = areas[0] * one[:, _HEIGHT] + areas[1] * other[:, _HEIGHT]
-    bev[i, j] = _part(shared, areas[0] + areas[1] - shared)
-    on[i, j] = _part(shared, areas[0])
-    space[i, j] = _part(volume, volumes - volume)
-    return Overlaps(bev, space, on)
+    bev = _part(shared, areas[0] + areas[1] - shared)
+    parts = np.stack((bev, _part(volume, volumes - volume), _part(shared, areas[0])))
+    return Overlaps((len(a), len(b)), (i, j), parts)
 
 
 def _near(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
