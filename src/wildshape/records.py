@@ -16,11 +16,12 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
+from wildshape.arguments import check_fields, expect
 from wildshape.errors import BadInputError
 from wildshape.geometry.box import SIGNS, box_axes
 from wildshape.geometry.projection.pinhole import Intrinsics
 from wildshape.geometry.projection.sight_lines import SightLines
-from wildshape.geometry.transforms.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3, several
 from wildshape.geometry.transforms.twist import Twist
 
 if TYPE_CHECKING:
@@ -66,6 +67,7 @@ class Sensor:
         """Refuse a kind that there is not: `LiDAR` would be another sensor."""
         if self.kind not in get_args(SensorKind):
             raise BadInputError(f"sensor {self.kind!r} is unknown; use 'lidar' or 'camera'.")
+        check_fields(self)
 
     def __repr__(self) -> str:
         step, camera = self.resolution_deg, self.intrinsics
@@ -138,7 +140,20 @@ class Track:
     shape_kind: ShapeKind = "whole"
 
     def __post_init__(self) -> None:
-        """Names are text, whatever the file system holds."""
+        """Names are text, whatever the file system holds.
+
+        Raises:
+            BadInputError: names that are no text, one array for all scans, or poses that are none.
+        """
+        for name in (self.name, self.category, self.source, *self.scan_names):
+            expect(name, str, "a name of a track", "pass text")
+        if getattr(self.scans, "ndim", 0) == 2:
+            raise BadInputError(
+                f"track {self.name}: expected several scans, found one array; put it in a tuple."
+            )
+        if self.T_sensor_object is not None and not isinstance(self.T_sensor_object, SE3):
+            poses = several(self.T_sensor_object, f"poses of track {self.name}")
+            object.__setattr__(self, "T_sensor_object", poses)
         object.__setattr__(self, "scan_names", tuple(map(as_text, self.scan_names)))
         for kept in ("name", "category", "source"):
             object.__setattr__(self, kept, as_text(getattr(self, kept)))
@@ -182,6 +197,16 @@ class Box:
     centre: tuple[float, float, float]
     size: tuple[float, float, float]
     quaternion_wxyz: tuple[float, float, float, float]
+
+    def __post_init__(self) -> None:
+        """Arrays become tuples: what is compared and hashed.
+
+        Raises:
+            BadInputError: another number of numbers.
+        """
+        parts = self.centre, self.size, self.quaternion_wxyz
+        if [(type(part), len(part)) for part in parts] != [(tuple, 3), (tuple, 3), (tuple, 4)]:
+            check_fields(self)
 
     def __repr__(self) -> str:
         length, width, height = self.size

@@ -13,8 +13,17 @@ from tests.stopping import stopped_at
 
 from wildshape.errors import BadInputError, LostWorkersError
 from wildshape.io import output
+from wildshape.io.atomic import atomic_write
 from wildshape.io.earlier import EARLIER
-from wildshape.io.output import MARKER, Output, begin, command_line, finished, provenance
+from wildshape.io.output import (
+    MARKER,
+    Output,
+    begin,
+    begin_file,
+    command_line,
+    finished,
+    provenance,
+)
 
 
 def test_says_what_is_needed_to_do_it_again() -> None:
@@ -140,3 +149,28 @@ def test_nothing_is_removed_by_patterns_that_are_none_or_lead_out(
     settings = "complete", {"a": 2}, ["*.ply"]
     refused(begin, out, *settings, overwrite=True, match=f"{MARKER}: expected which files are")
     assert _content(tmp_path) == before
+
+
+_KILLED_WRITING = """
+import os, signal, sys
+from wildshape.io.atomic import atomic_write
+with atomic_write(sys.argv[1]) as file:
+    file.write(b"half")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.parametrize("name", ["fused.ply", "[a]*.ply", "n" * 255])
+def test_what_a_killed_process_left_of_a_file_goes_with_the_next(name: str, tmp_path: Path) -> None:
+    """Neither what is being written now, nor what others left, nor what belongs to others."""
+    file, others = tmp_path / name, [tmp_path / ".film.part", tmp_path / ".b.ply.x1y2.part"]
+    for other in others:
+        other.write_text("theirs")
+    subprocess.run([sys.executable, "-c", _KILLED_WRITING, str(file)], check=False)
+    assert len(list(tmp_path.iterdir())) == 3
+    with atomic_write(file) as written:
+        written.write(b"whole")
+        begin_file(file, overwrite=False)
+        assert len(list(tmp_path.iterdir())) == 3
+    assert sorted(tmp_path.iterdir()) == sorted([*others, file])
+    assert file.read_bytes() == b"whole"

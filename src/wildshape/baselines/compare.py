@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from wildshape.arguments import as_path, check_fields, expect
 from wildshape.baselines.dpc import completer as dpc
 from wildshape.baselines.dpc.checkpoint import is_dpc
 from wildshape.baselines.dpc.completer import Dpc
@@ -78,6 +79,7 @@ class ComparisonOptions:
     overwrite: bool = False
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if self.seeds < 1:
             raise BadInputError(f"--seeds {self.seeds}: expected 1 or more.")
         if self.max_scans is not None and self.max_scans < 1:
@@ -116,7 +118,10 @@ class Comparison(NamedTuple):
 
 
 def compare(
-    data: Path, out: Path, options: ComparisonOptions = _DEFAULT, progress: Progress = SILENT
+    data: Path | str,
+    out: Path | str,
+    options: ComparisonOptions = _DEFAULT,
+    progress: Progress = SILENT,
 ) -> Comparison:
     """Measure shapes and registration against truth, and write metrics, scores, table, figures.
 
@@ -124,6 +129,8 @@ def compare(
         BadInputError: data, models or options that cannot be used; nothing with truth.
         MissingExtraError: a baseline needs a library that is not installed.
     """
+    data, out = as_path(data, "data"), as_path(out, "out")
+    expect(options, ComparisonOptions, "options")
     baselines = {name: baseline(name) for name in options.baselines if name != "none"}
     source = open_tracks(data, options.coordinates)
     first = _first_with_poses(source)

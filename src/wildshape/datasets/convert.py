@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any, cast
 
+from wildshape.arguments import as_path, check_fields, expect
 from wildshape.datasets.destinations import PackedStore, TrackFolders, left_out
 from wildshape.datasets.tracks.conversion import Conversion, Part, PartResult
 from wildshape.datasets.tracks.source import Source
@@ -39,6 +40,9 @@ class ConversionOptions:
     ray: str | None = None
     overwrite: bool = False
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
 
 _DEFAULT = ConversionOptions()
 _NAMED = 3  # reasons, where nothing is left
@@ -59,7 +63,7 @@ class Converted:
 
 def convert(
     source: Source,
-    out: Path,
+    out: Path | str,
     options: ConversionOptions = _DEFAULT,
     progress: Progress = SILENT,
     *,
@@ -73,7 +77,9 @@ def convert(
         BadInputError: the data set or the output cannot be used, or no track came.
         MissingExtraError: Ray is not installed.
     """
-    name = name or type(source).__name__
+    expect(source, Source, "source", "open_source makes one of a folder")
+    expect(options, ConversionOptions, "options")
+    out, name = as_path(out, "out"), name or type(source).__name__
     parts = [Part(i, part) for i, part in enumerate(source.parts())]
     identity = _identity(name, source, options, parts)
     settings = json.loads(json.dumps(identity, default=str), parse_constant=str)

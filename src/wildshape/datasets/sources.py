@@ -8,15 +8,20 @@ names of fields of the reader or of its records; whoever passes one to a reader 
 told so.
 """
 
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
+from wildshape.arguments import as_path
 from wildshape.errors import BadInputError
 
 if TYPE_CHECKING:
     from wildshape.datasets.tracks.source import Source
+
+_NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
 
 SOURCES = {
     "kitti-raw": "wildshape.datasets.kitti.raw:KittiRaw",
@@ -35,7 +40,7 @@ SOURCES = {
 """Name on the command line -> module and class; imported when it is asked for."""
 
 
-def open_source(name: str, root: Path, options: dict[str, Any]) -> "Source":
+def open_source(name: str, root: Path | str, options: Mapping[str, Any] = _NO_OPTIONS) -> "Source":
     """The reader of a data set of `SOURCES`, with its own defaults where nothing else is wanted.
 
     `options`: values for the fields of the reader or of its records (`Selection`, `Crop`).
@@ -48,7 +53,7 @@ def open_source(name: str, root: Path, options: dict[str, Any]) -> "Source":
             f"'{name}' is no source that can be converted; there are {', '.join(SOURCES)}."
         )
     module, _, kind = SOURCES[name].partition(":")
-    source = getattr(import_module(module), kind)(root)
+    source = getattr(import_module(module), kind)(as_path(root, "root"))
     for option, value in options.items():
         source = _with(source, name, option, value)
     return source

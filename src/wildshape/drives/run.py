@@ -6,6 +6,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wildshape.arguments import as_path, expect
 from wildshape.drives.adapting import second_pass
 from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.clock import Clock, Watch, silent
@@ -21,7 +22,7 @@ from wildshape.inference.predictor import Predictor, load
 from wildshape.io.atomic import released_after
 from wildshape.io.output import begin, finished, keep_apart, remove_leftovers
 from wildshape.method.checkpoint import weights_file
-from wildshape.parallel.team import ALONE, Team, team
+from wildshape.parallel.team import ALONE, Team, check_workers, team
 
 if TYPE_CHECKING:
     from wildshape.drives.adapting.adapt import Adaptation
@@ -36,11 +37,11 @@ def drive(
     config: DriveConfig = _DEFAULT,
     *,
     topic: str | None = None,
-    predictor: Predictor | None = None,
+    predictor: Predictor | Path | str | None = None,
     workers: int | Team | None = None,
     files: DriveFiles = _NO_FILES,
-    detections: DetectionFile | None = None,
-    adapt: "AdaptConfig | Adaptation | None" = None,
+    detections: DetectionFile | Path | str | None = None,
+    adapt: "AdaptConfig | Adaptation | bool | None" = None,
     overwrite: bool = False,
     watch: Watch = silent,
 ) -> DriveResult:
@@ -54,13 +55,15 @@ def drive(
         out: folder to write (docs/drive.md); by default `found` where Python runs.
         config: the numbers of every stage.
         topic: of point clouds, for a recording of ROS that holds several.
-        predictor: for scans of LiDARs; by default the shipped weights.
+        predictor: for scans of LiDARs, or the weights that `load` takes; by default the shipped
+            ones.
         workers: processes that cut scans and complete objects; None: one a core; or those of a
             `parallel.team.team` that are there already.
         files: what else to write into the folder.
         detections: the file of what somebody else's detector found, in place of the clusters.
-        adapt: an `AdaptConfig`: train the model on what was found, and complete the drive again if
-            it is better; or what came of that already (`adapting.adapt`), for several drives.
+        adapt: an `AdaptConfig`, or True for the usual one: train the model on what was found, and
+            complete the drive again if it is better; or what came of that already
+            (`adapting.adapt`), for several drives.
         overwrite: remove an earlier output first.
         watch: told of progress.
 
@@ -68,15 +71,19 @@ def drive(
         BadInputError: source, weights, detections or output cannot be used.
         MissingExtraError: a library is not installed.
     """
-    source, out = Path(source), Path(out)
-    files.check()
+    source, out = as_path(source, "source"), as_path(out, "out")
+    expect(config, DriveConfig, "config")
+    expect(files, DriveFiles, "files", "for example DriveFiles(mcap=True)").check()
+    adapt, detections = _adaptation(adapt), _detections(detections)
+    check_workers(workers)
     recording = open_drive(source, topic)
     given = None
     if detections is not None:
         given = find_detections(detections, recording)
         recording = given.noted(recording)
         keep_apart(out, detections.path)
-    predictor = load(config=INFERENCE) if predictor is None else predictor
+    if not isinstance(predictor, Predictor):
+        predictor = load(predictor, config=INFERENCE)
     _check_lidar(predictor)
     keep_apart(out, source, predictor.named and weights_file(predictor.named))
     settings = settings_of(source, recording, topic, config, predictor, detections)
@@ -104,6 +111,23 @@ def drive(
                 found = replace(run, helpers=helpers).again(adapt.model, found)
         files.write(out)
         return found
+
+
+def _adaptation(given: object) -> "AdaptConfig | Adaptation | None":
+    """What is handed in as `adapt`; True is the usual way."""
+    if given is None or isinstance(given, bool):
+        return AdaptConfig() if given else None
+    if not isinstance(given, AdaptConfig):
+        from wildshape.drives.adapting.adapt import Adaptation
+
+        return expect(given, Adaptation, "adapt", "pass True or an AdaptConfig")
+    return given
+
+
+def _detections(given: object) -> DetectionFile | None:
+    if given is None or isinstance(given, DetectionFile):
+        return given
+    return DetectionFile(as_path(given, "detections"))
 
 
 def _check_lidar(predictor: Predictor) -> None:

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How much of the ground two upright boxes share."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,26 +14,52 @@ Place = Float[np.ndarray, "4"]
 """Centre x, y, z and yaw, metres and radians."""
 
 
+_CORNERS = np.array(((1, 1), (-1, 1), (-1, -1), (1, -1))) / 2
+
+
 def upright_places(T_level_box: SE3) -> Float[np.ndarray, "n 4"]:
     """The `Place` of each of `(n,)` boxes, by their poses."""
     yaw = torch.atan2(T_level_box.rotation[:, 1, 0], T_level_box.rotation[:, 0, 0])
     return torch.cat((T_level_box.translation, yaw[:, None]), dim=1).numpy()
 
 
-def footprint(box: Place, size: Sequence[float]) -> Float[np.ndarray, "4 2"]:
-    """Corners of a box (centre x, y, z and yaw) seen from above, counter-clockwise."""
-    c, s = math.cos(box[3]), math.sin(box[3])
-    half = np.array(((1, 1), (-1, 1), (-1, -1), (1, -1))) * np.array(size[:2]) / 2
-    return half @ np.array(((c, s), (-s, c))) + np.array(box[:2])
+def footprint(
+    box: Float[np.ndarray, "*n 4"], size: Sequence[float] | Float[np.ndarray, "*n k"]
+) -> Float[np.ndarray, "*n 4 2"]:
+    """Corners of boxes (centre x, y, z and yaw) seen from above, counter-clockwise.
+
+    Args:
+        box: the `Place` of each.
+        size: of each, or of all: length and width, and what follows is not read.
+    """
+    c, s = np.cos(box[..., 3, None]), np.sin(box[..., 3, None])
+    along, across = np.moveaxis(_CORNERS * np.asarray(size)[..., None, :2], -1, 0)
+    corners = np.stack((c * along - s * across, s * along + c * across), axis=-1)
+    return corners + box[..., None, :2]
+
+
+def shared_grounds(
+    box: Float[np.ndarray, "n 4"],
+    size: Float[np.ndarray, "n 2"],
+    other: Float[np.ndarray, "n 4"],
+    other_size: Float[np.ndarray, "n 2"],
+) -> Float[np.ndarray, "n"]:
+    """Square metres that each of `(n,)` boxes shares in bird's eye view with its other."""
+    shared = np.zeros(len(box))
+    # Without a side a box is a line or a point, and no point lies outside of that.
+    some = np.flatnonzero((size > 0).all(1) & (other_size > 0).all(1))
+    if len(some):
+        corners = footprint(box[some], size[some]), footprint(other[some], other_size[some])
+        shared[some] = _areas(_clipped(*corners))
+    return shared
 
 
 def shared_ground(
     box: Place, size: Sequence[float], other: Place, other_size: Sequence[float]
 ) -> float:
     """Square metres that two boxes share in bird's eye view; see `footprint`."""
-    if not min(*size[:2], *other_size[:2]) > 0:
-        return 0.0  # no point is outside of a polygon that is one point
-    return _area(_clipped(footprint(box, size), footprint(other, other_size)))
+    sizes = (np.array([one[:2]], float) for one in (size, other_size))
+    return float(shared_grounds(box[None], next(sizes), other[None], next(sizes))[0])
 
 
 def footprint_overlap(
@@ -54,26 +79,28 @@ def footprint_iou(
     return shared / union if union > 0 else 0.0
 
 
-def _clipped(polygon: np.ndarray, by: np.ndarray) -> np.ndarray:
-    """The part of a polygon inside a convex one (Sutherland and Hodgman 1974)."""
-    for start, end in zip(by, np.roll(by, -1, axis=0)):
-        if not len(polygon):
-            break
-        edge = end - start
-        inside = edge[0] * (polygon[:, 1] - start[1]) - edge[1] * (polygon[:, 0] - start[0])
-        kept = []
-        for i, (a, b) in enumerate(zip(polygon, np.roll(polygon, -1, axis=0))):
-            here, there = inside[i], inside[(i + 1) % len(polygon)]
-            if here >= 0:
-                kept.append(a)
-            if here * there < 0:
-                kept.append(a + (b - a) * here / (here - there))
-        polygon = np.array(kept).reshape(-1, 2)
-    return polygon
+def _clipped(
+    polygons: Float[np.ndarray, "n k 2"], by: Float[np.ndarray, "n c 2"]
+) -> Float[np.ndarray, "n m 2"]:
+    """The part of each polygon inside a convex one (Sutherland and Hodgman 1974).
+
+    All have as many corners: those with fewer have their first one again at the end.
+    """
+    for start, end in zip(by.swapaxes(0, 1), np.roll(by, -1, axis=1).swapaxes(0, 1)):
+        edge, seen = (end - start)[:, None], polygons - start[:, None]
+        here = edge[..., 0] * seen[..., 1] - edge[..., 1] * seen[..., 0]
+        there, after = np.roll(here, -1, axis=1), np.roll(polygons, -1, axis=1)
+        kept = np.stack((here >= 0, here * there < 0), axis=2).reshape(len(here), -1)
+        share = np.divide(here, here - there, out=np.zeros_like(here), where=here != there)
+        met = polygons + (after - polygons) * share[..., None]
+        both = np.stack((polygons, met), axis=2).reshape(len(here), -1, 2)
+        order = np.argsort(~kept, axis=1, kind="stable")[:, : kept.sum(1).max(initial=1)]
+        polygons = np.take_along_axis(both, order[..., None], axis=1)
+        left = np.take_along_axis(kept, order, axis=1)
+        polygons = np.where(left[..., None], polygons, polygons[:, :1])
+    return polygons
 
 
-def _area(polygon: np.ndarray) -> float:
-    if len(polygon) < 3:
-        return 0.0
-    x, y = (polygon - polygon[0]).T
-    return abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2
+def _areas(polygons: Float[np.ndarray, "n k 2"]) -> Float[np.ndarray, "n"]:
+    x, y = np.moveaxis(polygons - polygons[:, :1], -1, 0)
+    return np.abs((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(1)) / 2

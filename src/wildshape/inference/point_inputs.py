@@ -21,7 +21,7 @@ from wildshape.io.scans.points import (
     read_scan,
     without_origin,
 )
-from wildshape.records import Points, Sensor, SightLines
+from wildshape.records import Points, Sensor, SightLines, Track
 
 _AXES = ("x", "y", "z")
 _RAYS = ("directions", "ranges", "origins")
@@ -80,7 +80,10 @@ def each_of(scans: object, what: str = "scans") -> Sequence[object]:
         BadInputError: it holds none in an order.
     """
     if isinstance(scans, str | Path | Mapping | Set) or not isinstance(scans, Iterable):
-        raise BadInputError(f"{what}: expected a list of {what}, found {type(scans).__name__}.")
+        cure = "; pass its .scans" if isinstance(scans, Track) else ""
+        raise BadInputError(
+            f"{what}: expected a list of {what}, found {type(scans).__name__}{cure}."
+        )
     if getattr(scans, "ndim", 0) == 2:
         raise BadInputError(
             f"{what}: expected a list of {what}, found one array; put it in a list."

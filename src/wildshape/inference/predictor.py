@@ -10,6 +10,7 @@ from pathlib import Path
 
 import torch
 
+from wildshape.arguments import expect
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference import point_inputs
@@ -84,7 +85,10 @@ class Predictor:
         level: bool = True,
         config: InferenceConfig = _DEFAULT,
     ) -> None:
-        self.network, self.settings, self.config = network, settings, config
+        cure = "wildshape.load makes a Predictor of a file"
+        expect(network, torch.nn.Module, "network", cure)
+        self.network, self.settings = network, expect(settings, ModelSettings, "settings", cure)
+        self.config = expect(config, InferenceConfig, "config")
         self.refines = settings.facing and not raw
         self.up = settings.up if level else None
         self.device = next(network.parameters()).device

@@ -8,6 +8,7 @@ checked.
 """
 
 import errno
+import glob
 import json
 import os
 import tempfile
@@ -24,6 +25,7 @@ try:
 except ImportError:  # Windows
     fcntl = None
 
+_NAMED = 40  # characters of a file's name in that of its temporary one: names end at 255 bytes
 _TAKEN = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES)
 _MASK = Lock()  # between setting and setting back, another thread would read what is set
 _CLAIM = Lock()
@@ -52,22 +54,57 @@ def atomic_write(path: Path | str, *, flush: bool = False) -> Iterator[IO[bytes]
     with naming(path):
         with suppress(FileNotFoundError):
             path.lstat()  # a name that is too long fails here, and not after all is written
-        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".part")
+        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=_prefix(path), suffix=".part")
     temporary = Path(name)
     try:
-        with os.fdopen(descriptor, "wb") as file:
-            yield file
-            if flush:
-                file.flush()
-                os.fsync(file.fileno())
-        with naming(path):
-            temporary.chmod(0o666 & ~_umask())
-            temporary.replace(path)
+        with _at_work(descriptor):
+            with os.fdopen(descriptor, "wb") as file:
+                yield file
+                if flush:
+                    file.flush()
+                    os.fsync(file.fileno())
+            with naming(path):
+                temporary.chmod(0o666 & ~_umask())
+                temporary.replace(path)
     except BaseException as error:
         temporary.unlink(missing_ok=True)
         if isinstance(error, OSError) and error.filename is None:  # a full disk names no file
             error.filename = str(path)
         raise
+
+
+def remove_leftovers_of(path: Path) -> None:
+    """Remove what processes left that were killed in `atomic_write` of this file.
+
+    What one at work has begun stays: it holds a lock on it, or the system keeps open files.
+    """
+    for leftover in path.parent.glob(f"{glob.escape(_prefix(path))}*.part"):
+        with suppress(OSError):  # at work, gone already, or not ours to remove
+            if fcntl is None:
+                leftover.unlink()
+                continue
+            with leftover.open("rb") as file:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                leftover.unlink()
+
+
+def _prefix(path: Path) -> str:
+    return f".{path.name[:_NAMED]}."
+
+
+@contextmanager
+def _at_work(descriptor: int) -> Iterator[None]:
+    """Says that a file is being written, past its closing; the end of the process ends it."""
+    if fcntl is None:
+        yield
+        return
+    lock = os.dup(descriptor)
+    try:
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        os.close(lock)
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 
+from wildshape.arguments import as_path
 from wildshape.errors import BadInputError
 from wildshape.io.progress import counted
 from wildshape.io.rays import check_rays, read_rays
@@ -15,6 +16,7 @@ from wildshape.io.scans.points import (
     SUFFIXES,
     Coordinates,
     check_scan,
+    checked,
     is_scan_file,
     read_scan,
     without_repeats,
@@ -220,7 +222,7 @@ def open_tracks(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> T
         BadInputError: nothing is there, or nothing that can be recognised; or a packed store that
             is to be read otherwise.
     """
-    path = Path(path)
+    path, coordinates = as_path(path, "path"), checked(coordinates)
     if not (path.is_file() or path.is_dir()):
         there = "a pipe; write it to a file and" if path.exists() else "no such file or folder;"
         raise BadInputError(f"{path}: {there} {_CURE}.")

@@ -21,8 +21,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from wildshape.arguments import expect
 from wildshape.errors import BadInputError, LostWorkersError, MissingExtraError
-from wildshape.io.atomic import lock_folder, write_json
+from wildshape.io.atomic import lock_folder, remove_leftovers_of, write_json
 from wildshape.io.earlier import EARLIER, MARKER, MARKERS, MOVED, forget, put_back, set_aside
 from wildshape.io.guard import reading
 from wildshape.io.progress import SILENT, Progress
@@ -103,6 +104,7 @@ def begin(
             another process is writing there.
     """
     settings = json.loads(json.dumps(settings, default=str))
+    expect(overwrite, bool, "overwrite", "True removes what is there")
     resumed = False
     if path.exists() and not path.is_dir():
         raise BadInputError(f"{path}: is a file; --out names a folder to write.")
@@ -219,8 +221,8 @@ def file_name(name: str) -> str:
     return name
 
 
-def refuse_file(path: Path, *, overwrite: bool) -> None:
-    """Refuse to write over a file.
+def begin_file(path: Path, *, overwrite: bool) -> None:
+    """Refuse to write over a file; what a process left that was killed while writing it goes.
 
     Raises:
         BadInputError: it exists, and `overwrite` was not given; or it is a folder.
@@ -229,6 +231,7 @@ def refuse_file(path: Path, *, overwrite: bool) -> None:
         raise BadInputError(f"{path}: is a folder; --out names a file to write.")
     if os.path.lexists(path) and not overwrite:  # a link that leads nowhere, too
         raise BadInputError(f"{path}: exists; pass --overwrite to replace it.")
+    remove_leftovers_of(path)
 
 
 def _existing(path: Path, command: str, settings: dict[str, Any], *, overwrite: bool) -> bool:

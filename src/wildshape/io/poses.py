@@ -15,12 +15,13 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from wildshape.arguments import as_path
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import (
     quaternion_from_rotation,
     rotation_from_quaternion,
 )
-from wildshape.geometry.transforms.se3 import SE3
+from wildshape.geometry.transforms.se3 import SE3, several
 from wildshape.geometry.transforms.smoothness import smoothness
 from wildshape.io.atomic import write_json, write_text
 from wildshape.io.guard import reading
@@ -41,7 +42,7 @@ def read_poses(path: Path | str, expected: int | None = None) -> SE3:
         BadInputError: another number of lines, a line without 12 finite numbers, or a line whose
             3x3 block is no rotation; the line and its determinant are named.
     """
-    path = Path(path)
+    path = as_path(path, "path")
     with reading(path, "12 numbers a line"):
         lines = path.read_text("utf-8-sig").splitlines()
         rows = [_parse(line, i, path) for i, line in enumerate(lines, 1) if line.strip()]
@@ -76,10 +77,21 @@ def _parse(line: str, number: int, path: Path) -> np.ndarray:
     return pose
 
 
-def write_poses(path: Path | str, poses: SE3) -> None:
-    """Write `(n,)` transforms, 12 numbers a line at full precision, atomically."""
-    rows = poses.matrix[..., :3, :].detach().cpu().numpy().reshape(-1, 12)
+def write_poses(path: Path | str, poses: SE3 | np.ndarray | Sequence[SE3]) -> None:
+    """Write `(n,)` transforms, 12 numbers a line at full precision, atomically.
+
+    Raises:
+        BadInputError: see `several`; a pose is not finite.
+    """
+    rows = _finite(poses, path).matrix[..., :3, :].detach().cpu().numpy().reshape(-1, 12)
     write_text(path, "".join(" ".join(map(repr, map(float, row))) + "\n" for row in rows))
+
+
+def _finite(poses: object, path: Path | str) -> SE3:
+    found = several(poses, "poses")
+    if not bool(found.translation.isfinite().all() and found.rotation.isfinite().all()):
+        raise BadInputError(f"{path}: poses that are NaN or infinite are not written; drop these.")
+    return found
 
 
 def places_of(scan_names: Sequence[str], skipped: Sequence[str] = ()) -> list[int]:
@@ -104,20 +116,28 @@ def times_of(scan_names: Sequence[str], skipped: Sequence[str] = ()) -> list[int
     return places_of(scan_names, skipped)
 
 
-def write_tum(path: Path, poses: SE3, times: Sequence[float] | Sequence[int]) -> None:
-    """Write `(n,)` poses, a line each, at full precision, atomically."""
+def write_tum(path: Path | str, poses: SE3, times: Sequence[float] | Sequence[int]) -> None:
+    """Write `(n,)` poses, a line each, at full precision, atomically.
+
+    Raises:
+        BadInputError: see `write_poses`; another number of times.
+    """
+    poses = _finite(poses, path)
+    if len(times) != len(poses):
+        raise BadInputError(f"{path}: {len(times)} times for {len(poses)} poses; pass one each.")
     wxyz = quaternion_from_rotation(poses.rotation.double())
     rows = torch.cat((poses.translation.double(), wxyz[:, 1:], wxyz[:, :1]), dim=-1).tolist()
     lines = [f"{time} {' '.join(map(repr, row))}\n" for time, row in zip(times, rows, strict=True)]
     write_text(path, "".join(lines))
 
 
-def read_tum(path: Path) -> tuple[list[float], SE3]:
+def read_tum(path: Path | str) -> tuple[list[float], SE3]:
     """Times and poses.
 
     Raises:
         BadInputError: a line is not of 8 finite numbers with a unit quaternion.
     """
+    path = as_path(path, "path")
     with reading(path, "8 numbers a line: time x y z qx qy qz qw"):
         lines = path.read_text("utf-8-sig").splitlines()
         rows = np.array([line.split() for line in lines if line[:1] not in ("", "#")], np.float64)

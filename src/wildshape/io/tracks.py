@@ -10,10 +10,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, get_args
 
+import numpy as np
 import torch
 from jaxtyping import Float32
 from numpy import ndarray
 
+from wildshape.arguments import as_path, expect
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import naming, write_json
@@ -25,6 +27,7 @@ from wildshape.io.scans.points import (
     METRES,
     SENSOR_METRES,
     Coordinates,
+    checked,
     is_scan_file,
     read_points,
     read_scan,
@@ -85,7 +88,7 @@ def read_track_file(
     Raises:
         BadInputError: no scans, none of them usable, or damaged rays, poses, shape or track.json.
     """
-    folder = Path(folder)
+    folder, coordinates = as_path(folder, "folder"), checked(coordinates)
     files = scan_files(folder / "scans")
     info = read_info(folder / _INFO)
     coordinates = coordinates.in_unit(info["unit"])
@@ -267,10 +270,11 @@ def write_track(folder: Path | str, track: Track) -> None:
     """Write a track folder in metres; scans are numbered files if their names are no file names.
 
     Raises:
-        BadInputError: the folder has scans already, or see `check_lengths`.
+        BadInputError: the folder has scans already, or see `check_lengths` and `check_points`.
     """
-    folder = Path(folder)
-    check_lengths(track)
+    folder = as_path(folder, "folder")
+    check_lengths(expect(track, Track, "track"))
+    check_points(track)
     if (folder / "scans").exists():
         raise BadInputError(f"{folder}: holds a track already; choose another folder or remove it.")
     if track.T_sensor_object is not None:
@@ -306,6 +310,17 @@ def check_lengths(track: Track) -> None:
             f"track {track.name}: {len(track.scans)} scans, {len(track.scan_names)} names, "
             f"{len(track.rays) or 'no'} rays and {posed} poses do not fit together."
         )
+
+
+def check_points(track: Track) -> None:
+    """Refuse scans or a shape that would be written as others.
+
+    Raises:
+        BadInputError: they are not `(n, 3)`.
+    """
+    clouds = track.scans if track.shape is None else (*track.scans, track.shape)
+    if any(np.shape(cloud) != (len(cloud), 3) for cloud in clouds):
+        raise BadInputError(f"track {track.name}: points are x, y, z; leave out what is more.")
 
 
 def is_placed(folder: Path) -> bool:

@@ -8,8 +8,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
+from wildshape.arguments import as_path
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import lock_folder
 from wildshape.io.output import begin, command_line, file_name, provenance
@@ -44,7 +45,7 @@ class Written:
 
 def write_tracks(
     tracks: Iterable[Track],
-    out: Path,
+    out: Path | str,
     layout: Layout,
     *,
     command: str,
@@ -68,7 +69,11 @@ def write_tracks(
     Raises:
         BadInputError: something is at `out` already, or no track came.
     """
-    write = _packed if layout == "packed" else _folders
+    if layout not in get_args(Layout):
+        raise BadInputError(f"layout {layout!r}: there are {' and '.join(get_args(Layout))}.")
+    if isinstance(tracks, Track):
+        raise BadInputError("tracks: expected several, found one; put it in a list.")
+    write, out = _packed if layout == "packed" else _folders, as_path(out, "out")
     settings = json.loads(json.dumps(settings, default=str))
     written = Written()
     output = _Output(out, command, settings, overwrite, progress)

@@ -15,6 +15,7 @@ from typing import Any
 
 import torch
 
+from wildshape.arguments import as_path
 from wildshape.errors import BadInputError
 from wildshape.geometry.box import unit_of
 from wildshape.geometry.projection.visibility import Projection
@@ -143,9 +144,10 @@ def fingerprint(model: Path | None) -> str:
 
 
 def save_checkpoint(
-    path: Path, network: ShapePoseNet, settings: ModelSettings, half: bool = False
+    path: Path | str, network: ShapePoseNet, settings: ModelSettings, half: bool = False
 ) -> None:
     """Write weights and settings atomically; `half` stores float16."""
+    path = as_path(path, "path")
     dtype = torch.float16 if half else torch.float32
     weights = {k: v.detach().cpu().to(dtype) for k, v in network.state_dict().items()}
     described = asdict(settings)
@@ -155,14 +157,14 @@ def save_checkpoint(
         file.write(packed_network(weights, metadata))
 
 
-def load_checkpoint(path: Path) -> tuple[ShapePoseNet, ModelSettings]:
+def load_checkpoint(path: Path | str) -> tuple[ShapePoseNet, ModelSettings]:
     """Network in evaluation mode, and its settings.
 
     Raises:
         BadInputError: no such file, no safetensors, another format or version, damaged settings,
             weights missing, of another shape or no numbers.
     """
-    return load_network(Path(path), _FORMAT)
+    return load_network(as_path(path, "path"), _FORMAT)
 
 
 def settings_from_dict(values: object) -> ModelSettings:

@@ -3,10 +3,12 @@
 """Who does the work: every core of this machine, or a Ray cluster."""
 
 import os
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Protocol, TypeVar, runtime_checkable
 
+from wildshape.arguments import expect_whole
 from wildshape.errors import BadInputError
 from wildshape.parallel.processes import Processes
 from wildshape.parallel.ray_cluster import on_ray
@@ -54,16 +56,15 @@ def team(
         soon: a module that long work will need; a helper of this machine imports it at once.
 
     Raises:
-        BadInputError: fewer than one worker; no cluster answers there.
+        BadInputError: no whole number of workers, or fewer than one; no cluster answers there.
         MissingExtraError: Ray is not installed.
     """
-    if workers is not None and not isinstance(workers, int):
+    if isinstance(workers, Team):
         if soon is not None and isinstance(workers, Processes):
             workers.begin(soon)
         yield workers
         return
-    if workers is not None and workers < 1:
-        raise BadInputError(f"--workers {workers}: expected 1 or more.")
+    check_workers(workers)
     if ray is not None:
         with on_ray(ray, workers) as cluster:
             yield cluster
@@ -75,6 +76,18 @@ def team(
         yield found
     finally:
         found.close()
+
+
+def check_workers(workers: int | Team | None) -> None:
+    """Refuse what is no number of processes, before any work.
+
+    Raises:
+        BadInputError: see `team`.
+    """
+    if workers is None or isinstance(workers, Team):
+        return
+    if expect_whole(workers, "workers", least=-sys.maxsize) < 1:
+        raise BadInputError(f"--workers {workers}: expected 1 or more.")
 
 
 def cores() -> int:

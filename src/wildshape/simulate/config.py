@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from wildshape.arguments import check_fields
 from wildshape.errors import BadInputError
 from wildshape.simulate.sensor import SENSORS, DepthCamera, SensorName, SpinningLidar
 
@@ -81,6 +82,7 @@ class SimulationConfig:
                 raise BadInputError(f"{name} is of LiDARs, sensor is {self.sensor}; leave it out.")
 
     def _check_numbers(self) -> None:
+        check_fields(self)
         counts = {"tracks": self.tracks, "shape_points": self.shape_points, "scans": self.scans}
         for name, count in counts.items():
             if count is not None and count < 1:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import torch
 
+from wildshape.arguments import expect, expect_whole
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.parallel.team import Team, team
 from wildshape.records import Sensor, Track
@@ -34,9 +35,11 @@ def simulate_tracks(
         workers: processes; None: one a core.
 
     Raises:
-        BadInputError: a mesh that cannot be used.
+        BadInputError: a mesh, seed or number of workers that cannot be used.
         MissingExtraError: embreex is not installed.
     """
+    expect(config, SimulationConfig, "config")
+    expect_whole(seed, "seed")
     with team(workers) as helpers:
         yield from simulated_by(helpers, config, seed)
 

@@ -4,6 +4,7 @@
 
 from dataclasses import dataclass
 
+from wildshape.arguments import check_fields
 from wildshape.errors import BadInputError
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates
 from wildshape.method.encoders.named import Backbone
@@ -47,6 +48,7 @@ class TrainingOptions:
     profile: bool = False
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if not self.preset.startswith("dpc"):
             recipe_named(self.preset)
         if not 0 <= self.seed < _SEEDS:

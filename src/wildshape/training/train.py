@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+from wildshape.arguments import as_path, expect
 from wildshape.errors import BadInputError
 from wildshape.io.output import provenance
 from wildshape.io.progress import SILENT, Progress, counted, duration
@@ -82,8 +83,8 @@ _DEFAULT = TrainingOptions()
 
 
 def train(
-    data: Path,
-    out: Path,
+    data: Path | str,
+    out: Path | str,
     options: TrainingOptions = _DEFAULT,
     progress: Progress = SILENT,
     stopping: Stopping = never_stopped,
@@ -101,6 +102,8 @@ def train(
         BadInputError: data or options that cannot be used, an existing run without `resume`.
         StopRequested: `stopping` said so, the state is saved; its text says how to go on.
     """
+    data, out = as_path(data, "data"), as_path(out, "out")
+    expect(options, TrainingOptions, "options")
     device, weights = choose_device(options.device), _Weights.named_in(options)
     weights.refuse_misfits(options)
     only = only_sensor(recipe_named(options.preset))

@@ -10,7 +10,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wildshape.evaluation.drives.overlap import UprightBox, overlaps
+from wildshape.evaluation.drives.overlap import Overlaps, UprightBox, overlaps
 from wildshape.evaluation.drives.rectangles import l_shape, smallest_rectangle
 from wildshape.geometry.box import FittedBox, box_iou
 from wildshape.geometry.transforms.rotation import rotation_z
@@ -52,6 +52,25 @@ def test_in_space_as_boxes_of_any_rotation(a: UprightBox, b: UprightBox) -> None
     assert overlaps([a], [b]).space[0, 0] == pytest.approx(
         box_iou(_fitted(a), _fitted(b)), abs=1e-5
     )
+
+
+def _tables(found: Overlaps) -> tuple[np.ndarray, ...]:
+    return found.bev, found.space, found.on
+
+
+@given(st.lists(_BOX, max_size=6), st.lists(_BOX, max_size=6))
+def test_many_boxes_as_each_pair_alone(found: list[UprightBox], labelled: list[UprightBox]) -> None:
+    every = overlaps(found, labelled)
+    for i, j in np.ndindex(len(found), len(labelled)):
+        alone = overlaps([found[i]], [labelled[j]])
+        for table, one in zip(_tables(every), _tables(alone), strict=True):
+            assert table[i, j] == pytest.approx(one[0, 0], abs=1e-12)
+
+
+def test_boxes_without_an_extent_share_nothing() -> None:
+    flat = CAR._replace(height=0.0)
+    assert overlaps([flat], [flat]).space == 0
+    assert overlaps([CAR._replace(width=0.0)], [CAR]).bev == 0
 
 
 def test_no_boxes() -> None:

@@ -40,10 +40,12 @@ def test_pcd_is_binary_and_other_programs_read_it(tmp_path):
 
 def test_whatever_is_an_array_is_saved(tmp_path):
     held = SimpleNamespace(__array__=None)
-    for name, shape in {"list": POINTS.tolist(), "tensor": torch.from_numpy(POINTS)}.items():
+    tensor = torch.from_numpy(POINTS)
+    shapes = {"list": POINTS.tolist(), "tensor": tensor, "graded": tensor.clone().requires_grad_()}
+    for name, shape in shapes.items():
         save(shape, str(tmp_path / f"{name}.npy"))
         np.testing.assert_array_equal(np.load(tmp_path / f"{name}.npy"), POINTS)
-    for wrong in (POINTS[:, :2], POINTS[0], "words", held, torch.zeros(3, 3, requires_grad=True)):
+    for wrong in (POINTS[:, :2], POINTS[0], "words", held):
         refused(save, wrong, tmp_path / "x.ply", match=r"x\.ply: cannot save")
 
 

@@ -49,9 +49,9 @@ def run(settings: Settings) -> None:
     """
     from wildshape.cli.terminal import answer
     from wildshape.inference.export.verify import export_model
-    from wildshape.io.output import refuse_file
+    from wildshape.io.output import begin_file
 
-    refuse_file(settings.out, overwrite=settings.overwrite)
+    begin_file(settings.out, overwrite=settings.overwrite)
     found = export_model(settings.model, settings.out, settings.scans)
     size = settings.out.stat().st_size
     text = (

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`wildshape fuse`: all scans of a track as one cloud."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -45,20 +45,21 @@ def run(settings: Settings) -> None:
         from wildshape.inference.predictor import load
         from wildshape.inference.registration import fuse_scans, to_middle
         from wildshape.io.inputs import open_tracks
-        from wildshape.io.output import refuse_file
+        from wildshape.io.output import begin_file
         from wildshape.io.progress import counted
         from wildshape.io.scans.writers import check_suffix, write_cloud
 
     asked = settings.scans
     check_suffix(settings.out)
-    refuse_file(settings.out, overwrite=asked.overwrite)
+    begin_file(settings.out, overwrite=asked.overwrite)
     _keep_out(settings.track, settings.out)
     source = open_tracks(settings.track, asked.files.coordinates)
     track = source.single("fuse")
     predictor = load(asked.network.model, asked.network.device)
-    done = list(
-        predictor.complete_checked(track.scans, track.sensor, track=asked.together, rays=track.rays)
+    found = predictor.complete_checked(
+        track.scans, track.sensor, track=asked.together, rays=track.rays
     )
+    done = [replace(one, points=one.points[:0].copy()) for one in found]  # poses alone are needed
     fused = fuse_scans(track.scans, to_middle(stack([scan.pose for scan in done])))
     write_cloud(settings.out, fused)
     for told in source.doubts:

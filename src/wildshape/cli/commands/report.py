@@ -53,13 +53,13 @@ def run(settings: Settings) -> None:
     with uncollected():
         from wildshape.cli.terminal import answer
         from wildshape.drives.writing.folder import is_drive
-        from wildshape.io.output import refuse_file
+        from wildshape.io.output import begin_file
         from wildshape.report.drive.page import report_from_drive
         from wildshape.report.page.folder import report_from_folder
         from wildshape.report.page.html import write_report
 
     out = settings.out or settings.folder / "report.html"
-    refuse_file(out, overwrite=settings.overwrite)
+    begin_file(out, overwrite=settings.overwrite)
     read = report_from_drive if is_drive(settings.folder) else report_from_folder
     found = read(settings.folder, settings.inputs)
     write_report(found, out)

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
+from wildshape.arguments import check_fields, expect_whole
 from wildshape.io.scans.points import LARGEST_EXTENT_M
 from wildshape.records import Points, Track
 
@@ -45,6 +46,10 @@ class Selection:
     categories: tuple[str, ...] = ()
     motion: Motion = "any"
     moved_m: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        expect_whole(self.every, "Selection.every", least=1)
 
     def objection_to_scan(self, points: Points) -> str:
         """Why the points on an object are no scan to keep; empty if they are."""

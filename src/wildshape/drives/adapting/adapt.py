@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from wildshape.arguments import as_path, expect
 from wildshape.drives.adapting.config import AdaptConfig
 from wildshape.drives.adapting.examples import Example, examples_of, split
 from wildshape.drives.adapting.fine_tuning import taught
@@ -92,8 +93,8 @@ def _change(before: Measures, after: Measures) -> str:
 
 
 def adapt_to(
-    outs: Sequence[Path],
-    folder: Path,
+    outs: Sequence[Path | str],
+    folder: Path | str,
     predictor: Predictor,
     config: AdaptConfig,
     *,
@@ -116,6 +117,12 @@ def adapt_to(
     Raises:
         BadInputError: a drive's folder is damaged, or another adaptation is there.
     """
+    if isinstance(outs, str | Path):
+        raise BadInputError(f"outs: expected a list of folders, found '{outs}'; put it in a list.")
+    outs = [as_path(out, "outs") for out in outs]
+    expect(predictor, Predictor, "predictor", "wildshape.load gives one")
+    expect(config, AdaptConfig, "config")
+    folder = as_path(folder, "folder")
     place = folder / ADAPTED
     settings = {
         "drives": {str(out.resolve()): _hash_of(out) for out in outs},

@@ -4,6 +4,7 @@
 
 from dataclasses import dataclass
 
+from wildshape.arguments import check_fields
 from wildshape.errors import BadInputError
 
 
@@ -43,5 +44,6 @@ class AdaptConfig:
     save_every: int = 50
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if self.steps < 1:
             raise BadInputError(f"--adapt-steps {self.steps}: expected 1 or more.")

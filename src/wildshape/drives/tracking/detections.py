@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from wildshape.arguments import check_fields
 from wildshape.drives.source import Drive
 from wildshape.drives.tracking.segmentation import CutScan
 from wildshape.drives.tracking.sightings import Sightings
@@ -66,10 +67,7 @@ class DetectionFile:
     least_score: float | None = None
 
     def __post_init__(self) -> None:
-        """Paths may be given as text."""
-        for name in ("path", "calibration"):
-            if isinstance(given := getattr(self, name), str):
-                object.__setattr__(self, name, Path(given))
+        check_fields(self)
 
     def identity(self) -> dict[str, Any]:
         """What decides what is found with them.

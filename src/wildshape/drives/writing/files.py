@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from wildshape.arguments import check_fields
 from wildshape.drives.completing.completion import CATEGORY
 from wildshape.drives.writing.finished import FinishedDrive, read_finished
 from wildshape.drives.writing.folder import MCAP, MESHES, RRD
@@ -34,6 +35,9 @@ class DriveFiles:
     mesh: MeshFormat | None = None
     mcap: bool = False
     rerun: bool = False
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
     def check(self) -> None:
         """Refuse before any work is done what could not be written after it.

@@ -17,6 +17,7 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
 
+from wildshape.arguments import as_path
 from wildshape.drives.completing.level_frame import boxes_in_scans, level_poses
 from wildshape.drives.completing.rolling_shutter import TURNS, Turns
 from wildshape.drives.recordings.recording_kinds import open_drive
@@ -238,13 +239,13 @@ def _across(
     return np.divide(way, since, out=np.zeros_like(way), where=since > 0)
 
 
-def read_finished(out: Path | str, boxes_in: Path | None = None) -> FinishedDrive:
+def read_finished(out: Path | str, boxes_in: Path | str | None = None) -> FinishedDrive:
     """What `wildshape drive` left in a folder; `boxes_in`: another than it, with its boxes.
 
     Raises:
         BadInputError: no drive, or a damaged one.
     """
-    out = Path(out)
+    out = as_path(out, "out")
     if not is_drive(out):
         raise BadInputError(f"{out}: holds no finished drive; run `wildshape drive` with --out.")
     names, times, scanned = _read_frames(out / FRAMES)
@@ -260,7 +261,7 @@ def read_finished(out: Path | str, boxes_in: Path | None = None) -> FinishedDriv
             f"{out / TUM}: {len(ticks)} poses for {len(names)} scans; write it anew."
         )
     rows: dict[str, list[BoxRow]] = defaultdict(list)
-    table = (boxes_in or out) / BOXES
+    table = as_path(boxes_in or out, "boxes_in") / BOXES
     for row in read_box_table(table):
         if not 0 <= row.frame < len(names):
             raise BadInputError(f"{table}: frame {row.frame} of {len(names)}; write it anew.")

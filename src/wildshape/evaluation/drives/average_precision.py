@@ -51,14 +51,15 @@ def match(
         least: overlap from which a box is right.
     """
     outcome = np.where(excused, NEITHER, MISS)
-    taken = np.zeros(len(counted), bool)
-    for one in np.argsort(-confidence, kind="stable"):
-        for wanted, said in ((counted, HIT), (~counted, NEITHER)):
-            free = np.flatnonzero(wanted & ~taken & (overlap[one] >= least))
-            if len(free):
-                taken[free[overlap[one, free].argmax()]] = True
-                outcome[one] = said
-                break
+    ones, labels = np.nonzero(overlap >= least)
+    rank = np.argsort(np.argsort(-confidence, kind="stable"))
+    order = np.lexsort((labels, -overlap[ones, labels], ~counted[labels], rank[ones]))
+    chosen, taken = set(), set()
+    for one, label in zip(ones[order].tolist(), labels[order].tolist()):
+        if one not in chosen and label not in taken:
+            chosen.add(one)
+            taken.add(label)
+            outcome[one] = HIT if counted[label] else NEITHER
     return outcome
 
 

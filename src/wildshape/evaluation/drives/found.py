@@ -3,12 +3,13 @@
 """What `wildshape drive` left in its folder: boxes, trajectory, and the points of each track."""
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from wildshape.arguments import as_path
 from wildshape.datasets.kitti.raw import read_velodyne
 from wildshape.errors import BadInputError
 from wildshape.evaluation.drives.overlap import UprightBox
@@ -19,7 +20,10 @@ from wildshape.io.inputs import open_tracks
 from wildshape.io.poses import read_poses
 from wildshape.records import Points
 
+Cluster = tuple[int, str, Points]
+"""Frame, track, and its points there, sensor frame, metres."""
 Clusters = dict[tuple[int, str], Points]
+"""Points of tracks, by frame and track."""
 _AROUND_M, _ABOVE_M, _FEWEST = 0.3, 0.2, 5
 BOXES, TRAJECTORY, TRACKS = "boxes.csv", "trajectory.txt", "tracks"
 
@@ -76,12 +80,13 @@ def _labels_of(name: str, labels: Path) -> Path:
     raise BadInputError(f"{labels}: no labels of the drive {name}; name them as it is named.")
 
 
-def read_found(path: Path, scans: int) -> FoundDrive:
+def read_found(path: Path | str, scans: int) -> FoundDrive:
     """The boxes and the trajectory of a drive of so many scans.
 
     Raises:
         BadInputError: boxes are missing or damaged, or are of another number of scans.
     """
+    path = as_path(path, "path")
     frames: dict[int, list[Found]] = defaultdict(list)
     seen: set[tuple[int, str]] = set()
     for row in read_box_table(path / BOXES):
@@ -120,22 +125,20 @@ def _upright(row: BoxRow) -> UprightBox:
     return UprightBox(row.x, row.y, row.z, row.length, row.width, row.height, row.yaw)
 
 
-def points_inside(drive: FoundDrive, scans: Sequence[Path]) -> Clusters:
+def points_inside(drive: FoundDrive, scans: Sequence[Path]) -> Iterator[Cluster]:
     """The points in and close around each found box, without the ground under it.
 
-    For drives whose clusters were not kept.
+    For drives whose clusters were not kept; one scan is held at a time.
 
     Raises:
         BadInputError: a scan is damaged.
     """
-    inside: Clusters = {}
     for number, (scan, frame) in enumerate(zip(scans, drive.frames)):
         points = read_velodyne(scan) if frame else np.empty((0, 3), np.float32)
         for one in frame:
             own = _inside(points, one.box)
             if len(own) >= _FEWEST:
-                inside[number, one.track] = own
-    return inside
+                yield number, one.track, own
 
 
 def _inside(points: Points, box: UprightBox) -> Points:
@@ -147,20 +150,18 @@ def _inside(points: Points, box: UprightBox) -> Points:
     return points[near & above]
 
 
-def read_clusters(path: Path) -> Clusters:
-    """The points of each track in each frame, sensor frame, metres; empty where none were kept.
+def kept_clusters(path: Path) -> Iterator[Cluster]:
+    """What was kept of each track in each frame; one track is held at a time.
 
     Raises:
         BadInputError: the tracks or the list of frames are damaged.
     """
     if not (path / TRACKS).exists() or not (path / FRAMES).is_file():
-        return {}
+        return
     frame_of = {name: frame for frame, name in enumerate(read_frames(path / FRAMES))}
     source = open_tracks(path / TRACKS)
-    clusters: Clusters = {}
     for number in range(len(source)):
         track = source[number]
         for name, points in zip(track.scan_names, track.scans, strict=True):
             if name in frame_of:
-                clusters[frame_of[name], track.name] = points
-    return clusters
+                yield frame_of[name], track.name, points

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from wildshape.arguments import as_path, check_fields, expect
 from wildshape.datasets.kitti.calibration import read_calibration, rigid
 from wildshape.datasets.kitti.oxts import read_oxts
 from wildshape.datasets.kitti.raw import read_velodyne
@@ -48,6 +49,9 @@ class Counting:
     range_m: float = 60.0
     image: tuple[int, int] = (1242, 375)
     on: float = 0.5
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -142,7 +146,7 @@ class _Place:
         return self.root / folder / f"{self.name}.{suffix}"
 
 
-def read_labels(path: Path, counting: Counting | None = None) -> LabelledDrive:
+def read_labels(path: Path | str, counting: Counting | None = None) -> LabelledDrive:
     """Labels with what lies beside them: `calib`, `velodyne`, and `oxts`, `poses`, `truth`.
 
     Args:
@@ -152,7 +156,7 @@ def read_labels(path: Path, counting: Counting | None = None) -> LabelledDrive:
     Raises:
         BadInputError: a file is missing or damaged, or there are several sequences.
     """
-    counting = counting or Counting()
+    path, counting = as_path(path, "path"), expect(counting or Counting(), Counting, "counting")
     place = _place(path)
     scans = _scans(place)
     calibration_file = place.file("calib")

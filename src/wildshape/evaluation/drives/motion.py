@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from wildshape.datasets.kitti.raw import read_velodyne
-from wildshape.evaluation.drives.found import Clusters
+from wildshape.evaluation.drives.found import Clusters, FoundDrive
 from wildshape.evaluation.drives.labels import Label, LabelledDrive
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.geometry.transforms.twist import Twist
@@ -33,7 +33,8 @@ def like_found(labelled: LabelledDrive, clusters: Clusters) -> tuple[LabelledDri
 
     Args:
         labelled: as the beam met it.
-        clusters: points of what was found; without any nothing is taken for corrected.
+        clusters: points of what was found, in `sampled_frames`; without any nothing is taken for
+            corrected.
     """
     if not is_corrected(clusters, labelled.scans):
         return labelled, "none"
@@ -42,11 +43,18 @@ def like_found(labelled: LabelledDrive, clusters: Clusters) -> tuple[LabelledDri
     return at_scan_times(labelled, labelled.T_world_sensor), "labels carried"
 
 
+def sampled_frames(found: FoundDrive) -> set[int]:
+    """A few frames with boxes, spread evenly: their points tell whether all were corrected."""
+    seen = [number for number, frame in enumerate(found.frames) if frame]
+    some = np.linspace(0, len(seen) - 1, min(len(seen), _FRAMES)).round().astype(int)
+    return {seen[i] for i in some}
+
+
 def is_corrected(clusters: Clusters, scans: Sequence[Path]) -> bool:
     """Whether points lie elsewhere than where the sensor measured them.
 
     Args:
-        clusters: points of what was found.
+        clusters: points of what was found, in a few frames.
         scans: files of the scans as measured, of KITTI's format.
 
     Raises:
@@ -55,9 +63,7 @@ def is_corrected(clusters: Clusters, scans: Sequence[Path]) -> bool:
     frames: dict[int, list[Points]] = defaultdict(list)
     for (number, _), points in clusters.items():
         frames[number].append(points)
-    some = np.linspace(0, len(frames) - 1, min(len(frames), _FRAMES)).round().astype(int)
-    numbers = sorted(frames)
-    off = [_off(np.concatenate(frames[one]), scans[one]) for one in (numbers[i] for i in some)]
+    off = [_off(np.concatenate(parts), scans[number]) for number, parts in frames.items()]
     return bool(off) and float(np.median(np.concatenate(off))) > _MOVED_M
 
 

@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Overlap of upright boxes, seen from above and in space."""
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from wildshape.geometry.footprint import Place, shared_ground
+from wildshape.geometry.footprint import shared_grounds
+
+_PLACE, _SIDES, _Z, _HEIGHT = [0, 1, 2, 6], [3, 4], 2, 5  # columns of an `UprightBox`
 
 
 class UprightBox(NamedTuple):
@@ -33,52 +34,66 @@ class UprightBox(NamedTuple):
     height: float
     yaw: float
 
-    @property
-    def area(self) -> float:
-        """Of its footprint, square metres."""
-        return self.length * self.width
-
 
 class Overlaps(NamedTuple):
-    """Of each found box with each labelled one, `(f, l)`.
+    """Of each found box with each labelled one; few of the pairs meet, and these alone are held.
 
     Attributes:
-        bev: intersection over union in bird's eye view.
-        space: intersection over union in 3D.
-        on: the part of the found box's footprint that lies on the label's.
+        shape: how many are found, how many labelled.
+        pairs: rows and columns of the pairs that are near each other.
+        parts: `(3, k)` of each of them: `bev`, `space` and `on`.
     """
 
-    bev: Float[np.ndarray, "f l"]
-    space: Float[np.ndarray, "f l"]
-    on: Float[np.ndarray, "f l"]
+    shape: tuple[int, int]
+    pairs: tuple[np.ndarray, np.ndarray]
+    parts: Float[np.ndarray, "3 k"]
+
+    @property
+    def bev(self) -> Float[np.ndarray, "f l"]:
+        """Intersection over union in bird's eye view; made anew each time."""
+        return self._table(0)
+
+    @property
+    def space(self) -> Float[np.ndarray, "f l"]:
+        """Intersection over union in 3D."""
+        return self._table(1)
+
+    @property
+    def on(self) -> Float[np.ndarray, "f l"]:
+        """The part of the found box's footprint that lies on the label's."""
+        return self._table(2)
+
+    def _table(self, which: int) -> Float[np.ndarray, "f l"]:
+        table = np.zeros(self.shape)
+        table[self.pairs] = self.parts[which]
+        return table
 
 
 def overlaps(found: Sequence[UprightBox], labelled: Sequence[UprightBox]) -> Overlaps:
     """All pairs."""
-    bev, space, on = np.zeros((3, len(found), len(labelled)))
-    for i, one in enumerate(found):
-        for j, other in enumerate(labelled):
-            shared = shared_area(one, other)
-            if shared > 0:
-                bev[i, j] = shared / (one.area + other.area - shared)
-                on[i, j] = shared / one.area
-                space[i, j] = _space(one, other, shared)
-    return Overlaps(bev, space, on)
+    a, b = (np.array(boxes, float).reshape(-1, 7) for boxes in (found, labelled))
+    i, j = _near(a, b)
+    one, other = a[i], b[j]
+    shared = shared_grounds(one[:, _PLACE], one[:, _SIDES], other[:, _PLACE], other[:, _SIDES])
+    areas = one[:, _SIDES].prod(1), other[:, _SIDES].prod(1)
+    tops, floors = (
+        [boxes[:, _Z] + half * boxes[:, _HEIGHT] for boxes in (one, other)] for half in (0.5, -0.5)
+    )
+    volume = shared * np.maximum(np.minimum(*tops) - np.maximum(*floors), 0.0)
+    volumes = areas[0] * one[:, _HEIGHT] + areas[1] * other[:, _HEIGHT]
+    bev = _part(shared, areas[0] + areas[1] - shared)
+    parts = np.stack((bev, _part(volume, volumes - volume), _part(shared, areas[0])))
+    return Overlaps((len(a), len(b)), (i, j), parts)
 
 
-def shared_area(a: UprightBox, b: UprightBox) -> float:
-    """Square metres of ground that two boxes share."""
-    reach = (math.hypot(a.length, a.width) + math.hypot(b.length, b.width)) / 2
-    if math.hypot(a.x - b.x, a.y - b.y) >= reach:
-        return 0.0
-    return shared_ground(_place(a), (a.length, a.width), _place(b), (b.length, b.width))
+def _near(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs whose circumscribed circles meet: few of all."""
+    reach = [np.linalg.norm(boxes[:, _SIDES], axis=1) / 2 for boxes in (a, b)]
+    apart = np.hypot(*(a[:, None, :2] - b[None, :, :2]).transpose(2, 0, 1))
+    i, j = np.nonzero(apart < reach[0][:, None] + reach[1])
+    return i, j
 
 
-def _place(box: UprightBox) -> Place:
-    return np.array((box.x, box.y, box.z, box.yaw))
-
-
-def _space(a: UprightBox, b: UprightBox, area: float) -> float:
-    top = min(a.z + a.height / 2, b.z + b.height / 2)
-    shared = area * max(top - max(a.z - a.height / 2, b.z - b.height / 2), 0.0)
-    return shared / (a.area * a.height + b.area * b.height - shared)
+def _part(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
+    """0 of what has no extent."""
+    return np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
+from wildshape.arguments import expect
 from wildshape.errors import BadInputError
 from wildshape.evaluation.drives.average_precision import (
     HIT,
@@ -22,11 +23,11 @@ from wildshape.evaluation.drives.found import (
     Clusters,
     Found,
     FoundDrive,
+    kept_clusters,
     points_inside,
-    read_clusters,
 )
 from wildshape.evaluation.drives.labels import LabelledDrive, LabelledFrame, View
-from wildshape.evaluation.drives.motion import Correction, like_found
+from wildshape.evaluation.drives.motion import Correction, like_found, sampled_frames
 from wildshape.evaluation.drives.overlap import Overlaps, UprightBox, overlaps
 from wildshape.evaluation.drives.rectangles import l_shape, smallest_rectangle
 from wildshape.evaluation.drives.same_scans import check_same_scans
@@ -49,6 +50,7 @@ BASELINES: dict[str, Callable[[Points], UprightBox]] = {
     "clusters, smallest rectangles": smallest_rectangle,
     "clusters, L-shape fits": l_shape,
 }
+_Boxes = dict[tuple[int, str], tuple[UprightBox, ...]]  # of each baseline, by frame and track
 
 
 @dataclass(frozen=True)
@@ -164,6 +166,7 @@ def evaluate_drives(
         BadInputError: nothing that counts is labelled, a drive was found in other scans than the
             labelled ones, or kept points or scans are damaged.
     """
+    _check(found, labelled)
     for drive, labels in zip(found, labelled, strict=True):
         check_same_scans(drive.path, labels.scans)
     if not any(one.counted for drive in labelled for frame in drive.frames for one in frame.labels):
@@ -171,32 +174,59 @@ def evaluate_drives(
             f"{labelled[0].path}: no label counts: none is of a vehicle with"
             f" {labelled[0].counting.points} points; give labels with their scans."
         )
-    kept = [read_clusters(drive.path) for drive in found]
-    labelled, corrections = zip(*map(like_found, labelled, kept))
+    others, samples = zip(*(_around_clusters(*one) for one in zip(found, labelled)))
+    labelled, corrections = zip(*map(like_found, labelled, samples))
     rows = [_row(OURS, found, labelled)]
     at(1)
-    clusters = [
-        own or points_inside(drive, labels.scans)
-        for own, drive, labels in zip(kept, found, labelled, strict=True)
-    ]
-    for number, (name, fit) in enumerate(BASELINES.items(), 2):
-        refitted = [_refitted(drive, own, fit) for drive, own in zip(found, clusters)]
+    for number, name in enumerate(BASELINES):
+        refitted = [_refitted(drive, own, number) for drive, own in zip(found, others)]
         rows.append(_row(name, refitted, labelled))
-        at(number)
+        at(number + 2)
     errors = tuple(_trajectory(one, other) for one, other in zip(found, labelled, strict=True))
     cameras = sum(one.view is not None for one in labelled)
     return DriveScores(tuple(rows), errors, corrections, cameras)
 
 
-def _refitted(
-    drive: FoundDrive, clusters: Clusters, fit: Callable[[Points], UprightBox]
-) -> FoundDrive:
+def _check(found: Sequence[FoundDrive], labelled: Sequence[LabelledDrive]) -> None:
+    """Refuse what Python hands in that is no list of drives and one of their labels."""
+    for name, given, kind, reader in (
+        ("found", found, FoundDrive, "read_found"),
+        ("labelled", labelled, LabelledDrive, "read_labels"),
+    ):
+        several = expect(given, Sequence, name, f"pass a list of what {reader} gives")
+        for one in several:
+            expect(one, kind, name, f"{reader} makes one of a path")
+    if len(found) != len(labelled) or not len(found):
+        raise BadInputError(
+            f"{len(found)} drives found, {len(labelled)} labelled; pass the labels of each drive."
+        )
+
+
+def _around_clusters(drive: FoundDrive, labels: LabelledDrive) -> tuple[_Boxes, Clusters]:
+    """Each baseline's box around each cluster, and the clusters kept of `sampled_frames`."""
+    sampled = sampled_frames(drive)
+    boxes, sample = _Boxes(), {}
+    for frame, track, points in kept_clusters(drive.path):
+        boxes[frame, track] = _fitted(points)
+        if frame in sampled:
+            sample[frame, track] = points
+    if not boxes:
+        inside = points_inside(drive, labels.scans)
+        boxes = {(frame, track): _fitted(points) for frame, track, points in inside}
+    return boxes, sample
+
+
+def _fitted(points: Points) -> tuple[UprightBox, ...]:
+    return tuple(fit(points) for fit in BASELINES.values())
+
+
+def _refitted(drive: FoundDrive, boxes: _Boxes, baseline: int) -> FoundDrive:
     """The same vehicles, as sure, with other boxes; where no point was seen there is none."""
     frames = tuple(
         tuple(
-            replace(one, box=fit(clusters[number, one.track]))
+            replace(one, box=boxes[number, one.track][baseline])
             for one in frame
-            if (number, one.track) in clusters
+            if (number, one.track) in boxes
         )
         for number, frame in enumerate(drive.frames)
     )
@@ -301,12 +331,13 @@ def _size_bias(frames: Sequence[_Frame]) -> tuple[float, float, float] | None:
 def _vehicles(frames: Sequence[_Frame]) -> tuple[VehicleScore, ...]:
     scores: dict[tuple[int, int], VehicleScore] = {}
     for frame in frames:
-        mine = {j: i for i, j in belonging(frame.overlaps.bev * frame.counted)}
+        bev = frame.overlaps.bev
+        mine = {j: i for i, j in belonging(bev * frame.counted)}
         for j in np.flatnonzero(frame.counted).tolist():
             key = (frame.drive, frame.labels.labels[j].track)
             before = scores.get(key, VehicleScore(*key, 0, 0, ()))
             track = (frame.found[mine[j]].track,) if j in mine else ()
-            hit = j in mine and bool(frame.overlaps.bev[mine[j], j] >= LEAST_IOU[0])
+            hit = j in mine and bool(bev[mine[j], j] >= LEAST_IOU[0])
             tracks = tuple(sorted({*before.tracks, *track}))
             scores[key] = VehicleScore(*key, before.scans + 1, before.found + hit, tracks)
     return tuple(scores[key] for key in sorted(scores))

@@ -17,6 +17,7 @@ from jaxtyping import Float, Int
 ALPHAS = np.arange(0.05, 0.99, 0.05)
 _TIE = np.finfo(float).eps
 _SWITCH_IOU, _BELONGS_IOU = 0.5, 0.3
+_NONE = -1  # the number of no track
 _KEPT = 1000.0  # an identity that goes on is worth more than any overlap
 
 
@@ -148,7 +149,7 @@ def identity_switches(frames: Sequence[Pairs]) -> int:
     for frame in frames:
         if not (len(frame.found) and len(frame.true)):
             continue  # what was found before the gap goes on after it
-        kept = np.array([[before.get(int(t)) == int(f) for t in frame.true] for f in frame.found])
+        kept = frame.found[:, None] == [before.get(t, _NONE) for t in frame.true.tolist()]
         worth = _KEPT * kept + frame.overlap
         worth[frame.overlap < _SWITCH_IOU - _TIE] = 0
         rows, columns = _assigned(worth)

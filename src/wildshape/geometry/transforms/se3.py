@@ -3,7 +3,7 @@
 """Rigid transforms. `T_a_b` takes points of frame b to frame a; frames cancel in a product."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ import torch
 from jaxtyping import Bool, Float, Real
 from torch import Tensor
 
+from wildshape.arguments import expect
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import (
     quaternion_from_rotation,
@@ -19,6 +20,7 @@ from wildshape.geometry.transforms.rotation import (
 )
 
 _TOLERANCE = 1e-3
+_OF_MATRICES = "SE3.from_matrix makes one of 4x4 matrices"
 ROWS = 4096
 """Points moved at once: few enough for the cache, and for BLAS to wake no threads."""
 
@@ -119,13 +121,19 @@ class SE3:
         return type(self)(inverse, -(inverse @ self.translation[..., None])[..., 0])
 
     def __matmul__(self, other: "SE3") -> "SE3":
-        """Composition: `T_a_c = T_a_b @ T_b_c`, broadcast over the batch."""
+        """Composition: `T_a_c = T_a_b @ T_b_c`, broadcast over the batch.
+
+        Raises:
+            BadInputError: `other` is no `SE3`.
+        """
+        expect(other, SE3, "what follows @", _OF_MATRICES)
         rotation = self.rotation @ other.rotation
         translation = (self.rotation @ other.translation[..., None])[..., 0] + self.translation
         return type(self)(rotation, translation)
 
     def apply(self, points: Float[Tensor, "*batch n 3"]) -> Float[Tensor, "*batch n 3"]:
         """Carry points `(..., n, 3)` of frame b to frame a."""
+        expect(points, Tensor, "points", "apply_numpy takes arrays")
         return points @ self.rotation.mT + self.translation[..., None, :]
 
     def apply_numpy(self, points: Real[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
@@ -133,6 +141,7 @@ class SE3:
 
         What this type cannot hold is infinite. Whole numbers become floating ones.
         """
+        expect(points, np.ndarray, "points", "np.asarray makes one")
         rotation, translation = self.rotation.double().numpy(), self.translation.double().numpy()
         moved = np.empty(points.shape, np.result_type(points, np.float16))
         for start in range(0, len(points), ROWS):
@@ -181,8 +190,35 @@ def _check_layout(m: Tensor) -> None:
         raise BadInputError("the last row of a pose is not 0 0 0 1; give it row-major.")
 
 
-def stack(transforms: list[SE3]) -> SE3:
-    """One batch of several transforms."""
+def several(transforms: object, name: str) -> SE3:
+    """A batch `(n,)` of what is handed in as several transforms.
+
+    Args:
+        transforms: a batch, single ones in a list, or matrices `(n, 4, 4)`.
+        name: for the error.
+
+    Raises:
+        BadInputError: one alone, none, or something else.
+    """
+    if isinstance(transforms, list | tuple) and all(isinstance(T, SE3) for T in transforms):
+        return stack(list(transforms))
+    if isinstance(transforms, np.ndarray | Tensor):
+        transforms = SE3.from_matrix(transforms)
+    found = expect(transforms, SE3, name, _OF_MATRICES)
+    if found.translation.ndim != 2:
+        raise BadInputError(f"{name}: expected several transforms, found {found!r}.")
+    return found
+
+
+def stack(transforms: Iterable[SE3]) -> SE3:
+    """One batch of several transforms.
+
+    Raises:
+        BadInputError: none, or something else.
+    """
+    transforms = [expect(T, SE3, "transforms", _OF_MATRICES) for T in transforms]
+    if not transforms:
+        raise BadInputError("transforms: expected at least one.")
     return SE3(
         torch.stack([t.rotation for t in transforms]),
         torch.stack([t.translation for t in transforms]),

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wildshape.arguments import check_fields
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import write_text
 
@@ -38,6 +39,9 @@ class BoxFiles:
 
     formats: tuple[str, ...]
     calibration: Path | None = None
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
     def identity(self) -> dict[str, Any]:
         """What decides the content of the box files."""

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from wildshape.arguments import as_path, check_fields, expect
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.confidence import ReasonCounts
 from wildshape.inference.folders.box_files import BOX_FILES, BoxFiles
@@ -79,6 +80,9 @@ class FolderOptions:
     ray: str | None = None
     overwrite: bool = False
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
     def identity(self, source: Path) -> dict[str, Any]:
         """What decides the output's content, as JSON values."""
         found = {"input": str(source.resolve()), **asdict(self.coordinates)}
@@ -125,8 +129,8 @@ _DEFAULT = FolderOptions()
 
 
 def complete_folder(
-    source: Path,
-    out: Path,
+    source: Path | str,
+    out: Path | str,
     options: FolderOptions = _DEFAULT,
     progress: Progress = SILENT,
     *,
@@ -146,6 +150,8 @@ def complete_folder(
         MissingExtraError: a box file needs a library that is not installed.
     """
     began = time.monotonic()
+    source, out = as_path(source, "source"), as_path(out, "out")
+    expect(options, FolderOptions, "options")
     if options.boxes is not None:
         options.boxes.check()
     tracks = open_tracks(source, options.coordinates)

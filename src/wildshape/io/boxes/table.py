@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 from operator import attrgetter
 from pathlib import Path
 
+from wildshape.arguments import as_path
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import write_text
 from wildshape.io.boxes.detector import check_radians
@@ -79,7 +80,7 @@ def read_box_table(path: Path | str) -> list[BoxRow]:
     Raises:
         BadInputError: another header, or a line that is no box.
     """
-    path = Path(path)
+    path = as_path(path, "path")
     with reading(path, "boxes of a drive"), path.open(encoding="utf-8-sig", newline="") as file:
         table = csv.reader(file)
         if tuple(next(table, ())) != HEADER:

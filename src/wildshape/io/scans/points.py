@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 
+from wildshape.arguments import as_path, check_fields, expect
 from wildshape.errors import BadInputError
 from wildshape.io.guard import reading
 from wildshape.io.scans.arrays import read_kitti_bin, read_npy, read_npz
@@ -66,6 +67,7 @@ class Coordinates:
     def __post_init__(self) -> None:
         if self.unit not in METRES:
             raise BadInputError(f"unit '{self.unit}' is unknown; use one of {', '.join(METRES)}.")
+        check_fields(self)
 
     @property
     def moved(self) -> bool:
@@ -141,6 +143,15 @@ def is_scan_file(path: Path) -> bool:
     return path.is_file() or (path.is_symlink() and not path.exists())  # a lost one is to be told
 
 
+def checked(coordinates: Coordinates) -> Coordinates:
+    """What was handed in from Python.
+
+    Raises:
+        BadInputError: a unit alone, or something else.
+    """
+    return expect(coordinates, Coordinates, "coordinates", "pass Coordinates('mm')")
+
+
 def read_points(
     path: Path | str, coordinates: Coordinates = SENSOR_METRES
 ) -> Float32[np.ndarray, "n 3"]:
@@ -153,7 +164,7 @@ def read_points(
     Raises:
         BadInputError: the file is missing, damaged, of an unknown kind, or far from its origin.
     """
-    points = read_all(Path(path), coordinates)
+    points = read_all(as_path(path, "path"), checked(coordinates))
     check_near(points, str(path))
     return drop_nonfinite(points).points
 
@@ -166,7 +177,7 @@ def read_scan(path: Path | str, coordinates: Coordinates = SENSOR_METRES) -> Sca
     Raises:
         BadInputError: the file cannot be read, or is no scan of an object in metres.
     """
-    points = read_all(Path(path), coordinates)
+    points = read_all(as_path(path, "path"), checked(coordinates))
     returned = without_origin(points)
     check_scan(returned, str(path))
     kept = drop_nonfinite(returned).points

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, BinaryIO, Literal, cast, get_args
 
 import numpy as np
 from jaxtyping import Float
+from torch import Tensor
 
+from wildshape.arguments import as_path, check_fields, expect
 from wildshape.errors import BadInputError
 from wildshape.geometry.other_libraries import las_cloud
 from wildshape.io.atomic import atomic_write
@@ -27,7 +29,13 @@ MESH_FORMATS: tuple[MeshFormat, ...] = get_args(MeshFormat)
 
 
 def ply_bytes(points: Float[np.ndarray, "n 3"]) -> bytes:
-    """A binary little-endian PLY file: float32 x y z."""
+    """A binary little-endian PLY file: float32 x y z.
+
+    Raises:
+        BadInputError: points are not `(n, 3)`.
+    """
+    if np.shape(points) != (len(points), 3):
+        raise BadInputError(f"points: of shape {np.shape(points)}; pass x, y and z alone, (n, 3).")
     header = (
         "ply\nformat binary_little_endian 1.0\n"
         f"element vertex {len(points)}\n"
@@ -86,14 +94,16 @@ def check_suffix(path: Path) -> None:
         )
 
 
-def write_cloud(path: Path, points: Float[np.ndarray, "n 3"]) -> None:
+def write_cloud(path: Path | str, points: Float[np.ndarray, "n 3"]) -> None:
     """Write points, metres, atomically, in the format of `CLOUD_SUFFIXES` that the name ends in.
 
     Raises:
         BadInputError: another suffix, one of a format of float32 for points that it would move by
             over a millimetre, or LAS for a cloud wider than its whole numbers reach.
     """
+    path = as_path(path, "path")
     check_suffix(path)
+    expect(points, np.ndarray, "points", "save takes lists and tensors, too")
     if path.suffix.lower() in _FLOAT32:
         _check_rounding(points, path)
     try:
@@ -130,6 +140,7 @@ def save(shape: object, path: str | Path) -> None:
         BadInputError: another suffix; no array `(n, 3)` of finite real numbers, none of them
             masked, or one without points; or points that the format cannot hold (`write_cloud`).
     """
+    path = as_path(path, "path")
     points = _real_numbers(shape, path)
     if points.ndim != 2 or points.shape[1] != 3:
         raise BadInputError(f"{path}: cannot save an array of shape {points.shape}; pass (n, 3).")
@@ -137,7 +148,7 @@ def save(shape: object, path: str | Path) -> None:
         raise BadInputError(f"{path}: cannot save a cloud without points; check what made it.")
     if not np.isfinite(points).all():
         raise BadInputError(f"{path}: cannot save points that are NaN or infinite; drop these.")
-    write_cloud(Path(path), points)
+    write_cloud(path, points)
 
 
 def _real_numbers(shape: object, path: str | Path) -> Float[np.ndarray, "..."]:
@@ -147,7 +158,7 @@ def _real_numbers(shape: object, path: str | Path) -> Float[np.ndarray, "..."]:
         BadInputError: it is something else.
     """
     try:
-        found = np.asarray(shape)
+        found = np.asarray(shape.detach().cpu() if isinstance(shape, Tensor) else shape)
         if np.ma.is_masked(shape):
             raise TypeError("some is masked; save numpy.ma.compress_rows of it")
         if found.dtype.kind == "c":
@@ -169,6 +180,9 @@ class MeshFiles:
     kind: MeshFormat = "ply"
     coloured: bool = False
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
 
 def mesh_bytes(mesh: "trimesh.Trimesh", kind: MeshFormat) -> bytes:
     """A mesh as a file's content; colours go with it, PLY and GLB hold attributes, too."""
@@ -176,7 +190,8 @@ def mesh_bytes(mesh: "trimesh.Trimesh", kind: MeshFormat) -> bytes:
     return made.encode() if isinstance(made, str) else bytes(made)
 
 
-def write_mesh(path: Path, mesh: "trimesh.Trimesh") -> None:
+def write_mesh(path: Path | str, mesh: "trimesh.Trimesh") -> None:
     """Write a mesh atomically, in the format that the suffix names."""
+    path = as_path(path, "path")
     with atomic_write(path) as file:
         mesh.export(file, file_type=path.suffix[1:])

@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 import numpy as np
 from jaxtyping import Float32, Int64
 
+from wildshape.arguments import as_path
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.guard import reading
@@ -63,7 +64,7 @@ def open_store(path: Path | str, named: Path | None = None) -> "Store":
     Raises:
         BadInputError: no store, half-written, of another version, or damaged.
     """
-    return Store(Path(path), named)
+    return Store(as_path(path, "path"), named)
 
 
 class Store:
@@ -78,13 +79,14 @@ class Store:
         provenance: how it was made.
     """
 
-    def __init__(self, path: Path, named: Path | None = None) -> None:
+    def __init__(self, path: Path | str, named: Path | None = None) -> None:
         """Map the index; the shards follow when touched.
 
         Raises:
             BadInputError: see `open_store`.
         """
-        self.path, self.named = path, named or path
+        self.path = path = as_path(path, "path")
+        self.named = named or path
         manifest = read_manifest(path)
         self._files = files_of(manifest)
         for record in self._files:

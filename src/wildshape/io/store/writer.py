@@ -15,6 +15,7 @@ from weakref import finalize
 import numpy as np
 from jaxtyping import Float32
 
+from wildshape.arguments import as_path, expect, expect_whole
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.se3 import SE3
 from wildshape.io.atomic import hold_folder, naming, write_json
@@ -36,7 +37,7 @@ from wildshape.io.store.layout import (
 )
 from wildshape.io.store.manifest import manifest_of
 from wildshape.io.store.rays import rows_of_rays
-from wildshape.io.tracks import check_lengths
+from wildshape.io.tracks import check_lengths, check_points
 from wildshape.records import ShapeKind, SightLines, Track
 
 _SHARD_BYTES = 256 << 20
@@ -69,9 +70,9 @@ class StoreWriter:
         Raises:
             BadInputError: something is at `path` already, or another writer is at work there.
         """
-        self.path = Path(path)
+        self.path = as_path(path, "path")
         self._provenance = provenance
-        self._shard_bytes = shard_bytes
+        self._shard_bytes = expect_whole(shard_bytes, "shard_bytes")
         if self.path.is_file():
             check_room(self.path, overwrite=overwrite)
         # Of a writer that is forgotten unclosed, too.
@@ -177,12 +178,11 @@ class StoreWriter:
 
     def _check(self, track: Track) -> None:
         """Refuse what no reader would take: one such track and the store never opens again."""
-        check_lengths(track)
+        check_lengths(expect(track, Track, "track"))
         if track.name in self._names:
             raise BadInputError(f"two tracks are named '{track.name}'; rename one of them.")
+        check_points(track)
         clouds = track.scans if track.shape is None else (*track.scans, track.shape)
-        if any(cloud.shape != (len(cloud), 3) for cloud in clouds):
-            raise BadInputError(f"track {track.name}: points are x, y, z; leave out what is more.")
         empty = [cloud is track.shape for cloud in clouds if not len(cloud)]
         if empty:
             raise BadInputError(

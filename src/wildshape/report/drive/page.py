@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from wildshape.arguments import as_path
 from wildshape.drives.result import REPORT
 from wildshape.drives.source import Drive
 from wildshape.drives.writing.finished import FinishedDrive, FoundVehicle, read_finished
@@ -74,12 +75,13 @@ def report_from_drive(out: Path, moved: Path | None = None, helpers: Team = ALON
     return drive_report(found, source, helpers)
 
 
-def write_drive_report(out: Path, helpers: Team = ALONE) -> None:
+def write_drive_report(out: Path | str, helpers: Team = ALONE) -> None:
     """Write `report.html` into a finished drive's folder; `helpers`: who reads and draws.
 
     Raises:
         BadInputError: no finished drive, or a damaged one.
     """
+    out = as_path(out, "out")
     write_report(report_from_drive(out, helpers=helpers), out / REPORT)
 
 

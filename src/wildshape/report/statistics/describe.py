@@ -10,7 +10,7 @@ from typing import Any
 from wildshape.errors import BadInputError
 from wildshape.io.atomic import write_json
 from wildshape.io.inputs import TrackSource, open_tracks
-from wildshape.io.output import refuse_file
+from wildshape.io.output import begin_file
 from wildshape.io.progress import SILENT, Progress
 from wildshape.io.scans.points import SENSOR_METRES, Coordinates
 from wildshape.io.store.origin import origin_of
@@ -126,7 +126,7 @@ def _files(out: Path | None, *, overwrite: bool) -> list[Path]:
     names = ("info.html", "info.png", "info.json")
     files = [out] if out.suffix else [out / name for name in names]
     for file in files:
-        refuse_file(file, overwrite=overwrite)
+        begin_file(file, overwrite=overwrite)
     return files
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wildshape.arguments import check_fields, expect, expect_whole
 from wildshape.errors import BadInputError
 from wildshape.geometry.transforms.rotation import rotations_about
 from wildshape.simulate.sensor import SENSORS, SensorName, SpinningLidar
@@ -72,6 +73,7 @@ class StreetConfig:
             raise BadInputError(
                 f"sensor is {self.sensor!r}; a drive needs a LiDAR: one of {', '.join(lidars)}."
             )
+        check_fields(self)
         if self.scans < 1:
             raise BadInputError(f"scans is {self.scans}, expected at least 1.")
         if self.speed is not None and not 0 <= self.speed <= 40:
@@ -147,9 +149,8 @@ class WholeDrive:
             BadInputError: a mesh that cannot be used, or a negative seed.
             MissingExtraError: embreex is not installed.
         """
-        if seed < 0:
-            raise BadInputError(f"seed is {seed}, expected 0 or more.")
-        self.config, self.seed = config, seed
+        self.config = expect(config, StreetConfig, "config")
+        self.seed = expect_whole(seed, "seed")
         seconds = config.scans * PERIOD_S
         files = mesh_files(config.meshes) if config.meshes else None
         vehicles = partial(_drawn_mesh, files) if files else random_vehicle
