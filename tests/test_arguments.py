@@ -88,7 +88,7 @@ def test_single_arguments():
     assert expect_whole(np.int32(2), "seed") == 2
     with pytest.raises(BadInputError, match=r"^seed: expected 0 or more, found -1\.$"):
         expect_whole(-1, "seed")
-    with pytest.raises(BadInputError, match=r"^files: expected Path, found 3; pass a Path\.$"):
+    with pytest.raises(BadInputError, match=r"^files: expected a path, found 3; pass a Path\.$"):
         expect(3, Path, "files", "pass a Path")
 
 
@@ -106,6 +106,8 @@ from wildshape.drives.writing.files import DriveFiles
 from wildshape.evaluation.drives.found import read_found
 from wildshape.evaluation.drives.labels import read_labels
 from wildshape.evaluation.drives.protocol import evaluate_drives
+from wildshape.evaluation.metrics import completion_error
+from wildshape.evaluation.protocol import run
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.folders.box_files import BoxFiles
 from wildshape.inference.folders.complete_folder import FolderOptions, complete_folder
@@ -147,6 +149,7 @@ print(json.dumps({expression: said(expression) for expression in json.load(sys.s
 """
 _REFUSED = {
     "wildshape.load(config={})": "config: expected InferenceConfig",
+    "wildshape.load(raw='no')": "raw: expected True or False, found 'no'",
     "wildshape.Predictor('a', 'b')": "wildshape.load",
     "model.complete_track(read_track(tracks + '/a'))": "pass its .scans",
     "wildshape.drive(None)": "source: expected a path",
@@ -179,6 +182,9 @@ _REFUSED = {
     "SimulationConfig(tracks='3')": "SimulationConfig.tracks: expected a whole number",
     "evaluate_drives(tracks, tracks)": "read_found makes one of a path",
     "evaluate_drives([], [])": "pass the labels of each drive",
+    "run(model, [], 'none', 0)": "pass a dict",
+    "run({}, tracks, 'none', 0)": "pass what open_tracks gives",
+    "completion_error(scan[:0], scan)": "a cloud without points",
     "read_labels('no')": "no: no label_02",
     "read_found('no', 3)": "no/boxes.csv: no such file",
     "read_points(scan)": "path: expected a path",
@@ -214,6 +220,7 @@ _TAKEN = (
     "complete_folder(tracks, out + '1', FolderOptions(workers=1, boxes=BoxFiles('json')))",
     "list(write_tracks([read_track(tracks + '/a')], out + '2', 'packed', command='', settings={})"
     " and [Store(out + '2')])",
+    "wildshape.load(level=np.False_)",
     "to_middle(np.stack([eye, eye]))",
     "to_middle([two[0], two[1]])",
     "fuse_scans((one for one in [scan, scan]), np.stack([eye, eye]))",

@@ -42,9 +42,10 @@ def expect(value: object, kind: type[Kind], name: str, cure: str = "") -> Kind:
     Raises:
         BadInputError: it is another; `cure` says what to pass, where the kind's name does not.
     """
+    value = _plain(kind, value)
     if isinstance(value, kind):
         return value
-    raise _wrong(name, value, kind.__name__, cure)
+    raise _wrong(name, value, _WORDS.get(kind, kind.__name__), cure)
 
 
 def expect_whole(value: object, name: str, least: int = 0) -> int:

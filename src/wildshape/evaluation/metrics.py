@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from wildshape.errors import BadInputError
 from wildshape.geometry.box import FittedBox, body_sides, box_iou
 from wildshape.geometry.footprint import footprint_iou
 from wildshape.geometry.transforms.rotation import rotation_from_quaternion, rotation_z
@@ -39,7 +40,13 @@ class CompletionError:
 
 
 def completion_error(predicted: Points, truth: Points) -> CompletionError:
-    """The whole predicted cloud `(m, 3)` against the truth `(g, 3)` in the same frame."""
+    """The whole predicted cloud `(m, 3)` against the truth `(g, 3)` in the same frame.
+
+    Raises:
+        BadInputError: one of them has no points.
+    """
+    if not (len(predicted) and len(truth)):
+        raise BadInputError("a cloud without points has no distance; check what made it.")
     # Near the origin float32 keeps its digits; distances do not care where the origin is.
     origin = truth.mean(axis=0, dtype=float)
     a = torch.as_tensor((predicted - origin)[None], dtype=torch.float32)

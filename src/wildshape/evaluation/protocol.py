@@ -4,11 +4,13 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, get_args
 
 import numpy as np
 import torch
 
+from wildshape.arguments import expect
 from wildshape.errors import BadInputError
 from wildshape.evaluation.cases import Case, Truth, prepare
 from wildshape.evaluation.method import (
@@ -106,6 +108,8 @@ def run(
             or is none; a protocol that there is not.
     """
     _check(methods, rotate)
+    if isinstance(tracks, str | Path | Track):
+        raise BadInputError("tracks: expected several; pass what open_tracks gives, or a list.")
     ledgers: dict[str, _Ledger] = {name: _Ledger() for name in methods}
     task = _TrackEvaluation(methods, rotate, seed, limits)
     for done, found in enumerate(helpers.in_order(task, tracks), start=1):
@@ -123,6 +127,7 @@ def _check(methods: Mapping[str, Method], rotate: Rotate) -> None:
         raise BadInputError(
             f"rotate {rotate!r} is unknown; use one of {', '.join(get_args(Rotate))}."
         )
+    expect(methods, Mapping, "methods", "pass a dict with the name of each")
     for name, method in methods.items():
         if not isinstance(method, get_args(Method)):
             raise BadInputError(

@@ -89,6 +89,7 @@ class Predictor:
         expect(network, torch.nn.Module, "network", cure)
         self.network, self.settings = network, expect(settings, ModelSettings, "settings", cure)
         self.config = expect(config, InferenceConfig, "config")
+        raw, level = expect(raw, bool, "raw"), expect(level, bool, "level")
         self.refines = settings.facing and not raw
         self.up = settings.up if level else None
         self.device = next(network.parameters()).device
