@@ -7,7 +7,7 @@ are short names for machines (docs/formats.md). Asked of the scan: `other_sensor
 for weights of LiDARs, or the reverse), `too_large_for_model` (the bounding box's diagonal is above
 the largest trained on), `too_small_for_model` (below half of the smallest trained on: a scan may
 show a part of an object), `few_points`, `sensor_inside` (the points lie on all sides of the
-origin); three more are asked of it and its shape (`single_object.py`). Asked of a track:
+origin); three more are asked of it and its shape (`method/single_object.py`). Asked of a track:
 `scans_disagree` (on its height: perhaps they are of several objects).
 Asked of the result: `poor_fit` (the label-free cost is far above that of scans held out in
 training), `low_confidence`, and which of the probabilities is low: `unsure_heading`, `unsure_box`,
@@ -34,8 +34,14 @@ from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.confidence import COVERED_M, SMALLEST_M, ConfidenceFeatures
 from wildshape.method.hindsight import Scores
 from wildshape.method.network import Poses
+from wildshape.method.single_object import (
+    looked_down_on,
+    share_off,
+    share_twice,
+    unseen_height,
+)
 from wildshape.method.trust import Calibrator, ScanFeatures, TrackFeatures
-from wildshape.records import Completion, Points, Registration, Sensor, SensorKind
+from wildshape.records import Box, Completion, Points, Registration, Sensor, SensorKind
 
 _RULE = ReasonRule()
 _LEAST_ODDS, _MOST_ODDS = 1e-3, 49.0
@@ -186,6 +192,28 @@ def reasons_of_scan(
         "too_small_for_model": size < rule.smallest * low,
         "few_points": len(scan) < rule.few_points,
         "sensor_inside": surrounded(scan),
+    }
+    return tuple(reason for reason, held in holds.items() if held)
+
+
+def reasons_of_object(
+    scan: Points, seen: Points, points: Points, box: Box, unit: float, rule: ReasonRule = _RULE
+) -> tuple[str, ...]:
+    """What speaks against a scan's being of one object alone, in short names.
+
+    Args:
+        scan: sensor frame, metres, none of its points at the sensor.
+        seen: the same without the ground beside the object.
+        points: of the completed shape, sensor frame.
+        box: of it.
+        unit: metres of the unit in which the object is as large as a vehicle.
+        rule: the bounds.
+    """
+    far = rule.apart_m * unit
+    holds = {
+        "points_off_shape": share_off(scan, points, far) > rule.off_share,
+        "not_one_scan": share_twice(scan, rule.alike_deg, far) > rule.twice_share,
+        "roof_not_seen": looked_down_on(scan) and unseen_height(seen, box) > far,
     }
     return tuple(reason for reason, held in holds.items() if held)
 

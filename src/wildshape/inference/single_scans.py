@@ -22,11 +22,15 @@ from wildshape.geometry.projection.line_of_sight import roll_angle
 from wildshape.geometry.sampling import sorted_points
 from wildshape.geometry.transforms.se3 import SE3, stack
 from wildshape.inference.boxes import box_seen
-from wildshape.inference.confidence import glance_of, judged, look_features
+from wildshape.inference.confidence import (
+    glance_of,
+    judged,
+    look_features,
+    reasons_of_object,
+)
 from wildshape.inference.config import HypothesisRule, InferenceConfig, RefineConfig
 from wildshape.inference.free_space import Rays, SeenScores, Sights, without_free_space
 from wildshape.inference.refine import Refined, refine, with_its_scan
-from wildshape.inference.single_object import reasons_of_object
 from wildshape.io.scans.points import LEAST_POINTS
 from wildshape.method.checkpoint import ModelSettings
 from wildshape.method.choose_hypothesis import (

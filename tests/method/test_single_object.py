@@ -7,12 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from wildshape.inference.confidence import ReasonCounts, reasons_sentence
+from wildshape.inference.confidence import ReasonCounts, reasons_of_object, reasons_sentence
 from wildshape.inference.config import InferenceConfig, ReasonRule
 from wildshape.inference.predictor import load
-from wildshape.inference.single_object import (
+from wildshape.method.single_object import (
     looked_down_on,
-    reasons_of_object,
     share_off,
     share_twice,
     unseen_height,

@@ -16,34 +16,10 @@ import torch
 
 from wildshape.geometry.box import box_axes
 from wildshape.geometry.sampling import quantiles
-from wildshape.inference.config import ReasonRule
 from wildshape.ops.nearest import nearest, nearest_k
 from wildshape.records import Box, Points
 
-_RULE = ReasonRule()
 _OUTERMOST = 0.01  # share of the points that may be strays above a roof
-
-
-def reasons_of_object(
-    scan: Points, seen: Points, points: Points, box: Box, unit: float, rule: ReasonRule = _RULE
-) -> tuple[str, ...]:
-    """What speaks against a scan's being of one object alone, in short names.
-
-    Args:
-        scan: sensor frame, metres, none of its points at the sensor.
-        seen: the same without the ground beside the object.
-        points: of the completed shape, sensor frame.
-        box: of it.
-        unit: metres of the unit in which the object is as large as a vehicle.
-        rule: the bounds.
-    """
-    far = rule.apart_m * unit
-    holds = {
-        "points_off_shape": share_off(scan, points, far) > rule.off_share,
-        "not_one_scan": share_twice(scan, rule.alike_deg, far) > rule.twice_share,
-        "roof_not_seen": looked_down_on(scan) and unseen_height(seen, box) > far,
-    }
-    return tuple(reason for reason, held in holds.items() if held)
 
 
 def share_off(scan: Points, points: Points, far: float) -> float:
