@@ -20,6 +20,7 @@ from tests.datasets.write_waymo import Thing as WaymoThing
 from tests.refusal import refused
 
 from wildshape.cli.main import main
+from wildshape.drives.recording_checks import clock_told
 from wildshape.drives.recordings import recording_kinds
 from wildshape.drives.recordings.recording_kinds import find_drives, open_drive
 from wildshape.io.scans.writers import write_ply
@@ -117,9 +118,11 @@ def test_points_that_were_moved_say_when_they_were_met(tmp_path):
         assert np.abs(turn.met).max() > 0.04
         assert away == pytest.approx(20.0 * np.abs(turn.met), abs=0.11)  # origins are of steps
         wrong = replace(turn, met=1000 * turn.met)
-        found = replace(drive, read=lambda _, wrong=wrong: wrong).turn(1)
-        assert found.met is None
-        assert found.origins is turn.origins
+        assert clock_told(drive) == []
+        drive = replace(drive, read=lambda _, wrong=wrong: wrong)
+        assert drive.turn(1).met is None
+        assert drive.turn(1).origins is turn.origins
+        assert "what drives are not corrected for its motion" in clock_told(drive)[0]
 
 
 def test_waymo_s_pixels_say_when_they_were_met_by_where_the_sensor_was(tmp_path, monkeypatch):

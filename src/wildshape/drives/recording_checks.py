@@ -131,10 +131,17 @@ def rate_told(scan_s: float | None, step_m: float, config: LinkConfig) -> list[s
 
 def clock_told(drive: Drive) -> list[str]:
     """A sentence if points have times that are of no use in any of the first scans."""
-    turns = {frame: _read(drive, frame) for frame in range(min(FIRST_SCANS, len(drive)))}
-    timed = [
-        frame for frame, turn in turns.items() if turn is not None and turn.seconds is not None
-    ]
+    first = ((frame, _read(drive, frame)) for frame in range(min(FIRST_SCANS, len(drive))))
+    turns = {frame: turn for frame, turn in first if turn is not None}
+    step = drive.scan_s
+    unused = (t.met is not None and drive.turn(i).met is None for i, t in turns.items())
+    if step is not None and any(unused):
+        return [
+            "the times at which points were met cannot be used: a turn would last much longer than"
+            f" it is from a scan to the next, {step:.2g} s; scans of what drives are not corrected"
+            " for its motion"
+        ]
+    timed = [frame for frame, turn in turns.items() if turn.seconds is not None]
     used = [seconds for frame in timed if (seconds := drive.turn(frame).seconds) is not None]
     spans = [float(np.ptp(seconds)) for seconds in used if len(seconds)]
     if spans and max(spans) < _INSTANT_S:

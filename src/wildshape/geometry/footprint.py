@@ -58,8 +58,8 @@ def shared_ground(
     box: Place, size: Sequence[float], other: Place, other_size: Sequence[float]
 ) -> float:
     """Square metres that two boxes share in bird's eye view; see `footprint`."""
-    sizes = (np.array([one[:2]], float) for one in (size, other_size))
-    return float(shared_grounds(box[None], next(sizes), other[None], next(sizes))[0])
+    mine, its = (np.array([one[:2]], float) for one in (size, other_size))
+    return float(shared_grounds(box[None], mine, other[None], its)[0])
 
 
 def footprint_overlap(
